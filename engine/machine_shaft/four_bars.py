@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, number_of, reduced
+from sprag.engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, lifted, number_of, reduced
 
 Floats = NDArray[np.float64]
 
@@ -118,6 +118,14 @@ class FourBar(Mechanism):
         inertia, slope = reduced([links.coupler(values, theta1, theta2), swinging(carried, psi1, psi2)])
         start = Links.of(values, self.dead_centres(values)[0]).psi
         return Motion(inertia, slope, c * (start - links.psi), -c * psi1)
+
+    def lift(self, values: Values, phi: Floats) -> Floats:
+        """See Mechanism; the frame rises from the shaft to the rocker's pivot by the inclination."""
+        links, c, zero = Links.of(values, phi), values["rocker"], np.zeros((1, 1, 1))
+        psi1, theta1, _, theta2 = links.turning()
+        x1, y1 = -c * np.sin(links.psi) * psi1, c * np.cos(links.psi) * psi1
+        tray = Body(values["tray_mass"], zero, x1, y1, zero, zero, zero, zero)
+        return lifted([links.coupler(values, theta1, theta2), tray], values["inclination"])
 
     def dead_centres(self, values: Values) -> tuple[Floats, Floats]:
         """See Mechanism."""

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, number_of, reduced
+from sprag.engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, lifted, number_of, reduced
 from sprag.engine.machine_shaft.sliders import Slider, slider_bodies, slider_dead_centres, slider_fold, slider_margin
 
 Floats = NDArray[np.float64]
@@ -27,6 +27,11 @@ class SliderCrank(Mechanism):
         inertia, slope = reduced(bodies)
         reach = np.sqrt((values["rod"] + values["crank"]) ** 2 - values["offset"] ** 2)
         return Motion(inertia, slope, reach - slider.x(), -x1)
+
+    def lift(self, values: Values, phi: Floats) -> Floats:
+        """See Mechanism; the crank's pin is above the level through the shaft first."""
+        slider = Slider(values["crank"], values["rod"], values["offset"], phi)
+        return lifted(slider_bodies(slider, values, 1.0, 0.0)[0], values["inclination"], outward=-1.0)
 
     def dead_centres(self, values: Values) -> tuple[Floats, Floats]:
         """See Mechanism."""
@@ -107,6 +112,14 @@ class _QuickReturn(Mechanism):
         inertia, slope = reduced(bodies)
         start = self._slider(values, self._link(values, self.dead_centres(values)[0])[0])
         return Motion(inertia + values["block_mass"] * values["crank"] ** 2, slope, start.x() - slider.x(), -x1)
+
+    def lift(self, values: Values, phi: Floats) -> Floats:
+        """See Mechanism; the link itself is taken to be balanced."""
+        theta, turn1, turn2 = self._link(values, phi)
+        bodies, _ = slider_bodies(self._slider(values, theta), values, turn1, turn2)
+        r, zero = values["crank"], np.zeros((1, 1, 1))
+        block = Body(values["block_mass"], zero, -r * np.sin(phi), r * np.cos(phi), zero, zero, zero, zero)
+        return lifted([*bodies, block], values["inclination"], outward=-1.0)
 
     def _slider(self, values: Values, theta: Floats) -> Slider:
         return Slider(values["link_arm"], values["rod"], values["offset"], theta)

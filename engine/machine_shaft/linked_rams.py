@@ -12,7 +12,7 @@ from sprag.engine.machine_shaft.four_bars import (
     rocking,
     swinging,
 )
-from sprag.engine.machine_shaft.mechanisms import Mechanism, Motion, Values, number_of, reduced
+from sprag.engine.machine_shaft.mechanisms import Mechanism, Motion, Values, lifted, number_of, reduced
 from sprag.engine.machine_shaft.sliders import Slider, slider_bodies, slider_dead_centres, slider_fold, slider_margin
 
 Floats = NDArray[np.float64]
@@ -58,6 +58,15 @@ class DragLink(Mechanism):
         inertia, slope = reduced(bodies)
         start = self._slider(values, self._links(values, self.dead_centres(values)[0]))
         return Motion(inertia, slope, start.x() - slider.x(), -x1)
+
+    def lift(self, values: Values, phi: Floats) -> Floats:
+        """See Mechanism; the follower itself is taken to be balanced."""
+        links = self._links(values, phi)
+        psi1, theta1, psi2, theta2 = links.turning()
+        own, _ = slider_bodies(self._slider(values, links), values, psi1, psi2)
+        coupler = [links.coupler(values, theta1, theta2)]
+        beta = values["inclination"]
+        return lifted(own, beta, outward=-1.0) + lifted(coupler, beta, values["frame_angle"], outward=-1.0)
 
     def dead_centres(self, values: Values) -> tuple[Floats, Floats]:
         """See Mechanism."""
@@ -119,6 +128,14 @@ class Toggle(Mechanism):
         inertia, slope = reduced(bodies)
         start = self._slider(values, Links.of(values, self.dead_centres(values)[0]).psi)
         return Motion(inertia, slope, slider.x() - start.x(), x1)
+
+    def lift(self, values: Values, phi: Floats) -> Floats:
+        """See Mechanism; the rocker itself is taken to be balanced."""
+        links = Links.of(values, phi)
+        psi1, theta1, psi2, theta2 = links.turning()
+        own, _ = slider_bodies(self._slider(values, links.psi), values, psi1, psi2)
+        coupler = [links.coupler(values, theta1, theta2)]
+        return lifted(own, values["inclination"]) + lifted(coupler, values["inclination"], -values["line_angle"])
 
     def dead_centres(self, values: Values) -> tuple[Floats, Floats]:
         """See Mechanism."""

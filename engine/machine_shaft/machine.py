@@ -20,6 +20,7 @@ from sprag.engine.machine_shaft.spec import (
     MAX_PARTS,
     MAX_STEPS,
     REVOLUTIONS,
+    RODDED,
     MachineSpec,
     PartChoice,
 )
@@ -75,6 +76,8 @@ def _check_part(part: PartChoice) -> None:
     mechanism, operation = part.mechanism, part.operation
     if not 0 <= operation.steps <= MAX_STEPS:
         raise StructureError(f"An operation has at most {MAX_STEPS} steps.")
+    if (mechanism.weights == "all" or mechanism.bodies == "two_mass") and mechanism.kind not in RODDED:
+        raise StructureError("The weights of all bodies and two masses need a mechanism with a rod or a coupler.")
     has_formula = bool(mechanism.formula)
     _check_form("The inertia of the mechanism", mechanism.kind, mechanism.table is not None, has_formula)
     if operation.quantity in {"torque", "force", "pressure"}:

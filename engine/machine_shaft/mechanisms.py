@@ -68,6 +68,27 @@ def reduced(bodies: Sequence[Body]) -> tuple[Floats, Floats]:
     return inertia, slope
 
 
+def lifted(bodies: Sequence[Body], forward: Floats, turned: Floats | float = 0.0, *, outward: float = 1.0) -> Floats:
+    """Sum of m dh/dphi of bodies whose x, turned by ``turned``, is that of a ram.
+
+    Parameters
+    ----------
+    bodies : sequence of Body
+    forward : array
+        Angle at which the forward stroke rises, in rad.
+    turned : array or float
+        Angle from the ram's x to that of the bodies, in rad.
+    outward : float
+        1 where the forward stroke is along the ram's x, -1 where it is against it.
+    """
+    total: Floats = np.zeros(1)
+    cos, sin = np.cos(turned), np.sin(turned)
+    for b in bodies:
+        x1, y1 = b.x1 * cos - b.y1 * sin, b.y1 * cos + b.x1 * sin
+        total = total + b.mass * (outward * np.sin(forward) * x1 + np.cos(forward) * y1)
+    return total
+
+
 class Mechanism(ABC):
     """Base of the mechanisms: one period is one revolution of the shaft."""
 
@@ -91,6 +112,10 @@ class Mechanism(ABC):
     @abstractmethod
     def worst_angles(self, values: Values) -> Sequence[Floats]:
         """Angles of which one has the smallest margin."""
+
+    def lift(self, values: Values, phi: Floats) -> Floats:
+        """Sum of m dh/dphi over all bodies with their heights h, in kg*m; for mechanisms with rods or couplers."""
+        raise NotImplementedError
 
     def breaks(self, values: Values) -> Sequence[Floats]:
         """Angles at which the inertia or the travel has a kink, of the parameters' shape."""

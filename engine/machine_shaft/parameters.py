@@ -9,6 +9,7 @@ from sprag.engine.catalogue import STANDARD_GRAVITY, Parameter
 from sprag.engine.machine_shaft.spec import (
     MOVING,
     MachineSpec,
+    MechanismChoice,
     MechanismKind,
     OperationChoice,
     PartChoice,
@@ -235,9 +236,19 @@ _CRANK_ANGLE = Parameter(
 )
 
 
+def _mechanism(choice: MechanismChoice) -> tuple[Parameter, ...]:
+    every = MECHANISM_PARAMETERS[choice.kind]
+    if choice.kind == "four_bar" and choice.weights == "all":
+        frame = "rise of the frame above the level, from the shaft to the rocker's pivot"
+        every += (Parameter("mechanism.four_bar.inclination", "beta", "rad", -_TURN, _TURN, False, 0.0, frame),)
+    if choice.bodies == "full":
+        return every
+    return tuple(entry for entry in every if not entry.path.endswith(("rod_inertia", "coupler_inertia")))
+
+
 def _part(prefix: str, part: PartChoice, cycle: int) -> tuple[Parameter, ...]:
     """Parameters of a mechanism and its operation; with a crank angle where it is one of several."""
-    own = (*MECHANISM_PARAMETERS[part.mechanism.kind], *_operation(part.operation, cycle))
+    own = (*_mechanism(part.mechanism), *_operation(part.operation, cycle))
     if not prefix:
         return own
     return tuple(replace(entry, path=prefix + entry.path) for entry in (_CRANK_ANGLE, *own))

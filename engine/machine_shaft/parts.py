@@ -17,7 +17,7 @@ from sprag.engine.machine_shaft.expressions import Expression
 from sprag.engine.machine_shaft.four_bars import FourBar, ParallelCrank
 from sprag.engine.machine_shaft.linkages import CrankShaper, ScotchYoke, SliderCrank, Whitworth
 from sprag.engine.machine_shaft.linked_rams import DragLink, Toggle
-from sprag.engine.machine_shaft.mechanisms import Mechanism, Motion
+from sprag.engine.machine_shaft.mechanisms import Mechanism, Motion, Values
 from sprag.engine.machine_shaft.operations import Operation, Stroke, every_revolution, formula_breaks
 from sprag.engine.machine_shaft.pieces import Formula
 from sprag.engine.machine_shaft.problems import TableError
@@ -62,6 +62,15 @@ def _inertia_curve(choice: MechanismChoice, revolutions: int) -> Curve | None:
             )
     within_one = len(table.rows) > 0 and table.rows[-1][0] - table.rows[0][0] <= _TURN * (1.0 + 1e-9)
     return periodic(table, _TURN if within_one else _TURN * revolutions)
+
+
+def _two_masses(values: Values) -> dict[str, Floats]:
+    """Inertias m s (L - s) of rod and coupler about their centres, which are those of two masses on their pins."""
+    found = {}
+    for name in {"rod", "coupler"} & set(values):
+        centre = values[f"{name}_centre"]
+        found[f"{name}_inertia"] = np.asarray(values[f"{name}_mass"] * centre * (values[name] - centre))
+    return found
 
 
 class PartFields(NamedTuple):
@@ -117,6 +126,8 @@ class ShaftPart:
         self._gravity, self._constants = columns.values["gravity"], columns.under("constants.")
         self.mechanism = mechanism_of(choice.mechanism)
         self.values = columns.under(f"{prefix}mechanism.{choice.mechanism.kind}.")
+        if choice.mechanism.bodies == "two_mass":
+            self.values |= _two_masses(self.values)
         self._curve = _inertia_curve(choice.mechanism, revolutions)
         names, text = ("phi", *self._constants), choice.mechanism.formula or ""
         self.inertia_formula = Expression(text, names) if choice.mechanism.kind == "formula" else None
@@ -185,7 +196,7 @@ class ShaftPart:
         motion = None if self.mechanism is None else self.mechanism.motion(self.values, own)
         inertia, slope = self._inertia(own, motion)
         torque = self._operation.torque(own, None if motion is None else motion.way_slope)
-        return PartFields(inertia, slope, torque + self._carried(motion), torque)
+        return PartFields(inertia, slope, torque + self._carried(own, motion), torque)
 
     def _inertia(self, own: Floats, motion: Motion | None) -> tuple[Floats, Floats]:
         if motion is not None:
@@ -197,8 +208,10 @@ class ShaftPart:
             return np.asarray(value), np.asarray(slope)
         return np.zeros(1), np.zeros(1)
 
-    def _carried(self, motion: Motion | None) -> Floats:
-        """Torque of the weight and the spring on the working part."""
+    def _carried(self, own_angle: Floats, motion: Motion | None) -> Floats:
+        """Torque of the weights and of the spring on the working part."""
+        if motion is not None and self.mechanism is not None and self.choice.mechanism.weights == "all":
+            return np.asarray(-self._gravity * self.mechanism.lift(self.values, own_angle))
         if motion is None or self.mechanism is None or self.mechanism.ram_mass is None:
             return np.zeros(1)
         own = self.values

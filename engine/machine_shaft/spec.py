@@ -17,6 +17,8 @@ MechanismKind = Literal[
     "none", "table", "formula", "slider_crank", "scotch_yoke", "four_bar", "parallel_crank",
     "quick_return", "drag_link", "toggle", "cam",
 ]  # fmt: skip
+Weights = Literal["ram", "all"]
+Bodies = Literal["full", "two_mass"]
 QuickReturn = Literal["whitworth", "crank_shaper"]
 Form = Literal["constant", "table", "formula", "steps"]
 Quantity = Literal["none", "torque", "force", "gas", "pressure"]
@@ -29,6 +31,8 @@ LINKED: frozenset[str] = frozenset(get_args(MechanismKind)) - {"none", "table", 
 #: Stages that move a mass beside the shaft on which they sit.
 MOVING: frozenset[str] = frozenset({"screw_nut", "rack"})
 MAX_STAGES = 16
+#: Mechanisms with rods or couplers.
+RODDED: frozenset[str] = frozenset({"slider_crank", "four_bar", "quick_return", "drag_link", "toggle"})
 MAX_STEPS = 32
 #: Harmonics of the cycle whose amplitudes are results.
 HARMONICS = 6
@@ -57,7 +61,8 @@ class Drive:
 class MechanismChoice:
     """Which mechanism; ``table`` and ``formula`` give I''(phi) in kg*m^2.
 
-    A table of at most one revolution repeats every revolution.
+    A table of at most one revolution repeats every revolution. ``weights`` "all" adds those of rods, couplers, blocks
+    and trays to that of the ram; ``bodies`` "two_mass" replaces rods and couplers by masses on their two pins.
     """
 
     kind: MechanismKind = "none"
@@ -66,6 +71,8 @@ class MechanismChoice:
     quick_return: QuickReturn = "crank_shaper"
     rise: CamLaw = "cycloidal"
     fall: CamLaw = "cycloidal"
+    weights: Weights = "ram"
+    bodies: Bodies = "full"
 
 
 @dataclass(frozen=True, slots=True)

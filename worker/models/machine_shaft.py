@@ -91,6 +91,7 @@ def catalogue() -> tuple[Parameter, ...]:
     every += [MachineSpec(drive=Drive(flywheel="rim"))]
     every += [MachineSpec(drive=Drive(stages=(stage,))) for stage in get_args(Stage)]
     every += [MachineSpec(mechanism=MechanismChoice(kind)) for kind in kinds]
+    every += [MachineSpec(mechanism=MechanismChoice("four_bar", weights="all"))]
     forms = (
         OperationChoice("force"),
         OperationChoice("force", "steps", steps=1),
@@ -112,6 +113,7 @@ def catalogue() -> tuple[Parameter, ...]:
 _OF_FORCE = "; N*m for a torque"
 _OF_ANGLE = "; a fraction from 0 to 1 over the stroke, else no further than the cycle"
 _REMARKS = {
+    "mechanism.four_bar.inclination": '; with `weights` "all"',
     "operation.value": _OF_FORCE,
     "operation.steps.K.value": _OF_FORCE,
     "operation.steps.K.from": _OF_ANGLE,

@@ -91,9 +91,9 @@ def _mechanism_choices(mechanism: Mapping[str, Any]) -> Iterator[tuple[str, str]
     yield "mechanism", mechanism["kind"]
     if "quick_return" in mechanism:
         yield "mechanism.quick_return.kind", mechanism["quick_return"]
-    for law in ("rise", "fall"):
-        if law in mechanism:
-            yield f"mechanism.cam.{law}", mechanism[law]
+    for name in ("rise", "fall", "weights", "bodies"):
+        if name in mechanism:
+            yield f"mechanism.{mechanism['kind']}.{name}", mechanism[name]
     if mechanism.get("table"):
         yield "mechanism.interpolation", mechanism["table"]["interpolation"]
 

@@ -27,10 +27,18 @@ INTERPOLATION: Final = choice(
     "linear",
     default="smooth",
 )
+_WEIGHTS: Final = "whether the ram alone has a weight, or rods, couplers and blocks too"
+_MODELLED: Final = "rods and couplers as full bodies, or as two masses on their pins"
+_BODIES: Final = named(
+    choice("weights", _WEIGHTS, "ram", "all", default="ram"),
+    choice("bodies", _MODELLED, "full", "two_mass", default="full"),
+)
 #: What of a mechanism is no number.
 MECHANISM_CHOICES: Final[dict[str, dict[str, Described]]] = {
-    **{kind: {} for kind in ("slider_crank", "scotch_yoke", "four_bar", "parallel_crank", "drag_link", "toggle")},
-    "quick_return": named(choice("kind", "kind of the quick return", "crank_shaper", "whitworth")),
+    **dict.fromkeys(("slider_crank", "four_bar", "drag_link", "toggle"), _BODIES),
+    "scotch_yoke": {},
+    "parallel_crank": {},
+    "quick_return": named(choice("kind", "kind of the quick return", "crank_shaper", "whitworth"), *_BODIES.values()),
     "cam": named(*(choice(part, f"law of the {part}", *_LAWS, default=_LAWS[0]) for part in ("rise", "fall"))),
 }
 MECHANISMS: Final = ("table", "csv", "formula", *MECHANISM_CHOICES)
@@ -150,8 +158,29 @@ def read_mechanism(report: Report, data: object, places: dict[str, str], prefix:
         return None
     made: dict[str, Any] = {"kind": kind}
     for name, field in choices.items():
-        made["quick_return" if name == "kind" else name] = field.read(report, pointer, own)
-    return None if None in made.values() else made
+        value = field.read(report, pointer, own)
+        # Defaults are left out, so that studies from before these choices keep their hash.
+        if name not in _BODIES or value != field.default:
+            made["quick_return" if name == "kind" else name] = value
+    if None in made.values():
+        return None
+    unused = _unused_of(made) & set(own)
+    for name in sorted(unused):
+        report.fault(join(pointer, name), "not-used", _UNUSED[name], own[name])
+    return None if unused else made
+
+
+_MASSES: Final = 'is not used with `bodies` "two_mass": it follows from the centre of mass'
+_UNUSED: Final = {
+    "rod_inertia": _MASSES, "coupler_inertia": _MASSES,
+    "inclination": 'is not used without `weights` "all": nothing of this mechanism has a weight',
+}  # fmt: skip
+
+
+def _unused_of(made: Mapping[str, Any]) -> set[str]:
+    """Numbers that a mechanism with these choices does not use."""
+    unused = {"rod_inertia", "coupler_inertia"} if "bodies" in made else set()
+    return unused | {"inclination"} if made["kind"] == "four_bar" and "weights" not in made else unused
 
 
 def read_operation(report: Report, data: object, places: dict[str, str], prefix: str = "") -> dict[str, Any] | None:

@@ -145,6 +145,25 @@ def way_slope(part: PartData, phi: Array) -> Array:
     return np.asarray(way.imag / _STEP)
 
 
+def lift(part: PartData, phi: Array) -> Array:
+    """Sum of m dh/dphi of all bodies: the heights of their centres above the level, kg*m.
+
+    The coupler of a drag link or a toggle has coordinates along the frame, everything else along the ram's line.
+    """
+    v, beta = part.dimensions, part.dimensions["inclination"]
+    bodies, _ = _POSITIONS[part.kind](v, phi + part.angle + 1j * _STEP)
+    # The direction of "up" for positions that count from the ram's line, and from the frame.
+    inward = part.kind not in {"toggle", "four_bar"}
+    up = (-math.sin(beta) if inward else math.sin(beta)) + 1j * math.cos(beta)
+    tilt = {"drag_link": v.get("frame_angle", 0.0), "toggle": -v.get("line_angle", 0.0)}.get(part.kind, 0.0)
+    total = np.zeros(phi.shape)
+    for index, body in enumerate(bodies):
+        mass, _, x, y = body[:4]
+        turned = up * np.exp(-1j * tilt) if index == 0 and tilt else up
+        total += mass * (x.imag * turned.real + y.imag * turned.imag) / _STEP
+    return total
+
+
 def _gas(part: PartData, phi: Array) -> Array:
     """Pressure on the piston of a compressor above that on its back, Pa."""
     load, stroke = part.load, _stroke(part)
@@ -296,8 +315,8 @@ def random_machine(rng: np.random.Generator) -> MachineData:
 
 
 def _random_part(rng: np.random.Generator, cycle: int) -> PartData:
-    kind = str(rng.choice(list(_RANDOM)))
-    part = PartData(kind, _RANDOM[kind](rng), float(rng.uniform(-TURN, TURN)))
+    kind = str(rng.choice(list(RANDOM)))
+    part = PartData(kind, RANDOM[kind](rng), float(rng.uniform(-TURN, TURN)))
     choices = ["none", "step", "resisting"] + ([] if kind == "four_bar" else ["gas"])
     part.operation = str(rng.choice(choices))
     if part.operation == "step":
@@ -382,7 +401,7 @@ def _random_scotch_yoke(rng: np.random.Generator) -> dict[str, float]:
     }  # fmt: skip
 
 
-_RANDOM: dict[str, Callable[[np.random.Generator], dict[str, float]]] = {
+RANDOM: dict[str, Callable[[np.random.Generator], dict[str, float]]] = {
     "slider_crank": _random_slider_crank, "quick_return": _random_quick_return, "four_bar": _random_four_bar,
     "drag_link": _random_drag_link, "toggle": _random_toggle, "scotch_yoke": _random_scotch_yoke,
 }  # fmt: skip

@@ -98,6 +98,10 @@ def test_what_is_given_decides_the_balance(changes: dict[str, Any], balance: str
     ("mechanism", "expected"),
     [
         ({"four_bar": {"frame": 0.5, "crank": 0.1, "coupler": 0.4, "rocker": 0.3}}, {"kind": "four_bar"}),
+        (
+            {"slider_crank": {"crank": 0.1, "rod": 0.4, "weights": "all", "bodies": "two_mass"}},
+            {"kind": "slider_crank", "weights": "all", "bodies": "two_mass"},
+        ),
         ({"scotch_yoke": {"crank": "50 mm", "yoke_mass": "8 kg"}}, {"kind": "scotch_yoke"}),
         ({"parallel_crank": {"crank": 0.1, "coupler_mass": 20}}, {"kind": "parallel_crank"}),
         (
@@ -252,6 +256,16 @@ WRONG: list[tuple[dict[str, Any], str, str]] = [
     ({"/base/mechanism/cam": {}}, "/base/mechanism", "exactly-one"),
     ({"/base/mechanism": {"slider_crank": 3}}, "/base/mechanism/slider_crank", "wrong-type"),
     ({"/base/mechanism": {"quick_return": {"crank": 1}}}, "/base/mechanism/quick_return/kind", "required"),
+    ({"/base/mechanism/slider_crank/bodies": "two_mass"}, "/base/mechanism/slider_crank/rod_inertia", "not-used"),
+    (
+        {
+            "/base/mechanism": {
+                "four_bar": {"frame": 0.5, "crank": 0.1, "coupler": 0.4, "rocker": 0.3, "inclination": 1}
+            }
+        },
+        "/base/mechanism/four_bar/inclination",
+        "not-used",
+    ),
     ({"/base/mechanism/slider_crank/krank": 1}, "/base/mechanism/slider_crank/krank", "unknown-field"),
     (
         {
