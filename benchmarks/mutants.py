@@ -22,6 +22,7 @@ _FAULTS = "tests/acceptance/test_faults.py::"
 _KILLS = "tests/acceptance/test_kills.py::"
 _ROUNDS = "tests/contract/test_rounds.py::"
 _CERTIFICATE = "tests/engine/test_certificate.py::"
+_FOLDS = "tests/engine/continuation/test_folds.py::"
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,6 +179,34 @@ MUTANTS = (
         "        found[case] = third > 0 and late < early * exponential(rate * third)",
         "        found[case] = third > 0",
         ("tests/engine/test_slow_orbits.py",),
+    ),
+    Mutant(
+        "steps of the parameter instead of the arc length",
+        "engine/continuation/follow.py",
+        "node.at(self._size), node.tangent)",
+        "node.at(self._size), [*[0.0] * (len(node.z) - 1), 1.0])",
+        (f"{_FOLDS}test_a_branch_goes_around_its_folds",),
+    ),
+    Mutant(
+        "stability by the opposite of its test",
+        "engine/continuation/problem.py",
+        "return self.multiplier < 1.0 - _ROUNDING",
+        "return self.multiplier > 1.0 - _ROUNDING",
+        (f"{_FOLDS}test_a_branch_goes_around_its_folds",),
+    ),
+    Mutant(
+        "doublings where a multiplier passes +1",
+        "engine/continuation/locate.py",
+        "product *= value + 1.0",
+        "product *= value - 1.0",
+        (f"{_FOLDS}test_one_impact_orbits_have_their_closed_form",),
+    ),
+    Mutant(
+        "unstable motions drawn as stable ones",
+        "service/results/figures/branch.py",
+        'Line("unstable", *_part(made.parameters, values, ~full), _UNSTABLE, 1,',
+        'Line("unstable", *_part(made.parameters, values, ~full), _UNSTABLE, 0,',
+        ("tests/service/results/figures/test_branch.py::test_stable_parts_are_full_and_unstable_ones_dashed",),
     ),
 )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,8 +17,8 @@ from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
 from sprag.worker.models.branches import Along, allowed_values, branch_results, run_branch
-from sprag.worker.models.common import case_machine
-from sprag.worker.spread import DRIVE
+from sprag.worker.models.common import NO_PARAMETERS, case_machine
+from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,7 +32,7 @@ _OUTSIDE = "outside the range of the parameter"
 
 def usual_along(study: Study) -> str:
     """The parameter along which a branch is usually followed: the first axis with a range; "" where there is none."""
-    axes = [axis for axis in study.axes if axis.paths != (DRIVE,) and np.ptp(axis.array) > 0.0]
+    axes = [axis for axis in study.axes if NO_PARAMETERS.isdisjoint(axis.paths) and np.ptp(axis.array) > 0.0]
     wanted = [axis.paths[0] for axis in axes]
     return next((path for path in models.presentation_of(study).along if path in wanted), wanted[0] if wanted else "")
 
@@ -166,11 +167,18 @@ def branch_csv(made: CaseBranch, along: Along) -> bytes:
 
 
 def neighbours(study: Study, case: int, along: Along) -> NDArray[np.int64]:
-    """The cases of a grid that differ from one only in the parameter of a branch; none of other studies."""
+    """The cases of a grid that differ from one only in the parameter of a branch, or in the direction of a sweep.
+
+    None of other studies.
+    """
     axis = study.axis_of(along.paths[0])
     if axis is None or study.combine != "grid":
         return np.empty(0, dtype=np.int64)
-    places = [int(index[0]) for index in study.indices([case])]
     values = study.axes[axis].array
-    within = np.flatnonzero((values >= along.low) & (values <= along.high))
-    return np.array([study.case_number([*places[:axis], int(k), *places[axis + 1 :]]) for k in within], dtype=np.int64)
+    free = {axis: np.flatnonzero((values >= along.low) & (values <= along.high))}
+    if study.sweep is not None and study.axes[-1].paths == (SWEEP,):
+        free[len(study.axes) - 1] = np.arange(len(study.axes[-1]))
+    places = [free.get(k, index) for k, index in enumerate(study.indices([case]))]
+    return np.array(
+        [study.case_number(list(map(int, chosen))) for chosen in itertools.product(*places)], dtype=np.int64
+    )
