@@ -190,6 +190,7 @@ class Machine:
         own = [part.fields(phi) for part in self.parts]
         inertia, slope, resistance, operation = (reduce(np.add, same) for same in zip(*own, strict=True))
         shape = (self.columns.cases, *phi.shape[1:])
+        resistance = resistance - self.columns.values["friction_torque"]
         fields = (inertia + self.train.inertia, slope, self._drive(phi), resistance, operation)
         return Fields(*(np.ascontiguousarray(np.broadcast_to(field, shape)) for field in fields))
 

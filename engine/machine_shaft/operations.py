@@ -198,7 +198,17 @@ class Operation:
         return total
 
     def torque(self, phi: Floats, way_slope: Floats | None) -> Floats:
-        """Reduced torque M_r of the operation in N*m, negative where it resists.
+        """Reduced torque M_r of the operation in N*m, negative where it resists, with the losses on its way.
+
+        The parameters are those of ``lossless``.
+        """
+        torque, efficiency = self.lossless(phi, way_slope), self._values.get("efficiency")
+        if efficiency is None or (efficiency == 1.0).all():
+            return torque
+        return np.where(torque > 0.0, torque * efficiency, torque / efficiency)
+
+    def lossless(self, phi: Floats, way_slope: Floats | None) -> Floats:
+        """Reduced torque of the operation in N*m, negative where it resists, if nothing is lost.
 
         Parameters
         ----------

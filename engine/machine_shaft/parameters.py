@@ -188,16 +188,18 @@ _INDICATOR = (
 def _operation(operation: OperationChoice, cycle: int) -> tuple[Parameter, ...]:
     if operation.quantity == "none":
         return ()
-    scale = Parameter("operation.scale", "k", "1", -_ANY, _ANY, False, 1.0, "factor on the whole diagram")
+    factor = Parameter("operation.scale", "k", "1", -_ANY, _ANY, False, 1.0, "factor on the whole diagram")
+    loss = "power given over power taken between the shaft and the operation"
+    scale = (factor, Parameter("operation.efficiency", "eta", "1", 0.0, 1.0, True, 1.0, loss))
     if operation.quantity == "gas":
-        return (scale, *_GAS)
+        return (*scale, *_GAS)
     if operation.quantity == "pressure":
-        return (scale, *_INDICATOR)
+        return (*scale, *_INDICATOR)
     unit = "N*m" if operation.quantity == "torque" else "N"
     if operation.form == "constant":
         own = Parameter("operation.value", "F", unit, -_ANY, _ANY, False, None, "resistance, the same at every angle")
-        return (scale, own)
-    return (scale, *chain.from_iterable(_step(operation, cycle, k, unit) for k in range(operation.steps)))
+        return (*scale, own)
+    return (*scale, *chain.from_iterable(_step(operation, cycle, k, unit) for k in range(operation.steps)))
 
 
 def _step(operation: OperationChoice, cycle: int, index: int, unit: str) -> tuple[Parameter, ...]:
@@ -273,6 +275,7 @@ def parameters(spec: MachineSpec) -> tuple[Parameter, ...]:
     own = 0.0 if spec.drive.stages or spec.drive.flywheel else None
     return (
         *speed,
+        Parameter("friction_torque", "M_f", "N*m", 0.0, 1e12, False, 0.0, "friction of the shaft, always resisting"),
         Parameter("gravity", "g", "m/s^2", 0.0, 1e3, False, STANDARD_GRAVITY, "gravitational acceleration"),
         Parameter("drive.inertia", "I'", "kg*m^2", 0.0, 1e12, False, own, "inertia that turns with the shaft"),
         Parameter(

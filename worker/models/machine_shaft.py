@@ -106,7 +106,8 @@ def catalogue() -> tuple[Parameter, ...]:
             path = entry.path.replace(".steps.0.", ".steps.K.").replace(".stages.0.", ".stages.K.")
             path = path.replace("parts.0.", "parts.N.")
             found.setdefault(path, replace(entry, path=path, help=entry.help + _REMARKS.get(path, "")))
-    order = ("mean_speed", "wanted_irregularity", "gravity", "drive", "mechanism", "operation", "parts", "constants")
+    shaft = ("mean_speed", "wanted_irregularity", "friction_torque", "gravity", "drive")
+    order = (*shaft, "mechanism", "operation", "parts", "constants")
     return tuple(sorted(found.values(), key=lambda entry: order.index(entry.path.split(".")[0])))
 
 

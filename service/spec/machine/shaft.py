@@ -30,7 +30,7 @@ from sprag.worker.models.parameters import model_parameter
 
 FIELDS: Final = (
     "cycle", "mean_speed", "mean_speed_is", "drive", "mechanism", "operation", "parts", "balance", "balance_side",
-    "phi_c", "constants", "wanted_irregularity", "gravity",
+    "phi_c", "constants", "wanted_irregularity", "friction_torque", "gravity",
 )  # fmt: skip
 _MEAN_HELP: Final = "which mean of the speed mean_speed and the irregularity refer to"
 MEAN_SPEED_IS: Final = choice("mean_speed_is", _MEAN_HELP, "midrange", "angle", "time", default="midrange")

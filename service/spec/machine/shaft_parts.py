@@ -188,7 +188,7 @@ def read_operation(report: Report, data: object, places: dict[str, str], prefix:
     where = places[f"{prefix}operation"] = _place(prefix, "operation")
     if data is None:
         return {"quantity": "none", "over": "angle", "steps": 0}
-    found = read_object(report, where, data, (*FORMS, *OPERATION_CHOICES, "interpolation", "scale"))
+    found = read_object(report, where, data, (*FORMS, *OPERATION_CHOICES, "interpolation", "scale", "efficiency"))
     if found is None:
         return None
     if "gas" in found:
@@ -215,10 +215,10 @@ def read_operation(report: Report, data: object, places: dict[str, str], prefix:
 
 def _beside(report: Report, where: str, found: Mapping[str, Any], form: str) -> bool:
     """Whether there are fields beside a gas or an indicator diagram that do not belong to it; each is a fault."""
-    foreign = [name for name in found if name not in {form, "scale"}]
+    foreign = [name for name in found if name not in {form, "scale", "efficiency"}]
     for name in foreign:
         told = "does not belong to a gas, which acts on the working part over the whole cycle"
-        report.fault(join(where, name), "not-used", told, found[name], allowed=f"{form}, scale")
+        report.fault(join(where, name), "not-used", told, found[name], allowed=f"{form}, scale, efficiency")
     return bool(foreign)
 
 

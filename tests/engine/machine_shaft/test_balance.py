@@ -173,3 +173,17 @@ def test_a_cycle_of_many_revolutions_has_the_closed_form() -> None:
     })  # fmt: skip
     assert got["energy.fluctuation"] == pytest.approx(work * (1.0 - width / (16.0 * math.pi)), rel=1e-11)
     assert got["work.drive"] == pytest.approx(work, rel=1e-12)
+
+
+def test_losses_of_the_operation_and_of_the_shaft() -> None:
+    """A load that resists over half a turn and drives over the other: 300 N*m and -100 N*m, lost both ways."""
+    spec = MachineSpec(operation=OperationChoice("torque", "formula", formula="if(phi < pi, 300, -100)"))
+    numbers = {"mean_speed": 10.0, "drive.inertia": 50.0, "operation.efficiency": 0.8, "friction_torque": 7.0}
+    got = one(spec, numbers)
+    assert got["drive_torque.mean"] == pytest.approx(0.5 * (300.0 / 0.8 - 100.0 * 0.8) + 7.0, rel=1e-12)
+    found = replace(spec, balance="scale", balance_side="operation", drive=Drive("formula", formula="87 + cos(phi)"))
+    # The operation carries what friction leaves of the drive's 87 N*m.
+    assert one(found, numbers)["balance.factor"] == pytest.approx(80.0 / 147.5, rel=1e-12)
+    assert one(spec, numbers | {"operation.efficiency": 1.0, "friction_torque": 0.0})[
+        "drive_torque.mean"
+    ] == pytest.approx(100.0, rel=1e-12)
