@@ -208,6 +208,27 @@ MUTANTS = (
         'Line("unstable", *_part(made.parameters, values, ~full), _UNSTABLE, 0,',
         ("tests/service/results/figures/test_branch.py::test_stable_parts_are_full_and_unstable_ones_dashed",),
     ),
+    Mutant(
+        "a sweep that starts every case from rest",
+        "engine/vibration_drive/sweep.py",
+        "            starts[cases], begun[cases] = _after(",
+        "            _, begun[cases] = _after(",
+        ("tests/engine/test_sweeps.py::test_the_direction_of_a_sweep_decides_between_two_motions",),
+    ),
+    Mutant(
+        "a sweep that always goes up",
+        "worker/sweeps.py",
+        "    ordered = np.where(columns[-1] == DOWN, -values, values)",
+        "    ordered = values",
+        ("tests/worker/test_sweeps.py::test_a_killed_sweep_goes_on_with_the_same_bits",),
+    ),
+    Mutant(
+        "chunks that split a line",
+        "worker/chunking.py",
+        "math.ceil(lines / MAX_CHUNKS)) * length",
+        "math.ceil(lines / MAX_CHUNKS)) * (length - 1)",
+        ("tests/worker/test_sweeps.py::test_a_killed_sweep_goes_on_with_the_same_bits",),
+    ),
 )
 
 

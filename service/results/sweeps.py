@@ -35,6 +35,11 @@ def value_text(path: str, value: float) -> str:
     return direction(value) if path == SWEEP else number(value)
 
 
+def direction_texts(study: Study, case: int) -> dict[str, str]:
+    """The direction of a case of a sweep in words, by its path; {} for any other study."""
+    return {} if study.sweep is None else {SWEEP: direction(study.case_parameters(case)[SWEEP])}
+
+
 def jumps_of_line(
     line: Line, flags: Sequence[str], regimes: Sequence[str | None], orders: Sequence[int | None]
 ) -> list[Jump]:

@@ -22,6 +22,7 @@ from sprag.service.results.pictures.curves import draw_motion
 from sprag.service.results.portraits import require_strobes
 from sprag.service.results.regimes import ORDER
 from sprag.service.results.selection import axis_name, own_paths
+from sprag.service.results.sweeps import direction_texts
 from sprag.service.results.wording import number
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
@@ -131,6 +132,7 @@ def case_page(
         motion="" if row is None else _motion(row),
         flags=[(flag, models.flags_of(study.model).get(flag, "")) for flag in (() if row is None else row.flags)],
         parameters=_parameters(study, case),
+        value_texts=direction_texts(study, case),
         infos=infos,
         shown=models.presentation_of(study),
         main=[info for info in infos if info.name in main_results(study, infos)],
