@@ -41,6 +41,8 @@ class PendulumColumn(IntEnum):
     LIMIT = auto()
     ANGLE = auto()
     SPEED = auto()
+    WINDUP = auto()
+    CLUTCH = auto()
 
 
 SHAFT_COLUMNS = len(Column)
@@ -114,8 +116,8 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     array, shape (cases, columns)
         `Column`: nu, period, d nu^2, b nu^2, chi, g, M_c, J_e, 1/rate, initial speed, step budget; four stops; per
         pendulum
-        `PendulumColumn`: M l/J, c a^2/J, lambda/J, 1/J, J, delta, u_end, initial angle, initial speed; its clutch
-        coefficients.
+        `PendulumColumn`: M l/J, c a^2/J, lambda/J, 1/J, J, delta, u_end, initial angle, speed, windup and state of
+        the clutch; its clutch coefficients.
     """
     n, count = pendulum_count(columns), coefficient_count(columns)
 
@@ -143,7 +145,7 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
             name: parameter(f"pendulums.{i}.{name}")
             for name in (
                 "inertia", "mass", "arm", "spring_rate", "spring_arm", "damping", "backlash", "initial_angle",
-                "initial_speed",
+                "initial_speed", "initial_windup", "initial_clutch",
             )
         }  # fmt: skip
         inertia = own["inertia"]
@@ -159,7 +161,7 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
             P.ML: moment, P.SPRING: spring, P.DAMPING: own["damping"] / inertia,
             P.INVERSE_INERTIA: 1.0 / inertia, P.INERTIA: inertia, P.BACKLASH: own["backlash"],
             P.LIMIT: column(f"{law}windup_limit", math.inf), P.ANGLE: own["initial_angle"],
-            P.SPEED: own["initial_speed"],
+            P.SPEED: own["initial_speed"], P.WINDUP: own["initial_windup"], P.CLUTCH: own["initial_clutch"],
         }  # fmt: skip
         pendulums += [values[place] for place in P]
         pendulums += [column(f"{law}coefficients.{k}", 0.0) for k in range(count)]

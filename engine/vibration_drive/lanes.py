@@ -17,7 +17,7 @@ from sprag.engine.vibration_drive.bounds import TOO_LONG
 from sprag.engine.vibration_drive.cases import PENDULUM_COLUMNS, STOPS, Column, PendulumColumn, stop_column
 from sprag.engine.vibration_drive.events import collect_guards, transit
 from sprag.engine.vibration_drive.layout import OUT_ENDING, OUT_EVENTS, OUT_RUNUP, OUT_STEPS, OUT_SUMS, Layout
-from sprag.engine.vibration_drive.states import count_event, law, set_clutch, set_shaft
+from sprag.engine.vibration_drive.states import count_event, law, set_clutch, set_shaft, watch_fall
 from sprag.engine.vibration_drive.stops import next_stop
 from sprag.engine.vibration_drive.strobes import FRACTION, begin_at, note
 from sprag.engine.vibration_drive.window import primitive, sample, series, watch_extrema
@@ -47,6 +47,7 @@ _INVERSE_RATE, _SPEED, _MOST_STEPS = int(Column.INVERSE_RATE), int(Column.SPEED)
 _FIRST_PENDULUM = stop_column(STOPS)
 _P_COPIED = int(PendulumColumn.LIMIT) + 1
 _P_ANGLE, _P_SPEED = int(PendulumColumn.ANGLE), int(PendulumColumn.SPEED)
+_P_WINDUP, _P_CLUTCH = int(PendulumColumn.WINDUP), int(PendulumColumn.CLUTCH)
 
 
 @part
@@ -86,8 +87,13 @@ def load_case(
         W[base + lay.p_speed, lane] = row[column + _P_SPEED]
         for k in range(lay.coefficients):
             W[base + lay.p_law + k, lane] = row[column + PENDULUM_COLUMNS + k]
+        state = int(row[column + _P_CLUTCH])
         W[base + lay.p_u, lane] = -W[base + lay.p_backlash, lane]
-        set_clutch(W, Z, lay, lane, i, _FREE)
+        if state != _FREE:
+            W[base + lay.p_u, lane] = row[column + _P_WINDUP]
+        set_clutch(W, Z, lay, lane, i, state)
+        if literal == 1 and ev.ENGAGED <= state <= ev.BEYOND:
+            watch_fall(W, lay, lane, i, row[column + _P_SPEED] >= row[_SPEED])
     set_shaft(W, Z, lay, lane, _HELD if row[_SPEED] == 0.0 and row[_LOAD] > 0.0 else _ROTATING)
     begin_at(W, Z, lay, lane, starts[case])
     watch_extrema(W, lay, lane, False)

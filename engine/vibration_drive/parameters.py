@@ -3,12 +3,16 @@
 import math
 
 from sprag.engine.catalogue import STANDARD_GRAVITY, Parameter
+from sprag.engine.vibration_drive.automaton import Clutch
 
 MAX_PENDULUMS = 8
 MAX_COEFFICIENTS = 12
 
 
 _INF = math.inf
+
+#: Parameters that a study has only where they are given: studies from before they existed keep their cases.
+START_STATES = frozenset({"initial_windup", "initial_clutch"})
 
 PARAMETERS: tuple[Parameter, ...] = (
     Parameter("gravity", "g", "m/s^2", 0.0, 1e3, False, STANDARD_GRAVITY, "gravitational acceleration"),
@@ -25,6 +29,29 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter("pendulums.N.backlash", "delta", "rad", 0.0, 1e3, False, 0.0, "backlash of the freewheel"),
     Parameter("pendulums.N.initial_angle", "phi(0)", "rad", -1e3, 1e3, False, 0.0, "angle at t = 0"),
     Parameter("pendulums.N.initial_speed", "phi'(0)", "rad/s", -1e6, 1e6, False, 0.0, "angular speed at t = 0"),
+    Parameter(
+        "pendulums.N.initial_windup",
+        "u(0)",
+        "rad",
+        -1e3,
+        1e6,
+        False,
+        0.0,
+        "windup of its clutch at t = 0; of no effect where the clutch is free",
+    ),
+    Parameter(
+        "pendulums.N.initial_clutch",
+        "",
+        "1",
+        0.0,
+        float(Clutch.LOCKED),
+        False,
+        0.0,
+        "state of its clutch at t = 0: "
+        + ", ".join(
+            f"{state.value} {state.name.lower().replace('_', ' ')}" for state in Clutch if state < Clutch.START
+        ),
+    ),
     Parameter("shaft.inertia", "J_e", "kg*m^2", 0.0, 1e6, True, None, "reduced inertia of the driven side"),
     Parameter("shaft.load", "M_c", "N*m", 0.0, 1e9, False, 0.0, "load torque, which resists rotation only"),
     Parameter("shaft.initial_speed", "phi_e'(0)", "rad/s", 0.0, 1e6, False, 0.0, "shaft speed at t = 0"),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from sprag.service.jobs.calibrations import Calibrations
 from sprag.service.jobs.fronts import Fronts
 from sprag.service.jobs.preview import preview_json
+from sprag.service.jobs.start_from import with_start
 from sprag.service.jobs.submission import Submission, hash_of, submission
 from sprag.service.json_text import to_bytes
 from sprag.service.results.fits import fit_json, read_fit
@@ -73,7 +74,8 @@ def begin(library: Library) -> None:
 
 def preview(library: Library, content: bytes, form: Format, finish: datetime | None, now: datetime) -> bytes:
     """The preview of the spec in a request's body, as JSON text; raises SpecError."""
-    parsed, store = parse_spec(load_spec(content, form)), library.store
+    store = library.store
+    parsed = parse_spec(with_start(store, load_spec(content, form)))
     left = None if finish is None else (finish - now).total_seconds()
     return to_bytes(preview_json(parsed, store.chunking, store.reusable(parsed.study), left))
 
@@ -88,7 +90,8 @@ def new_study(
     given: Mapping[str, object],
 ) -> Submission:
     """The study of the spec in a request's body; raises SpecError."""
-    parsed, store = parse_spec(load_spec(content, form)), library.store
+    store = library.store
+    parsed = parse_spec(with_start(store, load_spec(content, form)))
     return submission(parsed, store, now, fresh, finish, given)
 
 

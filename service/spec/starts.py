@@ -14,7 +14,7 @@ from sprag.service.spec.fields import read_number, read_object
 from sprag.service.spec.report import Report, join
 from sprag.service.spec.schema.quantity import QUANTITY, Schema, object_schema
 from sprag.worker.limits import MAX_START_RANGES, MAX_STARTS
-from sprag.worker.models import is_settled
+from sprag.worker.models import START_STATES, is_settled
 
 if TYPE_CHECKING:
     from sprag.service.spec.machine.machine import Machine
@@ -93,7 +93,8 @@ def _read_ranges(report: Report, data: object, machine: Machine) -> dict[str, li
 
 
 def _is_initial(path: str) -> bool:
-    return path.rpartition(".")[2].startswith(_INITIAL)
+    name = path.rpartition(".")[2]
+    return name.startswith(_INITIAL) and name not in START_STATES
 
 
 def _add_range(

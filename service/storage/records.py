@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from sprag.service.storage.part import moment, optional_moment
 from sprag.service.storage.tables import COARSE_TO_FINE, HELD_AT_DEADLINE
 from sprag.service.storage.warning_texts import read_warnings
@@ -15,7 +17,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from datetime import datetime
 
-    import numpy as np
     import sqlalchemy as sa
     from numpy.typing import NDArray
 
@@ -189,6 +190,14 @@ class RowBlock:
 
     def __len__(self) -> int:
         return len(self.endings)
+
+    def first_rows(self) -> RowBlock:
+        """The first row of each case."""
+        first = np.flatnonzero(np.diff(self.cases, prepend=-1))
+        if len(first) == len(self):
+            return self
+        endings, flags = ([texts[row] for row in first] for texts in (self.endings, self.flags))
+        return RowBlock(self.infos, self.cases[first], endings, flags, self.values[first])
 
     def rows(self) -> Iterator[CaseRow]:
         """The rows, case by case."""

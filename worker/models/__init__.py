@@ -37,6 +37,7 @@ from sprag.engine.vibration_drive.parameters import (
     CLUTCH_WINDUP_LIMIT,
     MAX_COEFFICIENTS,
     MAX_PENDULUMS,
+    START_STATES,
 )
 from sprag.engine.warning_text import WarningText
 from sprag.worker.models import machine_shaft, vibration_drive
@@ -90,6 +91,7 @@ __all__ = [
     "OK",
     "REGIME_SENTENCES",
     "SETTLED",
+    "START_STATES",
     "VIBRATION_DRIVE",
     "WINDUP_OUT_OF_DATA",
     "AssemblyError",
@@ -157,6 +159,7 @@ __all__ = [
     "result_catalogue",
     "result_infos",
     "run_chunk",
+    "run_end_state",
     "run_engagements",
     "run_of",
     "run_portrait",
@@ -309,6 +312,14 @@ def has_strobes(study: Study) -> bool:
 def run_portrait(study: Study, case: int) -> Portrait:
     """How one case approaches its motion, strobe by strobe; ValueError where its machine has no strobes."""
     return model_of(study.model).portrait(study, case)
+
+
+def run_end_state(study: Study, case: int) -> dict[str, float] | None:
+    """Initial values (SI) that go on from the end of one case, which is run for this; None where it does not end ok.
+
+    ValueError where the model has no initial values.
+    """
+    return model_of(study.model).end_state(study, case)
 
 
 def lanes_per_case(study: Study) -> int:

@@ -121,6 +121,13 @@ class Model(Protocol):
         """How one case approaches its motion; ValueError where there are no strobes."""
         raise ValueError(f"a machine of model {self.name} has no strobes")
 
+    def end_state(self, study: Study, case: int) -> dict[str, float] | None:
+        """Initial values (SI) by path that go on from the end of one case; None where it does not end ok.
+
+        ValueError where its machines have no initial values.
+        """
+        raise ValueError(f"a machine of model {self.name} has no initial values")
+
     def lanes_per_case(self, study: Study) -> int:
         """Runs of the engine that one case of the study takes side by side."""
         return 1

@@ -285,6 +285,12 @@ class VibrationDrive(Model):
             return settled_portrait(columns, settings_of(study.run), start_of(study, case))
         return portrait(columns, run_of(study.run))
 
+    def end_state(self, study: Study, case: int) -> dict[str, float] | None:
+        from sprag.engine.vibration_drive.start_states import end_state
+
+        settings = settings_of(study.run) if is_settled(study.run) else run_of(study.run)
+        return end_state(case_machine(study, case), settings)
+
     def lanes_per_case(self, study: Study) -> int:
         return count_of(study.run)
 

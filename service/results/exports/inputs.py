@@ -128,6 +128,9 @@ def _origin(spec: Mapping[str, Any], path: str) -> Origin:
 def _run_text(name: str, value: object) -> str:
     if value is None:
         return "the last third"
+    if isinstance(value, Mapping):  # starts
+        ranges = "; ".join(f"{path} {_text(ends)}" for path, ends in value["ranges"].items())
+        return f"{value['count']}, seed {value['seed']}: {ranges}"
     return f"{value} periods" if name in {"at_most", "max_period"} else _text(value)
 
 

@@ -187,7 +187,8 @@ class _Columns:
         self.flags: NDArray[np.int32] = np.zeros(cases, dtype=np.int32)
         file = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
         try:
-            for block in source.blocks:
+            # A grid has one value for each case: that of its first row.
+            for block in (block.first_rows() for block in source.blocks):
                 self._note(block.cases, block.endings, block.flags)
                 # Runs of consecutive cases; nearly always one run is the whole block.
                 starts = np.flatnonzero(np.diff(block.cases, prepend=block.cases[0] - 2) != 1)

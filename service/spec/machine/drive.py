@@ -12,12 +12,21 @@ from sprag.service.spec.fields import placed, read_number, read_object, read_par
 from sprag.service.spec.machine.clutch import Clutch, read_clutch
 from sprag.service.spec.machine.machine import Machine
 from sprag.service.spec.report import Report, did_you_mean, join
-from sprag.worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, VIBRATION_DRIVE, Parameter, parameter_catalogue
+from sprag.worker.models import (
+    MAX_COEFFICIENTS,
+    MAX_PENDULUMS,
+    START_STATES,
+    VIBRATION_DRIVE,
+    Parameter,
+    parameter_catalogue,
+)
 
 if TYPE_CHECKING:
     from sprag.worker.models import ClutchFit
 
 PENDULUMS = Listed("pendulums", 1, MAX_PENDULUMS)
+#: Field of the base that a service replaces by the initial values that go on from the end of a case.
+START = "start"
 _PENDULUM_PATH = re.compile(r"pendulums\.([0-9]{1,9})\.(.+)")
 _CLUTCH_PATH = re.compile(r"(?:pendulums\.[0-9]{1,9}\.)?clutch\.(.+)")
 
@@ -74,10 +83,13 @@ def read_drive(report: Report, data: object) -> Drive:
     machine = Drive()
     catalogue = [entry for entry in parameter_catalogue(VIBRATION_DRIVE) if not entry.path.startswith("clutch.")]
     sections = list(dict.fromkeys(entry.path.split(".")[0] for entry in catalogue))
-    found = read_object(report, "/base", data, (*sections, "clutch"))
+    found = read_object(report, "/base", data, (*sections, "clutch", START))
     if found is None:
         _assume_everything(catalogue, machine)
         return machine
+    if START in found:
+        message = "refers to a study of a service, which replaces it by initial values"
+        report.fault(f"/base/{START}", "not-used", message, found[START], allowed="submission to that service")
     for section in sections:
         entries = [entry for entry in catalogue if entry.path.split(".")[0] == section]
         pointer = join("/base", section)
@@ -109,7 +121,16 @@ def _read_section(
         return
     found = read_object(report, pointer, data, names)
     if found is not None:
-        machine.values.update(read_parameters(report, pointer, found, parameters))
+        values = read_parameters(report, pointer, found, parameters)
+        for name, entry in parameters.items():
+            if name in START_STATES and name not in found:
+                del values[entry.path]
+            elif name == "initial_clutch" and not values.get(entry.path, 0.0).is_integer():
+                report.fault(
+                    join(pointer, name), "invalid-choice", "is not the number of a state", found[name],
+                    allowed=entry.help,
+                )  # fmt: skip
+        machine.values.update(values)
 
 
 def _read_pendulums(report: Report, pointer: str, data: object, entries: list[Parameter], machine: Drive) -> None:

@@ -86,6 +86,13 @@ def _drive_run(report: Report, data: object, machine: Machine, axes: Axes | None
 
 def _drive_check(report: Report, machine: Machine, axes: Axes, combine: Combine) -> None:
     assert isinstance(machine, Drive)
+    for k, axis in enumerate(axes):
+        states = [path for path in axis.paths if path.endswith(".initial_clutch")]
+        if states and (axis.array % 1.0).any():
+            report.fault(
+                f"/axes/{k}", "invalid-choice", f"has values of {states[0]} that are not the number of a state",
+                allowed=machine.parameters[states[0]].help,
+            )  # fmt: skip
     for clutch in machine.clutches:
         if report.faults or not any(path.startswith(clutch.prefix) for path in machine.derive):
             check_laws(report, [clutch], axes, combine)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN, schemas
 from sprag.service.spec.fields import placed
 from sprag.service.spec.machine.clutch import ACCURACY, COEFFICIENTS, ROWS
-from sprag.service.spec.machine.drive import PENDULUMS
+from sprag.service.spec.machine.drive import PENDULUMS, START
 from sprag.service.spec.run import SETTLED_FIELDS, TIMED_FIELDS
 from sprag.service.spec.schema.quantity import (
     QUANTITY,
@@ -40,7 +40,19 @@ def drive_schema() -> Schema:
         if any(entry.default is None for entry in entries):
             required.append(section)
     properties["clutch"] = clutch_schema()
+    properties[START] = start_schema()
     return object_schema(properties, required=required, description="the machine that every case begins from")
+
+
+def start_schema() -> Schema:
+    """Schema of a start from the end of a case of a study of the same service."""
+    fields: Schema = {
+        "study": {"type": "string", "description": "id of the study"},
+        "case": {"type": "integer", "minimum": 0, "description": "number of the case"},
+        "start": {"type": "integer", "minimum": 0, "description": "of a case with many starts: which of them"},
+    }
+    what = "begin in the state in which a case of another study ends; the service replaces it by initial values"
+    return object_schema(fields, required=("study", "case"), description=what)
 
 
 def clutch_schema() -> Schema:

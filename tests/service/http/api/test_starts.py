@@ -8,8 +8,10 @@ import csv
 import numpy as np
 import pytest
 
+from sprag.service.spec.document import parse_spec
 from sprag.worker import models
 from sprag.worker.models import ChunkResult, FurtherRows
+from sprag.worker.study import Study
 from tests.service.conftest import API, Service
 from tests.service.timed_spec import SPEC
 
@@ -102,3 +104,40 @@ def test_the_page_of_a_case_lists_its_regimes(service: Service, started: str) ->
     other = service.http.get(f"/studies/{started}/cases/1", params={"start": "5"}).text
     assert "5, shown below" in other
     assert f"/studies/{started}/cases/1/strobes?start=5&amp;columns=2" in other
+
+
+def test_a_study_begins_at_the_end_of_a_case(service: Service, started: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    end = {SPEED: 12.5, "pendulums.0.initial_windup": 0.01, "pendulums.0.initial_clutch": 2.0}
+    asked: list[tuple[float, int]] = []
+
+    def run_end_state(study: Study, case: int) -> dict[str, float]:
+        asked.append((study.base["shaft.load"], case))
+        return end
+
+    monkeypatch.setattr(models, "run_end_state", run_end_state)
+    monkeypatch.setattr(models, "is_compiled", lambda _: True)
+    spec = copy.deepcopy(SPEC)
+    spec["base"]["start"] = {"study": started, "case": 1, "start": 5}
+    for place in (spec["base"]["shaft"], *spec["base"]["pendulums"]):
+        for name in [name for name in place if name.startswith("initial_")]:
+            del place[name]
+    study_id = service.submit(spec)
+    assert asked == [(0.2, 0)]
+    study, stored = service.store.study(study_id), service.store.spec(study_id)
+    assert {path: study.base[path] for path in end} == end
+    # The study needs the other one no longer.
+    assert "start" not in stored["base"]
+    assert parse_spec(stored).study == study
+    for change, where in (
+        ({"study": "no-such-study"}, "/base/start/study"),
+        ({"case": 2}, "/base/start/case"),
+        ({"start": 8}, "/base/start/start"),
+        ({"many": 1}, "/base/start/many"),
+    ):
+        wrong = copy.deepcopy(spec)
+        wrong["base"]["start"] |= change
+        answer = service.http.post(f"{API}/studies", json=wrong)
+        assert (answer.status_code, [fault["pointer"] for fault in answer.json()["errors"]]) == (422, [where])
+    spec["base"]["shaft"]["initial_speed"] = 1
+    answer = service.http.post(f"{API}/studies", json=spec)
+    assert [fault["pointer"] for fault in answer.json()["errors"]] == ["/base/shaft/initial_speed"]

@@ -1,0 +1,94 @@
+"""Starts from the end of a case of another study: replaced by initial values when a study is submitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from sprag.service.spec.fields import read_object, read_whole
+from sprag.service.spec.machine.drive import START
+from sprag.service.spec.machine.shaft_check import NotCompiledError
+from sprag.service.spec.report import Report
+from sprag.service.storage.errors import StudyNotFoundError
+from sprag.worker import models
+from sprag.worker.limits import MAX_CASES, MAX_STARTS
+from sprag.worker.models.starts import at_start, count_of
+
+if TYPE_CHECKING:
+    from sprag.service.storage.store import Store
+    from sprag.worker.study import Study
+
+_POINTER = f"/base/{START}"
+
+
+def with_start(store: Store, data: Any) -> Any:
+    """The spec ``data`` with the initial values that go on from the case that its `base.start` names; else unchanged.
+
+    Raises SpecError, and NotCompiledError where the kernel for that case has to be compiled first.
+    """
+    base = data.get("base") if isinstance(data, Mapping) else None
+    if not isinstance(base, Mapping) or START not in base:
+        return data
+    report = Report(data)
+    study = _source(report, store, base[START], data)
+    report.raise_if_any()
+    assert study is not None
+    shape = models.shape_of(study)
+    if not models.is_compiled(shape):
+        raise NotCompiledError(shape)
+    values = models.run_end_state(study, 0)
+    if values is None:
+        report.fault(_POINTER, "conflict", "the case does not end ok", base[START], allowed="a case that ends ok")
+        raise report.error()
+    new = {name: part for name, part in base.items() if name != START}
+    for path, value in values.items():
+        _put(report, new, path, value)
+    report.raise_if_any()
+    return {**data, "base": new}
+
+
+def _source(report: Report, store: Store, data: object, spec: Mapping[str, Any]) -> Study | None:
+    """The study of the single case that is gone on from; None, with faults recorded, where there is none."""
+    found = read_object(report, _POINTER, data, ("study", "case", "start"))
+    if found is None:
+        return None
+    case = read_whole(report, f"{_POINTER}/case", found.get("case"), 0, MAX_CASES - 1)
+    start = read_whole(report, f"{_POINTER}/start", found.get("start", 0), 0, MAX_STARTS - 1)
+    study_id = found.get("study")
+    try:
+        if not isinstance(study_id, str):
+            raise StudyNotFoundError(str(study_id))
+        study = store.study(study_id)
+    except StudyNotFoundError:
+        report.fault(f"{_POINTER}/study", "unknown-name", "is not a study of this service", study_id, allowed="its id")
+        return None
+    if study.model != spec.get("model"):
+        report.fault(f"{_POINTER}/study", "conflict", f"is of the model {study.model}", study_id, allowed="one model")
+    if case is not None and case >= study.cases:
+        report.fault(f"{_POINTER}/case", "out-of-range", "is out of range", case, allowed=f"0 to {study.cases - 1:,}")
+    count = count_of(study.run)
+    if start is not None and start >= count:
+        report.fault(f"{_POINTER}/start", "out-of-range", "is out of range", start, allowed=f"0 to {count - 1:,}")
+    if report.found or case is None or start is None:
+        return None
+    return at_start(study, case, start)
+
+
+def _put(report: Report, base: dict[str, Any], path: str, value: float) -> None:
+    """Write an initial value into a base; faults are recorded where it has no such place, or another value there."""
+    *parts, name = path.split(".")
+    place: Any = base
+    for part in parts:
+        key: Any = int(part) if isinstance(place, list) else part
+        inside = key < len(place) if isinstance(place, list) else key in place
+        if not inside or not isinstance(place[key], Mapping | list):
+            report.fault(_POINTER, "conflict", f"has a value of {path}, which the base has no place for", base)
+            return
+        place[key] = list(place[key]) if isinstance(place[key], list) else dict(place[key])
+        place = place[key]
+    if name in place:
+        report.fault(
+            f"/base/{path.replace('.', '/')}", "conflict", f"is given by `base.{START}`", place[name],
+            allowed=f"either it or `base.{START}`",
+        )  # fmt: skip
+    place[name] = value
