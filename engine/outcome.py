@@ -86,6 +86,28 @@ class Portrait:
 
 
 @dataclass(frozen=True, slots=True)
+class Basin:
+    """The regimes to which one case comes from a grid of starts.
+
+    Attributes
+    ----------
+    x, y : float64 arrays, shapes (k,) and (m,)
+        Initial values (SI) of two parameters.
+    members : int64 array, shape (m, k)
+        Number of the regime to which each start comes; -1 where it did not end ok.
+    names : tuple of str
+    values : float64 array, shape (regimes, results)
+        Results ``names`` of each regime, the most frequent first.
+    """
+
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    members: NDArray[np.int64]
+    names: tuple[str, ...]
+    values: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
 class Engagement:
     """One stretch in which a clutch transmits torque.
 

@@ -16,6 +16,8 @@ MAX_CORRELATIONS: Final = 1_000
 #: Starts of each case of one study, and initial values that differ between them.
 MAX_STARTS: Final = 4_096
 MAX_START_RANGES: Final = 24
+#: Values of each initial value of a basin.
+MAX_BASIN_POINTS: Final = 64
 #: Cases of one study.
 MAX_CASES: Final = 10_000_000
 #: Values on all axes of one study together (they are stored with the study).

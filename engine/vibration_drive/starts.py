@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sprag.engine.endings import ENDINGS, Ending
+from sprag.engine.outcome import Basin
 from sprag.engine.run import SettledRun
 from sprag.engine.vibration_drive.cases import (
     Column,
@@ -15,6 +16,7 @@ from sprag.engine.vibration_drive.cases import (
     case_matrix,
     default_of,
     pendulum_column,
+    pendulum_count,
     with_lengths,
 )
 from sprag.engine.vibration_drive.integration import integrate
@@ -364,3 +366,25 @@ def _orbits(module: Kernel, matrix: Floats, settings: SettledRun, points: Floats
         inside = np.arange(longest) < orders[rows, None]
         strobes[rows] = np.where(inside[:, :, None], done, np.nan)
     return strobes
+
+
+def basin(
+    columns: Mapping[str, ArrayLike], settings: SettledRun, paths: tuple[str, str], x: Floats, y: Floats
+) -> Basin:
+    """The regimes to which one case comes from every pair of the initial values ``x`` and ``y`` of two ``paths``.
+
+    Parameters
+    ----------
+    columns : mapping
+        As for ``simulate``, scalars only.
+    settings : SettledRun
+    paths : tuple of two str
+    x, y : arrays, shapes (k,) and (m,), SI
+    """
+    across, along = (part.reshape(-1) for part in np.meshgrid(x, y))
+    first = {**columns, paths[0]: across[0], paths[1]: along[0]}
+    found = settle_starts(first, settings, {paths[0]: across[1:], paths[1]: along[1:]}, cases=1)
+    names = tuple(info.name for info in started_infos(pendulum_count(columns)))
+    ok = ENDINGS[int(found.endings[0])] is Ending.OK
+    values = np.concatenate([found.values if ok else found.values[:0], found.further_values])
+    return Basin(x, y, found.members.reshape(len(y), len(x)), names, values)

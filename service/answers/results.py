@@ -41,6 +41,17 @@ class CaseDetail(Case):
     links: dict[str, str]
 
 
+class BasinData(TypedDict):
+    """To which regime one case comes from each start of a grid of two initial values."""
+
+    x: Annotated[str, Doc("path of the initial value across")]
+    y: Annotated[str, Doc("path of the other one")]
+    x_values: Annotated[list[float], Doc("SI")]
+    y_values: Annotated[list[float], Doc("SI")]
+    numbers: Annotated[list[list[int]], Doc("number of the regime, a row for each y; -1 where a start did not end ok")]
+    regimes: Annotated[list[RegimeRow], Doc("the most frequent first, with the main results of each")]
+
+
 class CasePage(TypedDict):
     """A page of finished cases, in order of their numbers."""
 

@@ -18,6 +18,7 @@ from starlette.types import ASGIApp
 from sprag.service.http import handlers
 from sprag.service.http.access import Access
 from sprag.service.http.api import (
+    basins,
     batches,
     calibrations,
     case_branches,
@@ -42,6 +43,7 @@ from sprag.service.http.metrics import Metrics
 from sprag.service.http.request_log import Noted, RequestLog
 from sprag.service.http.shares import Shares
 from sprag.service.http.views import API_PREFIX
+from sprag.service.http.web import basin as basin_pages
 from sprag.service.http.web import branch as branch_pages
 from sprag.service.http.web import (
     calibrate,
@@ -224,6 +226,7 @@ def _routes() -> APIRouter:
         cases,
         case_branches,
         case_tables,
+        basins,
         clutch_fits,
         schedules,
         catalogues,
@@ -246,6 +249,7 @@ def _routes() -> APIRouter:
         engagement_pages,
         branch_pages,
         diagram_pages,
+        basin_pages,
         compare,
         laboratory,
         schedule_pages,

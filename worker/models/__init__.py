@@ -19,7 +19,7 @@ from sprag.engine.machine_shaft.problems import (
     MachineError,
     TableError,
 )
-from sprag.engine.outcome import Engagements, Portrait, Trajectory
+from sprag.engine.outcome import Basin, Engagements, Portrait, Trajectory
 from sprag.engine.run import MEANS_FROM_PERIODS
 from sprag.engine.sources import engine_folder, source_hash
 from sprag.engine.vibration_drive.clutch import (
@@ -74,6 +74,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from sprag.worker.study import Study
 
 __all__ = [
@@ -95,6 +98,7 @@ __all__ = [
     "VIBRATION_DRIVE",
     "WINDUP_OUT_OF_DATA",
     "AssemblyError",
+    "Basin",
     "ChunkResult",
     "ChunkTask",
     "ClutchFit",
@@ -158,6 +162,7 @@ __all__ = [
     "register",
     "result_catalogue",
     "result_infos",
+    "run_basin",
     "run_chunk",
     "run_end_state",
     "run_engagements",
@@ -320,6 +325,11 @@ def run_end_state(study: Study, case: int) -> dict[str, float] | None:
     ValueError where the model has no initial values.
     """
     return model_of(study.model).end_state(study, case)
+
+
+def run_basin(study: Study, case: int, paths: tuple[str, str], x: NDArray[np.float64], y: NDArray[np.float64]) -> Basin:
+    """The regimes to which one case of a settled study comes from a grid of initial values (SI) of two ``paths``."""
+    return model_of(study.model).basin(study, case, paths, x, y)
 
 
 def lanes_per_case(study: Study) -> int:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from sprag.engine import Ending
     from sprag.engine.catalogue import Parameter, ResultInfo
-    from sprag.engine.outcome import Engagements, Portrait, Trajectory
+    from sprag.engine.outcome import Basin, Engagements, Portrait, Trajectory
     from sprag.worker.models.branches import Along, CaseBranch
     from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
     from sprag.worker.models.sections import CaseSections, Sampling
@@ -120,6 +120,15 @@ class Model(Protocol):
     def portrait(self, study: Study, case: int) -> Portrait:
         """How one case approaches its motion; ValueError where there are no strobes."""
         raise ValueError(f"a machine of model {self.name} has no strobes")
+
+    def basin(
+        self, study: Study, case: int, paths: tuple[str, str], x: NDArray[np.float64], y: NDArray[np.float64]
+    ) -> Basin:
+        """The regimes to which one case comes from a grid of the initial values ``x`` and ``y`` (SI) of two ``paths``.
+
+        ValueError where its machines have no initial values.
+        """
+        raise ValueError(f"a machine of model {self.name} has no initial values")
 
     def end_state(self, study: Study, case: int) -> dict[str, float] | None:
         """Initial values (SI) by path that go on from the end of one case; None where it does not end ok.

@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag.engine.catalogue import Parameter
-    from sprag.engine.outcome import Engagements, Portrait, Trajectory
+    from sprag.engine.outcome import Basin, Engagements, Portrait, Trajectory
     from sprag.engine.run import Reset, Unit
     from sprag.worker.study import Study
 
@@ -284,6 +284,13 @@ class VibrationDrive(Model):
         if is_settled(study.run):
             return settled_portrait(columns, settings_of(study.run), start_of(study, case))
         return portrait(columns, run_of(study.run))
+
+    def basin(
+        self, study: Study, case: int, paths: tuple[str, str], x: NDArray[np.float64], y: NDArray[np.float64]
+    ) -> Basin:
+        from sprag.engine.vibration_drive.starts import basin
+
+        return basin(case_machine(study, case), settings_of(study.run), paths, x, y)
 
     def end_state(self, study: Study, case: int) -> dict[str, float] | None:
         from sprag.engine.vibration_drive.start_states import end_state

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
+from sprag.service.results.figures.basin import basin_figure
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.motion import motion_figure
 from sprag.service.results.figures.portrait import portrait_figure
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from sprag.service.results.curves import Curves
     from sprag.service.results.figures.figure import Figure as Described
     from sprag.service.results.figures.figure import Line, Marks, Panel
-    from sprag.worker.models import Portrait, Presentation, Trajectory
+    from sprag.worker.models import Basin, Portrait, Presentation, Trajectory
 
 Picture = Literal["svg", "png", "pdf"]
 PICTURES: Final[tuple[Picture, ...]] = get_args(Picture)
@@ -81,6 +82,11 @@ def draw_motion(made: Trajectory, shown: Presentation, title: str, picture: Pict
 def draw_portrait(made: Portrait, shown: Presentation, title: str, picture: Picture) -> bytes:
     """Orbit and strobes of one case, beside the strobes period by period."""
     return draw_figure(portrait_figure(made, shown), title, picture)
+
+
+def draw_basin(made: Basin, paths: tuple[str, str], units: tuple[str, str], title: str, picture: Picture) -> bytes:
+    """To which regime one case comes from each start of a grid."""
+    return draw_figure(basin_figure(made, paths, units), title, picture)
 
 
 def require_drawable(drawn: Sequence[Curves]) -> None:

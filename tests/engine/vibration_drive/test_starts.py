@@ -14,7 +14,7 @@ from sprag.engine.run import SettledRun
 from sprag.engine.vibration_drive import starts as module
 from sprag.engine.vibration_drive.regimes import Regime
 from sprag.engine.vibration_drive.start_results import started_infos
-from sprag.engine.vibration_drive.starts import StartedBatch, settle_starts, started_columns, wilson
+from sprag.engine.vibration_drive.starts import StartedBatch, basin, settle_starts, started_columns, wilson
 
 NAMES = [info.name for info in started_infos(1)]
 ANGLE = "pendulums.0.initial_angle"
@@ -110,3 +110,20 @@ def test_shares_have_the_intervals_of_wilson(reached: int, starts: int) -> None:
 def test_starts_of_different_numbers_are_refused() -> None:
     with pytest.raises(ValueError, match="same number"):
         settle_starts(TWO_WELLS, SettledRun(), {ANGLE: [0.1], "shaft.initial_speed": [1.0, 2.0]}, cases=1)
+
+
+def test_a_basin_has_the_regime_of_every_start_of_its_grid() -> None:
+    x, y = np.array([-0.4, 0.3]), np.array([-1.0, 0.0, 1.0])
+    found = basin(TWO_WELLS, SettledRun(), (ANGLE, "pendulums.0.initial_speed"), x, y)
+    # Slow starts fall to the side on which they begin.
+    assert found.members[1].tolist() == [1 - found.members[1, 1], found.members[1, 1]]
+    single = [
+        settle_starts(TWO_WELLS, SettledRun(), {ANGLE: [angle], "pendulums.0.initial_speed": [speed]}, cases=1)
+        for speed in y
+        for angle in x
+    ]
+    # The case's own start, at -0.4 rad, beside each start of the grid.
+    alike = [batch.members[0, 0] == batch.members[0, 1] for batch in single]
+    assert (found.members == found.members[1, 0]).reshape(-1).tolist() == alike
+    shares = found.values[:, found.names.index("regime.share")]
+    assert shares.tolist() == [np.mean(found.members == k) for k in range(len(shares))]

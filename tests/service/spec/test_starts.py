@@ -91,3 +91,16 @@ def test_the_schema_accepts_starts() -> None:
     assert check.is_valid(_spec(count=16))
     assert not check.is_valid(_spec(count=1))
     assert not check.is_valid(_spec(many=1))
+
+
+def test_states_of_clutches_are_in_a_study_only_where_they_are_given() -> None:
+    spec = _spec()
+    path = "pendulums.0.initial_clutch"
+    assert path not in parse_spec(spec).study.base
+    spec["base"]["pendulums"][0] |= {"initial_clutch": 2, "initial_windup": "0.01 rad"}
+    base = parse_spec(spec).study.base
+    assert (base[path], base["pendulums.0.initial_windup"]) == (2.0, 0.01)
+    spec["base"]["pendulums"][0]["initial_clutch"] = 1.5
+    with pytest.raises(SpecError) as error:
+        parse_spec(spec)
+    assert [fault.where for fault in error.value.faults] == ["/base/pendulums/0/initial_clutch"]

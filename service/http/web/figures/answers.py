@@ -9,6 +9,8 @@ from sprag.service.http.web.figures.plotly import Data, plotly_figure
 from sprag.service.jobs.answers import curves_of, map_of
 from sprag.service.jobs.batch_answers import ribbon_of, yield_of
 from sprag.service.json_text import to_bytes
+from sprag.service.results.basins import basin_of, units_of
+from sprag.service.results.figures.basin import basin_figure
 from sprag.service.results.figures.calibration import calibration_figure
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.front import front_figure, history_figure
@@ -21,6 +23,7 @@ from sprag.worker import models
 if TYPE_CHECKING:
     from sprag.service.jobs.batch_answers import RibbonQuery, YieldQuery
     from sprag.service.jobs.checks import Library
+    from sprag.service.results.basins import BasinQuery
     from sprag.service.results.curves import CurveQuery
     from sprag.worker.study import Study
 
@@ -79,6 +82,12 @@ def strobes_figure(study: Study, case: int, columns: int) -> Data:
     """The strobes and the orbit of a case that is run again for them. For the computing process."""
     made = models.run_portrait(study, case)
     return plotly_figure(portrait_figure(made, models.presentation_of(study), columns))
+
+
+def basin_plot(study: Study, case: int, query: BasinQuery) -> Data:
+    """The basin of a case that is run from every start for it. For the computing process."""
+    made = basin_of(study, case, query)
+    return plotly_figure(basin_figure(made, query.paths, units_of(study, query)))
 
 
 def _no_motion(study: Study, case: int, ending: str) -> str:

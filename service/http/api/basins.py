@@ -1,0 +1,61 @@
+"""The basin of a case: to which regime it comes from each start of a grid of two initial values."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Depends
+from starlette.responses import Response
+
+from sprag.service.answers.results import BasinData
+from sprag.service.http.api.document import files, format_query, problems
+from sprag.service.http.basin_query import Across, Along, End, Points
+from sprag.service.http.context import CaseNumber, StudyId
+from sprag.service.http.drawing import DRAWN_FORMATS, picture
+from sprag.service.http.drawing import table as written
+from sprag.service.http.requests import strict_query
+from sprag.service.http.respond import choose_format
+from sprag.service.http.work import Attended
+from sprag.service.results import basins
+from sprag.service.results.pictures.curves import draw_basin
+
+router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
+
+_PROBLEMS = (
+    "invalid-parameter", "study-not-found", "case-not-found", "not-found", "not-acceptable", "not-computed",
+    "timed-out", "too-many-requests", "unavailable", "too-costly",
+)  # fmt: skip
+
+
+@router.get(
+    "/{case:case}/basin",
+    response_model=BasinData,
+    responses={
+        **files("The grid as JSON or CSV, or a picture.", DRAWN_FORMATS.values()),
+        **problems(*_PROBLEMS),
+    },
+)
+async def get_basin(
+    work: Attended,
+    study_id: StudyId,
+    case: CaseNumber,
+    x: Across = None,
+    y: Along = None,
+    x_from: End = None,
+    x_to: End = None,
+    y_from: End = None,
+    y_to: End = None,
+    points: Points = 20,
+    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
+) -> Response:
+    """To which regime a settled case comes from each start of a grid. The case is run from all of them for this."""
+    chosen = choose_format(work.request, form, DRAWN_FORMATS)
+    ends = {"x": (x_from, x_to), "y": (y_from, y_to)}
+    study, _, query = await work.case_of(study_id, case, lambda study, _: basins.basin_query(study, x, y, ends, points))
+    if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - so that the types are told apart
+        content = await work.run_case(basins.basin_file, study, case, query, chosen)
+        return written(content, chosen, f"{study_id}-case-{case}-basin")
+    made = await work.run_case(basins.basin_of, study, case, query)
+    units = basins.units_of(study, query)
+    title = f"{study.name}, case {case}"
+    return await picture(draw_basin, chosen, made, query.paths, units, title).response(work)

@@ -1,0 +1,149 @@
+"""To which regime one case comes from each start of a grid of two initial values: JSON, CSV, and what is asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from sprag.service.answers.results import BasinData, RegimeRow
+from sprag.service.faults import FaultError, parameter_error
+from sprag.service.json_text import to_bytes
+from sprag.service.results.exports import table_csv
+from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
+from sprag.worker import models
+from sprag.worker.models.starts import STARTS, has_starts
+
+if TYPE_CHECKING:
+    from sprag.service.formats import Format
+    from sprag.worker.models import Basin, Parameter
+    from sprag.worker.study import Study
+
+#: Initial values that a basin can be drawn over.
+INITIAL: Final = ("initial_angle", "initial_speed", "initial_windup")
+#: What is reported of each regime besides its number.
+_SHOWN: Final = ("regime", "regime.order", "regime.share", "shaft.speed.mean")
+
+
+@dataclass(frozen=True, slots=True)
+class BasinQuery:
+    """Two initial values, and the values (SI) of each."""
+
+    paths: tuple[str, str]
+    x: tuple[float, float]
+    y: tuple[float, float]
+    points: int
+
+    def axes(self) -> tuple[np.ndarray, np.ndarray]:
+        """The values of both: equally spaced, the ends among them."""
+        return np.linspace(*self.x, self.points), np.linspace(*self.y, self.points)
+
+
+def initial_values(study: Study) -> dict[str, Parameter]:
+    """The initial values of a study's machine by path."""
+    catalogue = {entry.path: entry for entry in models.parameter_catalogue(study.model)}
+    found: dict[str, Parameter] = {}
+    for path in study.base:
+        plain = ".".join("N" if part.isdigit() else part for part in path.split("."))
+        if plain.rpartition(".")[2] in INITIAL and plain in catalogue:
+            found[path] = catalogue[plain]
+    return found
+
+
+def require_basin(study: Study) -> None:
+    """Raise FaultError where cases of a study have no basins."""
+    if not (models.is_settled(study.run) and initial_values(study)):
+        raise FaultError("not-found", "Only cases that run until their motion is settled have basins.")
+
+
+def basin_query(
+    study: Study, x: str | None, y: str | None, ends: dict[str, tuple[str | None, str | None]], points: int
+) -> BasinQuery:
+    """What is asked for; by default the first two ranges of the study's starts. FaultError about a parameter.
+
+    ``ends`` has for "x" and "y" the first and the last value as text, None where they are those of the starts.
+    """
+    require_basin(study)
+    known = initial_values(study)
+    ranges = study.run[STARTS]["ranges"] if has_starts(study.run) else {}
+    usual = [path for path in (*ranges, *known) if path in known]
+    paths: list[str] = []
+    for name, given in (("x", x), ("y", y)):
+        path = given or next(path for path in usual if path not in paths and path != (y if name == "x" else x))
+        if path not in known:
+            raise parameter_error(name, "unknown-name", "is not an initial value", path, ", ".join(known))
+        if path in paths:
+            raise parameter_error(name, "repeated", "is the other initial value too", path, "two different ones")
+        paths.append(path)
+    both = [_ends(name, known[path], ranges.get(path), ends[name]) for name, path in zip("xy", paths, strict=True)]
+    return BasinQuery((paths[0], paths[1]), both[0], both[1], points)
+
+
+def _ends(
+    name: str, entry: Parameter, drawn: list[float] | None, given: tuple[str | None, str | None]
+) -> tuple[float, float]:
+    values: list[float] = []
+    for place, text in zip(("from", "to"), given, strict=True):
+        if text is None:
+            if drawn is None:
+                allowed = f"a quantity in {entry.unit}: the study has no starts with a range of it"
+                raise parameter_error(f"{name}_{place}", "required", "is required", None, allowed)
+            values.append(drawn[len(values)])
+            continue
+        try:
+            number, unit = split_quantity(text)
+            value = parse_quantity(text, entry.unit) if unit else to_float(number)
+        except QuantityError as error:
+            raise parameter_error(f"{name}_{place}", error.code, str(error), text, entry.range_text()) from error
+        if not entry.accepts(value):
+            raise parameter_error(f"{name}_{place}", "out-of-range", "is out of range", text, entry.range_text())
+        values.append(value)
+    if not values[0] < values[1]:
+        raise parameter_error(f"{name}_to", "invalid-range", "is not above the first value", given[1], "above it")
+    return values[0], values[1]
+
+
+def basin_of(study: Study, case: int, query: BasinQuery) -> Basin:
+    """Run the case from every start. For the computing process."""
+    return models.run_basin(study, case, query.paths, *query.axes())
+
+
+def basin_file(study: Study, case: int, query: BasinQuery, form: Format) -> bytes:
+    """Run the case from every start and write the file. For the computing process."""
+    made = basin_of(study, case, query)
+    if form == "csv":
+        across, along = np.meshgrid(made.x, made.y)
+        columns: list[list[Any]] = [
+            across.reshape(-1).tolist(),
+            along.reshape(-1).tolist(),
+            made.members.reshape(-1).tolist(),
+        ]
+        return table_csv([*query.paths, "regime.number"], columns)
+    return to_bytes(basin_json(study, query, made))
+
+
+def basin_json(study: Study, query: BasinQuery, made: Basin) -> BasinData:
+    """A basin as JSON data."""
+    infos = {info.name: info for info in models.result_infos(study.model, models.variant_of(study))}
+    regimes: list[RegimeRow] = []
+    for number, row in enumerate(made.values.tolist()):
+        results: dict[str, Any] = {}
+        for name in _SHOWN:
+            value = row[made.names.index(name)]
+            results[name] = infos[name].cell(value) if name in infos else value
+        regimes.append({"number": number, "flags": [], "results": results})
+    return {
+        "x": query.paths[0],
+        "y": query.paths[1],
+        "x_values": made.x.tolist(),
+        "y_values": made.y.tolist(),
+        "numbers": made.members.tolist(),
+        "regimes": regimes,
+    }
+
+
+def units_of(study: Study, query: BasinQuery) -> tuple[str, str]:
+    """Units of both initial values."""
+    known = initial_values(study)
+    return known[query.paths[0]].unit, known[query.paths[1]].unit
