@@ -74,9 +74,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from sprag.worker.models.model import Floats
     from sprag.worker.study import Study
 
 __all__ = [
@@ -320,10 +318,7 @@ def run_portrait(study: Study, case: int) -> Portrait:
 
 
 def run_end_state(study: Study, case: int) -> dict[str, float] | None:
-    """Initial values (SI) that go on from the end of one case, which is run for this; None where it does not end ok.
-
-    ValueError where the model has no initial values.
-    """
+    """Initial values (SI) that go on from the end of one case, which is run for this; None where it does not end ok."""
     return model_of(study.model).end_state(study, case)
 
 

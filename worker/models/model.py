@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from sprag.worker.models.sections import CaseSections, Sampling
     from sprag.worker.study import Study
 
+    Floats = NDArray[np.float64]
+
 
 class Model(Protocol):
     """A model: turns a study's columns into a call of the engine and its output into results.
