@@ -322,7 +322,7 @@ def run_end_state(study: Study, case: int) -> dict[str, float] | None:
     return model_of(study.model).end_state(study, case)
 
 
-def run_basin(study: Study, case: int, paths: tuple[str, str], x: NDArray[np.float64], y: NDArray[np.float64]) -> Basin:
+def run_basin(study: Study, case: int, paths: tuple[str, str], x: Floats, y: Floats) -> Basin:
     """The regimes to which one case of a settled study comes from a grid of initial values (SI) of two ``paths``."""
     return model_of(study.model).basin(study, case, paths, x, y)
 
@@ -363,8 +363,7 @@ def is_compiled(shape: KernelShape) -> bool:
 
 def _mark(shape: KernelShape) -> Path:
     # Machines that share a home folder may need different code.
-    parts = (shape.model, *shape.key, platform.node())
-    return cache_folder() / f"{'-'.join(map(str, parts))}.ready"
+    return cache_folder() / f"{'-'.join(map(str, (shape.model, *shape.key, platform.node())))}.ready"
 
 
 def warm_up(study: Study) -> None:
