@@ -43,13 +43,19 @@ class Sections:
 
 
 def sections(
-    columns: Mapping[str, ArrayLike], settings: SettledRun, *, cases: int, phase: float, count: int
+    columns: Mapping[str, ArrayLike],
+    settings: SettledRun,
+    *,
+    cases: int,
+    phase: float,
+    count: int,
+    starts: Floats | None = None,
 ) -> Sections:
     """Settle each case, and record its strobes at a phase of the excitation.
 
     Parameters
     ----------
-    columns, settings, cases :
+    columns, settings, cases, starts :
         As for ``settle``.
     phase : float
         Part of the excitation period, 0 .. 1, rounded to a multiple of ``GRID``; 0 and 1 are its end.
@@ -61,7 +67,7 @@ def sections(
     ValueError
         As ``settle``.
     """
-    found = settle(columns, settings, cases=cases)
+    found = settle(columns, settings, cases=cases, starts=starts)
     kernel = kernel_of(columns, settings.tolerance)
     n = kernel.LAYOUT.n
     names = [info.name for info in settled_infos(n)]

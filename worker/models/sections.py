@@ -11,6 +11,7 @@ from sprag.engine.vibration_drive.regimes import Regime
 from sprag.worker.models.branches import machines_along
 from sprag.worker.models.model import model_of
 from sprag.worker.models.settled import settings_of, settled_study
+from sprag.worker.models.swept import start_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -74,7 +75,10 @@ def drive_sections(study: Study, case: int, asked: Sampling) -> CaseSections:
 
     columns = machines_along(study, case, asked.paths)(asked.values)
     settings = settings_of(settled_study(study).run)
-    found = sections(columns, settings, cases=len(asked.values), phase=asked.phase, count=asked.count)
+    # The case itself begins where it does in its study.
+    starts = start_of(study, case) if len(asked.values) == 1 else None
+    cases, phase, count = len(asked.values), asked.phase, asked.count
+    found = sections(columns, settings, cases=cases, phase=phase, count=count, starts=starts)
     names, units, values = ["shaft.speed"], ["rad/s"], [found.strobes[:, :, SHAFT_SPEED]]
     for i in range((found.strobes.shape[2] - SHAFT_WIDTH) // PENDULUM_WIDTH):
         own = found.strobes[:, :, SHAFT_WIDTH + i * PENDULUM_WIDTH :]

@@ -89,6 +89,19 @@ def test_what_cannot_be_followed_is_refused(
     assert (error["parameter"], error["code"]) == (parameter, code)
 
 
+def test_a_case_of_a_sweep_has_the_motion_of_the_sweep(service: Service) -> None:
+    axis = {"path": "shaft.load", "values": [0.225, 0.23], "sweep": "both"}
+    study_id = service.submit(changed({"/run": {"until": "settled"}, "/axes": [axis]}))
+    body = asked(service, study_id, "along=shaft.load", case=1).json()
+    assert (body["order"], body["value"], body["specials"]) == (1, 0.225, [])
+    section = service.get(f"/studies/{study_id}/cases/1/section")
+    assert (section["order"], len(section["strobes"]["shaft.speed"][0])) == ([1], 1)
+    service.fill(study_id)
+    drawn = service.http.get(f"/studies/{study_id}/cases/1/branch/figure?along=shaft.load").json()["data"]
+    (own,) = (trace for trace in drawn if trace["name"] == "cases of the study")
+    assert own["customdata"] == [0, 1, 2, 3]
+
+
 def test_a_case_without_an_orbit_has_a_note(service: Service) -> None:
     still = {"path": ["excitation.amplitude_x", "excitation.amplitude_y"], "values": [0.0]}
     study_id = service.submit(changed({"/run": {"until": "settled"}, "/axes": [still]}))
