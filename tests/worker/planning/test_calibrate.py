@@ -223,3 +223,15 @@ def test_a_fit_that_explains_its_values_badly_begins_again(seed: int) -> None:
     found = _answer(plan_of([(0.0, 200.0), (0.0, 5.0)], x, {"y": y}, np.full(len(x), 0.02), refits=2, seed=seed), wave)
     assert found.values == pytest.approx(true, rel=0.1)
     assert found.chi_square < 30.0
+
+
+def test_a_fit_that_stays_bad_leaves_room_for_the_intervals() -> None:
+    """No set of parameters explains these values, and the cases for beginning again are bounded."""
+    y = _measured() + 0.5 * np.sin(40.0 * X)
+    plan = plan_of(WIDE, X, {"y": y}, np.full(len(X), 1e-3), refits=200)
+    planner, rounds = calibrated(plan, _rise)
+    found = answer(planner)
+    assert found is not None
+    assert found.complete
+    assert found.intervals is not None
+    assert sum(len(rows.points) for rows in rounds) <= plan.most_cases

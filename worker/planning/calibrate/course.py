@@ -34,7 +34,7 @@ _DISTINCT: Final = 0.1
 #: Largest scatter of a scan around the fit, in widths of the ranges; logarithm of the factor by which it reaches beyond
 #: the scatter of the fit; shells of distances, from each of which it is fitted again; standard deviations of chi-square
 #: that are improbable.
-_WIDEST, _FARTHEST, _SHELLS, _IMPROBABLE = 0.5, 3.0, 3, 3.0
+_WIDEST, _FARTHEST, _SHELLS, _IMPROBABLE = 0.5, 3.0, 3, 2.0
 #: By how much (in squares of standard deviations) another set must be better than the fit to begin again from there.
 _BEGIN_AGAIN: Final = 0.02
 #: Streams of random numbers of each scan of the ranges and the searches that follow it.
@@ -89,7 +89,7 @@ def course(plan: CalibratePlan, space: Space, state: State) -> Generator[Request
     if plan.refits:
         yield from _around_best(plan, state, 0)
         for attempt in range(1, 1 + RESTARTS):
-            if not _improbable(plan, state):
+            if not _improbable(plan, state) or _left(plan, state) < plan.scan + plan.least_fit:
                 break
             another = yield from _anywhere(plan, space, state, FIT_PHASE, Draws(plan.seed, _STREAMS * attempt))
             yield from _taken(plan, state, another)
@@ -113,8 +113,10 @@ def _anywhere(
     """Scan the ranges and fit from the best places: the best of these fits."""
     scan = space.scan(plan.scan, draws)
     modelled = yield from _run(plan, state, phase, scan)
-    starts = _starts(scan, state.data.costs(modelled), STARTS if phase == SCAN_PHASE else 2 * STARTS)
-    again = fit(state.data, scan[starts], modelled[starts], plan.fit_sets)
+    first = phase == SCAN_PHASE
+    starts = _starts(scan, state.data.costs(modelled), STARTS if first else 2 * STARTS)
+    sets = plan.fit_sets if first else min(plan.fit_sets, _left(plan, state))
+    again = fit(state.data, scan[starts], modelled[starts], sets)
     return _least((yield from _through(plan, state, FIT_PHASE, again)))
 
 
@@ -123,9 +125,17 @@ def _around_best(plan: CalibratePlan, state: State, attempt: int) -> Generator[R
     for step in range(SEARCHES):
         assert state.best is not None
         before = float(state.best.costs[0])
+        if attempt and _left(plan, state) < plan.scan + plan.fit_sets // 4:
+            break
         yield from _searched(plan, state, Draws(plan.seed, _STREAMS * attempt + 2 + step))
         if state.best.costs[0] > before - _BEGIN_AGAIN and (attempt or not _improbable(plan, state)):
             break
+
+
+def _left(plan: CalibratePlan, state: State) -> int:
+    """Sets of parameters that are left if the refits and the curve are to have theirs."""
+    run = sum(len(places) for places, _ in state.library)
+    return plan.sets_before_refits - run
 
 
 def _taken(plan: CalibratePlan, state: State, found: Lanes) -> Generator[Request, Floats, None]:

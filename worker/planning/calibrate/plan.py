@@ -28,6 +28,8 @@ REFITS: Final = (0, 1000)
 SCAN, LEAST_SCAN, STARTS, ITERATIONS, TRIALS = 24, 48, 4, 40, 10
 #: Scans around the fit at most; scans of the ranges at most that begin again because the fit explains the values badly.
 SEARCHES, RESTARTS = 3, 3
+#: Sets of parameters that are kept for each refit.
+REFIT_SETS: Final = 5
 #: Iterations of a fit at most, and those that a plan must have room for; fits one after another.
 MOST_ITERATIONS, LEAST_ITERATIONS, AGAIN = 100, 8, 24
 #: Conditions between and around the measured ones at most, for the fitted curve and the next point.
@@ -114,9 +116,10 @@ class CalibratePlan:
         _check(self.loss in LOSSES, "loss", self.loss, ", ".join(LOSSES))
         low, high = REFITS
         _check(low <= self.refits <= high, "refits", self.refits, f"{low} to {high:,}")
-        least = STARTS * LEAST_ITERATIONS * (1 + 2 * len(self.unknown))
-        most = MAX_PLANNED_CASES // 2 // (least + self.scan)
-        _check(self.fit_sets >= least, "measured", len(self.conditions), f"at most {most} different conditions")
+        most = MAX_PLANNED_CASES // 2 // (self.least_fit + self.scan)
+        _check(
+            self.fit_sets >= self.least_fit, "measured", len(self.conditions), f"at most {most} different conditions"
+        )
         _check(0 <= self.seed < 2**63, "seed", self.seed, "an integer of at least 0")
         seen = [path for paths in self.paths for path in paths]
         _check(len(set(seen)) == len(seen), "unknown", seen, "each parameter once, unknown or measured")
@@ -145,6 +148,17 @@ class CalibratePlan:
     def scan(self) -> int:
         """Sets of parameters of the scan."""
         return max(LEAST_SCAN, SCAN * len(self.unknown))
+
+    @property
+    def least_fit(self) -> int:
+        """Sets of parameters that a fit must have room for."""
+        return STARTS * LEAST_ITERATIONS * (1 + 2 * len(self.unknown))
+
+    @property
+    def sets_before_refits(self) -> int:
+        """Sets of parameters after which no fit begins again, so that the refits have room."""
+        rest = self.most_cases - (1 + CURVES) * CURVE
+        return rest // len(self.conditions) - REFIT_SETS * self.refits
 
     @property
     def fit_sets(self) -> int:
