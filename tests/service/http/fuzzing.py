@@ -39,7 +39,7 @@ CHECKS: Final = (
     "ignored_auth",
 )
 #: Operations whose bodies or queries keep to more than JSON Schema can say (units, cron expressions, names of a study's
-#: axes), so that what the document allows may still be refused.
+#: axes, starts of its cases), so that what the document allows may still be refused.
 FURTHER_RULES: Final = (
     "create_study",
     "preview_study",
@@ -57,6 +57,11 @@ FURTHER_RULES: Final = (
     "get_yield",
     "get_sensitivity",
     "get_trajectory",
+    "get_branch",
+    "get_diagram",
+    "get_section",
+    "get_engagements",
+    "get_strobes",
 )
 
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from sprag.worker.planning.calibrate.course import ENDED, leverages
 from sprag.worker.planning.calibrate.fit import quadratic
@@ -190,6 +189,8 @@ def _likely(planner: CalibratePlanner, state: State) -> Floats:
     Half the change of chi-square that it allows is added to the least cost: 3.84 for one parameter, or the square of
     Student's t where the standard deviations follow from the residuals. None but the fit with another loss.
     """
+    from scipy.special import stdtrit  # takes as long to load as all of the service's own code
+
     best, plan = state.best, planner.plan
     assert best is not None
     if plan.loss != "linear":
