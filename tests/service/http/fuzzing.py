@@ -60,6 +60,7 @@ FURTHER_RULES: Final = (
     "get_branch",
     "get_diagram",
     "get_section",
+    "get_basin",
     "get_engagements",
     "get_strobes",
 )

@@ -28,26 +28,27 @@ HEAVY = {
     ),
     "get_report": ("examples", "coverage"),
 }
-#: What cases do is not computed here, no study is of settled motion, has a goal or is a calibration, and a few made-up
-#: requests do not find the results of a map, or meet a study that nothing has deleted yet.
+#: What cases do is not computed here, and no study is of settled motion, has a goal or starts, or is a calibration.
 NEVER_SERVED = {
-    "DELETE /api/v1/studies/{study_id}",
     "POST /api/v1/studies/{study_id}:longer",
     *(
         f"GET /api/v1/studies/{{study_id}}/{which}"
         for which in (
             "calibration",
             "front",
-            "map",
             "cases/{case}/engagements",
             "cases/{case}/strobes",
             "cases/{case}/branch",
             "cases/{case}/diagram",
             "cases/{case}/section",
+            "cases/{case}/basin",
             "cases/{case}/trajectory",
         )
     ),
 }
+#: A few made-up requests may not find the results of a map, nor meet a study that nothing has deleted yet; and a slow
+#: process has not heard of a worker for a while.
+SELDOM_SERVED = {"DELETE /api/v1/studies/{study_id}", "GET /api/v1/studies/{study_id}/map", "GET /readyz"}
 TOKEN = "correct-horse-battery-staple"
 
 
@@ -83,7 +84,7 @@ def test_made_up_requests_are_answered_as_documented(
     told = "\n".join(f"{finding}\n{more}" for finding, more in summary.findings.items())
     assert not summary.findings, f"{summary}\n{told}"
     operations = {f"{method.upper()} {path}" for path, methods in document["paths"].items() for method in methods}
-    assert operations - set(summary.served) == NEVER_SERVED, sorted(operations - set(summary.served))
+    assert operations - set(summary.served) - SELDOM_SERVED == NEVER_SERVED, sorted(operations - set(summary.served))
     assert set(summary.phases) == {"examples", "coverage", "fuzzing", "stateful"}
     assert {401, 404, 405, 422} <= set(summary.statuses)
     assert set(CHECKS) <= set(summary.checks)

@@ -60,16 +60,16 @@ BODIES = {
 TARGETS = ("/api/v1/studies", "/api/v1/studies:preview", "/api/v1/clutch-fits", "/api/v1/schedules")
 
 
-@pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("name", BODIES)
-def test_a_hostile_body_is_refused_by_a_short_problem(service: Service, name: str, target: str) -> None:
+def test_a_hostile_body_is_refused_by_a_short_problem(service: Service, name: str) -> None:
     headers = {"Content-Type": "application/json"}
-    answer = service.http.post(target, content=BODIES[name], headers=headers)
-    assert answer.status_code in (413, 422), answer.text[:300]
-    assert answer.headers["content-type"] == "application/problem+json"
-    assert len(answer.content) < 60_000
-    answer.content.decode("utf-8")
-    assert service.get("/studies")["studies"] == []
+    for target in TARGETS:
+        answer = service.http.post(target, content=BODIES[name], headers=headers)
+        assert answer.status_code in (413, 422), (target, answer.text[:300])
+        assert answer.headers["content-type"] == "application/problem+json"
+        assert len(answer.content) < 60_000
+        answer.content.decode("utf-8")
+        assert service.get("/studies")["studies"] == []
 
 
 @pytest.mark.parametrize("name", [name for name in BODIES if name not in ("nothing", "deep lists", "deep objects")])
