@@ -19,7 +19,7 @@ from sprag.engine.machine_shaft.estimate import estimate_seconds
 from sprag.engine.machine_shaft.results import result_infos
 from sprag.engine.machine_shaft.simulate import simulate
 from sprag.engine.machine_shaft.spec import MachineSpec
-from tests.engine.machine_shaft import independent
+from tests.engine.machine_shaft import independent, random_machines
 from tests.engine.machine_shaft.machines import PRESS_NUMBERS
 from tests.engine.machine_shaft.test_parts import PRESS_PART, engine_machine, in_part, of_shaft
 
@@ -35,7 +35,7 @@ def main() -> None:
     arguments = parser.parse_args()
     largest: dict[str, float] = defaultdict(float)
     for seed in range(arguments.seed, arguments.seed + arguments.machines):
-        machine = independent.random_machine(np.random.default_rng(seed))
+        machine = random_machines.random_machine(np.random.default_rng(seed))
         batch = simulate(*engine_machine(machine), cases=1)
         found = dict(zip(NAMES, batch.values[0], strict=True))
         for name, value in independent.solve(machine).items():

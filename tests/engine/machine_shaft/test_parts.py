@@ -15,7 +15,7 @@ from sprag.engine.machine_shaft.simulate import check, simulate
 from sprag.engine.machine_shaft.spec import MachineSpec, MechanismChoice, OperationChoice, PartChoice
 from sprag.engine.machine_shaft.tables import Table
 from sprag.engine.machine_shaft.trajectory import trajectory
-from tests.engine.machine_shaft import independent
+from tests.engine.machine_shaft import independent, random_machines
 from tests.engine.machine_shaft.machines import PRESS, PRESS_NUMBERS, ending_of, one
 
 OF_PART = ("mechanism.", "operation.")
@@ -56,7 +56,7 @@ def engine_machine(machine: independent.MachineData) -> tuple[MachineSpec, dict[
 @pytest.mark.parametrize("seed", range(4))
 def test_random_machines_agree_with_an_independent_computation(seed: int) -> None:
     """`python -m benchmarks.machine_parts` compares 300 of them."""
-    machine = independent.random_machine(np.random.default_rng(seed))
+    machine = random_machines.random_machine(np.random.default_rng(seed))
     expected = independent.solve(machine)
     found = one(*engine_machine(machine))
     for name, value in expected.items():
@@ -212,7 +212,7 @@ def test_a_structure_with_parts_survives_json() -> None:
 def test_weights_of_all_bodies_are_those_of_their_heights(kind: str) -> None:
     """By complex steps through the heights; over a cycle they do no work. Two masses are a body with m s (L - s)."""
     rng = np.random.default_rng(11)
-    part = independent.PartData(kind, independent.RANDOM[kind](rng), 0.4)
+    part = independent.PartData(kind, random_machines.RANDOM[kind](rng), 0.4)
     part.dimensions["inclination"] = 0.7
     spec, numbers = engine_machine(independent.MachineData([part], 3.0, 25.0, 1))
     (only,) = spec.parts

@@ -1,0 +1,78 @@
+"""Machine shafts of several parts in specs: their paths, and faults and warnings at the place of each part."""
+
+from __future__ import annotations
+
+import copy
+import math
+from typing import Any
+
+import jsonschema
+import pytest
+
+from sprag.service.faults import warned
+from sprag.service.spec.document import parse_spec
+from sprag.service.spec.schema.document import spec_schema
+from tests.service.spec.machine.test_shaft import GAS, PRESS, changed, problems, study
+
+
+def of_parts(*angles: float) -> dict[str, Any]:
+    """Changes that make the press a machine of several, of the same mechanism and operation at these crank angles."""
+    own = {"mechanism": PRESS["base"]["mechanism"], "operation": PRESS["base"]["operation"]}
+    parts = [copy.deepcopy({**own, "crank_angle": f"{angle} deg"}) for angle in angles]
+    return {"/base/mechanism": ..., "/base/operation": ..., "/base/parts": parts, "/axes": []}
+
+
+def test_parts_have_the_fields_of_a_single_mechanism_at_their_own_paths() -> None:
+    axes = [{"path": "parts.1.crank_angle", "linspace": ["0 deg", "180 deg", 3]}]
+    derive = {"parts.1.mechanism.slider_crank.ram_mass": "2*parts.0.mechanism.slider_crank.ram_mass"}
+    derived = {"/base/parts/1/mechanism/slider_crank/ram_mass": ..., "/derive": derive}
+    changes = of_parts(0, 90) | {"/axes": axes} | derived
+    found = study(changes=changes)
+    assert found.structure is not None
+    assert [part["mechanism"]["kind"] for part in found.structure["parts"]] == ["slider_crank"] * 2
+    assert found.structure["mechanism"] == {"kind": "none"}
+    assert found.base["parts.0.crank_angle"] == 0.0
+    assert found.base["parts.1.operation.steps.0.value"] == 20e3
+    assert found.base["parts.1.mechanism.slider_crank.ram_mass"] == 40.0
+    assert found.columns(range(3))["parts.1.crank_angle"].tolist() == pytest.approx([0.0, math.pi / 2, math.pi])
+    jsonschema.Draft202012Validator(spec_schema()).validate(changed(changes))
+
+
+PARTS_WRONG: list[tuple[dict[str, Any], str, str]] = [
+    ({"/base/mechanism": {"formula": "1"}}, "/base/mechanism", "conflict"),
+    ({"/base/operation": {"quantity": "torque", "value": 1}}, "/base/operation", "conflict"),
+    ({"/base/parts": []}, "/base/parts", "wrong-type"),
+    ({"/base/parts": [{"crank": 1}]}, "/base/parts/0/crank", "unknown-field"),
+    ({"/base/parts/1/crank_angle": "3 m"}, "/base/parts/1/crank_angle", "wrong-unit"),
+    ({"/base/parts/1/mechanism/slider_crank/rod": "90 mm"}, "/base/parts/1/mechanism/slider_crank", "cannot-assemble"),
+    ({"/base/parts/1/mechanism": {"formula": "1"}}, "/base/parts/1/operation/steps", "invalid-machine"),
+    (
+        {"/base/parts/1": {"operation": {"quantity": "torque", "formula": "sqrt(phi - 1)"}}},
+        "/base/parts/1/operation/formula",
+        "invalid-formula",
+    ),
+    ({"/base/parts/0/operation/during": "forward"}, "/base/parts/0/operation/during", "not-used"),
+    (
+        {"/base/parts/1/operation": {"gas": GAS | {"clearance": 0.5}}},
+        "/base/parts/1/operation/gas/discharge_pressure",
+        "conflict",
+    ),
+    ({"/axes": [{"path": "parts.2.crank_angle", "values": [1]}]}, "/axes/0/path", "invalid-path"),
+    ({"/axes": [{"path": "mechanism.slider_crank.crank", "values": [1]}]}, "/axes/0/path", "invalid-path"),
+]
+
+
+@pytest.mark.parametrize(("changes", "pointer", "code"), PARTS_WRONG, ids=[f"{p} {s}" for _, p, s in PARTS_WRONG])
+def test_what_is_wrong_with_a_part_is_reported_at_its_place(changes: dict[str, Any], pointer: str, code: str) -> None:
+    found = problems(of_parts(0, 90) | changes)
+    assert found[pointer].code == code
+    if "parts.2" in str(changes):
+        assert "parts are numbered from 0 to 1" in found[pointer].message
+
+
+def test_parts_are_warned_of_like_a_single_mechanism() -> None:
+    axes = [{"path": "parts.1.operation.gas.discharge_pressure", "values": ["7 bar", "9 bar"]}]
+    changes = of_parts(0, 90) | {"/base/parts/1/operation": {"gas": GAS | {"clearance": 0.25}}, "/axes": axes}
+    found = parse_spec(changed(changes)).warnings
+    assert warned(found)["warning_codes"] == ["no-discharge"]
+    assert found[0].startswith("/axes/0 (parts.1.operation.gas.discharge_pressure): ")
