@@ -16,6 +16,8 @@ Test = Callable[["Node"], float]
 #: Arc length to which a special point is located, and the most points computed for it.
 PRECISION: Final = 1e-11
 _TRIES = 60
+#: Where else a point is tried, as parts of the bracket beside the estimate.
+_ASIDE = (0.0, 1e-3, -1e-3, 1e-2, -1e-2, 0.1, -0.1)
 #: Imaginary part from which on a multiplier counts as one of a complex pair.
 _COMPLEX = 1e-6
 
@@ -94,7 +96,9 @@ class Between:
         latest = high
         for _ in range(_TRIES):
             length = low + (high - low) * before / (before - after)
-            node = self.node(length)
+            # Where a period is halved the equations are singular right at the root.
+            places = [length + share * (high - low) for share in _ASIDE]
+            node, length = next(((found, place) for place in places if (found := self.node(place))), (None, length))
             if node is None:
                 return best
             best, value = node, test(node)

@@ -124,3 +124,13 @@ class Impact(Smooth):
     def fold(self) -> float:
         """Distance of the stop at which both orbits are one."""
         return math.sqrt(self.amplitude**2 + self.slope**-2)
+
+
+class Halved(Smooth):
+    """x -> x + x (p - x^2)/10 as the second iterate of a map that turns x into -x: its period is halved at p = 0."""
+
+    def images(self, points: Floats, parameters: Floats) -> Floats:
+        return points + 0.1 * points * (parameters[:, None] - points**2)
+
+    def half(self, point: Floats, parameter: float) -> float:
+        return float(2.0 * abs(point[0]))

@@ -12,7 +12,7 @@ from scipy.optimize import brentq, root
 
 from sprag.engine.continuation.follow import Range, follow
 from sprag.engine.continuation.problem import Branch, End, Kind
-from tests.engine.continuation.problems import Duffing, Impact
+from tests.engine.continuation.problems import Duffing, Halved, Impact
 
 Floats = NDArray[np.float64]
 
@@ -83,6 +83,14 @@ def test_one_impact_orbits_have_their_closed_form() -> None:
     # Both orbits of one stop, before and after the fold.
     middle = [point for point in made.points if -1.3 < point.parameter < -0.6]
     assert {point.stable for point in middle} == {True, False}
+
+
+@pytest.mark.parametrize("parameter", [0.5, 0.6, 0.75])
+def test_a_branch_ends_where_its_period_is_halved(parameter: float) -> None:
+    made = follow(Halved(), [math.sqrt(parameter)], parameter, Range(-1.0, 1.5))
+    assert made.ends == (End.HALVED, End.RANGE)
+    (doubling,) = made.specials
+    assert (doubling.kind, doubling.parameter) == (Kind.DOUBLING, pytest.approx(0.0, abs=1e-9))
 
 
 def test_a_range_without_the_parameter_is_refused() -> None:

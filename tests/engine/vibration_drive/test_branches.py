@@ -62,6 +62,13 @@ def test_a_period_doubles_where_both_branches_say(first: DriveBranch, second: Dr
     assert speeds[grazing.index + 1] == pytest.approx(speeds[grazing.index], rel=1e-7)
 
 
+def test_a_period_is_halved_where_the_equations_are_singular() -> None:
+    """The steps of this branch are symmetrical to the doubling, so that the first estimate of its place meets it."""
+    made = branch(machines, 0.05, SettledRun(), Range(0.03, 0.4), (0.0, np.inf))
+    assert (made.order, made.ends) == (4, (End.RANGE, End.HALVED))
+    assert made.specials[-1].parameter == pytest.approx(0.08947439, abs=1e-7)
+
+
 def test_stable_points_are_the_settled_cases(first: DriveBranch, second: DriveBranch) -> None:
     for made in (first, second):
         # Near a doubling cases take longer to settle than they may; near a grazing engagements last by its root.
