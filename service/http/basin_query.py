@@ -13,4 +13,4 @@ Across = Annotated[
 ]
 Along = Annotated[str | None, Query(description="the other initial value; by default the next one")]
 End = Annotated[str | None, Query(description="SI or with a unit; by default as in the study's starts", max_length=80)]
-Points = Annotated[int, Query(ge=2, le=MAX_BASIN_POINTS, description="values of each")]
+Points = Annotated[int, Query(ge=2, le=MAX_BASIN_POINTS, description="values of each", examples=[2])]
