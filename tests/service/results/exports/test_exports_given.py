@@ -81,8 +81,10 @@ def test_sheets_of_two_machines_differ_where_the_machines_do(service: Service) -
 PRESS_DEFAULTS = {
     "cycle": "1 revolution",
     "drive.torque": 0,
+    "friction_torque": 0,
     "gravity": 9.80665,
     "mechanism.slider_crank.offset": 0,
+    "operation.efficiency": 1,
     "operation.scale": 1,
     "operation.sense": "resisting",
     "phi_c": "the first at which T rises",
