@@ -43,7 +43,9 @@ def as_parameters(row: Floats) -> dict[str, float]:
     return values
 
 
-def end_state(columns: Mapping[str, ArrayLike], settings: Run | SettledRun) -> dict[str, float] | None:
+def end_state(
+    columns: Mapping[str, ArrayLike], settings: Run | SettledRun, start: Floats | None = None
+) -> dict[str, float] | None:
     """The initial values (SI) that go on from the end of a case; None where it does not end ok.
 
     For a settled run a state of the settled motion; for a run of a given time that after its last whole period.
@@ -53,6 +55,8 @@ def end_state(columns: Mapping[str, ArrayLike], settings: Run | SettledRun) -> d
     columns : mapping
         As for ``simulate``, scalars only.
     settings : Run or SettledRun
+    start : array, shape (1, strobes.width(n)), optional
+        The state from which a settled case starts, as ``starts`` of ``settle``.
 
     Raises
     ------
@@ -61,7 +65,7 @@ def end_state(columns: Mapping[str, ArrayLike], settings: Run | SettledRun) -> d
     """
     values = scalars(columns)
     if isinstance(settings, SettledRun):
-        found = settle(values, settings, cases=1)
+        found = settle(values, settings, cases=1, starts=start)
         if ENDINGS[int(found.endings[0])] is not Ending.OK:
             return None
         rows, arrived = whole_periods(values, settings, found.points)

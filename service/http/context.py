@@ -129,4 +129,5 @@ def started(study: Study, case: int, start: int | None) -> tuple[Study, int]:
     count = count_of(study.run)
     if start >= count:
         raise parameter_error("start", "out-of-range", "there is no such start", start, f"0 to {count - 1}")
-    return at_start(study, case, start), 0
+    # A case of a sweep starts from the cases before it, and has no other starts.
+    return (study, case) if study.sweep is not None else (at_start(study, case, start), 0)

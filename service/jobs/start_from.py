@@ -30,13 +30,14 @@ def with_start(store: Store, data: Any) -> Any:
     if not isinstance(base, Mapping) or START not in base:
         return data
     report = Report(data)
-    study = _source(report, store, base[START], data)
+    source = _source(report, store, base[START], data)
     report.raise_if_any()
-    assert study is not None
+    assert source is not None
+    study, case = source
     shape = models.shape_of(study)
     if not models.is_compiled(shape):
         raise NotCompiledError(shape)
-    values = models.run_end_state(study, 0)
+    values = models.run_end_state(study, case)
     if values is None:
         report.fault(_POINTER, "conflict", "the case does not end ok", base[START], allowed="a case that ends ok")
         raise report.error()
@@ -47,8 +48,8 @@ def with_start(store: Store, data: Any) -> Any:
     return {**data, "base": new}
 
 
-def _source(report: Report, store: Store, data: object, spec: Mapping[str, Any]) -> Study | None:
-    """The study of the single case that is gone on from; None, with faults recorded, where there is none."""
+def _source(report: Report, store: Store, data: object, spec: Mapping[str, Any]) -> tuple[Study, int] | None:
+    """A study and the case in it that is gone on from; None, with faults recorded, where there is none."""
     found = read_object(report, _POINTER, data, ("study", "case", "start"))
     if found is None:
         return None
@@ -71,7 +72,8 @@ def _source(report: Report, store: Store, data: object, spec: Mapping[str, Any])
         report.fault(f"{_POINTER}/start", "out-of-range", "is out of range", start, allowed=f"0 to {count - 1:,}")
     if report.found or case is None or start is None:
         return None
-    return at_start(study, case, start)
+    # A case of a sweep starts from the cases before it.
+    return (study, case) if study.sweep is not None else (at_start(study, case, start), 0)
 
 
 def _put(report: Report, base: dict[str, Any], path: str, value: float) -> None:

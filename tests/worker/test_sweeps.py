@@ -234,3 +234,15 @@ def test_motion_engagements_and_portrait_are_those_of_the_row() -> None:
     # On its neighbour's orbit the row below starts near its own; from rest it would begin in equilibrium.
     first = models.run_portrait(study, 5).strobes
     assert abs(first.values[0, first.names.index("pendulums.0.angle")]) > 1e-3
+
+
+@pytest.mark.parametrize(("case", "speed"), [(4, 0.3844941463), (5, 0.5579460807)])
+def test_the_end_of_a_case_is_that_of_the_motion_it_has_in_its_sweep(case: int, speed: float) -> None:
+    study = swept(loads=(0.4,))
+    state = models.run_end_state(study, case)
+    assert state is not None
+    base = {**study.base, **study.case_parameters(case), **state}
+    del base["sweep"]
+    alone = Study("vibration-drive", "alone", base, dict(RUN), ())
+    place = [info.name for info in models.study_results(alone)].index("shaft.speed.mean")
+    assert models.run_chunk(alone, 0, 1).values[0, place] == pytest.approx(speed, abs=1e-9)

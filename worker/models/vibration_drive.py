@@ -296,7 +296,7 @@ class VibrationDrive(Model):
         from sprag.engine.vibration_drive.start_states import end_state
 
         settings = settings_of(study.run) if is_settled(study.run) else run_of(study.run)
-        return end_state(case_machine(study, case), settings)
+        return end_state(case_machine(study, case), settings, start_of(study, case))
 
     def lanes_per_case(self, study: Study) -> int:
         return count_of(study.run)

@@ -46,6 +46,7 @@ def read_sweep(report: Report, found: Mapping[str, Any]) -> tuple[int, str] | No
     conflicts = {
         "`refine`, `goal` or `calibrate`, or an adaptive axis": chooses(found),
         "`tolerances`": "tolerances" in found,
+        "`starts`": "starts" in found,
         "`exclude`": "exclude" in found,
         f"combine: {found.get('combine')!r}": found.get("combine", "grid") != "grid",
         "samples, points or groups": any(

@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sprag.service.http.context import started
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.form.spec import field_of, spec_of, values_of
 from sprag.service.jobs.answers import curves_of
 from sprag.service.jobs.local import run_here
+from sprag.service.jobs.start_from import with_start
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import main_query
 from sprag.service.results.figures.curves import curves_figure
@@ -169,3 +171,22 @@ def test_the_form_keeps_a_sweep() -> None:
     spec, _ = spec_of(values)
     assert [axis.get("sweep") for axis in spec["axes"]] == ["both", None]
     assert field_of("/axes/0/sweep", values) == "/axes/0/sweep"
+
+
+def test_a_case_of_a_sweep_is_gone_on_from_in_its_sweep(
+    service: Service, study_id: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = service.store.study(study_id)
+    assert started(study, 3, 0) == (study, 3)
+    asked: list[tuple[Study, int]] = []
+
+    def run_end_state(study: Study, case: int) -> dict[str, float]:
+        asked.append((study, case))
+        return {"shaft.initial_speed": 2.5}
+
+    monkeypatch.setattr(models, "run_end_state", run_end_state)
+    monkeypatch.setattr(models, "is_compiled", lambda _: True)
+    spec = changed({"/run": {"until": "settled"}, "/axes": [], "/base/start": {"study": study_id, "case": 3}})
+    spec["base"]["shaft"].pop("initial_speed", None)
+    assert with_start(service.store, spec)["base"]["shaft"]["initial_speed"] == 2.5
+    assert asked == [(study, 3)]
