@@ -81,7 +81,8 @@ def balanced(
         return Balanced(drive, resistance, one, ~within, *works)
     own_work = works[0] if side == "drive" else panels.integral(operation)
     rest_work = works[1] if side == "drive" else works[0] + panels.integral(resistance - operation)
-    opposite = (own_work * rest_work < 0.0) & (np.abs(own_work) > 1e-9 * largest)
+    least = np.minimum(np.abs(own_work), np.abs(rest_work))
+    opposite = (own_work * rest_work < 0.0) & (least > 1e-9 * largest)
     factor = np.where(opposite, -rest_work / np.where(opposite, own_work, 1.0), 1.0)
     wrong = ~(opposite | within)
     if side == "drive":

@@ -95,20 +95,27 @@ class UnbalancedWorkError(MachineError):
 
     ending = Ending.UNBALANCED_WORK
 
-    def __init__(self, drive: float, resistance: float, scaled: str = "") -> None:
+    def __init__(self, drive: float, resistance: float, scaled: str = "", friction: float = 0.0) -> None:
         super().__init__(
             f"The work over a cycle is not zero: the drive does {drive:.6g} J and the resistance {resistance:.6g} J. "
-            + self._advice(drive, resistance, scaled)
+            + self._advice(drive, resistance, scaled, friction)
         )
         self.drive, self.resistance = drive, resistance
 
     @staticmethod
-    def _advice(drive: float, resistance: float, scaled: str) -> str:
+    def _advice(drive: float, resistance: float, scaled: str, friction: float) -> str:
         if not scaled:
             return 'Steady motion needs opposite works: choose balance "scale" or "constant", or correct the torques.'
-        own, other = (drive, resistance) if scaled == "driving torque" else (resistance, drive)
+        own, other = (drive, resistance) if scaled == "driving torque" else (resistance + friction, drive)
         if abs(own) <= 1e-9 * abs(other):
             return f"No factor on the {scaled} balances that, since it does no work over a cycle of its own."
+        if abs(other) <= 1e-9 * abs(own):
+            rest = "operation" if scaled == "driving torque" else "driving torque"
+            return f"No positive factor on the {scaled} balances that, since the {rest} does no work over a cycle."
+        if scaled == "operation" and own < 0.0 < drive:
+            return (
+                f"No positive factor on the operation balances that: the friction of the shaft takes {friction:.6g} J."
+            )
         if drive < 0.0 and resistance < 0.0:
             return f"No positive factor on the {scaled} balances that: the driving torque brakes, too."
         return f"No positive factor on the {scaled} balances that: the operation drives instead of resisting."

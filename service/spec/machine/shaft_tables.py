@@ -28,6 +28,10 @@ def read_csv_rows(report: Report, where: str, text: object, *columns: Parameter)
     if len(headings) != len(columns) or None in headings:
         report.fault(where, "wrong-type", f"must have {len(columns)} columns with headings", allowed=example)
         return []
+    if any(parse_number(cell.replace(",", ".")) is not None for cell in rows[0].cells):
+        told = "must begin with headings: its first line has a number, which would be lost"
+        report.fault(where, "wrong-type", told, ", ".join(rows[0].cells), allowed=example)
+        return []
     units = [(heading[2] or "") if heading else "" for heading in headings]
     before = report.found
     for unit, column in zip(units, columns, strict=True):

@@ -159,6 +159,12 @@ def test_what_no_factor_balances_is_named() -> None:
         check(ENGINE, numbers)
     with pytest.raises(UnbalancedWorkError, match=r"No factor on the operation .* no work over a cycle"):
         check(ENGINE, PRESS_NUMBERS | {"operation.scale": 0.0})
+    with pytest.raises(UnbalancedWorkError, match=r"No factor on the operation .* no work over a cycle"):
+        check(ENGINE, PRESS_NUMBERS | {"operation.scale": 0.0, "friction_torque": 5.0})
+    with pytest.raises(UnbalancedWorkError, match="since the driving torque does no work"):
+        check(replace(ENGINE, drive=Drive("formula", formula="50*sin(phi)")), PRESS_NUMBERS)
+    with pytest.raises(UnbalancedWorkError, match=r"the friction of the shaft takes 942.478 J"):
+        check(ENGINE, PRESS_NUMBERS | {"friction_torque": 150.0})
     with pytest.raises(UnbalancedWorkError, match="the driving torque brakes, too"):
         check(replace(ENGINE, balance_side="drive", drive=Drive("formula", formula="-50 + cos(phi)")), PRESS_NUMBERS)
 

@@ -61,6 +61,8 @@ def test_an_indicator_diagram() -> None:
             "the heading of column angle is in 'kg'",
         ),
         ({"quantity": "torque", "csv": "angle\n0\n1\n"}, "csv", "must have 2 columns"),
+        ({"quantity": "torque", "csv": "0,10\n3.14,2\n6.28,1\n"}, "csv", "must begin with headings"),
+        ({"quantity": "torque", "csv": "0;10,5\n3,14;2\n6,28;1\n"}, "csv", "must begin with headings"),
         ({"quantity": "torque", "csv": [[0, 1]]}, "csv", "must be the text of a CSV file"),
         ({"quantity": "torque", "csv": TORQUE, "table": [[0, 1], [1, 2]]}, "", "exactly one"),
         ({"indicator": INDICATOR, "quantity": "force"}, "quantity", "does not belong to a gas"),
