@@ -44,6 +44,7 @@ def with_start(store: Store, data: Any) -> Any:
     new = {name: part for name, part in base.items() if name != START}
     for path, value in values.items():
         _put(report, new, path, value)
+    _check_pendulums(report, new, values)
     report.raise_if_any()
     return {**data, "base": new}
 
@@ -74,6 +75,15 @@ def _source(report: Report, store: Store, data: object, spec: Mapping[str, Any])
         return None
     # A case of a sweep starts from the cases before it.
     return (study, case) if study.sweep is not None else (at_start(study, case, start), 0)
+
+
+def _check_pendulums(report: Report, base: Mapping[str, Any], values: Mapping[str, float]) -> None:
+    """Record a fault where the base has more pendulums than the case that is gone on from."""
+    count = len({path.split(".")[1] for path in values if path.startswith("pendulums.")})
+    own = base.get("pendulums")
+    if isinstance(own, list) and len(own) > count:
+        message = f"the base has {len(own)} pendulums, the case has {count}"
+        report.fault("/base/pendulums", "conflict", message, allowed="as many as the case")
 
 
 def _put(report: Report, base: dict[str, Any], path: str, value: float) -> None:

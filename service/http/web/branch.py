@@ -11,7 +11,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError
-from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
+from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, started, study_with
 from sprag.service.http.respond import json_response
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.study import study_frame
@@ -37,19 +37,22 @@ End = Annotated[str, Query(alias="to", max_length=80)]
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/branch")
 def branch_page(
-    context: Ctx, study_id: StudyId, case: CaseNumber, along: Text = "", low: Begin = "", high: End = "", y: Text = ""
-) -> Response:
+    context: Ctx, study_id: StudyId, case: CaseNumber, along: Text = "", low: Begin = "", high: End = "",
+    y: Text = "", which: StartNumber = None,
+) -> Response:  # fmt: skip
     """The form of a branch, and its figure."""
     study = study_with(context, study_id, case)
     require_strobes(study)
+    started(study, case, which)
     path = along or usual_along(study)
+    start = "" if which is None else str(which)
     faults: tuple[Any, ...] = ()
     query = ""
     try:
         result = result_of(study, y)
         if path:
             along_of(study, case, path, low, high)
-            given = {"along": path, "from": low.strip(), "to": high.strip(), "y": result}
+            given = {"along": path, "from": low.strip(), "to": high.strip(), "y": result, "start": start}
             query = urlencode({name: value for name, value in given.items() if value})
     except FaultError as error:
         result, faults = y, error.faults
@@ -60,6 +63,7 @@ def branch_page(
         **study_frame(context, study_id),
         tab="/cases",
         case=case,
+        start=start,
         along=path,
         low=low,
         high=high,
@@ -74,15 +78,16 @@ def branch_page(
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/branch/figure")
 async def branch_drawn(
-    work: Attended, study_id: StudyId, case: CaseNumber, along: Text, low: Begin = "", high: End = "", y: Text = ""
-) -> Response:
+    work: Attended, study_id: StudyId, case: CaseNumber, along: Text, low: Begin = "", high: End = "",
+    y: Text = "", which: StartNumber = None,
+) -> Response:  # fmt: skip
     """The figure of a branch, with the cases of the study along its parameter."""
 
     def look(study: Study, number: int) -> tuple[Along, str]:
         return along_of(study, number, along, low, high), result_of(study, y)
 
     study, _, (asked, result) = await work.case_of(study_id, case, look)
-    made = await work.run_case(run_branch, study, case, asked)
+    made = await work.run_case(run_branch, *started(study, case, which), asked)
     own = await run_in_threadpool(_own_cases, work.context, study_id, study, case, asked, result)
     return json_response(plotly_figure(branch_figure(made, study, asked, result, own)))
 

@@ -146,7 +146,7 @@ def case_page(
         file=f"/api/v1{own}/trajectory?{query}&points={SAMPLES}&format=csv",
         clutches=f"{own}/engagements{own_start}" if models.has_clutches(study) else "",
         strobes=f"{own}/strobes{own_start}" if models.has_strobes(study) else "",
-        branch=f"{own}/branch" if models.has_strobes(study) else "",
+        branch=f"{own}/branch{own_start}" if models.has_strobes(study) else "",
         settled=models.is_settled(study.run),
         last=study.cases - 1,
     )

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError
-from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
+from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, started, study_with
 from sprag.service.http.drawing import unchanging
 from sprag.service.http.respond import json_response
 from sprag.service.http.web.figures.plotly import plotly_figure
@@ -42,22 +42,24 @@ _SECTION: Final = 1000
 @router.get("/studies/{study_id:study}/cases/{case:case}/diagram")
 def diagram_page(
     context: Ctx, study_id: StudyId, case: CaseNumber, along: Text = "", low: Begin = "", high: End = "",
-    phase: Phase = "", y: Text = "",
+    phase: Phase = "", y: Text = "", which: StartNumber = None,
 ) -> Response:  # fmt: skip
     """The form of a diagram, its figure, and the section of the case."""
     study = study_with(context, study_id, case)
     require_strobes(study)
+    started(study, case, which)
+    start = "" if which is None else str(which)
     path = along or usual_along(study)
     faults: tuple[Any, ...] = ()
     diagram = section = ""
     try:
         shown = variable_of(study, y)
         section_of(study, case, phase, _SECTION)
-        section = urlencode([("phase", phase.strip())] if phase.strip() else [])
+        section = _query({"phase": phase.strip(), "start": start})
         if path:
             diagram_of(study, case, path, (low, high), phase, _SIZE)
             asked = {"along": path, "from": low.strip(), "to": high.strip(), "phase": phase.strip(), "y": shown}
-            diagram = urlencode({name: value for name, value in asked.items() if value})
+            diagram = _query(asked | {"start": start})
     except FaultError as error:
         shown, faults = y, error.faults
     own = f"/studies/{study_id}/cases/{case}"
@@ -67,6 +69,7 @@ def diagram_page(
         **study_frame(context, study_id),
         tab="/cases",
         case=case,
+        start=start,
         along=path,
         low=low,
         high=high,
@@ -84,7 +87,7 @@ def diagram_page(
 @router.get("/studies/{study_id:study}/cases/{case:case}/diagram/figure")
 async def diagram_drawn(
     work: Attended, study_id: StudyId, case: CaseNumber, along: Text, low: Begin = "", high: End = "",
-    phase: Phase = "", y: Text = "",
+    phase: Phase = "", y: Text = "", which: StartNumber = None,
 ) -> Response:  # fmt: skip
     """The figure of a bifurcation diagram."""
 
@@ -94,14 +97,16 @@ async def diagram_drawn(
     study, _, (asked, shown) = await work.case_of(study_id, case, look)
 
     async def make() -> Response:
-        made = await work.run_case(run_sections, study, case, asked)
+        made = await work.run_case(run_sections, *started(study, case, which), asked)
         return json_response(plotly_figure(diagram_figure(made, study, asked, shown)))
 
     return await unchanging(work, study_id, make)
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/section/figure")
-async def section_drawn(work: Attended, study_id: StudyId, case: CaseNumber, phase: Phase = "") -> Response:
+async def section_drawn(
+    work: Attended, study_id: StudyId, case: CaseNumber, phase: Phase = "", which: StartNumber = None
+) -> Response:
     """The figure of a Poincare section."""
 
     def look(study: Study, number: int) -> Sampling:
@@ -110,7 +115,11 @@ async def section_drawn(work: Attended, study_id: StudyId, case: CaseNumber, pha
     study, _, asked = await work.case_of(study_id, case, look)
 
     async def make() -> Response:
-        made = await work.run_case(run_sections, study, case, asked)
+        made = await work.run_case(run_sections, *started(study, case, which), asked)
         return json_response(plotly_figure(section_figure(made, study, asked)))
 
     return await unchanging(work, study_id, make)
+
+
+def _query(asked: dict[str, str]) -> str:
+    return urlencode({name: value for name, value in asked.items() if value})

@@ -6,10 +6,12 @@ import copy
 import csv
 import html
 import re
+from typing import Any
 
 import numpy as np
 import pytest
 
+from sprag.service.http.problems import ApiError
 from sprag.service.results import basins
 from sprag.service.results.basins import BasinQuery
 from sprag.service.spec.document import parse_spec
@@ -110,6 +112,28 @@ def test_the_page_of_a_case_lists_its_regimes(service: Service, started: str) ->
     assert f"/studies/{started}/cases/1/strobes?start=5&amp;columns=2" in other
 
 
+@pytest.mark.parametrize("figure", ["branch", "diagram", "section"])
+def test_pages_of_a_regime_follow_its_motion(service: Service, started: str, figure: str) -> None:
+    case = f"/studies/{started}/cases/1"
+    which = "branch" if figure == "branch" else "diagram"
+    assert f"{case}/{which}?start=5" in service.http.get(case, params={"start": "5"}).text
+    asked = {"start": "5", "along": "shaft.load", "from": "0.1", "to": "0.3"}
+    page = html.unescape(service.http.get(f"{case}/{which}", params=asked).text)
+    (drawn,) = re.findall(f'data-figure="({case}/{figure}/figure[^"]*)"', page)
+    assert "start=5" in drawn
+    assert '<input type="hidden" name="start" value="5">' in page
+    assert f'{case}?start=5">' in page
+
+    def not_here(*_: Any) -> Any:
+        raise ApiError("not-computed", "It is not computed here.")
+
+    service.computer.answer = not_here
+    service.http.get(drawn)
+    _, study, number, *_ = service.computer.calls[-1]
+    values = service.store.study(started).run["starts"]["values"][SPEED]
+    assert (number, study.base[SPEED], study.base["shaft.load"]) == (0, values[4], 0.2)
+
+
 def test_a_study_begins_at_the_end_of_a_case(service: Service, started: str, monkeypatch: pytest.MonkeyPatch) -> None:
     end = {SPEED: 12.5, "pendulums.0.initial_windup": 0.01, "pendulums.0.initial_clutch": 2.0}
     asked: list[tuple[float, int]] = []
@@ -142,6 +166,10 @@ def test_a_study_begins_at_the_end_of_a_case(service: Service, started: str, mon
         wrong["base"]["start"] |= change
         answer = service.http.post(f"{API}/studies", json=wrong)
         assert (answer.status_code, [fault["pointer"] for fault in answer.json()["errors"]]) == (422, [where])
+    more = copy.deepcopy(spec)
+    more["base"]["pendulums"] *= 2
+    answer = service.http.post(f"{API}/studies", json=more)
+    assert [fault["pointer"] for fault in answer.json()["errors"]] == ["/base/pendulums"]
     spec["base"]["shaft"]["initial_speed"] = 1
     answer = service.http.post(f"{API}/studies", json=spec)
     assert [fault["pointer"] for fault in answer.json()["errors"]] == ["/base/shaft/initial_speed"]
