@@ -13,13 +13,15 @@ from benchmarks.faults import harness
 from sprag.service.jobs.preview import estimated_bytes
 from sprag.service.storage.room import RESERVE_BYTES
 
+#: At least the size of a database without studies.
+_EMPTY_BYTES = 1_500_000
 _STATE = "SELECT state FROM studies WHERE id = ?"
 
 
 def file_limit(folder: Path, *, cases: int, studies: int) -> dict[str, Any]:
     """Run studies under a limit of file sizes that is too small for all of them, and raise it when they are held."""
     specs = [harness.spec(cases, 20.0 + 0.5 * number) for number in range(studies)]  # none has rows for another
-    room = int(0.6 * studies * estimated_bytes(harness.study_of(specs[0]))) + RESERVE_BYTES + 1_000_000
+    room = int(0.6 * studies * estimated_bytes(harness.study_of(specs[0]))) + RESERVE_BYTES + _EMPTY_BYTES
     service = harness.Service(folder, "--processes", 1, "--chunk", 250)
     service.before_exec = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
     service.start()

@@ -14,7 +14,8 @@ from sprag.service.spec.document import SpecError, parse_spec
 from sprag.service.spec.schema.document import spec_schema
 from sprag.worker.rounds import Rounds
 from sprag.worker.spread import DRIVE
-from tests.service.searching import run_round, spec_of
+from tests.service.rounds import run_round
+from tests.service.searching import rows_of, spec_of
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
@@ -63,7 +64,7 @@ def ended(service: Service) -> tuple[Service, str]:
     store = service.store
     number, epoch, planner = store.get_study(study_id).number, store.take_over("test"), Rounds(store)
     for _ in range(9):
-        run_round(store, number, epoch)
+        run_round(store, number, epoch, rows_of)
         if planner.advance(epoch, number, store.study(study_id)) is None:
             break
     return service, study_id

@@ -46,10 +46,11 @@ def submit(executor: Executor, chunks: int, size: int = 4) -> None:
 
 def pool_processes() -> list[psutil.Process]:
     """Processes of the pools that live."""
-    found = []
+    found, own = [], psutil.Process().cmdline()
     for child in psutil.Process().children():
         with suppress(psutil.NoSuchProcess):  # a zombie is one, too
-            if "spawn_main" in " ".join(child.cmdline()):
+            command = child.cmdline()
+            if "spawn_main" in " ".join(command) or command == own:  # of a new process, as long as it is not replaced
                 found.append(child)
     return found
 

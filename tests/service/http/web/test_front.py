@@ -14,7 +14,8 @@ from sprag.service.results.fronts import Designs, designs_of
 from sprag.service.spec.design import design_spec
 from sprag.service.spec.document import parse_spec
 from tests.service.conftest import API, Service
-from tests.service.searching import run_round, search
+from tests.service.rounds import run_round
+from tests.service.searching import rows_of, search
 
 
 def test_the_page_shows_the_best_designs_with_their_links(service: Service) -> None:
@@ -121,7 +122,7 @@ def test_designs_are_ranked_once_for_all_that_shows_them(service: Service, monke
     assert ranked == [False]
     before = service.http.get(pages[0]).text.count("data-design=")
     record = service.store.get_study(study_id)
-    run_round(service.store, record.number, service.store.take_over("test"))
+    run_round(service.store, record.number, service.store.take_over("test"), rows_of)
     assert service.http.get(pages[0]).text.count("data-design=") > before
     assert {service.http.get(f"{page}?exact=true").status_code for page in pages[:2]} == {200}
     assert ranked == [False, False, True]
