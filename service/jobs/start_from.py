@@ -81,7 +81,7 @@ def _check_pendulums(report: Report, base: Mapping[str, Any], values: Mapping[st
     """Record a fault where the base has more pendulums than the case that is gone on from."""
     count = len({path.split(".")[1] for path in values if path.startswith("pendulums.")})
     own = base.get("pendulums")
-    if isinstance(own, list) and len(own) > count:
+    if isinstance(own, list) and 0 < count < len(own):
         message = f"the base has {len(own)} pendulums, the case has {count}"
         report.fault("/base/pendulums", "conflict", message, allowed="as many as the case")
 
