@@ -40,7 +40,7 @@ def test_the_service_ends_soon_with_open_streams_and_hands_running_chunks_back(t
         assert any(line == "event: progress" for line in lines)
         service.stop()
         assert "event: end" not in list(lines)
-    assert harness.asked(service.database, claimed) == 0
+    assert harness.asked(service.database, claimed) == 0, service.log.read_text()
     assert harness.asked(service.database, "SELECT count(*) FROM chunks WHERE failures > 0") == 0
     assert harness.asked(service.database, "SELECT state FROM studies") == "running"
 
