@@ -165,8 +165,9 @@ class _Walk:
             # The disturbed points must all lie beyond, too.
             inside = node.at(size + 10.0 * DISTURBANCE)
             tangent = self.corrector.tangent_at(node.map, inside, node.tangent)
-            for sign in (1.0, -1.0) if tangent is not None else ():
-                assert tangent is not None
+            if tangent is None:
+                return End.GRAZING
+            for sign in (1.0, -1.0):
                 direction = [sign * part for part in tangent]
                 for step in (1e-5, 1e-4, 1e-3):
                     guess = [a + step * b for a, b in zip(node.z, direction, strict=True)]

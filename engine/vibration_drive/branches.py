@@ -11,12 +11,12 @@ from sprag.engine.continuation.follow import Range, follow
 from sprag.engine.continuation.problem import End, Point, Special
 from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.cases import Column, case_matrix, pendulum_count, scalars, with_lengths
+from sprag.engine.vibration_drive.cases import Column, case_matrix, scalars, with_lengths
 from sprag.engine.vibration_drive.characteristics import characteristics
 from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import kernel_of
+from sprag.engine.vibration_drive.kernel import Kernel, kernel_of
 from sprag.engine.vibration_drive.orbits import find_units
-from sprag.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag.engine.vibration_drive.regimes import Regime
 from sprag.engine.vibration_drive.results import OF_RUNS, result_infos
 from sprag.engine.vibration_drive.return_map import DriveMap, Machines
 from sprag.engine.vibration_drive.settle import settle
@@ -94,24 +94,19 @@ def branch(
     if regime != Regime.PERIODIC:
         what = ending.sentence if ending != Ending.OK else regime.sentence
         raise NoOrbitError(f"the case has no periodic motion of a turning shaft to be followed: {what}")
-    names = [info.name for info in settled_infos(pendulum_count(columns))]
-    order = int(found.values[0, names.index("regime.order")])
-    map_ = DriveMap(
-        kernel_of(columns, settings.tolerance), machines, bounds, settings.fine, order, found.points[0],
-        _units(machines, parameter, settings, found.points, order),
-    )  # fmt: skip
+    order = int(found.orders[0])
+    kernel = kernel_of(columns, settings.tolerance)
+    units = _units(kernel, case_matrix(columns, settings.fine, 1), settings, found.points, order)
+    map_ = DriveMap(kernel, machines, bounds, settings.fine, order, found.points[0], units)
     made = follow(map_, map_.point(found.points[0]).tolist(), parameter, along)
     values = _results(map_, made.points)
     return DriveBranch(order, made.points, values, made.specials, made.ends, made.start)
 
 
-def _units(machines: Machines, parameter: float, settings: SettledRun, start: Floats, order: int) -> Floats:
+def _units(kernel: Kernel, matrix: Floats, settings: SettledRun, start: Floats, order: int) -> Floats:
     """Scales of the strobes' columns, from one turn of the orbit."""
-    run = settings.fine
-    matrix = case_matrix(machines(np.array([parameter])), run, 1)
-    kernel = kernel_of(machines(np.array([parameter])), settings.tolerance)
     turn = with_lengths(matrix, start[:, BEGIN], np.array([float(order)]), windowed=False)
-    strobes = integrate(kernel, turn, run, starts=start, strobes=order).strobes
+    strobes = integrate(kernel, turn, settings.fine, starts=start, strobes=order).strobes
     units = np.empty((1, start.shape[1]))
     find_units(strobes, np.zeros(1, dtype=np.int64), order, order, matrix[:, Column.NU], False, units)
     own: Floats = units[0]

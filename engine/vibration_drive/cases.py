@@ -73,6 +73,11 @@ def default_of(path: str) -> float | None:
     return _DEFAULTS[".".join("N" if part.isdigit() else part for part in path.split("."))]
 
 
+def of_cases(columns: Mapping[str, ArrayLike], cases: NDArray[np.int64] | slice) -> dict[str, ArrayLike]:
+    """The parameters of some cases of a batch."""
+    return {path: value[cases] if (value := np.asarray(column)).ndim else column for path, column in columns.items()}
+
+
 def scalars(columns: Mapping[str, ArrayLike]) -> dict[str, float]:
     """The parameters of one case as numbers."""
     return {path: float(np.asarray(value)) for path, value in columns.items()}

@@ -14,12 +14,12 @@ from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.outcome import Engagement, Engagements, PeriodMeans
 from sprag.engine.run import Run, SettledRun
 from sprag.engine.vibration_drive.automaton import Clutch
-from sprag.engine.vibration_drive.cases import Column, case_matrix, pendulum_count, with_lengths
+from sprag.engine.vibration_drive.cases import Column, case_matrix, with_lengths
 from sprag.engine.vibration_drive.integration import integrate
 from sprag.engine.vibration_drive.kernel import Kernel, kernel_of
 from sprag.engine.vibration_drive.layout import OUT_ENDING
 from sprag.engine.vibration_drive.pieces import Pieces, integrals, largest, products
-from sprag.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag.engine.vibration_drive.regimes import Regime
 from sprag.engine.vibration_drive.settle import settle
 from sprag.engine.vibration_drive.strobes import BEGIN
 
@@ -104,8 +104,7 @@ def settled_engagements(
     regime, ending = Regime(int(found.regimes[0])), ENDINGS[int(found.endings[0])]
     period = 1.0 / float(np.asarray(columns["excitation.frequency"]))
     repeats = regime.repeats
-    names = [info.name for info in settled_infos(pendulum_count(columns))]
-    turn = int(found.values[0, names.index("regime.order")]) if repeats else settings.max_period
+    turn = int(found.orders[0]) if repeats else settings.max_period
     name = regime.name.lower()
     unloaded = not float(np.asarray(columns.get("shaft.load", 1.0))) > 0.0
     if ending != Ending.OK or (unloaded and regime in (Regime.COASTING, Regime.HELD)):

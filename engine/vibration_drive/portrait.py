@@ -83,7 +83,7 @@ def settled_portrait(columns: Mapping[str, ArrayLike], settings: SettledRun, sta
     regime, ending = Regime(int(found.regimes[0])), ENDINGS[int(found.endings[0])]
     names = [info.name for info in settled_infos(pendulum_count(values))]
     row = dict(zip(names, found.values[0].tolist(), strict=True))
-    order = int(row["regime.order"]) if regime.repeats else 0
+    order = int(found.orders[0])
     run = settings.run
     periods = settings.at_most
     if regime.repeats and row["regime.settled_after"] < periods:

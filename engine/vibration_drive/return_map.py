@@ -102,7 +102,7 @@ class DriveMap:
         if self.order % 2:
             return math.inf
         row = self.state(point)
-        end = self.point(self._run(row[None], np.array([parameter]), self.order)[0, self.order // 2 - 1])
+        end = self.point(self._run(row[None], np.array([parameter]), self.order // 2)[0, -1])
         return math.inf if np.any(np.isnan(end)) else float(np.max(np.abs(end - point)))
 
     def _turn(self, row: Floats, parameter: float) -> Pieces | None:

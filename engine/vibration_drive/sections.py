@@ -12,9 +12,8 @@ from sprag.engine.vibration_drive.cases import case_matrix, with_lengths
 from sprag.engine.vibration_drive.integration import integrate
 from sprag.engine.vibration_drive.kernel import kernel_of
 from sprag.engine.vibration_drive.layout import OUT_ENDING
-from sprag.engine.vibration_drive.regimes import Regime, settled_infos
 from sprag.engine.vibration_drive.settle import settle
-from sprag.engine.vibration_drive.strobes import BEGIN, FRACTION, PENDULUM_WIDTH, SHAFT_WIDTH, in_order
+from sprag.engine.vibration_drive.strobes import BEGIN, FRACTION, in_order
 
 Floats = NDArray[np.float64]
 
@@ -68,13 +67,8 @@ def sections(
         As ``settle``.
     """
     found = settle(columns, settings, cases=cases, starts=starts)
-    kernel = kernel_of(columns, settings.tolerance)
-    n = kernel.LAYOUT.n
-    names = [info.name for info in settled_infos(n)]
-    repeats = np.isin(found.regimes, [regime for regime in Regime if regime.repeats])
-    orders = np.where(repeats, found.values[:, names.index("regime.order")], 0.0)
-    orders = np.where(np.isnan(orders), 0.0, orders).astype(np.int64)
-    strobes = np.full((cases, count, SHAFT_WIDTH + PENDULUM_WIDTH * n), np.nan)
+    orders = found.orders
+    strobes = np.full((cases, count, found.points.shape[1]), np.nan)
     kept = np.flatnonzero(found.endings == _OK)
     if len(kept):
         strobes[kept] = _strobes(columns, settings, found.points, kept, phase, count)

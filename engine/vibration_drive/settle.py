@@ -33,6 +33,7 @@ _UNCHANGED = 40
 #: may be from their contact-free orbit.
 _CREEPS, _FREELY = 0.01, 0.01
 _OK = ENDINGS.index(Ending.OK)
+_REPEATING = [regime for regime in Regime if regime.repeats]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +59,18 @@ class SettledBatch:
     regimes: NDArray[np.int8]
     points: Floats
     spent: Floats
+
+    @property
+    def repeats(self) -> NDArray[np.bool_]:
+        """Whether the motion of each case has an orbit, shape (cases,)."""
+        return np.isin(self.regimes, _REPEATING)
+
+    @property
+    def orders(self) -> Ints:
+        """Excitation periods in one turn of the orbit of each case, shape (cases,); 0 where there is none."""
+        names = [info.name for info in settled_infos((self.points.shape[1] - SHAFT_WIDTH) // PENDULUM_WIDTH)]
+        orders: Ints = np.nan_to_num(self.values[:, names.index("regime.order")]).astype(np.int64)
+        return orders
 
 
 class _Results:

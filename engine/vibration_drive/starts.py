@@ -1,4 +1,4 @@
-"""Coexisting motions: each case from many starts, and the regimes to which these come (docs/theory.md, "Starts")."""
+"""Each case from many starts, and the regimes to which these come (docs/theory.md, "Coexisting motions")."""
 
 import math
 from collections.abc import Mapping
@@ -15,6 +15,7 @@ from sprag.engine.vibration_drive.cases import (
     PendulumColumn,
     case_matrix,
     default_of,
+    of_cases,
     pendulum_column,
     pendulum_count,
     with_lengths,
@@ -57,7 +58,6 @@ TOGETHER = 4096
 #: 97.5 % point of the normal distribution.
 _NORMAL = 1.959963984540054
 _OK = ENDINGS.index(Ending.OK)
-_REPEATING = tuple(int(regime) for regime in Regime if regime.repeats)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,10 +126,7 @@ def settle_starts(
     parts: list[StartedBatch] = []
     step = max(1, TOGETHER // count)
     for first in range(0, cases, step):
-        some = {
-            path: column[first : first + step] if (column := np.asarray(value, dtype=np.float64)).ndim else column
-            for path, value in columns.items()
-        }
+        some = of_cases(columns, slice(first, first + step))
         parts.append(_settle_together(some, settings, own, count, min(step, cases - first)))
     if len(parts) == 1:
         return parts[0]
@@ -173,10 +170,9 @@ class _Motions:
         n = module.LAYOUT.n
         self.settled = settled
         self.ok: Flags = settled.endings == _OK
-        self.repeats: Flags = self.ok & np.isin(settled.regimes, _REPEATING)
-        names = [info.name for info in settled_infos(n)]
+        self.repeats: Flags = self.ok & settled.repeats
         self.kinds = settled.regimes.astype(np.int64)
-        self.orders = np.nan_to_num(settled.values[:, names.index("regime.order")], nan=0.0).astype(np.int64)
+        self.orders = settled.orders
         self.strobes = _orbits(module, matrix, settings, settled.points, self.orders)
         self.nu = matrix[:, Column.NU]
         self.means, self.half_widths = _means(settled.values, n)
@@ -287,8 +283,7 @@ def _run_longer(columns: Mapping[str, Floats], settings: SettledRun, motions: _M
             again.append(lanes[motions.ok[lanes] & ~motions.repeats[lanes]])
     rows = np.concatenate(again)
     if len(rows):
-        some = {path: column[rows] if column.ndim else column for path, column in columns.items()}
-        longer = settle(some, replace(settings, at_most=LONGER * settings.at_most), cases=len(rows))
+        longer = settle(of_cases(columns, rows), replace(settings, at_most=LONGER * settings.at_most), cases=len(rows))
         settled.values[rows], settled.endings[rows] = longer.values, longer.endings
         settled.regimes[rows], settled.points[rows] = longer.regimes, longer.points
     return len(rows) > 0

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.cases import Column, case_matrix, pendulum_count, with_lengths
+from sprag.engine.vibration_drive.cases import Column, case_matrix, of_cases, pendulum_count, with_lengths
 from sprag.engine.vibration_drive.integration import integrate
 from sprag.engine.vibration_drive.kernel import kernel_of
 from sprag.engine.vibration_drive.layout import OUT_ENDING
@@ -33,7 +33,6 @@ Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 _OK = ENDINGS.index(Ending.OK)
-_REPEATS = [int(regime) for regime in Regime if regime.repeats]
 #: Orbits are apart where they are so many times as far from each other as those around them in the line (the median of
 #: so many pairs to either side), and at least this far (scaled); without any others around, the last number.
 _TIMES, _AROUND, _LEAST, _ALONE = 4.0, 3, 0.02, 0.2
@@ -114,7 +113,7 @@ def sweep(columns: Mapping[str, ArrayLike], settings: SettledRun, lines: Ints) -
     starts = from_rest(count, n)
     before: Ints | None = None
     for cases in lines.T:
-        own = _rows(columns, cases)
+        own = of_cases(columns, cases)
         if before is not None:
             starts[cases], begun[cases] = _after(columns, settings, batch, before)
         found = settle(own, settings, cases=len(cases), starts=starts[cases])
@@ -124,21 +123,16 @@ def sweep(columns: Mapping[str, ArrayLike], settings: SettledRun, lines: Ints) -
     return Sweep(batch, begun, starts, _jumped(columns, settings, batch, starts, begun, lines))
 
 
-def _rows(columns: Mapping[str, ArrayLike], cases: Ints) -> dict[str, ArrayLike]:
-    """The columns of some cases."""
-    return {path: value[cases] if (value := np.asarray(column)).ndim else column for path, column in columns.items()}
-
-
 def _after(
     columns: Mapping[str, ArrayLike], settings: SettledRun, batch: SettledBatch, cases: Ints
 ) -> tuple[Floats, NDArray[np.int8]]:
     """The starts of the cases that follow ``cases``, and how they begin."""
     starts = from_rest(len(cases), pendulum_count(columns))
     ok = batch.endings[cases] == _OK
-    starts[ok], arrived = whole_periods(_rows(columns, cases[ok]), settings, batch.points[cases[ok]])
+    starts[ok], arrived = whole_periods(of_cases(columns, cases[ok]), settings, batch.points[cases[ok]])
     ok[ok] = arrived
     starts[~ok] = from_rest(1, pendulum_count(columns))
-    begun = np.where(np.isin(batch.regimes[cases], _REPEATS), Begun.ON_ORBIT, Begun.ARBITRARY)
+    begun = np.where(batch.repeats[cases], Begun.ON_ORBIT, Begun.ARBITRARY)
     return starts, np.where(ok, begun, Begun.AGAIN).astype(np.int8)
 
 
@@ -165,7 +159,7 @@ def whole_periods(columns: Mapping[str, ArrayLike], settings: SettledRun, points
     moved = np.flatnonzero(starts[:, BEGIN] > 0.0)
     if len(moved):
         begin = starts[moved, BEGIN]
-        matrix = case_matrix(_rows(columns, moved), settings.run, len(moved))
+        matrix = case_matrix(of_cases(columns, moved), settings.run, len(moved))
         matrix = with_lengths(matrix, begin, 1.0 - begin, windowed=False)
         module = kernel_of(columns, settings.tolerance)
         done = integrate(module, matrix, settings.fine, starts=starts[moved], strobes=1)
@@ -183,8 +177,7 @@ def _jumped(
     lines: Ints,
 ) -> Flags:
     """Which cases do not continue the motion of the case before them."""
-    names = [info.name for info in settled_infos((starts.shape[1] - SHAFT_WIDTH) // PENDULUM_WIDTH)]
-    order = np.nan_to_num(batch.values[:, names.index("regime.order")]).astype(np.int64)
+    order = batch.orders
     # Without a load a drive coasts, as the limit of a vanishing load.
     kind = np.where(batch.regimes == Regime.COASTING, Regime.PERIODIC, batch.regimes)
     found = np.zeros(len(starts), dtype=np.bool_)
@@ -221,7 +214,7 @@ def _apart(
     """
     own = np.union1d(cases, before)
     begin = points[own, BEGIN]
-    matrix = case_matrix(_rows(columns, own), settings.run, len(own))
+    matrix = case_matrix(of_cases(columns, own), settings.run, len(own))
     matrix = with_lengths(matrix, begin, order[own] - begin + (begin > 0.0), windowed=False)
     module, most = kernel_of(columns, settings.tolerance), int(order[own].max()) + 1
     orbits = integrate(module, matrix, settings.run, starts=continued(points[own]), strobes=most).strobes
