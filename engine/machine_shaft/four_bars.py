@@ -5,7 +5,16 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, lifted, number_of, reduced
+from sprag.engine.machine_shaft.mechanisms import (
+    Body,
+    HarmonicMechanism,
+    Motion,
+    RodMechanism,
+    Values,
+    lifted,
+    number_of,
+    reduced,
+)
 
 Floats = NDArray[np.float64]
 
@@ -101,7 +110,7 @@ def crank_rocker_rule(values: Values) -> str | None:
     return f"the crank ({crank:.6g} m) of a crank-rocker must be shorter than {told}{hint}"
 
 
-class FourBar(Mechanism):
+class FourBar(RodMechanism):
     """Crank and rocker; the crank's angle is counted from the frame, towards the side on which the rocker's pin is.
 
     ``frame``, ``crank``, ``coupler``, ``rocker`` are lengths. The coupler's centre of mass is at ``coupler_centre``
@@ -145,7 +154,7 @@ class FourBar(Mechanism):
         return 0.0 * one, np.pi * one
 
 
-class ParallelCrank(Mechanism):
+class ParallelCrank(HarmonicMechanism):
     """A parallelogram: two equal cranks joined by a coupler as long as the frame, which moves without turning.
 
     Every point of the coupler goes round a circle of the crank's radius. Its travel is counted along the direction in
@@ -155,22 +164,8 @@ class ParallelCrank(Mechanism):
     """
 
     ram_mass = "coupler_mass"
-    has_singular_positions = False
 
-    def motion(self, values: Values, phi: Floats) -> Motion:
-        """See Mechanism; the inertia is constant."""
-        r = values["crank"]
-        inertia = values["coupler_mass"] * r**2 + values["driven_inertia"]
-        return Motion(inertia, np.zeros((1, 1, 1)), r * (1.0 - np.cos(phi)), r * np.sin(phi))
-
-    def dead_centres(self, values: Values) -> tuple[Floats, Floats]:
-        """See Mechanism."""
-        return np.zeros_like(values["crank"]), np.full_like(values["crank"], np.pi)
-
-    def margin(self, values: Values, phi: Floats) -> Floats:
-        """See Mechanism; any crank can be assembled."""
-        return np.ones(np.broadcast_shapes(values["crank"].shape, phi.shape))
-
-    def worst_angles(self, values: Values) -> Sequence[Floats]:
-        """See Mechanism."""
-        return (np.zeros_like(values["crank"]),)
+    def inertia(self, values: Values, phi: Floats) -> tuple[Floats, Floats]:
+        """See HarmonicMechanism; it is constant."""
+        del phi
+        return values["coupler_mass"] * values["crank"] ** 2 + values["driven_inertia"], np.zeros((1, 1, 1))

@@ -5,13 +5,22 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, lifted, number_of, reduced
+from sprag.engine.machine_shaft.mechanisms import (
+    Body,
+    HarmonicMechanism,
+    Motion,
+    RodMechanism,
+    Values,
+    lifted,
+    number_of,
+    reduced,
+)
 from sprag.engine.machine_shaft.sliders import Slider, slider_bodies, slider_dead_centres, slider_fold, slider_margin
 
 Floats = NDArray[np.float64]
 
 
-class SliderCrank(Mechanism):
+class SliderCrank(RodMechanism):
     """Crank, rod and ram; the shaft's angle is 0 when the crank points along the ram's way to the far side.
 
     The forward stroke runs from the outer dead centre (ram farthest away) to the inner one. The rod's centre of mass
@@ -51,7 +60,7 @@ class SliderCrank(Mechanism):
         return 0.5 * np.pi * one, 1.5 * np.pi * one
 
 
-class ScotchYoke(Mechanism):
+class ScotchYoke(HarmonicMechanism):
     """A crank pin in a slot across a yoke that slides: the travel is harmonic.
 
     The shaft's angle is 0 when the crank points along the yoke's way to the far side; the forward stroke ends half a
@@ -59,30 +68,16 @@ class ScotchYoke(Mechanism):
     """
 
     ram_mass = "yoke_mass"
-    has_singular_positions = False
 
-    def motion(self, values: Values, phi: Floats) -> Motion:
-        """See Mechanism."""
+    def inertia(self, values: Values, phi: Floats) -> tuple[Floats, Floats]:
+        """See HarmonicMechanism."""
         r, zero = values["crank"], np.zeros((1, 1, 1))
-        sin, cos = np.sin(phi), np.cos(phi)
-        yoke = Body(values["yoke_mass"], zero, -r * sin, zero, zero, -r * cos, zero, zero)
+        yoke = Body(values["yoke_mass"], zero, -r * np.sin(phi), zero, zero, -r * np.cos(phi), zero, zero)
         inertia, slope = reduced([yoke])
-        return Motion(inertia + values["block_mass"] * r**2, slope, r * (1.0 - cos), r * sin)
-
-    def dead_centres(self, values: Values) -> tuple[Floats, Floats]:
-        """See Mechanism."""
-        return np.zeros_like(values["crank"]), np.full_like(values["crank"], np.pi)
-
-    def margin(self, values: Values, phi: Floats) -> Floats:
-        """See Mechanism; any crank can be assembled."""
-        return np.ones(np.broadcast_shapes(values["crank"].shape, phi.shape))
-
-    def worst_angles(self, values: Values) -> Sequence[Floats]:
-        """See Mechanism."""
-        return (np.zeros_like(values["crank"]),)
+        return inertia + values["block_mass"] * r**2, slope
 
 
-class _QuickReturn(Mechanism):
+class _QuickReturn(RodMechanism):
     """Crank whose pin slides in a slotted link; the link drives a ram by a rod.
 
     The link turns about a pivot at ``pivot_distance`` straight below the shaft; ``link_arm`` is the distance of the

@@ -12,13 +12,13 @@ from sprag.engine.machine_shaft.four_bars import (
     rocking,
     swinging,
 )
-from sprag.engine.machine_shaft.mechanisms import Mechanism, Motion, Values, lifted, number_of, reduced
+from sprag.engine.machine_shaft.mechanisms import Motion, RodMechanism, Values, lifted, number_of, reduced
 from sprag.engine.machine_shaft.sliders import Slider, slider_bodies, slider_dead_centres, slider_fold, slider_margin
 
 Floats = NDArray[np.float64]
 
 
-class DragLink(Mechanism):
+class DragLink(RodMechanism):
     """A double crank whose second crank, the follower, turns fully but unevenly and drives a ram like a crank.
 
     The follower's pivot is at ``frame`` from the shaft, at ``frame_angle`` from the direction of the ram's far side;
@@ -104,7 +104,7 @@ class DragLink(Mechanism):
         return values["frame_angle"] * one, values["frame_angle"] + np.pi * one, *across
 
 
-class Toggle(Mechanism):
+class Toggle(RodMechanism):
     """The toggle of a knuckle-joint press: a crank-rocker whose rocker and a rod straighten to press a ram away.
 
     Crank, coupler and rocker are those of a four-bar, with the crank's angle counted from the frame. The ram slides on

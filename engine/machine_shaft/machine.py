@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.drive_train import Train
 from sprag.engine.machine_shaft.expressions import RESERVED, Expression
+from sprag.engine.machine_shaft.mechanisms import RodMechanism
 from sprag.engine.machine_shaft.operations import formula_breaks
 from sprag.engine.machine_shaft.parameters import parameters
-from sprag.engine.machine_shaft.parts import Jumps, ShaftPart
+from sprag.engine.machine_shaft.parts import Jumps, ShaftPart, mechanism_of
 from sprag.engine.machine_shaft.pieces import Formula
 from sprag.engine.machine_shaft.problems import ExpressionError, StructureError
 from sprag.engine.machine_shaft.spec import (
@@ -20,7 +21,6 @@ from sprag.engine.machine_shaft.spec import (
     MAX_PARTS,
     MAX_STEPS,
     REVOLUTIONS,
-    RODDED,
     MachineSpec,
     PartChoice,
 )
@@ -76,7 +76,8 @@ def _check_part(part: PartChoice) -> None:
     mechanism, operation = part.mechanism, part.operation
     if not 0 <= operation.steps <= MAX_STEPS:
         raise StructureError(f"An operation has at most {MAX_STEPS} steps.")
-    if (mechanism.weights == "all" or mechanism.bodies == "two_mass") and mechanism.kind not in RODDED:
+    rods = mechanism.weights == "all" or mechanism.bodies == "two_mass"
+    if rods and not isinstance(mechanism_of(mechanism), RodMechanism):
         raise StructureError("The weights of all bodies and two masses need a mechanism with a rod or a coupler.")
     has_formula = bool(mechanism.formula)
     _check_form("The inertia of the mechanism", mechanism.kind, mechanism.table is not None, has_formula)

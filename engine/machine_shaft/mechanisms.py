@@ -113,10 +113,6 @@ class Mechanism(ABC):
     def worst_angles(self, values: Values) -> Sequence[Floats]:
         """Angles of which one has the smallest margin."""
 
-    def lift(self, values: Values, phi: Floats) -> Floats:
-        """Sum of m dh/dphi over all bodies with their heights h, in kg*m; for mechanisms with rods or couplers."""
-        raise NotImplementedError
-
     def breaks(self, values: Values) -> Sequence[Floats]:
         """Angles at which the inertia or the travel has a kink, of the parameters' shape."""
         del values
@@ -174,3 +170,38 @@ class Mechanism(ABC):
             middle = 0.5 * (good + bad)
             good, bad = (good, middle) if fails(np.array([middle]))[0] else (middle, bad)
         return float(bad)
+
+
+class RodMechanism(Mechanism):
+    """Base of the mechanisms with a rod or a coupler, which can have a weight beside that of the working part."""
+
+    @abstractmethod
+    def lift(self, values: Values, phi: Floats) -> Floats:
+        """Sum of m dh/dphi over all bodies with their heights h, in kg*m."""
+
+
+class HarmonicMechanism(Mechanism):
+    """Base of the mechanisms whose working part moves as the projection of the crank's pin: any crank will do."""
+
+    has_singular_positions = False
+
+    @abstractmethod
+    def inertia(self, values: Values, phi: Floats) -> tuple[Floats, Floats]:
+        """Inertia and its slope at ``phi``; see Motion."""
+
+    def motion(self, values: Values, phi: Floats) -> Motion:
+        """See Mechanism."""
+        r = values["crank"]
+        return Motion(*self.inertia(values, phi), r * (1.0 - np.cos(phi)), r * np.sin(phi))
+
+    def dead_centres(self, values: Values) -> tuple[Floats, Floats]:
+        """See Mechanism."""
+        return np.zeros_like(values["crank"]), np.full_like(values["crank"], np.pi)
+
+    def margin(self, values: Values, phi: Floats) -> Floats:
+        """See Mechanism; any crank can be assembled."""
+        return np.ones(np.broadcast_shapes(values["crank"].shape, phi.shape))
+
+    def worst_angles(self, values: Values) -> Sequence[Floats]:
+        """See Mechanism."""
+        return (np.zeros_like(values["crank"]),)

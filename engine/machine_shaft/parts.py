@@ -17,7 +17,7 @@ from sprag.engine.machine_shaft.expressions import Expression
 from sprag.engine.machine_shaft.four_bars import FourBar, ParallelCrank
 from sprag.engine.machine_shaft.linkages import CrankShaper, ScotchYoke, SliderCrank, Whitworth
 from sprag.engine.machine_shaft.linked_rams import DragLink, Toggle
-from sprag.engine.machine_shaft.mechanisms import Mechanism, Motion, Values
+from sprag.engine.machine_shaft.mechanisms import Mechanism, Motion, RodMechanism, Values
 from sprag.engine.machine_shaft.operations import Operation, Stroke, every_revolution, formula_breaks
 from sprag.engine.machine_shaft.pieces import Formula
 from sprag.engine.machine_shaft.problems import TableError
@@ -210,7 +210,7 @@ class ShaftPart:
 
     def _carried(self, own_angle: Floats, motion: Motion | None) -> Floats:
         """Torque of the weights and of the spring on the working part."""
-        if motion is not None and self.mechanism is not None and self.choice.mechanism.weights == "all":
+        if self.choice.mechanism.weights == "all" and isinstance(self.mechanism, RodMechanism):
             return np.asarray(-self._gravity * self.mechanism.lift(self.values, own_angle))
         if motion is None or self.mechanism is None or self.mechanism.ram_mass is None:
             return np.zeros(1)

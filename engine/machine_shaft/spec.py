@@ -31,8 +31,6 @@ LINKED: frozenset[str] = frozenset(get_args(MechanismKind)) - {"none", "table", 
 #: Stages that move a mass beside the shaft on which they sit.
 MOVING: frozenset[str] = frozenset({"screw_nut", "rack"})
 MAX_STAGES = 16
-#: Mechanisms with rods or couplers.
-RODDED: frozenset[str] = frozenset({"slider_crank", "four_bar", "quick_return", "drag_link", "toggle"})
 MAX_STEPS = 32
 #: Harmonics of the cycle whose amplitudes are results.
 HARMONICS = 6
