@@ -43,7 +43,7 @@ class Order(Protocol):
     ----------
     passes : tuple of int
         The positions before each entry form a complete, coarser study; ascending, the last is the number of cases.
-        None for an order without coarser studies.
+        Empty for an order without coarser studies.
     """
 
     @property

@@ -7,7 +7,6 @@ is an axis with the path `SWEEP`, the last one of the study.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
@@ -89,14 +88,10 @@ def lines_of(study: Study, cases: Numbers) -> Numbers:
 
 
 def line_to(study: Study, case: int) -> Numbers:
-    """The cases of the line of one case, from its first to this one, in the order in which they are run."""
-    assert study.sweep is not None
-    fixed = study.case_parameters(case)
-    axes = [axis.paths[0] for axis in study.axes if study.sweep not in axis.paths]
-    line = study.cases_at({path: fixed[path] for path in axes})
-    ordered = line[lines_of(study, line)[0]]
-    found: Numbers = ordered[: int(np.flatnonzero(ordered == case)[0]) + 1]
-    return found
+    """The cases of the line of one case of a grid, from its first to this one, in the order in which they are run."""
+    order = LineOrder(study)
+    last = int(order.positions(np.array([case]))[0])
+    return order.cases(np.arange(last - last % order.unit, last + 1))
 
 
 class LineOrder:
@@ -143,9 +138,14 @@ class LineOrder:
         """Cases of a line."""
         return self._steps
 
+    def lines_at(self, positions: Numbers) -> Numbers:
+        """Positions of all cases, ascending, of the lines of which some are given."""
+        lines = np.unique(positions // self._steps)
+        return np.asarray((lines[:, None] * self._steps + np.arange(self._steps)).reshape(-1), dtype=np.int64)
+
 
 def whole_lines(study: Study, cases: Numbers) -> NDArray[np.bool_]:
     """Which of the given cases (each once) of a swept grid belong to lines of which all cases are given."""
     order = LineOrder(study)
-    line = order.positions(cases) // order.unit
-    return np.asarray(np.bincount(line, minlength=math.prod(study.shape) // order.unit)[line] == order.unit)
+    _, member, counts = np.unique(order.positions(cases) // order.unit, return_inverse=True, return_counts=True)
+    return np.asarray(counts[member] == order.unit)

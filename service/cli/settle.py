@@ -115,8 +115,7 @@ def _of_lines(study: Study, cases: NDArray[np.int64]) -> RowBlock:
     from sprag.worker.sweeps import LineOrder
 
     order = LineOrder(study)
-    lines = np.unique(order.positions(cases) // order.unit)
-    every = np.sort(order.cases((lines[:, None] * order.unit + np.arange(order.unit)).reshape(-1)))
+    every = np.sort(order.cases(order.lines_at(order.positions(cases))))
     done = run_chunk(taken(study, every), 0, every.size)
     rows = np.searchsorted(every, cases)
     endings, flags = ([column[row] for row in rows.tolist()] for column in (done.endings, done.flags))

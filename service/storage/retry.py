@@ -115,8 +115,7 @@ def _places(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...
     query = sa.select(c.case_number).where(c.study == row.number, c.ending.in_(endings))
     places = np.sort(order.positions(np.fromiter(connection.execute(query).scalars(), dtype=np.int64)))
     if isinstance(order, LineOrder):
-        lines = np.unique(places // order.unit)
-        places = (lines[:, None] * order.unit + np.arange(order.unit)).reshape(-1)
+        places = order.lines_at(places)
     edges = np.flatnonzero(np.diff(places) > 1) + 1
     return _few([(int(run[0]), run.size) for run in np.split(places, edges)])
 
