@@ -19,7 +19,7 @@ from sprag.service.results.unaffected import Unaffected
 from sprag.service.settings import Settings
 from sprag.service.storage.store import Store
 from sprag.worker.limits import MAX_CASES, MAX_CHECKS_EACH, MAX_COMPUTATIONS_EACH, MAX_STARTS, MAX_STREAMS
-from sprag.worker.models.starts import at_start, count_of
+from sprag.worker.models.starts import count_of
 
 if TYPE_CHECKING:
     from sprag.worker.study import Study
@@ -122,12 +122,8 @@ StartNumber = Annotated[
 ]
 
 
-def started(study: Study, case: int, start: int | None) -> tuple[Study, int]:
-    """The study and the number of the case in it; with a start, the study of this case from that start only."""
-    if start is None:
-        return study, case
+def check_start(study: Study, start: int | None) -> None:
+    """Refuse a number of a start that the cases of the study do not have."""
     count = count_of(study.run)
-    if start >= count:
+    if start is not None and start >= count:
         raise parameter_error("start", "out-of-range", "there is no such start", start, f"0 to {count - 1}")
-    # A case of a sweep starts from the cases before it, and has no other starts.
-    return (study, case) if study.sweep is not None else (at_start(study, case, start), 0)

@@ -10,7 +10,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
 from sprag.service.http.access import OPEN
-from sprag.service.http.context import started, study_with
+from sprag.service.http.context import check_start, study_with
 from sprag.service.spec.machine.shaft_check import NotCompiledError
 from sprag.worker import models
 
@@ -66,16 +66,17 @@ class Work:
         return await self.compute(function, study, *args)
 
     async def case_of(
-        self, study_id: str, case: int, look: Callable[[Study, int], R], start: int | None = None
-    ) -> tuple[Study, int, R]:
-        """The study, when it has that case, its number, and what ``look`` finds in it.
+        self, study_id: str, case: int, look: Callable[[Study], R], start: int | None = None
+    ) -> tuple[Study, R]:
+        """The study, when it has that case, and what ``look`` finds in it.
 
-        Raises ApiError, and what ``look`` does. With a ``start`` it is that of one case, from this start only.
+        Raises ApiError, also where the case has no such ``start``, and what ``look`` does.
         """
 
-        def find() -> tuple[Study, int, R]:
-            study, number = started(study_with(self.context, study_id, case), case, start)
-            return study, number, look(study, number)
+        def find() -> tuple[Study, R]:
+            study = study_with(self.context, study_id, case)
+            check_start(study, start)
+            return study, look(study)
 
         return await run_in_threadpool(find)
 

@@ -12,7 +12,7 @@ from sprag.service.spec.report import Report
 from sprag.service.storage.errors import StudyNotFoundError
 from sprag.worker import models
 from sprag.worker.limits import MAX_CASES, MAX_STARTS
-from sprag.worker.models.starts import at_start, count_of
+from sprag.worker.models.starts import count_of, motion_of
 
 if TYPE_CHECKING:
     from sprag.service.storage.store import Store
@@ -73,8 +73,7 @@ def _source(report: Report, store: Store, data: object, spec: Mapping[str, Any])
         report.fault(f"{_POINTER}/start", "out-of-range", "is out of range", start, allowed=f"0 to {count - 1:,}")
     if report.found or case is None or start is None:
         return None
-    # A case of a sweep starts from the cases before it.
-    return (study, case) if study.sweep is not None else (at_start(study, case, start), 0)
+    return motion_of(study, case, start)
 
 
 def _check_pendulums(report: Report, base: Mapping[str, Any], values: Mapping[str, float]) -> None:

@@ -18,6 +18,7 @@ from sprag.service.spec.units import QuantityError, parse_quantity, split_quanti
 from sprag.worker import models
 from sprag.worker.models.branches import Along, allowed_values, branch_results, run_branch
 from sprag.worker.models.common import NO_PARAMETERS, case_machine
+from sprag.worker.models.starts import motion_of
 from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
@@ -117,9 +118,9 @@ def _value(name: str, text: str | None, unit: str, usual: float | None) -> float
         raise parameter_error(name, error.code, str(error), text, f"a value in {unit}") from error
 
 
-def branch_file(study: Study, case: int, along: Along, form: Format) -> bytes:
+def branch_file(study: Study, case: int, along: Along, form: Format, start: int | None = None) -> bytes:
     """Follow the branch and write the file. For the computing process."""
-    made = run_branch(study, case, along)
+    made = run_branch(*motion_of(study, case, start), along)
     return branch_csv(made, along) if form == "csv" else to_bytes(branch_json(made, study, case, along))
 
 

@@ -11,6 +11,7 @@ from sprag.service.faults import FaultError
 from sprag.service.json_text import to_bytes
 from sprag.service.results.exports import table_csv
 from sprag.worker import models
+from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
     from sprag.service.formats import Format
@@ -36,9 +37,9 @@ def require_clutches(study: Study) -> None:
         raise FaultError("not-found", f"A machine of model {study.model} has no clutches, so it has no engagements.")
 
 
-def engagements_file(study: Study, case: int, table: Table, form: Format) -> bytes:
+def engagements_file(study: Study, case: int, table: Table, form: Format, start: int | None = None) -> bytes:
     """Run the case again and write the file. For the computing process."""
-    made = models.run_engagements(study, case)
+    made = models.run_engagements(*motion_of(study, case, start))
     if form == "csv":
         return engagements_csv(made, table)
     return to_bytes(engagements_json(made, case, study.case_parameters(case)))

@@ -9,6 +9,7 @@ from sprag.service.faults import FaultError
 from sprag.service.json_text import to_bytes
 from sprag.service.results.trajectories import timed_values, trajectory_csv
 from sprag.worker import models
+from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
     from sprag.service.formats import Format
@@ -26,9 +27,9 @@ def require_strobes(study: Study) -> None:
         raise FaultError("not-found", message)
 
 
-def portrait_file(study: Study, case: int, table: Table, form: Format) -> bytes:
+def portrait_file(study: Study, case: int, table: Table, form: Format, start: int | None = None) -> bytes:
     """Run the case again and write the file. For the computing process."""
-    made = models.run_portrait(study, case)
+    made = models.run_portrait(*motion_of(study, case, start))
     if form == "csv":
         return trajectory_csv(made.strobes if table == "strobes" else made.orbit)
     return to_bytes(portrait_json(made, case, study.case_parameters(case)))

@@ -16,6 +16,7 @@ from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker.models.common import case_machine
 from sprag.worker.models.sections import Sampling, run_sections
+from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
     from sprag.service.answers.sections import Sections
@@ -86,9 +87,11 @@ def variable_of(study: Study, name: str | None) -> str:
     return choice_of("y", name, variables(study)) if name and name.strip() else "shaft.speed"
 
 
-def sections_file(study: Study, case: int, asked: Sampling, form: Format, section: bool = False) -> bytes:
+def sections_file(
+    study: Study, case: int, asked: Sampling, form: Format, section: bool, start: int | None = None
+) -> bytes:
     """Settle the cases and write the file. For the computing process."""
-    made = run_sections(study, case, asked)
+    made = run_sections(*motion_of(study, case, start), asked)
     if form == "csv":
         return sections_csv(made, asked, section=section)
     return to_bytes(sections_json(made, study, case, asked, section=section))

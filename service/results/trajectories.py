@@ -10,6 +10,7 @@ from sprag.service.json_text import numbers, to_bytes
 from sprag.service.results.exports import table_csv
 from sprag.service.spec.units import PERIOD_NAMES, QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
+from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
     from sprag.service.answers.results import AngleTable, TimedValues, ValueAxis
@@ -53,9 +54,14 @@ def _place(name: str, text: str, extent: Extent) -> float:
         raise parameter_error(name, error.code, str(error), text, kind) from error
 
 
-def trajectory_file(study: Study, case: int, start: float, end: float, points: int, form: Format) -> bytes:
-    """Run the case again and write the file. For the computing process: large answers take seconds to write."""
-    made = models.run_trajectory(study, case, start, end, points)
+def trajectory_file(
+    study: Study, case: int, start: float, end: float, points: int, form: Format, which: int | None = None
+) -> bytes:
+    """Run the case again, from its start ``which``, and write the file.
+
+    For the computing process: large answers take seconds to write.
+    """
+    made = models.run_trajectory(*motion_of(study, case, which), start, end, points)
     if form == "csv":
         return trajectory_csv(made)
     return to_bytes(trajectory_json(made, case, study.case_parameters(case)))

@@ -53,3 +53,11 @@ def at_start(study: Study, case: int, start: int) -> Study:
         study, base={path: base[path] for path in study.base}, run=run, axes=(), combine="grid", derive={}, spread=None,
         plan=None,
     )  # fmt: skip
+
+
+def motion_of(study: Study, case: int, start: int | None) -> tuple[Study, int]:
+    """A study, and the number in it, by whose run a case goes on from one of its starts; None for the case itself.
+
+    A case of a sweep starts from the cases before it, and has no other starts.
+    """
+    return (study, case) if start is None or study.sweep is not None else (at_start(study, case, start), 0)

@@ -51,7 +51,7 @@ async def get_basin(
     """To which regime a settled case comes from each start of a grid. The case is run from all of them for this."""
     chosen = choose_format(work.request, form, DRAWN_FORMATS)
     ends = {"x": (x_from, x_to), "y": (y_from, y_to)}
-    study, _, query = await work.case_of(study_id, case, lambda study, _: basins.basin_query(study, x, y, ends, points))
+    study, query = await work.case_of(study_id, case, lambda study: basins.basin_query(study, x, y, ends, points))
     if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - so that the types are told apart
         content = await work.run_case(basins.basin_file, study, case, query, chosen)
         return written(content, chosen, f"{study_id}-case-{case}-basin")

@@ -22,6 +22,7 @@ from sprag.service.results.figures.sections import diagram_figure, section_figur
 from sprag.service.results.pictures.curves import draw_figure
 from sprag.worker.models.branches import run_branch
 from sprag.worker.models.sections import run_sections
+from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
     from sprag.worker.models.branches import Along
@@ -78,14 +79,14 @@ async def get_branch(
     """The periodic motions that the motion of one case becomes along a parameter, stable and unstable ones."""
     chosen = choose_format(work.request, form, DRAWN_FORMATS)
 
-    def look(study: Study, number: int) -> tuple[Along, str]:
-        return branches.along_of(study, number, along, low, high), branches.result_of(study, y)
+    def look(study: Study) -> tuple[Along, str]:
+        return branches.along_of(study, case, along, low, high), branches.result_of(study, y)
 
-    study, number, (asked, result) = await work.case_of(study_id, case, look, which)
+    study, (asked, result) = await work.case_of(study_id, case, look, which)
     if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - so that the types are told apart
-        content = await work.run_case(branches.branch_file, study, number, asked, chosen)
+        content = await work.run_case(branches.branch_file, study, case, asked, chosen, which)
         return written(content, chosen, f"{study_id}-case-{case}-branch")
-    made = await work.run_case(run_branch, study, number, asked)
+    made = await work.run_case(run_branch, *motion_of(study, case, which), asked)
     figure = branch_figure(made, study, asked, result)
     return await picture(draw_figure, chosen, figure, f"{study.name}, case {case}").response(work)
 
@@ -119,15 +120,15 @@ async def get_diagram(
     """Strobes of the settled motions of one case along a parameter, each from its own start: a bifurcation diagram."""
     chosen = choose_format(work.request, form, DRAWN_FORMATS)
 
-    def look(study: Study, number: int) -> tuple[Sampling, str]:
-        asked = sections.diagram_of(study, number, along, (low, high), phase, (points, strobes))
+    def look(study: Study) -> tuple[Sampling, str]:
+        asked = sections.diagram_of(study, case, along, (low, high), phase, (points, strobes))
         return asked, sections.variable_of(study, y)
 
-    study, number, (asked, variable) = await work.case_of(study_id, case, look, which)
+    study, (asked, variable) = await work.case_of(study_id, case, look, which)
     if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - so that the types are told apart
-        content = await work.run_case(sections.sections_file, study, number, asked, chosen)
+        content = await work.run_case(sections.sections_file, study, case, asked, chosen, False, which)
         return written(content, chosen, f"{study_id}-case-{case}-diagram")
-    made = await work.run_case(run_sections, study, number, asked)
+    made = await work.run_case(run_sections, *motion_of(study, case, which), asked)
     figure = diagram_figure(made, study, asked, variable)
     return await picture(draw_figure, chosen, figure, f"{study.name}, case {case}").response(work)
 
@@ -152,13 +153,13 @@ async def get_section(
     """Strobes of the settled motion of one case at a phase of the excitation: its Poincare section."""
     chosen = choose_format(work.request, form, DRAWN_FORMATS)
 
-    def look(study: Study, number: int) -> Sampling:
-        return sections.section_of(study, number, phase, strobes)
+    def look(study: Study) -> Sampling:
+        return sections.section_of(study, case, phase, strobes)
 
-    study, number, asked = await work.case_of(study_id, case, look, which)
+    study, asked = await work.case_of(study_id, case, look, which)
     if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - so that the types are told apart
-        content = await work.run_case(sections.sections_file, study, number, asked, chosen, True)
+        content = await work.run_case(sections.sections_file, study, case, asked, chosen, True, which)
         return written(content, chosen, f"{study_id}-case-{case}-section")
-    made = await work.run_case(run_sections, study, number, asked)
+    made = await work.run_case(run_sections, *motion_of(study, case, which), asked)
     figure = section_figure(made, study, asked)
     return await picture(draw_figure, chosen, figure, f"{study.name}, case {case}").response(work)

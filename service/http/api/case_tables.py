@@ -19,6 +19,7 @@ from sprag.service.http.work import Attended
 from sprag.service.results import engagements, portraits
 from sprag.service.results.pictures.curves import draw_portrait
 from sprag.worker import models
+from sprag.worker.models.starts import motion_of
 
 router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
 
@@ -49,8 +50,8 @@ async def get_engagements(
     """Every engagement of the clutches of one case, and the means of its periods. The case is run again for this."""
     chosen = choose_format(work.request, form, TABLE_FORMATS)
     asked = choice_of("table", table, engagements.TABLES)
-    study, number, _ = await work.case_of(study_id, case, lambda study, _: engagements.require_clutches(study), which)
-    content = await work.run_case(engagements.engagements_file, study, number, asked, chosen)
+    study, _ = await work.case_of(study_id, case, engagements.require_clutches, which)
+    content = await work.run_case(engagements.engagements_file, study, case, asked, chosen, which)
     return written(content, chosen, f"{study_id}-case-{case}-{asked}")
 
 
@@ -79,10 +80,10 @@ async def get_strobes(
     """The state of one case once per excitation period, and its orbit. The case is run again for this."""
     chosen = choose_format(work.request, form, DRAWN_FORMATS)
     asked = choice_of("table", table, portraits.TABLES)
-    study, number, _ = await work.case_of(study_id, case, lambda study, _: portraits.require_strobes(study), which)
+    study, _ = await work.case_of(study_id, case, portraits.require_strobes, which)
     if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - so that the types are told apart
-        content = await work.run_case(portraits.portrait_file, study, number, asked, chosen)
+        content = await work.run_case(portraits.portrait_file, study, case, asked, chosen, which)
         return written(content, chosen, f"{study_id}-case-{case}-{asked}")
-    made = await work.run_case(models.run_portrait, study, number)
+    made = await work.run_case(models.run_portrait, *motion_of(study, case, which))
     title = f"{study.name}, case {case}"
     return await picture(draw_portrait, chosen, made, models.presentation_of(study), title).response(work)

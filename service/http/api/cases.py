@@ -166,8 +166,6 @@ async def get_trajectory(
 ) -> Response:
     """Every variable, torque, power and state of one case over time (or the angle). The case is run again for this."""
     chosen = choose_format(work.request, form, TABLE_FORMATS)
-    study, number, span = await work.case_of(
-        study_id, case, lambda study, number: trajectories.span(study, number, start, end), which
-    )
-    content = await work.run_case(trajectories.trajectory_file, study, number, *span, points, chosen)
+    study, span = await work.case_of(study_id, case, lambda study: trajectories.span(study, case, start, end), which)
+    content = await work.run_case(trajectories.trajectory_file, study, case, *span, points, chosen, which)
     return table(content, chosen, f"{study_id}-case-{case}")

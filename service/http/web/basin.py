@@ -36,8 +36,8 @@ async def basin_page(
 ) -> Response:
     """To which regime a case comes from each start of a grid."""
     ends = {"x": (x_from or None, x_to or None), "y": (y_from or None, y_to or None)}
-    study, _, query = await work.case_of(
-        study_id, case, lambda study, _: basins.basin_query(study, x or None, y or None, ends, points)
+    study, query = await work.case_of(
+        study_id, case, lambda study: basins.basin_query(study, x or None, y or None, ends, points)
     )
     frame = await run_in_threadpool(study_frame, work.context, study_id)
     given = {
@@ -72,7 +72,7 @@ async def basin(
 ) -> Response:
     """The figure of a basin."""
     ends = {"x": (x_from, x_to), "y": (y_from, y_to)}
-    study, _, query = await work.case_of(study_id, case, lambda study, _: basins.basin_query(study, x, y, ends, points))
+    study, query = await work.case_of(study_id, case, lambda study: basins.basin_query(study, x, y, ends, points))
 
     async def make() -> Response:
         return json_response(await work.run_case(basin_plot, study, case, query))

@@ -11,7 +11,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError
-from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, started, study_with
+from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, check_start, study_with
 from sprag.service.http.respond import json_response
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.study import study_frame
@@ -22,6 +22,7 @@ from sprag.service.results.figures.branch import OwnCases, branch_figure
 from sprag.service.results.portraits import require_strobes
 from sprag.service.results.selection import axis_name
 from sprag.worker.models.branches import branch_results, run_branch
+from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
     from sprag.service.http.context import Context
@@ -43,7 +44,7 @@ def branch_page(
     """The form of a branch, and its figure."""
     study = study_with(context, study_id, case)
     require_strobes(study)
-    started(study, case, which)
+    check_start(study, which)
     path = along or usual_along(study)
     start = "" if which is None else str(which)
     faults: tuple[Any, ...] = ()
@@ -83,11 +84,11 @@ async def branch_drawn(
 ) -> Response:  # fmt: skip
     """The figure of a branch, with the cases of the study along its parameter."""
 
-    def look(study: Study, number: int) -> tuple[Along, str]:
-        return along_of(study, number, along, low, high), result_of(study, y)
+    def look(study: Study) -> tuple[Along, str]:
+        return along_of(study, case, along, low, high), result_of(study, y)
 
-    study, _, (asked, result) = await work.case_of(study_id, case, look)
-    made = await work.run_case(run_branch, *started(study, case, which), asked)
+    study, (asked, result) = await work.case_of(study_id, case, look, which)
+    made = await work.run_case(run_branch, *motion_of(study, case, which), asked)
     own = await run_in_threadpool(_own_cases, work.context, study_id, study, case, asked, result)
     return json_response(plotly_figure(branch_figure(made, study, asked, result, own)))
 

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError
-from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, started, study_with
+from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, check_start, study_with
 from sprag.service.http.drawing import picture, unchanging
 from sprag.service.http.respond import json_response
 from sprag.service.http.web.figures.answers import SAMPLES, motion_figures, strobes_figure
@@ -27,6 +27,7 @@ from sprag.service.results.wording import number
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 from sprag.worker.codes import PENDING
+from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
     from sprag.service.http.context import Context
@@ -105,11 +106,11 @@ def case_page(
         (row for row in rows if which is not None and row.results.get(_START) == which), rows[0] if rows else None
     )
     which = _start_of(row) if which is None else which
-    single, number = started(study, case, which)
+    check_start(study, which)
     faults: tuple[Any, ...] = ()
     span = None
     try:
-        span = _span(single, number, begin, end)
+        span = _span(study, case, begin, end)
     except FaultError as error:
         faults = error.faults
     start = [] if which is None else [("start", str(which))]
@@ -117,7 +118,7 @@ def case_page(
     own_start = f"?{urlencode(start)}" if start else ""
     own = f"/studies/{study_id}/cases/{case}"
     infos = models.study_results(study)
-    extent = models.extent(single, number)
+    extent = models.extent(study, case)
     return page(
         "case.html",
         status=422 if faults else 200,
@@ -157,12 +158,10 @@ async def motion(
     work: Attended, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = "", which: StartNumber = None
 ) -> Response:
     """The figures of a motion."""
-    study, number, span = await work.case_of(
-        study_id, case, lambda study, number: _span(study, number, begin, end), which
-    )
+    study, span = await work.case_of(study_id, case, lambda study: _span(study, case, begin, end), which)
 
     async def make() -> Response:
-        return json_response(await work.run_case(motion_figures, study, number, *span))
+        return json_response(await work.run_case(motion_figures, *motion_of(study, case, which), *span))
 
     return await unchanging(work, study_id, make)
 
@@ -172,12 +171,10 @@ async def motion_picture(
     work: Attended, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = "", which: StartNumber = None
 ) -> Response:
     """The motion as one picture, for pages without JavaScript."""
-    study, number, span = await work.case_of(
-        study_id, case, lambda study, number: _span(study, number, begin, end), which
-    )
+    study, span = await work.case_of(study_id, case, lambda study: _span(study, case, begin, end), which)
 
     async def make() -> Response:
-        made = await work.run_case(models.run_trajectory, study, number, *span, SAMPLES // 3)
+        made = await work.run_case(models.run_trajectory, *motion_of(study, case, which), *span, SAMPLES // 3)
         title = f"{study.name}, case {case}"
         return await picture(draw_motion, "svg", made, models.presentation_of(study), title).response(work)
 
@@ -193,9 +190,9 @@ async def strobes(
     which: StartNumber = None,
 ) -> Response:
     """The figure of a case's strobes and its orbit: how it approaches its motion."""
-    study, number, _ = await work.case_of(study_id, case, lambda study, _: require_strobes(study), which)
+    study, _ = await work.case_of(study_id, case, require_strobes, which)
 
     async def make() -> Response:
-        return json_response(await work.run_case(strobes_figure, study, number, columns))
+        return json_response(await work.run_case(strobes_figure, *motion_of(study, case, which), columns))
 
     return await unchanging(work, study_id, make)

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError
-from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, started, study_with
+from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, check_start, study_with
 from sprag.service.http.drawing import unchanging
 from sprag.service.http.respond import json_response
 from sprag.service.http.web.figures.plotly import plotly_figure
@@ -22,6 +22,7 @@ from sprag.service.results.portraits import require_strobes
 from sprag.service.results.sections import diagram_of, section_of, variable_of, variables
 from sprag.service.results.selection import axis_name
 from sprag.worker.models.sections import run_sections
+from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
     from sprag.worker.models.sections import Sampling
@@ -47,7 +48,7 @@ def diagram_page(
     """The form of a diagram, its figure, and the section of the case."""
     study = study_with(context, study_id, case)
     require_strobes(study)
-    started(study, case, which)
+    check_start(study, which)
     start = "" if which is None else str(which)
     path = along or usual_along(study)
     faults: tuple[Any, ...] = ()
@@ -91,13 +92,13 @@ async def diagram_drawn(
 ) -> Response:  # fmt: skip
     """The figure of a bifurcation diagram."""
 
-    def look(study: Study, number: int) -> tuple[Sampling, str]:
-        return diagram_of(study, number, along, (low, high), phase, _SIZE), variable_of(study, y)
+    def look(study: Study) -> tuple[Sampling, str]:
+        return diagram_of(study, case, along, (low, high), phase, _SIZE), variable_of(study, y)
 
-    study, _, (asked, shown) = await work.case_of(study_id, case, look)
+    study, (asked, shown) = await work.case_of(study_id, case, look, which)
 
     async def make() -> Response:
-        made = await work.run_case(run_sections, *started(study, case, which), asked)
+        made = await work.run_case(run_sections, *motion_of(study, case, which), asked)
         return json_response(plotly_figure(diagram_figure(made, study, asked, shown)))
 
     return await unchanging(work, study_id, make)
@@ -109,13 +110,13 @@ async def section_drawn(
 ) -> Response:
     """The figure of a Poincare section."""
 
-    def look(study: Study, number: int) -> Sampling:
-        return section_of(study, number, phase, _SECTION)
+    def look(study: Study) -> Sampling:
+        return section_of(study, case, phase, _SECTION)
 
-    study, _, asked = await work.case_of(study_id, case, look)
+    study, asked = await work.case_of(study_id, case, look, which)
 
     async def make() -> Response:
-        made = await work.run_case(run_sections, *started(study, case, which), asked)
+        made = await work.run_case(run_sections, *motion_of(study, case, which), asked)
         return json_response(plotly_figure(section_figure(made, study, asked)))
 
     return await unchanging(work, study_id, make)

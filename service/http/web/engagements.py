@@ -12,6 +12,7 @@ from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.results.engagements import require_clutches
 from sprag.worker import models
+from sprag.worker.models.starts import motion_of
 
 router = APIRouter(include_in_schema=False)
 
@@ -22,8 +23,8 @@ _SHOWN = 100
 @router.get("/studies/{study_id:study}/cases/{case:case}/engagements")
 async def engagements_page(work: Attended, study_id: StudyId, case: CaseNumber, which: StartNumber = None) -> Response:
     """What the clutches of a case do."""
-    study, number, _ = await work.case_of(study_id, case, lambda study, _: require_clutches(study), which)
-    made = await work.run_case(models.run_engagements, study, number)
+    study, _ = await work.case_of(study_id, case, require_clutches, which)
+    made = await work.run_case(models.run_engagements, *motion_of(study, case, which))
     own = f"/studies/{study_id}/cases/{case}"
     frame = await run_in_threadpool(study_frame, work.context, study_id)
     return page(

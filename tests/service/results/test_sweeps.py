@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.service.http.context import started
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.form.spec import field_of, spec_of, values_of
 from sprag.service.jobs.answers import curves_of
@@ -24,6 +23,7 @@ from sprag.service.results.sweeps import hysteresis
 from sprag.service.spec.document import parse_spec
 from sprag.worker import models
 from sprag.worker.models import ChunkResult
+from sprag.worker.models.starts import motion_of
 from sprag.worker.study import Study
 from tests.service.conftest import API, Service
 from tests.service.spec_sample import changed
@@ -177,7 +177,7 @@ def test_a_case_of_a_sweep_is_gone_on_from_in_its_sweep(
     service: Service, study_id: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study = service.store.study(study_id)
-    assert started(study, 3, 0) == (study, 3)
+    assert motion_of(study, 3, 0) == (study, 3)
     asked: list[tuple[Study, int]] = []
 
     def run_end_state(study: Study, case: int) -> dict[str, float]:

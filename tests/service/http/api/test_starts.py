@@ -17,6 +17,7 @@ from sprag.service.results.basins import BasinQuery
 from sprag.service.spec.document import parse_spec
 from sprag.worker import models
 from sprag.worker.models import Basin, ChunkResult, FurtherRows
+from sprag.worker.models.starts import motion_of
 from sprag.worker.study import Study
 from tests.service.conftest import API, Service
 from tests.service.timed_spec import SPEC
@@ -96,10 +97,22 @@ def test_a_motion_begins_at_the_start_that_is_asked_for(service: Service, starte
     for part in ("strobes", "trajectory", "engagements"):
         answer = service.http.get(f"{API}/studies/{started}/cases/1/{part}", params={"start": 5})
         assert answer.status_code == 200, answer.text
-        _, study, case, *_ = service.computer.calls[-1]
-        assert (case, study.base[SPEED], study.base["shaft.load"]) == (0, values[4], 0.2)
+        _, study, case, *_, start = service.computer.calls[-1]
+        assert (case, start) == (1, 5)
+        run, number = motion_of(study, case, start)
+        assert (number, run.base[SPEED], run.base["shaft.load"]) == (0, values[4], 0.2)
     wrong = service.http.get(f"{API}/studies/{started}/cases/1/strobes", params={"start": 8})
     assert (wrong.status_code, wrong.json()["errors"][0]["allowed"]) == (422, "0 to 7")
+
+
+def test_the_motion_of_a_start_is_that_of_its_case(service: Service, started: str) -> None:
+    for part in ("strobes", "trajectory", "engagements", "section"):
+        body = service.get(f"/studies/{started}/cases/1/{part}", start=5)
+        assert (body["case"], body["parameters"]) == (1, {"shaft.load": 0.2})
+        assert body != service.get(f"/studies/{started}/cases/1/{part}")
+    # Its range is that of the study's axis.
+    body = service.get(f"/studies/{started}/cases/1/diagram", along="shaft.load", points=2, start=5)
+    assert (body["case"], body["parameter"]) == (1, [0.1, 0.2])
 
 
 def test_the_page_of_a_case_lists_its_regimes(service: Service, started: str) -> None:
