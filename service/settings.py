@@ -89,6 +89,13 @@ class Settings(BaseSettings):
         description="seconds of processor time after which a chunk is killed; one that hangs without using any "
         "is killed after ten times as long",
     )
+    stop_seconds: float = Field(
+        default=30.0,
+        ge=10.0,
+        le=3_600.0,
+        description="seconds after SIGTERM at which the service exits in any case; at half of them a worker that has "
+        "not ended is killed",
+    )
     trajectory_timeout: float = Field(
         default=60.0,
         gt=0.0,

@@ -85,7 +85,7 @@ class Dispatcher:
         self._next_beat = 0.0
 
     def run(self, stopping: Callable[[], bool]) -> None:
-        """Work until ``stopping()``; then stop the chunks in flight and return their claims.
+        """Work until ``stopping()``; then return the claims of the chunks in flight and stop these.
 
         Raises EpochLostError when another dispatcher took over, ExecutorError when nothing can be run.
         """
@@ -94,12 +94,15 @@ class Dispatcher:
             while not stopping():
                 self.step()
         finally:
-            self._executor.close()
-            if self._news is not None:
-                self._news.close()
-            # The dispatcher that has taken over, or the next one, returns the claims.
-            with suppress(EpochLostError, StoreFullError):
-                self._store.release(self._epoch)
+            # First, because killed processes take long to exit on a busy machine, and this one may be killed then. The
+            # dispatcher that has taken over, or the next one, returns the claims where this one cannot.
+            try:
+                with suppress(EpochLostError, StoreFullError):
+                    self._store.release(self._epoch)
+            finally:
+                self._executor.close()
+                if self._news is not None:
+                    self._news.close()
 
     def step(self) -> None:
         """One iteration: poll for new studies and requests when it is time, then process the executor's outcomes.

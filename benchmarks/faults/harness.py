@@ -36,10 +36,12 @@ _ORPHANED = "EOFError: Ran out of input"
 def environment(**more: str) -> dict[str, str]:
     """The environment without the user's settings of the program, except where compiled kernels lie.
 
-    One process checks specs: each loads the engine when a service starts, and drills start many services.
+    One process checks specs: each loads the engine when a service starts, and drills start many services. A service may
+    take long to stop, because the machine may be busy.
     """
     kept = {k: v for k, v in os.environ.items() if not k.startswith("SPRAG_") or k == "SPRAG_KERNEL_CACHE"}
-    return {**kept, "PYTHONPATH": str(ROOT), "SPRAG_CHECK_PROCESSES": "1", **more}
+    set_here = {"SPRAG_CHECK_PROCESSES": "1", "SPRAG_STOP_SECONDS": f"{PATIENCE:g}"}
+    return {**kept, "PYTHONPATH": str(ROOT), **set_here, **more}
 
 
 def until(condition: Callable[[], object], what: str, patience: float = PATIENCE) -> None:
@@ -60,7 +62,7 @@ def kill_family(process: subprocess.Popen[bytes]) -> None:
     for child in family:
         with suppress(psutil.Error):
             child.kill()
-    psutil.wait_procs(family, timeout=60)
+    psutil.wait_procs(family, timeout=PATIENCE)
 
 
 def spec(cases: int, periods: float = 60.0) -> dict[str, Any]:
@@ -103,7 +105,7 @@ class Service:
         with self.process.stdout as output:
             line = output.readline()
         assert line, self.log.read_text()
-        self.http = httpx.Client(base_url=f"{json.loads(line)['address']}/api/v1", timeout=60.0, trust_env=False)
+        self.http = httpx.Client(base_url=f"{json.loads(line)['address']}/api/v1", timeout=PATIENCE, trust_env=False)
 
     def dispatcher(self) -> psutil.Process | None:
         """The process of its dispatcher, if it has taken the lock."""
@@ -130,7 +132,7 @@ class Service:
         self.http.close()
         self.process.kill()
         self.process.wait()
-        assert psutil.wait_procs(family, timeout=60)[1] == [], "a process outlived the service"
+        assert psutil.wait_procs(family, timeout=PATIENCE)[1] == [], "a process outlived the service"
 
     def stop(self) -> float:
         """SIGTERM; seconds until everything had ended in order."""
@@ -141,7 +143,7 @@ class Service:
         code = self.process.wait(PATIENCE)
         seconds = time.monotonic() - begin
         assert code == 0, self.log.read_text()
-        assert psutil.wait_procs(family, timeout=10)[1] == [], "a process outlived the service"
+        assert psutil.wait_procs(family, timeout=PATIENCE)[1] == [], "a process outlived the service"
         # A process whose parent is killed while it starts finds its pipe closed, and Python says so.
         log = self.log.read_text()
         assert log.count("Traceback") == log.count(_ORPHANED), log[-20_000:]

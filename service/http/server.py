@@ -26,12 +26,9 @@ from sprag.worker.limits import MAX_CONNECTIONS
 
 _LOG = logging.getLogger("sprag.service")
 
-#: Time limits of the shutdown in s: for current requests, then for the answers of cancelled ones, then for the
-#: dispatcher and its chunks. After the last limit the process exits in any case.
+#: Time limits of the shutdown in s: for current requests, then for the answers of cancelled ones.
 _GRACE_SECONDS = 5.0
 _ANSWER_SECONDS = 3
-_STOP_SECONDS = 15.0
-_LAST_SECONDS = 30.0
 #: Seconds before a dead dispatcher is restarted: doubled each time, and reset after a long life.
 _FIRST_DELAY = 0.5
 _LONGEST_DELAY = 10.0
@@ -73,6 +70,8 @@ class Supervisor(threading.Thread):
         Seconds before it is restarted.
     leaving : Event
         Set when the shutdown begins: the child is ended while current requests are still answered.
+    stop_seconds : float
+        Time for the child to end before it is killed.
     """
 
     def __init__(
@@ -80,8 +79,10 @@ class Supervisor(threading.Thread):
         start: Callable[[], Child],
         delays: tuple[float, float] = (_FIRST_DELAY, _LONGEST_DELAY),
         leaving: threading.Event | None = None,
+        stop_seconds: float = 15.0,
     ) -> None:
         super().__init__(name="sprag-supervisor", daemon=True)
+        self._stop_seconds = stop_seconds
         self._start_child = start
         self._first, self._longest = delays
         self._ending = threading.Event()
@@ -113,7 +114,7 @@ class Supervisor(threading.Thread):
         if child is None or child.exitcode is not None:
             return
         child.terminate()
-        child.join(_STOP_SECONDS)
+        child.join(self._stop_seconds)
         if child.exitcode is None:
             _LOG.error("The worker does not stop; it is killed.")
             child.kill()
@@ -137,7 +138,7 @@ class Server(uvicorn.Server):
     cut : function
         Called in a thread when the grace period is over; makes the remaining requests answer.
     give_up : function
-        Called when the service is still running long after the signal.
+        Called when the service is still running ``last_seconds`` after the signal.
     listening : function
         Called once the service listens.
     """
@@ -149,12 +150,13 @@ class Server(uvicorn.Server):
         cut: Callable[[], None],
         give_up: Callable[[], None],
         listening: Callable[[], None],
+        last_seconds: float,
     ) -> None:
         super().__init__(config)
         self._listening = listening
         self._told = ending
         self._cut = cut
-        self._last = threading.Timer(_LAST_SECONDS, give_up)
+        self._last = threading.Timer(last_seconds, give_up)
         self._last.daemon = True
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
@@ -186,7 +188,7 @@ class Server(uvicorn.Server):
 
 def _give_up() -> None:
     """Kill this process and all its children."""
-    _LOG.critical("The service did not stop within %g s; it is stopped now.", _LAST_SECONDS)
+    _LOG.critical("The service did not stop within the limit of SPRAG_STOP_SECONDS; it is stopped now.")
     for child in psutil.Process().children(recursive=True):
         with suppress(psutil.Error):
             child.kill()
@@ -218,7 +220,9 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
         lifespan="on",
     )
     supervisor = Supervisor(
-        lambda: start_dispatcher_process(worker_settings(settings)), leaving=app.state.context.ending
+        lambda: start_dispatcher_process(worker_settings(settings)),
+        leaving=app.state.context.ending,
+        stop_seconds=settings.stop_seconds / 2.0,
     )
     with listener, _outlived_signals():
 
@@ -227,7 +231,7 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
             supervisor.start()
 
         context = app.state.context
-        server = Server(config, context.ending, context.cut, _give_up, listening)
+        server = Server(config, context.ending, context.cut, _give_up, listening, settings.stop_seconds)
         try:
             with suppress(KeyboardInterrupt):
                 server.run(sockets=[listener])

@@ -34,7 +34,7 @@ def test_the_service_ends_soon_with_open_streams_and_hands_running_chunks_back(t
     study = service.submit(made)
     claimed = "SELECT count(*) FROM chunks WHERE state = 'claimed'"
     harness.until(lambda: harness.asked(service.database, claimed), "chunks are claimed")
-    http = httpx.Client(base_url=service.http.base_url, timeout=60, trust_env=False)
+    http = httpx.Client(base_url=service.http.base_url, timeout=harness.PATIENCE, trust_env=False)
     with http, http.stream("GET", f"/studies/{study}/events") as events:
         lines = events.iter_lines()
         assert any(line == "event: progress" for line in lines)
