@@ -87,7 +87,7 @@ class Outcome:
     error: float
     same_places: float
     jumps: int
-    told: float
+    in_jumps: float
     missed: int
     islands: int
     slowest: float
@@ -105,21 +105,21 @@ def _error_at(errors: Floats, counts: Bools) -> float:
 
 def refined(problem: Problem, plan: RefinePlan) -> tuple[Curve, int, float]:
     """A refined curve, its rounds, and the processor time of the slowest round's planning."""
-    planner, told, slowest = CurveRefiner(plan), [], 0.0
+    planner, seen, slowest = CurveRefiner(plan), [], 0.0
     while True:
         begin = time.process_time()
         step = planner.ask()
         spent = time.process_time() - begin
         if not len(step.points):
             break
-        told.append(problem.rows(step.points))
+        seen.append(problem.rows(step.points))
         begin = time.process_time()
-        planner.tell(told[-1])
+        planner.tell(seen[-1])
         slowest = max(slowest, spent + time.process_time() - begin)
     names = plan.needed
-    values = {name: np.concatenate([rows.values[name] for rows in told]) for name in names}
-    points, ok = np.vstack([rows.points for rows in told]), np.concatenate([rows.ok for rows in told])
-    return describe(plan, Rows(points, ok, values))[0], len(told), slowest
+    values = {name: np.concatenate([rows.values[name] for rows in seen]) for name in names}
+    points, ok = np.vstack([rows.points for rows in seen]), np.concatenate([rows.ok for rows in seen])
+    return describe(plan, Rows(points, ok, values))[0], len(seen), slowest
 
 
 def measured(problem: Problem, truth: Truth, error: float) -> Outcome:
@@ -144,7 +144,7 @@ def measured(problem: Problem, truth: Truth, error: float) -> Outcome:
         error=_error_at(errors, ~inside),
         same_places=_error_at(errors, truth.away()),
         jumps=int(truth.jumps.sum()),
-        told=float(held.mean()),
+        in_jumps=float(held.mean()),
         missed=len(missed),
         islands=int((~apart.any(axis=1)).sum()),
         slowest=slowest,
@@ -171,7 +171,7 @@ def adaptive(problem: Problem, truth: Truth, error: float) -> tuple[int, float]:
         begin = time.process_time()
         asked = np.array(learner.ask(BATCH)[0])
         spent += time.process_time() - begin
-        # A case without a result cannot be told to it otherwise.
+        # There is no other way to give it a case without a result.
         rows = np.nan_to_num(_values(problem, problem.rows(asked[:, None])) / truth.ranges)
         begin = time.process_time()
         learner.tell_many(asked.tolist(), rows)
@@ -188,7 +188,8 @@ def _line(name: str, outcome: Outcome, grid: int, peer: tuple[int, float] | None
     return (
         f"  {name}\n    {outcome.points:3d} points, {outcome.rounds} rounds; error {outcome.error:.2%}, reported "
         f"at most {outcome.estimate:.2%}; jumps {outcome.jumps}, missed {outcome.missed} (of these {outcome.islands} "
-        f"narrower than the finest interval); reported jumps {outcome.told:.1%} of the axis; uniform {grid:4d}{other}"
+        f"narrower than the finest interval); reported jumps {outcome.in_jumps:.1%} of the axis; "
+        f"uniform {grid:4d}{other}"
     )
 
 
@@ -214,7 +215,7 @@ def family(name: str, problems: Any, error: float, with_peer: bool) -> None:
         f"{largest(lambda one: one.same_places):.2%}\n"
         f"  jumps {sum(one.jumps for one in outcomes)}, missed {sum(one.missed for one in outcomes)}, of these "
         f"{sum(one.islands for one in outcomes)} narrower than the finest interval; reported "
-        f"{np.mean([one.told for one in outcomes]):.1%} of the axes\n"
+        f"{np.mean([one.in_jumps for one in outcomes]):.1%} of the axes\n"
         f"  planning of a round: at most {1e3 * largest(lambda one: one.slowest):.1f} ms for a curve"
     )
     if with_peer:

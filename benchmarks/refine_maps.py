@@ -99,11 +99,11 @@ def compare(problem: Problem, error: float, start: int, finest: int) -> None:
     surface = np.stack([found.at(name, x, y) for name in problem.results], axis=2)
     counts = np.isfinite(surface)
     grid, least = (finest + 1) ** 2, uniform(values, ranges, error) ** 2
-    told = ", ".join(f"{share:.1%}" for share in found.told.values())
+    held = ", ".join(f"{share:.1%}" for share in found.told.values())
     estimate = "unknown" if found.error is None else f"{found.error:.2%}"
     print(
         f"{problem.name}\n  {len(found.x)} cases, {rounds} rounds; error "
-        f"{error_of(surface, values, ranges, counts):.2%}, reported at most {estimate}; reported as jumps {told}\n"
+        f"{error_of(surface, values, ranges, counts):.2%}, reported at most {estimate}; reported as jumps {held}\n"
         f"  uniform grid of the finest spacing {grid} ({len(found.x) / grid:.0%}); for the error alone {least} "
         f"({len(found.x) / least:.0%}); planning of a round at most {1e3 * slowest:.0f} ms",
         flush=True,

@@ -332,6 +332,6 @@ def _rows(done: LocalRun, form: Format | ReportFormat) -> Iterator[bytes]:
     from sprag.service.results.report import write_report
     from sprag.service.results.report.content import report_of
 
-    if form == "html" or form == "pdf":  # noqa: PLR1714 - so that the types are told apart
+    if form == "html" or form == "pdf":  # noqa: PLR1714 - narrows the type
         return iter([write_report(report_of(done.store, done.record.id), form)])
     return export(stored(done.store, done.record, done.store.study(done.record.id)), form)

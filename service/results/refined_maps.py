@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from sprag.worker.planning.refine import Map as Described
     from sprag.worker.study import Study
 
-#: Squares along an axis, at most; more cannot be told apart in a picture.
+#: Squares along an axis, at most; more cannot be seen in a picture.
 MOST_SQUARES: Final = 256
 #: What stands in the place of an ending where a square is interpolated, and where it must not be.
 INTERPOLATED, JUMP = "interpolated", "jump"

@@ -141,5 +141,5 @@ def starts_schema() -> Schema:
     return object_schema(
         {**schemas(SETTINGS), "ranges": ranges},
         required=("ranges",),
-        description="many starts of each case, whose regimes are told apart",
+        description="many starts of each case, to find its coexisting regimes",
     )

@@ -52,7 +52,7 @@ async def get_basin(
     chosen = choose_format(work.request, form, DRAWN_FORMATS)
     ends = {"x": (x_from, x_to), "y": (y_from, y_to)}
     study, query = await work.case_of(study_id, case, lambda study: basins.basin_query(study, x, y, ends, points))
-    if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - so that the types are told apart
+    if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - narrows the type
         content = await work.run_case(basins.basin_file, study, case, query, chosen)
         return written(content, chosen, f"{study_id}-case-{case}-basin")
     made = await work.run_case(basins.basin_of, study, case, query)

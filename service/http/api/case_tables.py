@@ -81,7 +81,7 @@ async def get_strobes(
     chosen = choose_format(work.request, form, DRAWN_FORMATS)
     asked = choice_of("table", table, portraits.TABLES)
     study, _ = await work.case_of(study_id, case, portraits.require_strobes, which)
-    if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - so that the types are told apart
+    if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - narrows the type
         content = await work.run_case(portraits.portrait_file, study, case, asked, chosen, which)
         return written(content, chosen, f"{study_id}-case-{case}-{asked}")
     made = await work.run_case(models.run_portrait, *motion_of(study, case, which))

@@ -1,4 +1,4 @@
-"""Coexisting motions: told apart by their orbits at equal phase, with their shares."""
+"""Coexisting motions: distinguished by their orbits at equal phase, with their shares."""
 
 from __future__ import annotations
 
