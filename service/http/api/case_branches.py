@@ -15,7 +15,7 @@ from sprag.service.http.drawing import DRAWN_FORMATS, picture
 from sprag.service.http.drawing import table as written
 from sprag.service.http.requests import strict_query
 from sprag.service.http.respond import choose_format
-from sprag.service.http.work import Attended
+from sprag.service.http.work import Attended, Work
 from sprag.service.results import branches, sections
 from sprag.service.results.figures.branch import branch_figure
 from sprag.service.results.figures.sections import diagram_figure, section_figure
@@ -25,6 +25,8 @@ from sprag.worker.models.sections import run_sections
 from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
+    from sprag.service.results.figures.figure import Figure
+    from sprag.service.results.pictures.curves import Picture
     from sprag.worker.models.branches import Along
     from sprag.worker.models.sections import Sampling
     from sprag.worker.study import Study
@@ -83,12 +85,11 @@ async def get_branch(
         return branches.along_of(study, case, along, low, high), branches.result_of(study, y)
 
     study, (asked, result) = await work.case_of(study_id, case, look, which)
-    if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - so that the types are told apart
+    if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - narrows the type
         content = await work.run_case(branches.branch_file, study, case, asked, chosen, which)
         return written(content, chosen, f"{study_id}-case-{case}-branch")
     made = await work.run_case(run_branch, *motion_of(study, case, which), asked)
-    figure = branch_figure(made, study, asked, result)
-    return await picture(draw_figure, chosen, figure, f"{study.name}, case {case}").response(work)
+    return await _drawn(work, chosen, branch_figure(made, study, asked, result), study, case)
 
 
 @router.get(
@@ -125,12 +126,11 @@ async def get_diagram(
         return asked, sections.variable_of(study, y)
 
     study, (asked, variable) = await work.case_of(study_id, case, look, which)
-    if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - so that the types are told apart
+    if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - narrows the type
         content = await work.run_case(sections.sections_file, study, case, asked, chosen, False, which)
         return written(content, chosen, f"{study_id}-case-{case}-diagram")
     made = await work.run_case(run_sections, *motion_of(study, case, which), asked)
-    figure = diagram_figure(made, study, asked, variable)
-    return await picture(draw_figure, chosen, figure, f"{study.name}, case {case}").response(work)
+    return await _drawn(work, chosen, diagram_figure(made, study, asked, variable), study, case)
 
 
 @router.get(
@@ -157,9 +157,12 @@ async def get_section(
         return sections.section_of(study, case, phase, strobes)
 
     study, asked = await work.case_of(study_id, case, look, which)
-    if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - so that the types are told apart
+    if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - narrows the type
         content = await work.run_case(sections.sections_file, study, case, asked, chosen, True, which)
         return written(content, chosen, f"{study_id}-case-{case}-section")
     made = await work.run_case(run_sections, *motion_of(study, case, which), asked)
-    figure = section_figure(made, study, asked)
-    return await picture(draw_figure, chosen, figure, f"{study.name}, case {case}").response(work)
+    return await _drawn(work, chosen, section_figure(made, study, asked), study, case)
+
+
+async def _drawn(work: Work, form: Picture, figure: Figure, study: Study, case: int) -> Response:
+    return await picture(draw_figure, form, figure, f"{study.name}, case {case}").response(work)

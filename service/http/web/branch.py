@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
-from urllib.parse import urlencode
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from fastapi import APIRouter, Query
+from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError
 from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, check_start, study_with
 from sprag.service.http.respond import json_response
+from sprag.service.http.web.along import Begin, End, Text, along_frame, query_of
 from sprag.service.http.web.figures.plotly import plotly_figure
-from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.results.branches import along_of, neighbours, result_of, usual_along
 from sprag.service.results.figures.branch import OwnCases, branch_figure
 from sprag.service.results.portraits import require_strobes
-from sprag.service.results.selection import axis_name
 from sprag.worker.models.branches import branch_results, run_branch
 from sprag.worker.models.starts import motion_of
 
@@ -30,10 +28,6 @@ if TYPE_CHECKING:
     from sprag.worker.study import Study
 
 router = APIRouter(include_in_schema=False)
-
-Text = Annotated[str, Query(max_length=400)]
-Begin = Annotated[str, Query(alias="from", max_length=80)]
-End = Annotated[str, Query(alias="to", max_length=80)]
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/branch")
@@ -46,34 +40,23 @@ def branch_page(
     require_strobes(study)
     check_start(study, which)
     path = along or usual_along(study)
-    start = "" if which is None else str(which)
     faults: tuple[Any, ...] = ()
     query = ""
     try:
         result = result_of(study, y)
         if path:
             along_of(study, case, path, low, high)
-            given = {"along": path, "from": low.strip(), "to": high.strip(), "y": result, "start": start}
-            query = urlencode({name: value for name, value in given.items() if value})
+            query = query_of({"along": path, "from": low, "to": high, "y": result}, which)
     except FaultError as error:
         result, faults = y, error.faults
-    own = f"/studies/{study_id}/cases/{case}"
     return page(
         "branch.html",
         status=422 if faults else 200,
-        **study_frame(context, study_id),
-        tab="/cases",
-        case=case,
-        start=start,
-        along=path,
-        low=low,
-        high=high,
-        y=result,
+        **along_frame(context, study_id, study, case, {"along": path, "low": low, "high": high, "y": result}, which),
+        title="Branch",
         faults=faults,
-        choices=[(axis.paths[0], axis_name(study, axis.paths[0])) for axis in study.axes],
         results=branch_results(study),
-        figure=f"{own}/branch/figure?{query}" if query else "",
-        file=f"/api/v1{own}/branch?{query}",
+        branch=query,
     )
 
 

@@ -115,7 +115,6 @@ def case_page(
         faults = error.faults
     start = [] if which is None else [("start", str(which))]
     query = urlencode([("from", repr(span[0])), ("to", repr(span[1])), *start]) if span else ""
-    own_start = f"?{urlencode(start)}" if start else ""
     own = f"/studies/{study_id}/cases/{case}"
     infos = models.study_results(study)
     extent = models.extent(study, case)
@@ -145,9 +144,9 @@ def case_page(
         figures=f"{own}/motion?{query}",
         picture=f"{own}/motion.svg?{query}",
         file=f"/api/v1{own}/trajectory?{query}&points={SAMPLES}&format=csv",
-        clutches=f"{own}/engagements{own_start}" if models.has_clutches(study) else "",
-        strobes=f"{own}/strobes{own_start}" if models.has_strobes(study) else "",
-        branch=f"{own}/branch{own_start}" if models.has_strobes(study) else "",
+        own=own,
+        has_clutches=models.has_clutches(study),
+        has_strobes=models.has_strobes(study),
         settled=models.is_settled(study.run),
         last=study.cases - 1,
     )

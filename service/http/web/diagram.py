@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any, Final
-from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query
 from starlette.responses import Response
@@ -12,15 +11,14 @@ from sprag.service.faults import FaultError
 from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, check_start, study_with
 from sprag.service.http.drawing import unchanging
 from sprag.service.http.respond import json_response
+from sprag.service.http.web.along import Begin, End, Text, along_frame, query_of
 from sprag.service.http.web.figures.plotly import plotly_figure
-from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.results.branches import usual_along
 from sprag.service.results.figures.sections import diagram_figure, section_figure
 from sprag.service.results.portraits import require_strobes
 from sprag.service.results.sections import diagram_of, section_of, variable_of, variables
-from sprag.service.results.selection import axis_name
 from sprag.worker.models.sections import run_sections
 from sprag.worker.models.starts import motion_of
 
@@ -30,9 +28,6 @@ if TYPE_CHECKING:
 
 router = APIRouter(include_in_schema=False)
 
-Text = Annotated[str, Query(max_length=400)]
-Begin = Annotated[str, Query(alias="from", max_length=80)]
-End = Annotated[str, Query(alias="to", max_length=80)]
 Phase = Annotated[str, Query(max_length=80)]
 
 #: Values of the parameter and strobes of each; strobes of a section.
@@ -49,37 +44,26 @@ def diagram_page(
     study = study_with(context, study_id, case)
     require_strobes(study)
     check_start(study, which)
-    start = "" if which is None else str(which)
     path = along or usual_along(study)
     faults: tuple[Any, ...] = ()
     diagram = section = ""
     try:
         shown = variable_of(study, y)
         section_of(study, case, phase, _SECTION)
-        section = _query({"phase": phase.strip(), "start": start})
+        section = query_of({"phase": phase}, which)
         if path:
             diagram_of(study, case, path, (low, high), phase, _SIZE)
-            asked = {"along": path, "from": low.strip(), "to": high.strip(), "phase": phase.strip(), "y": shown}
-            diagram = _query(asked | {"start": start})
+            diagram = query_of({"along": path, "from": low, "to": high, "phase": phase, "y": shown}, which)
     except FaultError as error:
         shown, faults = y, error.faults
-    own = f"/studies/{study_id}/cases/{case}"
+    entered = {"along": path, "low": low, "high": high, "phase": phase, "y": shown}
     return page(
         "diagram.html",
         status=422 if faults else 200,
-        **study_frame(context, study_id),
-        tab="/cases",
-        case=case,
-        start=start,
-        along=path,
-        low=low,
-        high=high,
-        phase=phase,
-        y=shown,
+        **along_frame(context, study_id, study, case, entered, which),
+        title="Bifurcation diagram",
         faults=faults,
-        choices=[(axis.paths[0], axis_name(study, axis.paths[0])) for axis in study.axes],
         variables=variables(study),
-        own=own,
         diagram=diagram,
         section=section,
     )
@@ -120,7 +104,3 @@ async def section_drawn(
         return json_response(plotly_figure(section_figure(made, study, asked)))
 
     return await unchanging(work, study_id, make)
-
-
-def _query(asked: dict[str, str]) -> str:
-    return urlencode({name: value for name, value in asked.items() if value})

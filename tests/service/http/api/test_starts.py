@@ -122,7 +122,7 @@ def test_the_page_of_a_case_lists_its_regimes(service: Service, started: str) ->
     assert "0, shown below" in page
     other = service.http.get(f"/studies/{started}/cases/1", params={"start": "5"}).text
     assert "5, shown below" in other
-    assert f"/studies/{started}/cases/1/strobes?start=5&amp;columns=2" in other
+    assert f"/studies/{started}/cases/1/strobes?columns=2&amp;start=5" in other
 
 
 @pytest.mark.parametrize("figure", ["branch", "diagram", "section"])

@@ -1,0 +1,40 @@
+"""What the pages of a case along a parameter have in common: the branch of its motion, and its bifurcation diagram."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+from urllib.parse import urlencode
+
+from fastapi import Query
+
+from sprag.service.http.web.study import study_frame
+from sprag.service.results.selection import axis_name
+
+if TYPE_CHECKING:
+    from sprag.service.http.context import Context
+    from sprag.worker.study import Study
+
+Text = Annotated[str, Query(max_length=400)]
+Begin = Annotated[str, Query(alias="from", max_length=80)]
+End = Annotated[str, Query(alias="to", max_length=80)]
+
+
+def along_frame(
+    context: Context, study_id: str, study: Study, case: int, entered: dict[str, str], start: int | None
+) -> dict[str, Any]:
+    """What the template of these pages shows around their figures; ``entered`` are the fields of their form."""
+    return {
+        **study_frame(context, study_id),
+        **entered,
+        "tab": "/cases",
+        "case": case,
+        "start": "" if start is None else str(start),
+        "own": f"/studies/{study_id}/cases/{case}",
+        "choices": [(axis.paths[0], axis_name(study, axis.paths[0])) for axis in study.axes],
+    }
+
+
+def query_of(asked: dict[str, str], start: int | None) -> str:
+    """The query of a figure: what is not empty, and the start."""
+    given = {name: text for name, value in asked.items() if (text := value.strip())}
+    return urlencode(given if start is None else {**given, "start": start})
