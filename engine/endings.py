@@ -65,7 +65,8 @@ _SENTENCES = {
     ),
     Ending.QUADRATURE_NOT_REACHED: (
         "A torque or the inertia changes too abruptly to be integrated to 1e-10: split a formula where it "
-        "jumps or widen its peaks, or smooth a table; an inertia may not jump at all."
+        "jumps or widen its peaks, or smooth a table; an inertia may not jump at all. Or no steady speed was found for "
+        "a load that follows it: let its torque rise with the speed."
     ),
     Ending.MOTOR_OVERRUN: (
         "The motor has no steady cycle with this load: the load drives the shaft harder than the motor can brake it, "

@@ -13,6 +13,8 @@ _FORMULA, _OWN, _SWITCHES = 0.1, 0.7, 1.0
 _PEAK = 12.0
 #: Additional time of each part beyond the first.
 _PART = 0.2
+#: Additional time of a formula that follows the speed, which is then iterated.
+_SPEED = 12.0
 _SHARP = frozenset({"exp", "tanh", "sinh", "cosh", "atan"})
 
 
@@ -30,8 +32,8 @@ def estimate_seconds(model: MachineSpec) -> float:
 
 
 def _formula_cost(text: str, constants: tuple[str, ...]) -> float:
-    expression = Expression(text, ("phi", "x", *constants))
-    cost = _FORMULA
+    expression = Expression(text, dict.fromkeys(("phi", "x", "omega", *constants)))
+    cost = _FORMULA + (_SPEED if "omega" in expression.used - set(constants) else 0.0)
     if expression.names & set(constants):
         cost += _OWN
     if expression.switch_count:

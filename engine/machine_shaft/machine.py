@@ -1,6 +1,6 @@
 """A machine with its structure and numbers: inertia and torques at any angles, for a block of cases."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
@@ -10,7 +10,8 @@ from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.drive_train import Train
 from sprag.engine.machine_shaft.expressions import RESERVED, Expression
 from sprag.engine.machine_shaft.mechanisms import RodMechanism
-from sprag.engine.machine_shaft.operations import formula_breaks
+from sprag.engine.machine_shaft.motor import free_speed
+from sprag.engine.machine_shaft.operations import SpeedLaw, formula_breaks
 from sprag.engine.machine_shaft.parameters import parameters
 from sprag.engine.machine_shaft.parts import Jumps, ShaftPart, mechanism_of
 from sprag.engine.machine_shaft.pieces import Formula
@@ -112,6 +113,10 @@ class Fields:
     resistance: Floats
     operation: Floats
 
+    def less(self, torque: Floats) -> "Fields":
+        """The same without a ``torque`` of the operations."""
+        return replace(self, resistance=self.resistance - torque, operation=self.operation - torque)
+
 
 class Machine:
     """A structure with the numbers of a block of cases.
@@ -120,6 +125,8 @@ class Machine:
     ----------
     parts : tuple of ShaftPart
         Its mechanisms with their operations; exactly one unless the structure lists several.
+    pace : array, shape (cases or 1, 1, 1)
+        A speed of the shaft in rad/s of the right size: the required mean speed, or that of the motor without load.
     """
 
     def __init__(self, spec: MachineSpec, columns: Columns) -> None:
@@ -127,8 +134,11 @@ class Machine:
         self.cycle = _TURN * spec.cycle
         self.constants = columns.under("constants.")
         self.train = Train.of(spec.drive, columns.values)
-        self.parts = tuple(ShaftPart(part, prefix, spec.cycle, columns) for prefix, part in spec.every_part())
         given = spec.balance != "motor"
+        self.pace = columns.values["mean_speed"] if given else free_speed(spec.drive, columns.values) / self.train.ratio
+        self.parts = tuple(
+            ShaftPart(part, prefix, spec.cycle, columns, self.pace) for prefix, part in spec.every_part()
+        )
         table, formula = spec.drive.table, spec.drive.formula
         self._drive_curve = (
             periodic(table, self.cycle) if given and spec.drive.form == "table" and table is not None else None
@@ -186,9 +196,33 @@ class Machine:
             raise AssertionError("a drive that is not constant has a table or a formula")
         return self.train.at_shaft(np.asarray(scale * self._drive_formula.evaluate(self._environment(phi))[0]))
 
-    def fields(self, phi: Floats) -> Fields:
-        """Inertia and torques at ``phi``, shape (cases or 1, panels, nodes), none of it at a jump."""
-        own = [part.fields(phi) for part in self.parts]
+    @property
+    def follows_speed(self) -> bool:
+        """Whether the torque of an operation follows the speed: whether its formula uses ``omega``."""
+        return any(part.follows_speed for part in self.parts)
+
+    def speed_law(self, phi: Floats) -> SpeedLaw:
+        """The sum of the torques of the operations that follow the speed, at ``phi`` (cases or 1, panels, nodes)."""
+        laws = [part.speed_law(phi) for part in self.parts if part.follows_speed]
+        shape = (self.columns.cases, *phi.shape[1:])
+
+        def law(omega: Floats) -> tuple[Floats, Floats]:
+            torque, slope = (reduce(np.add, same) for same in zip(*(own(omega) for own in laws), strict=True))
+            return np.broadcast_to(torque, shape), np.broadcast_to(slope, shape)
+
+        return law
+
+    def fields(self, phi: Floats, omega: Floats | None = None) -> Fields:
+        """Inertia and torques, none of it at a jump.
+
+        Parameters
+        ----------
+        phi : array, shape (cases or 1, panels, nodes)
+            In rad.
+        omega : array of that shape, optional
+            Speeds there in rad/s, for operations that follow the speed; by default ``pace``.
+        """
+        own = [part.fields(phi, omega) for part in self.parts]
         inertia, slope, resistance, operation = (reduce(np.add, same) for same in zip(*own, strict=True))
         shape = (self.columns.cases, *phi.shape[1:])
         resistance = resistance - self.columns.values["friction_torque"]

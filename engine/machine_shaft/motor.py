@@ -6,14 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine.machine_shaft.operations import SpeedLaw
 from sprag.engine.machine_shaft.panels import Panels
-from sprag.engine.machine_shaft.spec import Motor
+from sprag.engine.machine_shaft.spec import Drive, Motor
 
 Floats = NDArray[np.float64]
 
 _MAX_ITERATIONS = 80
 #: Cycles of the simulation that decides whether a shaft stops: load peaks stop it within the first few.
 _CYCLES = 20
+#: Guesses of the speed at which a load that follows it needs what the motor gives.
+_GUESSES = 4
 
 
 def motor_torque(motor: Motor, values: Mapping[str, Floats], omega: Floats) -> tuple[Floats, Floats]:
@@ -36,6 +39,12 @@ def motor_torque(motor: Motor, values: Mapping[str, Floats], omega: Floats) -> t
     size = slip**2 + critical**2
     by_slip = 2.0 * most * critical * (critical**2 - slip**2) / size**2
     return 2.0 * most * critical * slip / size, -by_slip / synchronous
+
+
+def free_speed(drive: Drive, values: Mapping[str, Floats]) -> Floats:
+    """Speed in rad/s of the motor's shaft without load; ``values`` by path."""
+    name = "no_load_speed" if drive.motor == "linear" else "synchronous_speed"
+    return values.get(f"drive.motor.{name}", np.ones((1, 1, 1)))
 
 
 def steady_speed(motor: Motor, values: Mapping[str, Floats], torque: Floats) -> Floats:
@@ -62,27 +71,37 @@ class LimitCycle:
     ----------
     start : array, shape (cases,)
         Kinetic energy T_0 at the angle 0, in J.
-    drive : array, shape (cases, panels, nodes)
-        The motor's torque in N*m.
+    drive, resistance : arrays, shape (cases, panels, nodes)
+        The torques of motor and load in N*m.
+    omega : array of that shape
+        Speed in rad/s.
     stalled, overrun : arrays of bool, shape (cases,)
         Where there is no stable periodic motion, because the shaft stops or because it runs away.
     """
 
     start: Floats
     drive: Floats
+    resistance: Floats
+    omega: Floats
     stalled: NDArray[np.bool_]
     overrun: NDArray[np.bool_]
 
 
 def limit_cycle(
-    motor: Motor, values: Mapping[str, Floats], panels: Panels, cycle: float, inertia: Floats, resistance: Floats
+    motor: Motor,
+    values: Mapping[str, Floats],
+    panels: Panels,
+    cycle: float,
+    inertia: Floats,
+    resistance: Floats,
+    law: SpeedLaw | None = None,
 ) -> LimitCycle:
     """The periodic motion that a machine with a motor approaches.
 
-    Integrating T' = M(omega) + M_r(phi), omega^2 = 2 T/I, over many cycles leads to a periodic T, which is computed
+    Integrating T' = M(omega) + M_r(phi, omega), omega^2 = 2 T/I, over many cycles leads to a periodic T, which is found
     directly: the equation is linearised about the last T, and the periodic solution of the linear equation (collocation
     at the nodes, panel after panel) is the next iterate. This converges quadratically. The solution is attracting if
-    the mean of dM/dT is negative; only then would integration approach it.
+    the mean of dM/dT, of the load's torque too, is negative; only then would integration approach it.
 
     Parameters
     ----------
@@ -94,13 +113,19 @@ def limit_cycle(
     cycle : float
         In rad.
     inertia, resistance : arrays, shape (cases, panels, nodes)
+    law : SpeedLaw, optional
+        Of the loads that follow the speed, beside ``resistance``.
 
     Returns
     -------
     LimitCycle
     """
-    needed = -(panels.integral(resistance) / cycle)[:, None, None]
-    speed = np.maximum(steady_speed(motor, values, needed), 0.05 * steady_speed(motor, values, 0.0 * needed))
+    free = steady_speed(motor, values, np.zeros((len(inertia), 1, 1)))
+    speed = free
+    for _ in range(1 if law is None else _GUESSES):
+        given = resistance if law is None else resistance + law(np.broadcast_to(speed, inertia.shape))[0]
+        needed = -(panels.integral(given) / cycle)[:, None, None]
+        speed = np.maximum(steady_speed(motor, values, needed), 0.05 * free)
     energy = 0.5 * inertia * speed**2
     start = energy[:, 0, 0].copy()
     active = np.arange(len(inertia))
@@ -109,7 +134,8 @@ def limit_cycle(
         own = {name: value[active] if len(value) > 1 else value for name, value in values.items()}
         own_panels, last = panels.take(active), energy[active]
         with np.errstate(all="ignore"):
-            found, start[active] = _linear_step(motor, own, own_panels, inertia[active], resistance[active], last)
+            load = _load(inertia, resistance, law, energy, active)
+            found, start[active] = _linear_step(motor, own, own_panels, inertia[active], load, last)
             kept = np.maximum(found, 0.1 * last)
             change = own_panels.largest(kept - last) / own_panels.largest(kept)
         energy[active] = kept
@@ -121,11 +147,24 @@ def limit_cycle(
             break
     with np.errstate(all="ignore"):
         drive, by_energy = _torque_and_slope(motor, values, inertia, energy)
-        final, _ = _linear_step(motor, values, panels, inertia, resistance, energy)
+        load = _load(inertia, resistance, law, energy, np.arange(len(inertia)))
+        final, _ = _linear_step(motor, values, panels, inertia, load, energy)
         error = panels.largest(final - energy) / panels.largest(energy)
-        none = ~((error < 1e-9) & (start > 0.0) & (panels.integral(by_energy) < 0.0))
-        overrun = none & _overruns(motor, values, panels, inertia, resistance, -needed[:, 0, 0] * cycle, none)
-    return LimitCycle(start, drive, none & ~overrun, overrun)
+        none = ~((error < 1e-9) & (start > 0.0) & (panels.integral(by_energy + load[1]) < 0.0))
+        # A load that follows the speed is judged by its torque at the last guess.
+        overrun = none & _overruns(motor, values, panels, inertia, given, -needed[:, 0, 0] * cycle, none)
+    return LimitCycle(start, drive, load[0], np.sqrt(2.0 * energy / inertia), none & ~overrun, overrun)
+
+
+def _load(
+    inertia: Floats, resistance: Floats, law: SpeedLaw | None, energy: Floats, rows: NDArray[np.int64]
+) -> tuple[Floats, Floats]:
+    """Resisting torque at the ``energy`` of some of the cases, and its derivative by the energy."""
+    if law is None:
+        return resistance[rows], np.zeros(1)
+    omega = np.sqrt(2.0 * energy / inertia)
+    torque, slope = law(omega)
+    return (resistance + torque)[rows], (slope / (inertia * omega))[rows]
 
 
 def _overruns(
@@ -194,9 +233,13 @@ def _linear_step(
     values: Mapping[str, Floats],
     panels: Panels,
     inertia: Floats,
-    resistance: Floats,
+    load: tuple[Floats, Floats],
     energy: Floats,
 ) -> tuple[Floats, Floats]:
-    """Periodic solution of the equation linearised about ``energy``: at the nodes and at the angle 0."""
+    """Periodic solution of the equation linearised about ``energy``: at the nodes and at the angle 0.
+
+    ``load`` is the resisting torque and its derivative by the energy.
+    """
     torque, slope = _torque_and_slope(motor, values, inertia, energy)
-    return panels.periodic(slope, torque + resistance - slope * energy)
+    slope = slope + load[1]
+    return panels.periodic(slope, torque + load[0] - slope * energy)

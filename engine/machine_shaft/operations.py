@@ -13,6 +13,8 @@ from sprag.engine.machine_shaft.spec import OperationChoice
 from sprag.engine.machine_shaft.tables import Curve, along_strokes, over_stroke, periodic
 
 Floats = NDArray[np.float64]
+#: Torque on the shaft in N*m at speeds of the shaft in rad/s, and its derivative by the speed.
+SpeedLaw = Callable[[Floats], tuple[Floats, Floats]]
 
 _TURN = 2.0 * np.pi
 #: Samples per revolution in the search for sign changes of a formula.
@@ -137,13 +139,21 @@ class Operation:
         The formulas' constants, of that shape.
     stroke : Stroke or None
         Of the mechanism, if it has one.
+    pace : array of that shape
+        Speed of the shaft in rad/s that a formula takes for ``omega`` where no other is given.
     """
 
     def __init__(
-        self, choice: OperationChoice, revolutions: int, values: Values, constants: Values, stroke: Stroke | None
+        self,
+        choice: OperationChoice,
+        revolutions: int,
+        values: Values,
+        constants: Values,
+        stroke: Stroke | None,
+        pace: Floats,
     ) -> None:
         self._choice, self._revolutions, self._values = choice, revolutions, values
-        self._constants, self._stroke = constants, stroke
+        self._constants, self._stroke, self._pace = constants, stroke, pace
         self._cycle = _TURN * revolutions
         self._curve: Curve | None = None
         self._expression: Expression | None = None
@@ -153,14 +163,59 @@ class Operation:
         elif choice.table is not None and choice.form == "table":
             self._curve = over_stroke(choice.table) if choice.over == "stroke" else periodic(choice.table, self._cycle)
         if choice.formula is not None and choice.form == "formula":
-            names = ("phi", "x", *constants) if stroke is not None else ("phi", *constants)
-            self._expression = Expression(choice.formula, names)
+            names = ("phi", "x") if stroke is not None else ("phi",)
+            self._expression = Expression(choice.formula, dict.fromkeys((*names, "omega", *constants)))
 
     def _environment(self, phi: Floats) -> dict[str, tuple[Floats, Floats | float]]:
         names: dict[str, tuple[Floats, Floats | float]] = {"phi": (phi, 0.0)}
         if self._stroke is not None:
             names["x"] = (self._stroke.fraction(phi), 0.0)
+        if self.follows_speed:
+            names["omega"] = (self._pace, 0.0)
         return names | {name: (value, 0.0) for name, value in self._constants.items()}
+
+    @property
+    def follows_speed(self) -> bool:
+        """Whether its formula uses the speed of the shaft, ``omega``."""
+        own = self.expression
+        return own is not None and "omega" in own.used and "omega" not in self._constants
+
+    def speed_law(self, phi: Floats, way_slope: Floats | None) -> SpeedLaw:
+        """The torque at ``phi`` by the speed, of an operation that follows it; parameters as in ``lossless``."""
+        environment, expression = self._environment(phi), self._expression
+        if expression is None:
+            raise AssertionError("only a formula follows the speed")
+        efficiency = self._values.get("efficiency", np.ones(1))
+
+        def law(omega: Floats) -> tuple[Floats, Floats]:
+            found = expression.evaluate(environment | {"omega": (omega, np.ones(1))})
+            value, by_speed = (self._turned(self._in_strokes(np.asarray(part), phi), way_slope) for part in found)
+            passed = np.where(value > 0.0, efficiency, 1.0 / efficiency)
+            return value * passed, by_speed * passed
+
+        return law
+
+    def _in_strokes(self, diagram: Floats, phi: Floats) -> Floats:
+        """A diagram over the stroke, 0 outside the strokes in which it holds."""
+        choice, stroke = self._choice, self._stroke
+        if choice.over == "angle" or stroke is None:
+            return diagram
+        acts = np.zeros(np.shape(phi), dtype=np.bool_)
+        if choice.during != "return":
+            acts = acts | stroke.forward(phi)
+        if choice.during != "forward":
+            acts = acts | stroke.backward(phi)
+        return np.where(acts, diagram, 0.0)
+
+    def _turned(self, diagram: Floats, way_slope: Floats | None) -> Floats:
+        """Torque on the shaft of a diagram of torque or force."""
+        scale = self._values["scale"]
+        if self._choice.quantity == "torque":
+            return np.asarray(-scale * diagram)
+        if way_slope is None:
+            raise AssertionError("a force needs a mechanism")
+        against = np.abs(way_slope) if self._choice.sense == "resisting" else way_slope
+        return np.asarray(-scale * diagram * against)
 
     def _diagram(self, phi: Floats) -> Floats:
         """Value of the torque or force diagram at ``phi``."""
@@ -174,14 +229,7 @@ class Operation:
             diagram = np.asarray(self._expression.evaluate(self._environment(phi))[0])
         else:
             diagram = self._steps(place, wraps=stroke is None)
-        if stroke is not None:
-            acts = np.zeros(np.shape(phi), dtype=np.bool_)
-            if choice.during != "return":
-                acts = acts | stroke.forward(phi)
-            if choice.during != "forward":
-                acts = acts | stroke.backward(phi)
-            diagram = np.where(acts, diagram, 0.0)
-        return np.asarray(diagram)
+        return self._in_strokes(np.asarray(diagram), phi)
 
     def _steps(self, place: Floats, *, wraps: bool) -> Floats:
         total: Floats = 0.0 * place
@@ -220,19 +268,16 @@ class Operation:
         choice = self._choice
         if choice.quantity == "none":
             return 0.0 * phi
+        if choice.quantity in {"torque", "force"}:
+            return self._turned(self._diagram(phi), way_slope)
         scale = self._values["scale"]
-        if choice.quantity == "torque":
-            return np.asarray(-scale * self._diagram(phi))
         if way_slope is None or self._stroke is None:
-            raise AssertionError("a force needs a mechanism")
+            raise AssertionError("a gas needs a mechanism")
         if choice.quantity == "gas":
             return np.asarray(scale * self._gas(phi, self._stroke) * way_slope)
-        if choice.quantity == "pressure":
-            v = self._values
-            force = (self._pressure(phi, self._stroke) - v["indicator.back_pressure"]) * v["indicator.piston_area"]
-            return np.asarray(scale * force * way_slope)
-        against = np.abs(way_slope) if choice.sense == "resisting" else way_slope
-        return np.asarray(-scale * self._diagram(phi) * against)
+        v = self._values
+        force = (self._pressure(phi, self._stroke) - v["indicator.back_pressure"]) * v["indicator.piston_area"]
+        return np.asarray(scale * force * way_slope)
 
     def _pressure(self, phi: Floats, stroke: Stroke) -> Floats:
         """Pressure on the piston in Pa; the strokes of a cycle are counted from the start of the first forward one."""

@@ -18,7 +18,7 @@ from sprag.engine.machine_shaft.four_bars import FourBar, ParallelCrank
 from sprag.engine.machine_shaft.linkages import CrankShaper, ScotchYoke, SliderCrank, Whitworth
 from sprag.engine.machine_shaft.linked_rams import DragLink, Toggle
 from sprag.engine.machine_shaft.mechanisms import Mechanism, Motion, RodMechanism, Values
-from sprag.engine.machine_shaft.operations import Operation, Stroke, every_revolution, formula_breaks
+from sprag.engine.machine_shaft.operations import Operation, SpeedLaw, Stroke, every_revolution, formula_breaks
 from sprag.engine.machine_shaft.pieces import Formula
 from sprag.engine.machine_shaft.problems import TableError
 from sprag.engine.machine_shaft.spec import MechanismChoice, MechanismKind, PartChoice
@@ -117,9 +117,11 @@ class ShaftPart:
         Of a cycle.
     columns : Columns
         Of the machine.
+    pace : array, shape (cases or 1, 1, 1)
+        Speed of the shaft in rad/s for formulas where no other is given.
     """
 
-    def __init__(self, choice: PartChoice, prefix: str, revolutions: int, columns: Columns) -> None:
+    def __init__(self, choice: PartChoice, prefix: str, revolutions: int, columns: Columns, pace: Floats) -> None:
         self.choice, self.prefix, self.cases = choice, prefix, columns.cases
         self._revolutions, self.cycle = revolutions, _TURN * revolutions
         self._ahead = columns.values[f"{prefix}crank_angle"] if prefix else None
@@ -133,7 +135,8 @@ class ShaftPart:
         self.inertia_formula = Expression(text, names) if choice.mechanism.kind == "formula" else None
         self._stroke = None if self.mechanism is None else Stroke.of(self.mechanism, self.values)
         own = columns.under(f"{prefix}operation.")
-        self._operation = Operation(choice.operation, revolutions, own, self._constants, self._stroke)
+        self._operation = Operation(choice.operation, revolutions, own, self._constants, self._stroke, pace)
+        self._pace = pace
 
     def own_angle(self, phi: Floats) -> Floats:
         """Angle of the part, 0 .. cycle, at angles of the shaft."""
@@ -177,10 +180,11 @@ class ShaftPart:
     def formulas(self) -> list[Formula]:
         """The formulas of its inertia and its resistance."""
         own = (("inertia", self.inertia_formula), ("resistance", self._operation.expression))
+        known = {"omega": self._pace} | self._constants
         return [
             Formula(
                 "inertia" if field == "inertia" else "resistance", expression,
-                {name: value for name, value in self._constants.items() if name in expression.used},
+                {name: value for name, value in known.items() if name in expression.used},
                 self._stroke if "x" in expression.used else None, self._ahead, self.cycle,
             )
             for field, expression in own if expression is not None
@@ -190,12 +194,34 @@ class ShaftPart:
         """The mechanism at angles of the shaft; None for one without dimensions."""
         return None if self.mechanism is None else self.mechanism.motion(self.values, self.own_angle(phi))
 
-    def fields(self, phi: Floats) -> PartFields:
-        """Inertia and torque at angles of the shaft, shape (cases or 1, panels, nodes), none of them at a jump."""
+    @property
+    def follows_speed(self) -> bool:
+        """Whether the formula of its operation uses the speed of the shaft, ``omega``."""
+        return self._operation.follows_speed
+
+    def speed_law(self, phi: Floats) -> SpeedLaw:
+        """The torque of an operation that follows the speed, at angles of the shaft (cases or 1, panels, nodes)."""
+        motion = self.motion(phi)
+        return self._operation.speed_law(self.own_angle(phi), None if motion is None else motion.way_slope)
+
+    def fields(self, phi: Floats, omega: Floats | None = None) -> PartFields:
+        """Inertia and torque at angles of the shaft, none of them at a jump.
+
+        Parameters
+        ----------
+        phi : array, shape (cases or 1, panels, nodes)
+            In rad.
+        omega : array of that shape, optional
+            Speeds there in rad/s, for an operation that follows the speed; by default the part's ``pace``.
+        """
         own = self.own_angle(phi)
         motion = None if self.mechanism is None else self.mechanism.motion(self.values, own)
         inertia, slope = self._inertia(own, motion)
-        torque = self._operation.torque(own, None if motion is None else motion.way_slope)
+        way_slope = None if motion is None else motion.way_slope
+        if omega is not None and self.follows_speed:
+            torque = self._operation.speed_law(own, way_slope)(omega)[0]
+        else:
+            torque = self._operation.torque(own, way_slope)
         return PartFields(inertia, slope, torque + self._carried(own, motion), torque)
 
     def _inertia(self, own: Floats, motion: Motion | None) -> tuple[Floats, Floats]:

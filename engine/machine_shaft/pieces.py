@@ -287,3 +287,9 @@ def _located(panels: Panels, cases: Integers, phi: Floats) -> tuple[Points, Inte
         points = panels.locate(int(case), phi[chosen].ravel())
         panel[chosen], t[chosen] = points.panel.reshape(-1, phi.shape[1]), points.t.reshape(-1, phi.shape[1])
     return Points(panel.ravel(), t.ravel(), phi.ravel()), np.repeat(cases, phi.shape[1])
+
+
+def courses(panels: Panels, values: Floats, cases: Integers, phi: Floats) -> Floats:
+    """Values at the angles ``phi`` (n, 1, m) of ``cases`` (n,), from those at the nodes (cases, panels, nodes)."""
+    points, every = _located(panels, cases, phi[:, 0, :])
+    return panels.at_rows(values, every, points).reshape(phi.shape)

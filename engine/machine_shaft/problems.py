@@ -124,14 +124,16 @@ class UnbalancedWorkError(MachineError):
 class InsufficientInertiaError(MachineError):
     """The shaft would stop at the required mean speed; ``least_mean_speed`` (rad/s) is the least feasible one.
 
-    A mean over time can exceed this and still require a shaft that nearly stops.
+    A mean over time can exceed this and still require a shaft that nearly stops. NaN where a load follows the speed.
     """
 
     ending = Ending.INERTIA_INSUFFICIENT
 
     def __init__(self, asked: float, least_mean_speed: float) -> None:
         stops = f"The inertia is insufficient for a mean speed of {asked:.6g} rad/s: the shaft would "
-        if asked > least_mean_speed:
+        if math.isnan(least_mean_speed):
+            more = "stop within the cycle. Choose a higher mean speed, or give the drive more inertia."
+        elif asked > least_mean_speed:
             more = "nearly stop within the cycle. Choose a higher mean speed, or give the drive more inertia."
         else:
             more = (

@@ -9,7 +9,7 @@ from sprag.engine.machine_shaft.decomposition import Decomposition
 from sprag.engine.machine_shaft.machine import Machine
 from sprag.engine.machine_shaft.panels import Panels
 from sprag.engine.machine_shaft.parts import ShaftPart
-from sprag.engine.machine_shaft.pieces import Part, Pieces, missed
+from sprag.engine.machine_shaft.pieces import Part, Pieces, courses, missed
 from sprag.engine.machine_shaft.spec import MachineSpec
 
 Floats = NDArray[np.float64]
@@ -92,11 +92,18 @@ def _resolved(panels: Panels, values: Floats, limit: float) -> Bools:
 
 
 def compare(
-    spec: MachineSpec, columns: Columns, rows: NDArray[np.int64], found: list[Pieces], d: Decomposition, rough: Bools
+    spec: MachineSpec,
+    columns: Columns,
+    rows: NDArray[np.int64],
+    found: list[Pieces],
+    d: Decomposition,
+    rough: Bools,
+    omega: Floats | None,
 ) -> None:
     """Mark in ``rough`` (cases, panels) the panels of the cases ``rows`` that miss features of a formula.
 
-    Cases that already have rough panels are checked once these are refined.
+    Cases that already have rough panels are checked once these are refined. ``omega`` (cases, panels, nodes) are the
+    speeds in rad/s at which loads that follow the speed were evaluated, if there are any.
     """
     ready = np.nonzero(~rough.any(axis=1))[0]
     panels = d.panels.take(ready)
@@ -104,8 +111,9 @@ def compare(
         part = own.formula.part
 
         def exact(place: NDArray[np.int64], phi: Floats, part: Part = part) -> Floats:
+            speeds = None if omega is None else courses(panels, omega[ready], place, phi)
             with np.errstate(all="ignore"):
-                fields = Machine(spec, columns.take(rows[ready[place]])).fields(phi)
+                fields = Machine(spec, columns.take(rows[ready[place]])).fields(phi, speeds)
             return np.asarray(getattr(fields, part))
 
         values: Floats = getattr(d.fields, part)[ready]

@@ -1,7 +1,8 @@
 """Running machines: a batch of cases in, results and endings out; the tables of one case over the angle."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,23 +15,13 @@ from sprag.engine.machine_shaft.drive_train import Train
 from sprag.engine.machine_shaft.flywheel import Flywheel, required_inertia
 from sprag.engine.machine_shaft.machine import Fields, Machine, check_structure
 from sprag.engine.machine_shaft.motor import LimitCycle, limit_cycle
+from sprag.engine.machine_shaft.operations import SpeedLaw
 from sprag.engine.machine_shaft.panels import Panels
 from sprag.engine.machine_shaft.pieces import Pieces, pieces
-from sprag.engine.machine_shaft.problems import (
-    AssemblyError,
-    InsufficientInertiaError,
-    MachineError,
-    MotorOverrunError,
-    MotorStalledError,
-    NearSingularError,
-    NegativeInertiaError,
-    QuadratureError,
-    UnbalancedWorkError,
-)
-from sprag.engine.machine_shaft.relations import check_relations
 from sprag.engine.machine_shaft.resolution import compare, linkage_unresolved, near_singular, rough_pace, rough_panels
 from sprag.engine.machine_shaft.results import result_infos
 from sprag.engine.machine_shaft.spec import MachineSpec
+from sprag.engine.machine_shaft.speed_course import follows_speed, speed_course
 from sprag.engine.machine_shaft.start import Shape, Stop, least_mean_speed, start_energy
 from sprag.engine.outcome import Batch
 
@@ -73,7 +64,10 @@ class Solved:
         Panels that do not resolve their torques or inertia; those in which the shaft is too close to rest to resolve
         the speed, or its mean over time where that is required; and those that do not resolve 1/omega.
     unknown : array of bool, shape (cases,)
-        Cases with a formula that cannot be enclosed and may have hidden features between any two angles.
+        Cases with a formula that cannot be enclosed and may have hidden features between any two angles, or for whose
+        loads no speed was found.
+    omega : array, shape (cases, panels, nodes), or None
+        The speeds in rad/s at which loads that follow the speed were evaluated.
     """
 
     decomposition: Decomposition
@@ -83,6 +77,7 @@ class Solved:
     slow: Bools
     rough_pace: Bools
     unknown: Bools
+    omega: Floats | None = None
 
 
 def attempts(spec: MachineSpec, columns: Columns) -> Iterator[tuple[NDArray[np.int64], Solved]]:
@@ -104,7 +99,7 @@ def attempts(spec: MachineSpec, columns: Columns) -> Iterator[tuple[NDArray[np.i
             found = [pieces(formula, panels, 2.0 * np.pi * spec.cycle) for formula in Machine(spec, columns).formulas()]
         for own in found:
             solved.unknown[...] |= np.broadcast_to(own.unknown, (columns.cases,))[rows]
-        compare(spec, columns, rows, found, solved.decomposition, solved.rough)
+        compare(spec, columns, rows, found, solved.decomposition, solved.rough, solved.omega)
         yield rows, solved
         chosen = solved.rough | solved.slow | solved.rough_pace
         real = np.broadcast_to((panels.half > 0.0).sum(axis=1), rows.shape)
@@ -177,32 +172,22 @@ def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
     # With an inertia at rounding level the speed is arbitrary.
     negative = ~(least_inertia > 1e-12 * panels.largest(fields.inertia))
     endings[negative] = _CODE[Ending.NEGATIVE_INERTIA]
-    if spec.balance == "motor":
-        found = _motored(spec, columns, panels, cycle, fields)
-        drive, resistance, start = found.drive, fields.resistance, found.start
-        endings[found.stalled & ~negative] = _CODE[Ending.MOTOR_STALLED]
-        endings[found.overrun & ~negative] = _CODE[Ending.MOTOR_OVERRUN]
-        least = factor = np.full(columns.cases, np.nan)
-    else:
-        balance = balanced(
-            spec.balance, spec.balance_side, panels, cycle, fields.drive, fields.resistance, fields.operation
-        )
-        drive, resistance, factor = balance.drive, balance.resistance, balance.factor
-        endings[balance.wrong & ~negative] = _CODE[Ending.UNBALANCED_WORK]
-        start, least = _started(spec, columns, panels, cycle, fields.inertia, drive + resistance, endings)
-    start = np.where(endings == _CODE[Ending.OK], start, np.nan)
+    moved = _moved(machine, columns, panels, fields, endings)
+    fields, drive, resistance = moved.fields, moved.drive, moved.resistance
+    start = np.where(endings == _CODE[Ending.OK], moved.start, np.nan)
     d = Decomposition(panels, cycle, fields, drive, resistance, start)
     results = characteristics(d, spec.phi_c)
     results["work.drive"], results["work.resistance"] = d.drive.ends[:, -1], d.resistance.ends[:, -1]
-    results["least_mean_speed"], results["balance.factor"] = least, factor
+    results["least_mean_speed"], results["balance.factor"] = moved.least, moved.factor
     results["resisting_torque.mean"] = d.resistance.ends[:, -1] / cycle
     for name in ("omega.angle_at_max", "omega.angle_at_min"):
         results[name] = np.where(np.isnan(start), np.nan, results[name])
     results["inertia.min"] = np.where(negative, least_inertia, results["inertia.min"])
     _by_definition(spec, d, results)
     results |= machine.train.results(panels, d.drive.torque, results)
-    results["required_inertia"] = _required(spec, columns, d, endings)
-    results |= _flywheel(spec, columns, results)
+    fixed = spec.balance != "motor" and moved.omega is None
+    results["required_inertia"] = _required(spec, columns, d, endings, fixed=fixed)
+    results |= _flywheel(spec, columns, results, fixed=fixed)
     no_cycle = (endings == _CODE[Ending.MOTOR_STALLED]) | (endings == _CODE[Ending.MOTOR_OVERRUN])
     if no_cycle.any():
         for name, values in results.items():
@@ -210,14 +195,65 @@ def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
                 results[name] = np.where(no_cycle, np.nan, values)
     (rough, slow), pace = rough_panels(d), rough_pace(d)
     slow = slow | pace if spec.mean_speed_is == "time" else slow
-    return Solved(d, results, endings, rough, slow, pace, np.zeros(columns.cases, dtype=np.bool_))
+    # Where the load is stiff, shorter panels may bring the speed that was not found.
+    return Solved(d, results, endings, rough | moved.stiff, slow, pace, moved.lost, moved.omega)
 
 
-def _motored(spec: MachineSpec, columns: Columns, panels: Panels, cycle: float, fields: Fields) -> LimitCycle:
+class _Moved(NamedTuple):
+    """The torques of a block of cases, the energy at the start, and what the balance gives; ``Solved`` has the rest."""
+
+    fields: Fields
+    drive: Floats
+    resistance: Floats
+    start: Floats
+    least: Floats
+    factor: Floats
+    omega: Floats | None
+    lost: Bools
+    stiff: Bools
+
+
+def _moved(machine: Machine, columns: Columns, panels: Panels, fields: Fields, endings: Codes) -> _Moved:
+    """Balance the works and find the speed; marks ``endings``, of which those that are not ok stay as they are."""
+    spec, cycle = machine.spec, machine.cycle
+    none, omega = np.full(columns.cases, np.nan), None
+    lost, stiff = np.zeros(columns.cases, dtype=np.bool_), np.zeros(fields.inertia.shape[:2], dtype=np.bool_)
+    ok = endings == _CODE[Ending.OK]
+    law = machine.speed_law(panels.angles) if follows_speed(machine) else None
+    if law is not None:
+        with np.errstate(all="ignore"):
+            fields = fields.less(law(np.broadcast_to(machine.pace, fields.inertia.shape))[0])
+    if spec.balance == "motor":
+        found = _motored(spec, columns, panels, cycle, fields, law)
+        endings[found.stalled & ok] = _CODE[Ending.MOTOR_STALLED]
+        endings[found.overrun & ok] = _CODE[Ending.MOTOR_OVERRUN]
+        if law is not None:
+            fields, omega = replace(fields, resistance=found.resistance), found.omega
+        return _Moved(fields, found.drive, found.resistance, found.start, none, none, omega, lost, stiff)
+    if law is not None:
+        course = speed_course(machine, columns, panels, fields, law)
+        endings[course.stopped & ok] = _CODE[Ending.INERTIA_INSUFFICIENT]
+        omega, lost, stiff = course.omega, course.lost & ok & ~course.stiff.any(axis=1), course.stiff & ok[:, None]
+        with np.errstate(all="ignore"):
+            fields = fields.less(-law(omega)[0])
+    balance = balanced(
+        spec.balance, spec.balance_side, panels, cycle, fields.drive, fields.resistance, fields.operation
+    )
+    drive, resistance = balance.drive, balance.resistance
+    endings[balance.wrong & (endings == _CODE[Ending.OK])] = _CODE[Ending.UNBALANCED_WORK]
+    start, least = _started(spec, columns, panels, cycle, fields.inertia, drive + resistance, endings)
+    # The least speed of a load that follows the speed is another than at these torques.
+    least = none if law is not None else least
+    return _Moved(fields, drive, resistance, start, least, balance.factor, omega, lost, stiff)
+
+
+def _motored(
+    spec: MachineSpec, columns: Columns, panels: Panels, cycle: float, fields: Fields, law: SpeedLaw | None
+) -> LimitCycle:
     if spec.drive.motor is None:
         raise AssertionError("check_structure lets no motor be missing")
     values = Train.of(spec.drive, columns.values).motor(columns.under("drive.motor."))
-    return limit_cycle(spec.drive.motor, values, panels, cycle, fields.inertia, fields.resistance)
+    return limit_cycle(spec.drive.motor, values, panels, cycle, fields.inertia, fields.resistance, law)
 
 
 def _started(
@@ -253,13 +289,16 @@ def _by_definition(spec: MachineSpec, d: Decomposition, out: dict[str, Floats]) 
     out["balance.work"] = np.abs(left) / np.where(d.most_work > 0.0, d.most_work, 1.0)
 
 
-def _required(spec: MachineSpec, columns: Columns, d: Decomposition, endings: Codes) -> Floats:
-    """The required flywheel inertia, (cases,), which does not depend on the drive's given inertia."""
+def _required(spec: MachineSpec, columns: Columns, d: Decomposition, endings: Codes, *, fixed: bool) -> Floats:
+    """The required flywheel inertia, (cases,), which does not depend on the drive's given inertia.
+
+    It is not known unless the torques are ``fixed``, the same at any speed.
+    """
     required = np.full(columns.cases, np.nan)
     wanted = columns.row("wanted_irregularity")
     known = (endings == _CODE[Ending.OK]) | (endings == _CODE[Ending.INERTIA_INSUFFICIENT])
     rows = np.nonzero(np.isfinite(wanted) & known)[0]
-    if rows.size and spec.balance != "motor":
+    if rows.size and fixed:
         drive = Train.of(spec.drive, columns.values).inertia
         mechanism = d.fields.inertia[rows] - (drive[rows] if len(drive) > 1 else drive)
         with np.errstate(all="ignore"):
@@ -270,11 +309,11 @@ def _required(spec: MachineSpec, columns: Columns, d: Decomposition, endings: Co
     return required
 
 
-def _flywheel(spec: MachineSpec, columns: Columns, known: Mapping[str, Floats]) -> dict[str, Floats]:
+def _flywheel(spec: MachineSpec, columns: Columns, known: Mapping[str, Floats], *, fixed: bool) -> dict[str, Floats]:
     """The required inertia by the energy alone, and the results of a flywheel given by its dimensions."""
     none = np.full(columns.cases, np.nan)
     out = {name: none for name in _NAMES if name.startswith("flywheel.")} | {"required_inertia.energy": none}
-    if spec.balance != "motor":
+    if fixed:
         wanted = columns.row("wanted_irregularity") * columns.row("mean_speed") ** 2
         finite = np.isfinite(wanted)
         out["required_inertia.energy"] = np.where(
@@ -342,54 +381,3 @@ def simulate(model: MachineSpec, columns: Mapping[str, ArrayLike], *, cases: int
         with np.errstate(all="ignore"):
             values[part], endings[part] = _block(model, block.take(part))
     return Batch(values, endings)
-
-
-def check(model: MachineSpec, columns: Mapping[str, ArrayLike]) -> None:
-    """Refuse a base machine without steady motion, with all available reasons.
-
-    Parameters
-    ----------
-    model : MachineSpec
-    columns : mapping
-        As for ``simulate``, scalars only.
-
-    Raises
-    ------
-    MachineError
-        One of ``sprag.engine.machine_shaft.problems``.
-    """
-    check_structure(model)
-    row = Columns.of(model, columns, 1)
-    check_relations(model, row)
-    batch = simulate(model, columns, cases=1)
-    ending, result = ENDINGS[int(batch.endings[0])], dict(zip(_NAMES, batch.values[0], strict=True))
-    if ending is not Ending.CANNOT_ASSEMBLE:
-        machine = Machine(model, row)
-        machine.check_finite()
-        machine.check_closed()
-    problem = _problem(model, ending, result, row)
-    if problem is not None:
-        raise problem
-
-
-def _problem(spec: MachineSpec, ending: Ending, result: Mapping[str, float], row: Columns) -> MachineError | None:
-    if ending is Ending.CANNOT_ASSEMBLE:
-        prefix, rule = Machine(spec, row).broken_rule()
-        return AssemblyError(float(result["assembly.angle"]), rule, prefix)
-    if ending is Ending.NEGATIVE_INERTIA:
-        return NegativeInertiaError(float(result["inertia.min"]))
-    if ending is Ending.UNBALANCED_WORK:
-        scaled = {"drive": "driving torque", "operation": "operation"}[spec.balance_side]
-        works = float(result["work.drive"]), float(result["work.resistance"])
-        friction = float(row.row("friction_torque")[0]) * 2.0 * np.pi * spec.cycle
-        return UnbalancedWorkError(*works, scaled if spec.balance == "scale" else "", friction)
-    if ending is Ending.INERTIA_INSUFFICIENT:
-        return InsufficientInertiaError(float(row.row("mean_speed")[0]), float(result["least_mean_speed"]))
-    plain = _PLAIN_PROBLEMS.get(ending)
-    return None if plain is None else plain()
-
-
-#: Problems without further information than the ending.
-_PLAIN_PROBLEMS: dict[Ending, type[MotorStalledError | MotorOverrunError | NearSingularError | QuadratureError]] = {
-    problem.ending: problem for problem in (MotorStalledError, MotorOverrunError, NearSingularError, QuadratureError)
-}

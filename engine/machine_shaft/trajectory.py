@@ -148,7 +148,7 @@ def _part_table(machine: Machine, solved: Solved, angles: Floats) -> dict[str, F
         factor = float(np.nan_to_num(solved.results["balance.factor"][0], nan=0.0))
     table = {}
     for part in machine.parts:
-        fields, motion = part.fields(panels.angles), part.motion(panels.angles)
+        fields, motion = part.fields(panels.angles, solved.omega), part.motion(panels.angles)
         resistance = fields.resistance if factor == 1.0 else fields.resistance + (factor - 1.0) * fields.operation
         own = {"inertia": fields.inertia, "resisting_torque": resistance}
         if motion is not None:

@@ -152,7 +152,7 @@ def check_structure(structure: Mapping[str, Any]) -> None:
 
 def check(structure: Mapping[str, Any], values: Mapping[str, float]) -> None:
     """Raise MachineError, with the reason, where the machine has no steady motion."""
-    from sprag.engine.machine_shaft.simulate import check as engine_check
+    from sprag.engine.machine_shaft.checked import check as engine_check
 
     engine_check(spec_of(structure), values)
 

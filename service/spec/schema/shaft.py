@@ -113,7 +113,9 @@ def _operation() -> Schema:
             **schemas(OPERATION_CHOICES),
             **quantities(numbers_under("operation.")),
             "steps": STEPS.schema(object_schema(quantities(step), required_of(step))),
-            **_diagram(table, "force or torque as a formula of phi (rad) and x (fraction of the stroke)"),
+            **_diagram(
+                table, "force or torque as a formula of phi (rad), x (fraction of the stroke) and omega (rad/s)"
+            ),
             "indicator": one_of(
                 object_schema(
                     {

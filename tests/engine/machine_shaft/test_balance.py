@@ -12,11 +12,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from sprag.engine.endings import Ending
+from sprag.engine.machine_shaft.checked import check
 from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.machine import Machine
 from sprag.engine.machine_shaft.motor import motor_torque, steady_speed
 from sprag.engine.machine_shaft.problems import UnbalancedWorkError
-from sprag.engine.machine_shaft.simulate import check
 from sprag.engine.machine_shaft.spec import Drive, MachineSpec, Motor, OperationChoice
 from sprag.engine.machine_shaft.trajectory import trajectory
 from tests.engine.machine_shaft.machines import PRESS, PRESS_NUMBERS, ending_of, one

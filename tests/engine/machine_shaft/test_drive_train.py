@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from sprag.engine.machine_shaft.checked import check
 from sprag.engine.machine_shaft.problems import RelationError
-from sprag.engine.machine_shaft.simulate import check
 from sprag.engine.machine_shaft.spec import Drive, MachineSpec, OperationChoice, Stage
 from sprag.engine.machine_shaft.trajectory import trajectory
 from tests.engine.machine_shaft.machines import PRESS, PRESS_NUMBERS, one

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from sprag.engine.endings import Ending
+from sprag.engine.machine_shaft.checked import check
 from sprag.engine.machine_shaft.problems import AssemblyError, StructureError
-from sprag.engine.machine_shaft.simulate import check, simulate
+from sprag.engine.machine_shaft.simulate import simulate
 from sprag.engine.machine_shaft.spec import MachineSpec, MechanismChoice, OperationChoice, PartChoice
 from sprag.engine.machine_shaft.tables import Table
 from sprag.engine.machine_shaft.trajectory import trajectory

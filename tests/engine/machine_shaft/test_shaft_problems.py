@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from sprag.engine.endings import ENDINGS, Ending
+from sprag.engine.machine_shaft.checked import check
 from sprag.engine.machine_shaft.estimate import estimate_seconds
 from sprag.engine.machine_shaft.parameters import parameters
 from sprag.engine.machine_shaft.problems import (
@@ -26,7 +27,7 @@ from sprag.engine.machine_shaft.problems import (
     UnbalancedWorkError,
 )
 from sprag.engine.machine_shaft.results import result_infos
-from sprag.engine.machine_shaft.simulate import check, simulate
+from sprag.engine.machine_shaft.simulate import simulate
 from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
 from sprag.engine.machine_shaft.tables import Table
 from sprag.engine.machine_shaft.trajectory import trajectory
