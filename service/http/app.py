@@ -53,7 +53,6 @@ from sprag.service.http.web import (
     drives,
     effects,
     front,
-    laboratory,
     login,
     pages,
     results,
@@ -64,6 +63,7 @@ from sprag.service.http.web import diagram as diagram_pages
 from sprag.service.http.web import engagements as engagement_pages
 from sprag.service.http.web import schedules as schedule_pages
 from sprag.service.http.web.form import page as form
+from sprag.service.http.web.laboratory import pages as laboratory
 from sprag.service.jobs import checks
 from sprag.service.jobs.housekeeping import Housekeeping
 from sprag.service.settings import Settings, UnsafeSettingsError

@@ -51,7 +51,7 @@ from sprag.worker.models.common import (
     WorkerEnding,
 )
 from sprag.worker.models.model import Model, all_models, model_names, model_of, register, unregister
-from sprag.worker.models.presentation import Panel, Presentation
+from sprag.worker.models.presentation import Panel, Presentation, Reference
 from sprag.worker.models.settled import (
     JUMPED,
     REGIME_SENTENCES,
@@ -117,6 +117,7 @@ __all__ = [
     "Parameter",
     "Portrait",
     "Presentation",
+    "Reference",
     "ResultInfo",
     "Run",
     "Span",

@@ -15,6 +15,7 @@ from sprag.engine import Ending
 from sprag.engine.machine_shaft.parameters import parameters as _engine_parameters
 from sprag.engine.machine_shaft.problems import ExpressionError, MachineError, RelationError
 from sprag.engine.machine_shaft.results import result_infos
+from sprag.engine.machine_shaft.sketch import Sketch
 from sprag.engine.machine_shaft.spec import (
     LINKED,
     MAX_CONSTANTS,
@@ -56,11 +57,13 @@ __all__ = [
     "ExpressionError",
     "MachineError",
     "RelationError",
+    "Sketch",
     "base_results",
     "check",
     "check_structure",
     "parameters_of",
     "reachable_pressure",
+    "sketches_of",
 ]
 
 MODEL = "machine-shaft"
@@ -170,6 +173,15 @@ def reachable_pressure(suction: ArrayLike, clearance: ArrayLike, exponent: Array
     from sprag.engine.machine_shaft.operations import reachable_pressure as engine_pressure
 
     return engine_pressure(*(np.asarray(part, dtype=np.float64) for part in (suction, clearance, exponent)))
+
+
+def sketches_of(
+    structure: Mapping[str, Any], values: Mapping[str, float], angles: NDArray[np.float64]
+) -> tuple[Sketch, ...]:
+    """Each mechanism at angles of the shaft (rad)."""
+    from sprag.engine.machine_shaft.sketches import sketches
+
+    return sketches(spec_of(structure), values, angles)
 
 
 class MachineShaft(Model):

@@ -4,6 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from sprag.engine.outcome import Trajectory
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,6 +22,20 @@ class Panel:
     lines: tuple[tuple[str, str], ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """A line beside the variables of a panel, such as a level or a sum; arrays of shape (m,).
+
+    ``style`` is the number of its dash; a ``wide`` one stands for the whole of the others.
+    """
+
+    label: str
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    style: int = 0
+    wide: bool = False
+
+
 def panels_by_unit(names: Sequence[str], units: Sequence[str]) -> tuple[Panel, ...]:
     """A panel for each unit, with all variables that have it."""
     pairs = tuple(zip(names, units, strict=True))
@@ -24,6 +45,10 @@ def panels_by_unit(names: Sequence[str], units: Sequence[str]) -> tuple[Panel, .
 
 def _no_phases(_: Sequence[str]) -> tuple[tuple[str, str, str], ...]:
     return ()
+
+
+def _no_references(_: Trajectory) -> Mapping[str, tuple[Reference, ...]]:
+    return {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +65,7 @@ class Presentation:
     checks : first parts of the names of results that describe the computation rather than the machine
     balance : rows of a balance of means: sign, result, label; ``residual`` is the result with the remainder
     panels : plots of a motion, from the names and units of its variables
+    references : further lines of a motion, by the title of their panel
     states : colour and two patterns (plotly's, matplotlib's) of each state; either alone distinguishes them
     phases : lines of the phase portrait, from the names of the variables: (angle, speed, label)
     portrait : description of the phase portrait; "" where there is none
@@ -58,6 +84,7 @@ class Presentation:
     balance: tuple[tuple[str, str, str], ...] = ()
     residual: str = ""
     panels: Callable[[Sequence[str], Sequence[str]], tuple[Panel, ...]] = panels_by_unit
+    references: Callable[[Trajectory], Mapping[str, tuple[Reference, ...]]] = _no_references
     states: Mapping[str, tuple[str, str, str]] = field(default_factory=dict)
     phases: Callable[[Sequence[str]], tuple[tuple[str, str, str], ...]] = _no_phases
     portrait: str = ""

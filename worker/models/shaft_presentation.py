@@ -4,21 +4,52 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from sprag.worker.models.presentation import Panel, Presentation
+import numpy as np
+
+from sprag.worker.models.presentation import Panel, Presentation, Reference
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
+    from sprag.engine.outcome import Trajectory
+
+_ENERGY: Final = "T, kinetic energy"
+_SQUARES: Final = "S₁ … S₄"
 _PANELS: Final = (
     Panel("ω, angular speed", "rad/s", (("omega", "ω"),)),
-    Panel("T, kinetic energy", "J", (("energy", "T"),)),
-    Panel("S₁ … S₄", "rad^2/s^2", (("s1", "S₁"), ("s2", "S₂"), ("s3", "S₃"), ("s4", "S₄"))),
+    Panel(_ENERGY, "J", (("energy", "T"),)),
+    Panel(_SQUARES, "rad^2/s^2", (("s1", "S₁"), ("s2", "S₂"), ("s3", "S₃"), ("s4", "S₄"))),
     Panel("Torques", "N*m", (("drive_torque", "driving"), ("resisting_torque", "resisting"))),
 )
 
 
 def _panels(_: Sequence[str], __: Sequence[str]) -> tuple[Panel, ...]:
     return _PANELS
+
+
+def _references(made: Trajectory) -> Mapping[str, tuple[Reference, ...]]:
+    """The levels of the energy, the angle from which S3 and S4 count, and the sum of the squares."""
+    if not made.times.size:
+        return {}
+    values = dict(zip(made.names, made.values.T, strict=True))
+    ends = made.times[[0, -1]]
+    half = 0.5 * float(values["inertia"][0])
+    least, mean = half * float(values["s1"][0]), half * float(values["s1"][0] + values["s2"][0])
+
+    def level(label: str, value: float, style: int) -> Reference:
+        return Reference(label, ends, np.full(2, value), style)
+
+    levels = [level("T_mean", mean, 1), level("T_min", least, 2)]
+    if made.times[0] == 0.0:
+        levels.append(level("T_0", float(values["energy"][0]), 3))
+    within = [angle for angle in made.phi_c if ends[0] <= angle <= ends[1]]
+    if within:
+        # The work of the drive counts from phi_c, where it is zero.
+        start = min(within, key=lambda angle: abs(float(np.interp(angle, made.times, values["s3"]))))
+        bounds = np.array([least, float(values["energy"].max())])
+        levels.append(Reference("φ_c", np.full(2, start), bounds, 2))
+    whole = Reference("ω² = S₁ + S₂ + S₃ + S₄", made.times, values["omega"] ** 2, 0, wide=True)
+    return {_ENERGY: tuple(levels), _SQUARES: (whole,)}
 
 
 PRESENTATION: Final = Presentation(
@@ -29,6 +60,7 @@ PRESENTATION: Final = Presentation(
     operating_point=("mean_speed", "drive.inertia"),
     checks=("balance",),
     panels=_panels,
+    references=_references,
     motion="Speed, energy, squares of the speed and torques over the angle of the shaft",
     motion_note="ω² = S₁ + S₂ + S₃ + S₄: shares of the least energy, of the mean energy above it, of the drive's and "
     "of the resistance's work.",

@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
+from urllib.parse import urlencode
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
@@ -38,6 +39,7 @@ def _templates() -> Environment:
         "duration": duration,
         "time_left": time_left,
         "bytes": bytes_text,
+        "query": urlencode,
     }
     environment.globals["read_only"] = _read_only
     return environment

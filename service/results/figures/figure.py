@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 #: Colours that are distinguishable with any kind of colour vision (after Okabe and Ito), on light and dark backgrounds.
 PALETTE: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f6fc4", "#8c6d31")
+#: Colour of what stands for the whole of other lines, or is drawn for reference only.
+NEUTRAL: Final = "#7a7f87"
 #: What bands are, for the legend.
 BANDS: Final = "jump, not interpolated"
 #: Look of a state for which its model defines none.
@@ -43,6 +45,7 @@ class Line:
     shades : float64 array, shape (m,), optional
         Numbers that colour the points; the panel has a scale for them.
     ring : whether the points are large and open
+    wide : whether the line is wider than others
     """
 
     name: str
@@ -58,6 +61,7 @@ class Line:
     joined: bool = True
     shades: NDArray[np.float64] | None = None
     ring: bool = False
+    wide: bool = False
 
 
 @dataclass(frozen=True, slots=True)

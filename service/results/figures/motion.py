@@ -2,41 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.results.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag.service.results.figures.figure import NEUTRAL, PALETTE, Figure, Line, Panel, Quantity
 from sprag.service.results.wording import words
 
 if TYPE_CHECKING:
-    from sprag.worker.models import Presentation, Trajectory
+    from numpy.typing import NDArray
+
+    from sprag.worker.models import Panel as Described
+    from sprag.worker.models import Presentation, Reference, Trajectory
 
 #: Points of a line that are drawn.
 _MOST_POINTS: Final = 2400
 
 
-def motion_figure(made: Trajectory, shown: Presentation) -> Figure:
-    """The model's panels over time, above the states of its parts; over the angle two in a row, in degrees."""
+def motion_figure(made: Trajectory, shown: Presentation, held: Sequence[tuple[str, Trajectory]] = ()) -> Figure:
+    """The model's panels over time, above the states of its parts; over the angle two in a row, in degrees.
+
+    ``held`` are other motions of the model with their names, drawn beside it.
+    """
     angle = made.along == "angle"
-    x = np.degrees(made.times) if angle else made.times
+    references = shown.references(made)
     panels = []
     for panel in shown.panels(made.names, made.units):
-        lines = tuple(
+        beside = references.get(panel.title, ())
+        listed = len(panel.lines) + len(beside) + len(held) > 1 or not angle
+        lines = [
             Line(
                 label,
-                x,
+                _along(made.times, angle=angle),
                 made.values[:, made.names.index(name)],
                 PALETTE[place % len(PALETTE)],
                 place,
                 key=f"{panel.title} {label}" if angle else panel.title,
                 heading="" if angle else words(panel.title),
-                listed=len(panel.lines) > 1 or not angle,
+                listed=listed,
             )
             for place, (name, label) in enumerate(panel.lines)
-        )
-        panels.append(Panel(Quantity(panel.title, panel.unit), lines))
+        ]
+        lines += [_reference_line(reference, panel.title, angle=angle) for reference in beside]
+        for place, (name, other) in enumerate(held):
+            lines += _held_lines(name, other, panel, shown, PALETTE[-1 - place])
+        panels.append(Panel(Quantity(panel.title, panel.unit), tuple(lines)))
     return Figure(
         Quantity("φ, angle of the shaft", "°") if angle else Quantity("time", "s"),
         tuple(panels),
@@ -46,6 +57,29 @@ def motion_figure(made: Trajectory, shown: Presentation) -> Figure:
         motion=True,
         most=_MOST_POINTS,
     )
+
+
+def _along(times: NDArray[np.float64], *, angle: bool) -> NDArray[np.float64]:
+    return np.degrees(times) if angle else times
+
+
+def _reference_line(reference: Reference, title: str, *, angle: bool) -> Line:
+    """A level, an angle or a sum beside the variables of a panel."""
+    x = _along(reference.x, angle=angle)
+    key = f"{title} {reference.label}"
+    return Line(reference.label, x, reference.y, NEUTRAL, reference.style, key=key, wide=reference.wide)
+
+
+def _held_lines(name: str, made: Trajectory, panel: Described, shown: Presentation, colour: str) -> list[Line]:
+    """The lines of another motion in a panel: its variables, or what stands for the whole of many."""
+    x = _along(made.times, angle=made.along == "angle")
+    wholes = [reference for reference in shown.references(made).get(panel.title, ()) if reference.wide]
+    if wholes:
+        return [Line(f"{name}: {whole.label}", x, whole.y, colour, 3, key=f"{panel.title} {name}") for whole in wholes]
+    return [
+        Line(f"{name}: {label}", x, made.values[:, made.names.index(variable)], colour, place, key=f"{name} {label}")
+        for place, (variable, label) in enumerate(panel.lines)
+    ]
 
 
 def _spans(made: Trajectory, states: list[str]) -> Iterator[tuple[str, float, float]]:

@@ -211,7 +211,7 @@ def _paint_line(axes: Axes, line: Line, *, thin: bool) -> None:
             marker="" if line.joined and line.cases is None else marker,
             markersize=9.0 if line.ring else 3.0 if line.joined or thin else 4.5,
             markerfacecolor="none" if line.ring else None,
-            linewidth=1.1 if thin else 1.4,
+            linewidth=2.2 if line.wide else 1.1 if thin else 1.4,
             label=line.name,
         )
 

@@ -203,7 +203,7 @@ def _line_trace(line: Line, panel: Panel, figure: Figure, headings: set[str]) ->
         "x": [None if place is None else float(line.x[place]) for place in places],
         "y": [None if place is None or np.isnan(line.y[place]) else float(line.y[place]) for place in places],
         "connectgaps": False,
-        "line": {"color": line.colour, "width": 1.8, "dash": _DASHES[line.style % len(_DASHES)]},
+        "line": {"color": line.colour, "width": 3.2 if line.wide else 1.8, "dash": _DASHES[line.style % len(_DASHES)]},
     }
     if line.cases is None:
         return trace if line.joined else trace | _points(line, kept, panel, figure.scale)

@@ -1,19 +1,34 @@
-// The laboratory: the server answers a moved slider or a changed field with picture and numbers.
+// The laboratory: the server answers a moved slider or a changed field with picture and numbers; the sketch turns here.
 "use strict";
 
 const lab = document.getElementById("lab"), plot = document.getElementById("lab-plot"), answer = document.getElementById("answer");
+const sketch = document.getElementById("sketch"), angle = document.getElementById("angle");
+const dial = document.querySelector("[data-angle]"), turn = document.querySelector("[data-turn]");
 let busy = false, again = false, old = false;
 
+// Sliders that show another unit than SI move in that unit, and write it beside the number.
+const endsOf = (slider) => [slider.dataset.low, slider.dataset.high].map((end) => Number(end) / Number(slider.dataset.factor || 1));
+
 const valueOf = (slider) => {
-  const low = Number(slider.dataset.low), high = Number(slider.dataset.high), share = slider.value / 1000;
+  const [low, high] = endsOf(slider), share = slider.value / 1000;
   const value = "log" in slider.dataset ? low * (high / low) ** share : low + (high - low) * share;
-  return String(Number(value.toPrecision(4)));
+  return [String(Number(value.toPrecision(4))), slider.dataset.shown].filter(Boolean).join(" ");
 };
 
-const positionOf = (slider, value) => {
-  const low = Number(slider.dataset.low), high = Number(slider.dataset.high);
+const positionOf = (slider, text) => {
+  const [, digits, unit] = text.trim().match(/^([-+\d.eE]+)\s*(.*)$/) || [];
+  if (!digits || !Number.isFinite(Number(digits)) || (unit && unit !== slider.dataset.shown)) return null;
+  const value = unit ? Number(digits) : Number(digits) / Number(slider.dataset.factor || 1);
+  const [low, high] = endsOf(slider);
   const share = "log" in slider.dataset ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
   return Math.min(Math.max(1000 * share, 0), 1000);
+};
+
+// Numbers that are always in sight, and those that were changed.
+const query = () => {
+  const found = new FormData(lab);
+  for (const field of lab.querySelectorAll("[data-further]")) if (field.value === field.dataset.own) found.delete(field.name);
+  return new URLSearchParams(found);
 };
 
 // One request at a time; later changes are sent when the answer has arrived.
@@ -21,16 +36,22 @@ const ask = async () => {
   if (busy) { again = true; return; }
   busy = true;
   try {
-    const query = new URLSearchParams(new FormData(lab));
-    const found = await sprag.fetchJson(`/laboratory/figure?${query}`);
-    history.replaceState(null, "", `/laboratory?${query}`);
-    for (const place of lab.querySelectorAll(".wrong")) {
+    const asked = query();
+    const found = await sprag.fetchJson(`/laboratory/figure?${asked}`);
+    history.replaceState(null, "", `/laboratory?${asked}`);
+    for (const place of document.querySelectorAll(".lab .wrong")) {
       const texts = found.faults[place.id.slice("wrong:".length)] || [];
       place.textContent = texts.join("; ");
     }
     answer.innerHTML = found.answer;
     plot.classList.toggle("stale", !found.figure);
-    if (found.figure) await sprag.show(plot, found.figure);
+    sketch.classList.toggle("stale", !found.figure);
+    if (found.figure) {
+      sketch.innerHTML = found.sketch;
+      pose();
+      await sprag.show(plot, found.figure);
+      point();
+    }
   } catch (error) {
     plot.classList.add("stale");
     old = true;
@@ -49,12 +70,91 @@ for (const slider of lab.querySelectorAll("input[type=range]")) {
     ask();
   });
   field.addEventListener("input", () => {
-    const value = Number(field.value);
-    if (field.value.trim() !== "" && Number.isFinite(value)) slider.value = positionOf(slider, value);
-    ask();
+    const place = positionOf(slider, field.value);
+    if (place !== null) slider.value = place;
   });
 }
-for (const field of lab.querySelectorAll("[data-further]")) field.addEventListener("input", ask);
+for (const field of lab.querySelectorAll(".slider .entry input")) field.addEventListener("input", ask);
+
+// The sketch: frames a few degrees apart, and straight lines between them.
+const degrees = () => Number.parseFloat(angle.value) || 0;
+
+const between = (frames) => {
+  const steps = frames.length - 1, place = ((degrees() % 360 + 360) % 360) / 360 * steps;
+  const first = Math.min(Math.floor(place), steps - 1), share = place - first;
+  const [a, b] = [frames[first], frames[first + 1]];
+  return Array.isArray(a) ? a.map((value, index) => value + (b[index] - value) * share) : a + (b - a) * share;
+};
+
+const pose = () => {
+  for (const figure of sketch.querySelectorAll("[data-frames]")) {
+    figure.frames ||= JSON.parse(figure.dataset.frames);
+    const { joints, turns } = figure.frames;
+    const at = Object.fromEntries(Object.entries(joints).map(([name, frames]) => [name, between(frames)]));
+    for (const bar of figure.querySelectorAll("[data-bar]")) {
+      bar.setAttribute("points", bar.dataset.bar.split(" ").map((name) => at[name].join(",")).join(" "));
+    }
+    for (const plate of figure.querySelectorAll("[data-plate]")) {
+      const [name, turned] = plate.dataset.plate.split(" ");
+      plate.setAttribute("transform", `translate(${at[name].join(" ")}) rotate(${between(turns[turned])})`);
+    }
+    for (const joint of figure.querySelectorAll("[data-joint]")) {
+      const [x, y] = at[joint.dataset.joint];
+      joint.setAttribute("cx", x);
+      joint.setAttribute("cy", y);
+    }
+    for (const label of figure.querySelectorAll("[data-label]")) {
+      const [from, to] = label.dataset.label.split(" ").map((name) => at[name]);
+      label.setAttribute("x", (from[0] + to[0]) / 2);
+      label.setAttribute("y", (from[1] + to[1]) / 2);
+    }
+  }
+};
+
+// A line across all panels of the picture, at the angle of the sketch.
+const point = () => {
+  if (!sprag.figures.has(plot)) return;
+  const x = Number(dial.value), line = { type: "line", x0: x, x1: x, y0: 0, y1: 1, yref: "paper", line: { color: sprag.colour("--accent"), width: 1 } };
+  const axes = [...new Set(plot.data.map((trace) => trace.xaxis || "x"))];
+  Plotly.relayout(plot, { shapes: axes.map((xref) => ({ ...line, xref })) });
+};
+
+let pointing = false;
+const turned = () => {
+  pose();
+  if (pointing) return;
+  pointing = true;
+  requestAnimationFrame(() => { pointing = false; point(); });
+};
+
+dial.addEventListener("input", () => {
+  angle.value = dial.value;
+  dial.setAttribute("aria-valuetext", `${dial.value} degrees`);
+  turned();
+});
+angle.addEventListener("input", () => {
+  const cycle = Number(dial.max);
+  dial.value = (degrees() % cycle + cycle) % cycle;
+  turned();
+});
+dial.addEventListener("change", () => history.replaceState(null, "", `/laboratory?${query()}`));
+
+// A turn of the shaft takes four seconds, until it is stopped.
+const SECONDS = 4;
+turn.addEventListener("click", () => {
+  const on = turn.getAttribute("aria-pressed") !== "true", from = Number(dial.value), begin = performance.now();
+  turn.setAttribute("aria-pressed", String(on));
+  turn.textContent = on ? "Stop" : "Turn";
+  const run = (now) => {
+    if (turn.getAttribute("aria-pressed") !== "true") { history.replaceState(null, "", `/laboratory?${query()}`); return; }
+    dial.value = (from + 0.36 / SECONDS * Math.max(now - begin, 0)) % Number(dial.max);
+    angle.value = dial.value;
+    turned();
+    requestAnimationFrame(run);
+  };
+  if (on) requestAnimationFrame(run);
+});
+
 // A chosen machine is shown immediately, so that picture and name always match.
 const machines = document.getElementById("machines");
 machines.addEventListener("change", () => machines.submit());

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qs, urlsplit
 
@@ -48,6 +49,29 @@ def test_a_deep_link_keeps_numbers_that_have_no_slider(visitor: Visitor) -> None
     page.get_by_role("link", name="the operation's load").click()
     spec = json.loads(named(page, "/text").input_value())
     assert spec["base"]["mechanism"]["slider_crank"]["crank"] == "90 mm"
+
+
+def test_the_sketch_turns_with_the_angle_as_the_server_draws_it(visitor: Visitor, office: Office) -> None:
+    page = visitor.page
+    page.goto("/laboratory?machine=press")
+    drawn(page, "#lab-plot")
+    rod = page.locator("#sketch [data-bar='pin ram']")
+    before = rod.get_attribute("points")
+    page.locator("#angle").fill("40")
+    still = re.findall(
+        r'data-bar="pin ram" points="([^"]*)"', office.http.get("/laboratory?machine=press&angle=40").text
+    )
+    assert still != [before]
+    assert _numbers(rod.get_attribute("points")) == pytest.approx(_numbers(still[0]), abs=0.11)
+    page.locator("[data-angle]").press("ArrowRight")
+    expect(page.locator("#angle")).to_have_value("41")
+    page.wait_for_url("**angle=41**")
+    names = {line["name"] for line in drawn(page, "#lab-plot")}
+    assert {"T_mean", "T_min", "T_0", "φ_c", "ω² = S₁ + S₂ + S₃ + S₄"} <= names
+
+
+def _numbers(points: str | None) -> list[float]:
+    return [float(text) for text in re.split("[ ,]", points or "")]
 
 
 def test_the_machine_that_is_chosen_is_the_one_that_is_shown(visitor: Visitor) -> None:

@@ -1,0 +1,1 @@
+"""The laboratory: a machine whose numbers change while its motion is redrawn."""

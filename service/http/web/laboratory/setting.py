@@ -1,0 +1,161 @@
+"""A setting of the laboratory: a machine with the numbers of an address, its sliders and its sketch."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import parse_qsl, urlencode
+
+from sprag.service.http.problems import ApiError
+from sprag.service.http.views import preset_of
+from sprag.service.http.web.figures.linkage import Drawing, drawings
+from sprag.service.http.web.figures.shaft import overridden
+from sprag.service.http.web.form.check import message
+from sprag.service.http.web.form.entries import plain
+from sprag.service.http.web.laboratory.sliders import Slider, group_of, in_order, slider_of
+from sprag.service.presets import preset_names
+from sprag.service.spec.document import parse_spec
+from sprag.service.spec.report import SpecError
+from sprag.service.spec.units import QuantityError, parse_quantity
+from sprag.worker import models
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from sprag.worker.study import Study
+
+_QUESTION: Final = "question_"
+#: Name of a machine that the address itself describes, by its ``base``.
+OWN: Final = "own"
+#: Characters of a base in an address, at most.
+MOST_BASE: Final = 12_000
+#: Settings that can be held beside the current one.
+MOST_HELD: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A machine with the numbers of a URL; ``faults``, by path, of invalid ones.
+
+    ``spec`` contains every number as given, valid or not; ``angle`` is that of the sketch, in degrees.
+    """
+
+    name: str
+    base: str
+    spec: dict[str, Any]
+    study: Study
+    sliders: list[Slider]
+    faults: dict[str, list[str]]
+    angle: float
+    sketch: tuple[Drawing, ...]
+
+    @property
+    def first(self) -> list[Slider]:
+        """The numbers that are always in sight."""
+        return [slider for slider in self.sliders if slider.first]
+
+    @property
+    def groups(self) -> dict[str, list[Slider]]:
+        """The other numbers, by their heading."""
+        found: dict[str, list[Slider]] = {}
+        for slider in self.sliders:
+            if not slider.first:
+                found.setdefault(group_of(slider.path), []).append(slider)
+        return found
+
+    @property
+    def degrees(self) -> int:
+        """Degrees of a cycle of the shaft."""
+        return 360 * int((self.study.structure or {}).get("cycle", 1))
+
+    @property
+    def machine(self) -> list[tuple[str, str]]:
+        """The machine as parameters of a URL, without what was changed."""
+        return [("machine", self.name), *([("base", self.base)] if self.base else [])]
+
+    @property
+    def query(self) -> str:
+        """The setting as parameters of a URL."""
+        numbers = [(s.path, s.text) for s in self.sliders if s.first or s.text != s.own]
+        return urlencode([*self.machine, *numbers])
+
+
+@lru_cache(maxsize=1)
+def machines() -> tuple[str, ...]:
+    """Names of the built-in machines, including those of the questions."""
+    shafts = (name for name in preset_names() if preset_of(name)["spec"]["model"] == models.MACHINE_SHAFT)
+    return tuple(name for name in shafts if not name.startswith(_QUESTION))
+
+
+def setting(given: Mapping[str, str]) -> Setting:
+    """The setting of a URL; ApiError for an unknown machine."""
+    name = given.get("machine") or next(iter(machines()), "")
+    base = given.get("base", "") if name == OWN else ""
+    spec = _own_spec(base) if name == OWN else _preset_spec(name)
+    try:
+        own = parse_spec(overridden(spec, {})).study
+    except SpecError as error:
+        texts = (f"{item.where or 'the spec'}: {message(item)}" for item in error.faults)
+        raise ApiError("invalid-spec", "; ".join(texts)) from error
+    values = {path: plain(given[path]) for path in own.base if given.get(path, "").strip()}
+    faults: dict[str, list[str]] = {}
+    try:
+        study = parse_spec(overridden(spec, values)).study
+    except SpecError as error:
+        study = own
+        for item in error.faults:
+            path = (item.where or "").removeprefix("/base/").replace("/", ".")
+            faults.setdefault(path if path in own.base else "", []).append(message(item))
+    angle = _angle(given.get("angle", ""), faults)
+    sliders = in_order([slider_of(own, study, path, given.get(path, "")) for path in own.base])
+    return Setting(name, base, overridden(spec, values), study, sliders, faults, angle, drawings(study, angle))
+
+
+def held_settings(queries: list[str]) -> list[Setting]:
+    """The settings that are held beside the current one; ApiError where there are too many or one is invalid."""
+    if len(queries) > MOST_HELD:
+        raise ApiError("invalid-parameter", f"At most {MOST_HELD} machines can be held; got {len(queries)}.")
+    found = [setting(dict(parse_qsl(query, max_num_fields=2000))) for query in queries]
+    if any(held.faults for held in found):
+        texts = [text for held in found for texts in held.faults.values() for text in texts]
+        raise ApiError("invalid-spec", f"A held machine is invalid: {'; '.join(texts)}.")
+    return found
+
+
+def _preset_spec(name: str) -> dict[str, Any]:
+    if name not in machines():
+        raise ApiError("not-found", f"Unknown machine; known machines: {', '.join(machines()) or 'none'}.")
+    found: dict[str, Any] = preset_of(name)["spec"]
+    return found
+
+
+def _own_spec(text: str) -> dict[str, Any]:
+    """The spec of a machine that the address describes."""
+    if len(text) > MOST_BASE:
+        raise ApiError("invalid-parameter", f"base must have at most {MOST_BASE} characters; got {len(text)}.")
+    try:
+        base = json.loads(text)
+    except ValueError as error:
+        raise ApiError("invalid-parameter", f"base must be the JSON object of a machine: {error}.") from error
+    if not isinstance(base, dict):
+        raise ApiError("invalid-parameter", "base must be the JSON object of a machine.")
+    return {"sprag": 1, "model": models.MACHINE_SHAFT, "name": "Own machine", "base": base}
+
+
+def _angle(text: str, faults: dict[str, list[str]]) -> float:
+    """The angle of the sketch in degrees; 0 where it is not one."""
+    if not text.strip():
+        return 0.0
+    value = plain(text)
+    try:
+        found = float(value) if isinstance(value, int | float) else math.degrees(parse_quantity(value, "rad"))
+    except QuantityError as error:
+        faults["angle"] = [f"{error}; allowed: an angle in degrees"]
+        return 0.0
+    if abs(found) > 1e6:
+        faults["angle"] = [f"out of range; got {found:g}; allowed: -1000000 to 1000000 deg"]
+        return 0.0
+    return found

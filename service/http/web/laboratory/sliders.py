@@ -1,0 +1,142 @@
+"""Sliders of the laboratory: which numbers have one, its range, and the place of its knob."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from sprag.service.results.wording import words
+from sprag.service.spec.numbers import parse_number
+from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity
+from sprag.worker.models.parameters import parameter_of
+
+if TYPE_CHECKING:
+    from sprag.worker.study import Study
+
+#: Numbers that every machine shows first, and the range of their sliders: (lower, upper) factor on the machine's own.
+FIRST: Final = {"drive.inertia": (0.05, 20.0), "mean_speed": (0.25, 4.0), "operation.scale": (0.0, 3.0)}
+_MASSES: Final = (0.0, 4.0)
+_OTHERS: Final = (0.5, 2.0)
+#: Units in which a slider moves, and the SI value of one.
+_SHOWN: Final = {"rad": ("deg", math.pi / 180.0), "rad/s": ("rpm", math.pi / 30.0)}
+#: Angles, in rad, whose sliders do not depend on the machine's own value.
+_ANGLES: Final = {"crank_angle": (-2.0 * math.pi, 2.0 * math.pi), "inclination": (-math.pi, math.pi)}
+_PART: Final = re.compile(r"parts\.(\d+)\.")
+_GROUPS: Final = (
+    ("drive.flywheel.", "Flywheel"), ("drive.motor.", "Motor"), ("drive.stages.", "Stages"), ("drive.", "Drive"),
+    ("mechanism.", "Mechanism"), ("operation.", "Operation"), ("constants.", "Constants"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Slider:
+    """One number that can be changed: its value as given, and the range of its slider (SI).
+
+    Attributes
+    ----------
+    text, own : as given, and as the machine has it
+    low, high : equal where the number has a field only
+    shown, factor : unit in which the slider moves and the SI value of one; "" for the unit of the number itself
+    first : whether it is always in sight
+    """
+
+    path: str
+    label: str
+    symbol: str
+    unit: str
+    help: str
+    value: float
+    text: str
+    own: str
+    low: float
+    high: float
+    logarithmic: bool
+    shown: str = ""
+    factor: float = 1.0
+    first: bool = True
+
+
+def part_of(path: str) -> tuple[int, str]:
+    """Number of the part that ``path`` belongs to, from 1, and the path within it; 0 for the machine itself."""
+    found = _PART.match(path)
+    return (0, path) if found is None else (int(found[1]) + 1, path[found.end() :])
+
+
+def group_of(path: str) -> str:
+    """Heading under which a number stands."""
+    part, own = part_of(path)
+    title = next((title for prefix, title in _GROUPS if own.startswith(prefix)), "Machine")
+    return f"Part {part}: {title.lower()}" if part else title
+
+
+def slider_of(own: Study, study: Study, path: str, text: str) -> Slider:
+    """The slider of a number: of the machine as it comes (``own``) and as it is set (``study``, ``text``)."""
+    entry = parameter_of(own, path)
+    unit = "" if entry is None else entry.unit
+    factors, is_first = _factors(own, path)
+    first = own.base[path]
+    low, high = sorted((factors[0] * first, factors[1] * first)) if math.isfinite(first) else (0.0, 0.0)
+    low, high = _ANGLES.get(path.rsplit(".", 1)[-1], (low, high))
+    if entry is not None:
+        low, high = max(low, entry.low), min(high, entry.high)
+    shown, factor = _SHOWN.get(unit, ("", 1.0))
+    part, name = part_of(path)
+    label = "Load, as a multiple of the diagram" if name == "operation.scale" else words(path.rsplit(".", 1)[-1])
+    if name.startswith(("operation.steps.", "drive.stages.")):
+        place = name.split(".")
+        label = f"{place[1][:-1].capitalize()} {int(place[2]) + 1}: {label.lower()}"
+    given = quantity_text(first, shown, factor)
+    return Slider(
+        path, f"Part {part}: {label}" if part else label, "" if entry is None else entry.symbol, unit,
+        "" if entry is None else entry.help, value_of(text, unit, study.base[path]), text.strip() or given, given,
+        low, high, low > 0.0, shown, factor, is_first,
+    )  # fmt: skip
+
+
+def _factors(study: Study, path: str) -> tuple[tuple[float, float], bool]:
+    """Range of a slider as factors on the machine's own value, and whether it is always in sight."""
+    own = part_of(path)[1]
+    if own in FIRST:
+        return FIRST[own], True
+    entry = parameter_of(study, path)
+    if own.startswith("mechanism.") and entry is not None and entry.unit == "kg" and study.base[path] > 0.0:
+        return _MASSES, True
+    return _OTHERS, False
+
+
+def value_of(text: str, unit: str, otherwise: float) -> float:
+    """The number (SI) of a text with or without a unit, even where the machine is invalid with it."""
+    try:
+        found = parse_quantity(text, unit) if split_quantity(text)[1] else parse_number(text.strip())
+    except QuantityError:
+        return otherwise
+    return otherwise if found is None or not math.isfinite(found) else found
+
+
+def quantity_text(value: float, shown: str = "", factor: float = 1.0) -> str:
+    """A number for a field, with the unit in which its slider moves."""
+    if not math.isfinite(value):
+        return ""
+    return f"{value / factor:.6g} {shown}" if shown else f"{value:.6g}"
+
+
+def position(slider: Slider) -> float:
+    """Position of a slider, 0 to 1000."""
+    span = slider.high - slider.low
+    if slider.logarithmic and span:
+        value = max(slider.value, slider.low)
+        return 1000.0 * math.log(value / slider.low) / math.log(slider.high / slider.low)
+    return 1000.0 * (slider.value - slider.low) / span if span else 0.0
+
+
+def in_order(sliders: list[Slider]) -> list[Slider]:
+    """The sliders as they stand on the page: the machine's own first, then those of each part."""
+    order = list(FIRST)
+
+    def place(slider: Slider) -> tuple[bool, int, bool, str]:
+        part, own = part_of(slider.path)
+        return not slider.first, part, own not in order, own
+
+    return sorted(sliders, key=place)
