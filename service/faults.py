@@ -75,6 +75,7 @@ WarningCode = Literal[
     "law-ends-falling",
     "law-falls",
     "law-jumps",
+    "many-runs",
     "mixed-origins",
     "never-acts",
     "no-compression",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -211,12 +212,14 @@ def follow(map_: ReturnMap, point: Sequence[float], parameter: float, along: Ran
     down = _Walk(corrector, along, Node(start.map, start.z, back, start.multipliers, start.residual, start.pattern))
     end_up = up.run() if parameter < along.high else End.RANGE
     end_down = End.CLOSED if end_up == End.CLOSED else down.run() if parameter > along.low else End.RANGE
-    return _joined(down, start, up, (end_down, end_up), scale)
+    return _joined(down, start, up, (end_down, end_up), (along.low, along.high, parameter))
 
 
-def _joined(down: _Walk, start: Node, up: _Walk, ends: tuple[End, End], scale: float) -> Branch:
+def _joined(down: _Walk, start: Node, up: _Walk, ends: tuple[End, End], given: tuple[float, float, float]) -> Branch:
+    """The branch; ``given`` has the ends of its range and the parameter of the first orbit, which it has exactly."""
     nodes = [*reversed(down.nodes), start, *up.nodes]
     at = len(down.nodes)
+    scale = up.corrector.scale
     found = []
     for kind, index, node, contacts in reversed(down.specials):
         turned = tuple(Contact(one.part, one.state, one.after, one.before) for one in contacts)
@@ -225,9 +228,12 @@ def _joined(down: _Walk, start: Node, up: _Walk, ends: tuple[End, End], scale: f
         found.append(Special(kind, node.z[-1] * scale, place, node.multipliers, turned))
     for kind, index, node, contacts in up.specials:
         found.append(Special(kind, node.z[-1] * scale, at + 1 + index, node.multipliers, contacts))
-    return Branch(tuple(_point(node, scale) for node in nodes), tuple(found), ends, at)
+    return Branch(tuple(_point(node, scale, given) for node in nodes), tuple(found), ends, at)
 
 
-def _point(node: Node, scale: float) -> Point:
+def _point(node: Node, scale: float, given: tuple[float, float, float]) -> Point:
     state: Floats = node.map.state(np.array(node.z[:-1]))
-    return Point(state, node.z[-1] * scale, node.multipliers, node.residual)
+    parameter = node.z[-1] * scale
+    # Scaling rounds.
+    exact = next((value for value in given if abs(parameter - value) <= 4.0 * math.ulp(value)), parameter)
+    return Point(state, exact, node.multipliers, node.residual)

@@ -51,7 +51,7 @@ def with_start(store: Store, data: Any) -> Any:
 
 def _source(report: Report, store: Store, data: object, spec: Mapping[str, Any]) -> tuple[Study, int] | None:
     """A study and the case in it that is gone on from; None, with faults recorded, where there is none."""
-    found = read_object(report, _POINTER, data, ("study", "case", "start"))
+    found = read_object(report, _POINTER, data, ("study", "case", "start"), given=True)
     if found is None:
         return None
     case = read_whole(report, f"{_POINTER}/case", found.get("case"), 0, MAX_CASES - 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -11,8 +12,11 @@ from sprag.service.answers.results import BasinData, RegimeRow
 from sprag.service.faults import FaultError, parameter_error
 from sprag.service.json_text import to_bytes
 from sprag.service.results.exports import table_csv
+from sprag.service.results.start_states import refuse_impossible
+from sprag.service.spec.report import quantity_text
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
+from sprag.worker.models.common import case_machine
 from sprag.worker.models.starts import STARTS, has_starts
 
 if TYPE_CHECKING:
@@ -22,6 +26,8 @@ if TYPE_CHECKING:
 
 #: Initial values that a basin can be drawn over.
 INITIAL: Final = ("initial_angle", "initial_speed", "initial_windup")
+#: For "x" and "y" the first and the last value as text, None where they are those of the starts.
+Ends = dict[str, tuple[str | None, str | None]]
 #: What is reported of each regime besides its number.
 _SHOWN: Final = ("regime", "regime.order", "regime.share", "shaft.speed.mean")
 
@@ -51,19 +57,25 @@ def initial_values(study: Study) -> dict[str, Parameter]:
     return found
 
 
+def usual_ends(study: Study) -> dict[str, tuple[str, str]]:
+    """The ends of the ranges of the study's starts with their units, by path."""
+    ranges = study.run[STARTS]["ranges"] if has_starts(study.run) else {}
+    known = initial_values(study)
+    return {
+        path: (quantity_text(low, known[path].unit), quantity_text(high, known[path].unit))
+        for path, (low, high) in ranges.items()
+        if path in known
+    }
+
+
 def require_basin(study: Study) -> None:
     """Raise FaultError where cases of a study have no basins."""
     if not (models.is_settled(study.run) and initial_values(study)):
         raise FaultError("not-found", "Only cases that run until their motion is settled have basins.")
 
 
-def basin_query(
-    study: Study, x: str | None, y: str | None, ends: dict[str, tuple[str | None, str | None]], points: int
-) -> BasinQuery:
-    """What is asked for; by default the first two ranges of the study's starts. FaultError about a parameter.
-
-    ``ends`` has for "x" and "y" the first and the last value as text, None where they are those of the starts.
-    """
+def basin_paths(study: Study, x: str | None, y: str | None) -> tuple[str, str]:
+    """The two initial values, by default the first ones of the study's starts; FaultError about a parameter."""
     require_basin(study)
     known = initial_values(study)
     ranges = study.run[STARTS]["ranges"] if has_starts(study.run) else {}
@@ -76,8 +88,21 @@ def basin_query(
         if path in paths:
             raise parameter_error(name, "repeated", "is the other initial value too", path, "two different ones")
         paths.append(path)
+    return paths[0], paths[1]
+
+
+def basin_query(study: Study, case: int, x: str | None, y: str | None, ends: Ends, points: int) -> BasinQuery:
+    """What is asked for of a case; FaultError about a parameter.
+
+    Initial values from which no motion begins in this case are refused.
+    """
+    paths = basin_paths(study, x, y)
+    known = initial_values(study)
+    ranges = study.run[STARTS]["ranges"] if has_starts(study.run) else {}
     both = [_ends(name, known[path], ranges.get(path), ends[name]) for name, path in zip("xy", paths, strict=True)]
-    return BasinQuery((paths[0], paths[1]), both[0], both[1], points)
+    corners = [dict(zip(paths, corner, strict=True)) for corner in itertools.product(*both)]
+    refuse_impossible({paths[0]: "x", paths[1]: "y"}, case_machine(study, case), corners)
+    return BasinQuery(paths, both[0], both[1], points)
 
 
 def _ends(

@@ -18,6 +18,7 @@ from sprag.service.spec.units import QuantityError, parse_quantity, split_quanti
 from sprag.worker import models
 from sprag.worker.models.branches import Along, allowed_values, branch_results, run_branch
 from sprag.worker.models.common import NO_PARAMETERS, case_machine
+from sprag.worker.models.start_states import is_initial
 from sprag.worker.models.starts import motion_of
 from sprag.worker.sweeps import SWEEP
 
@@ -31,15 +32,32 @@ if TYPE_CHECKING:
 _OUTSIDE = "outside the range of the parameter"
 
 
+def ranged_axes(study: Study, *, initial: bool = False) -> list[str]:
+    """Paths of the axes along which a case can be followed, with the initial values if ``initial``."""
+    axes = [axis for axis in study.axes if NO_PARAMETERS.isdisjoint(axis.paths) and np.ptp(axis.array) > 0.0]
+    return [axis.paths[0] for axis in axes if initial or not any(map(is_initial, axis.paths))]
+
+
 def usual_along(study: Study) -> str:
     """The parameter along which a branch is usually followed: the first axis with a range; "" where there is none."""
-    axes = [axis for axis in study.axes if NO_PARAMETERS.isdisjoint(axis.paths) and np.ptp(axis.array) > 0.0]
-    wanted = [axis.paths[0] for axis in axes]
+    wanted = ranged_axes(study)
     return next((path for path in models.presentation_of(study).along if path in wanted), wanted[0] if wanted else "")
 
 
 def along_of(study: Study, case: int, along: str, low: str | None = None, high: str | None = None) -> Along:
-    """The parameter of a branch and its range.
+    """The parameter of a branch and its range; as `range_of`, and FaultError about an initial value."""
+    for path in (part.strip() for part in along.split(",")):
+        axis = study.axis_of(path)
+        if any(map(is_initial, (path,) if axis is None else study.axes[axis].paths)):
+            message = "is an initial value: a periodic motion does not depend on how it began"
+            own = case_machine(study, case)
+            free = ", ".join(name for name in own if name not in study.derive and not is_initial(name))
+            raise parameter_error("along", "conflict", message, path, free)
+    return range_of(study, case, along, low, high)
+
+
+def range_of(study: Study, case: int, along: str, low: str | None = None, high: str | None = None) -> Along:
+    """The parameter along which a case is followed, and its range.
 
     Parameters
     ----------

@@ -9,9 +9,10 @@ import numpy as np
 
 from sprag.service.faults import choice_of, parameter_error
 from sprag.service.json_text import numbers, to_bytes
-from sprag.service.results.branches import along_of
+from sprag.service.results.branches import range_of
 from sprag.service.results.exports import table_csv
 from sprag.service.results.portraits import require_strobes
+from sprag.service.results.start_states import refuse_impossible
 from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker.models.common import case_machine
@@ -54,7 +55,7 @@ def diagram_of(
     study : Study
     case : int
     along, ends :
-        As `branches.along_of` takes them.
+        As `branches.range_of` takes them.
     phase : str, optional
     size : tuple of two int
         Values of the parameter, equally spaced, and strobes of each.
@@ -62,9 +63,12 @@ def diagram_of(
     Raises
     ------
     FaultError
-        As `branches.along_of`, and about ``phase``.
+        As `branches.range_of`, and about ``phase``.
     """
-    asked = along_of(study, case, along, *ends)
+    asked = range_of(study, case, along, *ends)
+    own = case_machine(study, case)
+    corners = [dict.fromkeys(asked.paths, end) for end in (asked.low, asked.high)]
+    refuse_impossible(dict.fromkeys(asked.paths, "along"), own, corners)
     return Sampling(asked.paths, np.linspace(asked.low, asked.high, size[0]), phase_of(phase), size[1])
 
 

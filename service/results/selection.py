@@ -162,7 +162,8 @@ def locate_axes(study: Study, at: Sequence[tuple[str, str]]) -> Fixed:
             continue
         index = study.axes[position].index_of(value)
         if index is None:
-            known = listed(np.sort(study.axes[position].array).tolist())
+            values = np.sort(study.axes[position].array).tolist()
+            known = listed(map(direction, values) if path == SWEEP else values)
             message = "the axis has no such value"
             raise refused("at", "unknown-value", message, f"{path}={text}", allowed=known, unit=unit)
         if fixed.setdefault(position, (path, index))[1] != index:
@@ -177,4 +178,7 @@ def _value(path: str, text: str, unit: str) -> float:
         number, unit_text = split_quantity(text)
         return parse_quantity(text, unit) if unit_text else to_float(number)
     except QuantityError as error:
+        if path == SWEEP:
+            message, allowed = "is not a direction", ", ".join(DIRECTIONS)
+            raise refused("at", "unknown-value", message, f"{path}={text}", allowed=allowed) from error
         raise refused("at", error.code, f"{path} {error}", f"{path}={text}", unit=unit) from error

@@ -127,15 +127,20 @@ def read_one(report: Report, pointer: str, found: Mapping[str, Any], names: Sequ
     return None
 
 
-def read_object(report: Report, pointer: str, value: object, known: Iterable[str]) -> Mapping[str, Any] | None:
-    """Read an object; None, with a fault recorded, for anything else. Fields that are not ``known`` are faults too."""
+def read_object(
+    report: Report, pointer: str, value: object, known: Iterable[str], *, given: bool = False
+) -> Mapping[str, Any] | None:
+    """Read an object; None, with a fault recorded, for anything else. Fields that are not ``known`` are faults too.
+
+    Unless ``given``, None means missing.
+    """
     known = tuple(known)
     if not isinstance(value, Mapping):
-        message = "is required" if value is None else "must be an object"
+        missing = value is None and not given
         report.fault(
             pointer,
-            "required" if value is None else "wrong-type",
-            message,
+            "required" if missing else "wrong-type",
+            "is required" if missing else "must be an object",
             value,
             allowed="an object with the fields " + ", ".join(known),
         )

@@ -39,7 +39,7 @@ def read_run(report: Report, data: object, frequencies: NDArray[np.float64]) -> 
     ----------
     frequencies : every excitation frequency (Hz) of the study; empty when they could not be read
     """
-    found = read_object(report, "/run", data, FIELDS)
+    found = read_object(report, "/run", data, FIELDS, given=True)
     if found is None:
         return dict(SETTLED_DEFAULTS)
     settled = not any(name in found for name in TIMED_FIELDS)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.spec.axes.axes import varied_values
 from sprag.service.spec.described import Described, named, schemas
 from sprag.service.spec.draws.tolerances import expanded
 from sprag.service.spec.draws.unit import unit_sample
@@ -15,35 +16,39 @@ from sprag.service.spec.report import Report, join
 from sprag.service.spec.schema.quantity import QUANTITY, Schema, object_schema
 from sprag.worker.limits import MAX_START_RANGES, MAX_STARTS
 from sprag.worker.models import START_STATES, is_settled
+from sprag.worker.models.start_states import LOCKED, is_initial
 
 if TYPE_CHECKING:
     from sprag.service.spec.machine.machine import Machine
     from sprag.worker.models import Parameter
+    from sprag.worker.study import Axis
 
 SETTINGS: Final = named(
     Described("count", "", "starts of each case, its own among them", "whole", 2, MAX_STARTS, 32),
     Described("seed", "", "seed of the initial values, which are those of a scrambled Sobol sequence", "whole", 0,
               2**32 - 1, 1),
 )  # fmt: skip
-_INITIAL: Final = "initial_"
 _ALLOWED: Final = (
     'ranges of initial values, as in {"shaft.initial_speed": ["0 rad/s", "30 rad/s"]}; `*` stands for every pendulum'
 )
 
 
-def read_starts(report: Report, found: Mapping[str, Any], machine: Machine, run: Mapping[str, Any]) -> dict[str, Any]:
+def read_starts(
+    report: Report, found: Mapping[str, Any], machine: Machine, axes: tuple[Axis, ...] | None, run: Mapping[str, Any]
+) -> dict[str, Any]:
     """The part of a study's run that its starts are: ``{"starts": ...}``, SI, with the values of every start.
 
     Empty without starts, or, with the faults recorded, where they are invalid.
     """
     if "starts" not in found:
         return {}
-    data = read_object(report, "/starts", found["starts"], (*SETTINGS, "ranges"))
+    data = read_object(report, "/starts", found["starts"], (*SETTINGS, "ranges"), given=True)
     if data is None:
         return {}
     before = report.found
     settings = {name: field.read(report, "/starts", data) for name, field in SETTINGS.items()}
     ranges = _read_ranges(report, data.get("ranges"), machine)
+    _check_locked(report, ranges, machine, axes or ())
     if not is_settled(run):
         report.fault(
             "/starts", "conflict", "needs runs until the motion is settled", allowed="neither `duration` nor `window`"
@@ -72,7 +77,7 @@ def _read_ranges(report: Report, data: object, machine: Machine) -> dict[str, li
             allowed=_ALLOWED,
         )
         return {}
-    initial = {path: entry for path, entry in machine.parameters.items() if _is_initial(path)}
+    initial = {path: entry for path, entry in machine.parameters.items() if _can_vary(path)}
     ranges: dict[str, list[float]] = {}
     for name, ends in data.items():
         pointer = join("/starts/ranges", name)
@@ -92,9 +97,23 @@ def _read_ranges(report: Report, data: object, machine: Machine) -> dict[str, li
     return ranges
 
 
-def _is_initial(path: str) -> bool:
-    name = path.rpartition(".")[2]
-    return name.startswith(_INITIAL) and name not in START_STATES
+def _check_locked(report: Report, ranges: Mapping[str, list[float]], machine: Machine, axes: tuple[Axis, ...]) -> None:
+    """Record ranges of the speed of a pendulum that begins locked to the shaft, or of that shaft."""
+    locked = [
+        path.removesuffix("initial_clutch")
+        for path in machine.parameters
+        if path.endswith(".initial_clutch") and (varied_values(path, axes, machine.values) == LOCKED).any()
+    ]
+    for path in ranges:
+        if path in (f"{prefix}initial_speed" for prefix in locked) or (locked and path == "shaft.initial_speed"):
+            report.fault(
+                join("/starts/ranges", path), "conflict", "is that of a pendulum that begins locked to the shaft", path,
+                allowed="ranges of other initial values, or clutches that begin in another state",
+            )  # fmt: skip
+
+
+def _can_vary(path: str) -> bool:
+    return is_initial(path) and path.rpartition(".")[2] not in START_STATES
 
 
 def _add_range(

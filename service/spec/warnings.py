@@ -14,10 +14,14 @@ from sprag.service.spec.axes.axes import varied_values
 from sprag.service.spec.report import Report
 from sprag.worker.derived import distinct_values, involved
 from sprag.worker.models import machine_shaft
+from sprag.worker.models.starts import count_of, has_starts
 from sprag.worker.study import Axis, Study
 
 #: Up to this number all combinations of the axes involved are checked; beyond it, only the ends of the axes.
 _MOST_COMBINATIONS: Final = 100_000
+
+#: Runs of a study with many starts beyond which their number is mentioned.
+_MANY_RUNS: Final = 1_000_000
 
 #: Last part of a path -> (largest plausible magnitude, its unit, the likely mistake).
 _PLAUSIBLE: Final[dict[str, tuple[float, str, str]]] = {
@@ -33,6 +37,7 @@ _PLAUSIBLE: Final[dict[str, tuple[float, str, str]]] = {
     "damping": (100.0, "N*m*s/rad", "was it in another unit?"),
     "backlash": (0.1, "rad", "was it in degrees?"),
     "initial_angle": (math.pi, "rad", "was it in degrees?"),
+    "initial_windup": (1.0, "rad", "was it in degrees?"),
     "initial_speed": (1e3, "rad/s", "was it in rpm?"),
     "load": (1e4, "N*m", "was it in N*mm?"),
 }
@@ -42,6 +47,13 @@ def warn_vibration_drive(report: Report, study: Study) -> None:
     """Warn of implausible values of a vibration drive anywhere on the axes of ``study``."""
     for path in dict.fromkeys((*study.base, *study.axis_paths)):
         _plausible(report, study, path)
+    runs = study.cases * count_of(study.run)
+    if has_starts(study.run) and runs > _MANY_RUNS:
+        report.warn(
+            "many-runs",
+            f"/starts/count: {study.cases:,} cases with {count_of(study.run):,} starts each are {runs:,} runs; "
+            "start with a few dozen for each case",
+        )
     if not any(_values(study, f"excitation.amplitude_{axis}").any() for axis in "xy"):
         report.warn("nothing-moves", "/base/excitation: both amplitudes are 0, so the base does not move")
     if _values(study, "excitation.frequency").min() < 0.1:

@@ -9,7 +9,7 @@ from starlette.responses import Response
 
 from sprag.service.answers.results import BasinData
 from sprag.service.http.api.document import files, format_query, problems
-from sprag.service.http.basin_query import Across, Along, End, Points
+from sprag.service.http.basin_query import AskedBasin
 from sprag.service.http.context import CaseNumber, StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, picture
 from sprag.service.http.drawing import table as written
@@ -39,19 +39,12 @@ async def get_basin(
     work: Attended,
     study_id: StudyId,
     case: CaseNumber,
-    x: Across = None,
-    y: Along = None,
-    x_from: End = None,
-    x_to: End = None,
-    y_from: End = None,
-    y_to: End = None,
-    points: Points = 20,
+    asked: AskedBasin,
     form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """To which regime a settled case comes from each start of a grid. The case is run from all of them for this."""
     chosen = choose_format(work.request, form, DRAWN_FORMATS)
-    ends = {"x": (x_from, x_to), "y": (y_from, y_to)}
-    study, query = await work.case_of(study_id, case, lambda study: basins.basin_query(study, x, y, ends, points))
+    study, query = await work.case_of(study_id, case, lambda study: asked.of(study, case))
     if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - narrows the type
         content = await work.run_case(basins.basin_file, study, case, query, chosen)
         return written(content, chosen, f"{study_id}-case-{case}-basin")

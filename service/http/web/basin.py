@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
-from fastapi import APIRouter
-from starlette.concurrency import run_in_threadpool
+from fastapi import APIRouter, Request
 from starlette.responses import Response
 
-from sprag.service.http.basin_query import Across, Along, End, Points
-from sprag.service.http.context import CaseNumber, StudyId
+from sprag.service.faults import FaultError, parameter_error
+from sprag.service.http.basin_query import USUAL_POINTS, AskedBasin, BasinParameters
+from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
 from sprag.service.http.drawing import unchanging
 from sprag.service.http.respond import json_response
 from sprag.service.http.web.figures.answers import basin_plot
@@ -17,64 +18,68 @@ from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.results import basins
+from sprag.worker.limits import MAX_BASIN_POINTS
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 router = APIRouter(include_in_schema=False)
 
+_FIELDS: Final = ("x", "x_from", "x_to", "y", "y_from", "y_to", "points")
+#: Characters of a field that are read.
+_LONGEST: Final = 80
+
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/basin")
-async def basin_page(
-    work: Attended,
-    study_id: StudyId,
-    case: CaseNumber,
-    x: Across = None,
-    y: Along = None,
-    x_from: End = None,
-    x_to: End = None,
-    y_from: End = None,
-    y_to: End = None,
-    points: Points = 20,
-) -> Response:
-    """To which regime a case comes from each start of a grid."""
-    ends = {"x": (x_from or None, x_to or None), "y": (y_from or None, y_to or None)}
-    study, query = await work.case_of(
-        study_id, case, lambda study: basins.basin_query(study, x or None, y or None, ends, points)
-    )
-    frame = await run_in_threadpool(study_frame, work.context, study_id)
-    given = {
-        "x": query.paths[0], "y": query.paths[1], "x_from": repr(query.x[0]), "x_to": repr(query.x[1]),
-        "y_from": repr(query.y[0]), "y_to": repr(query.y[1]), "points": str(points),
-    }  # fmt: skip
-    own, text = f"/studies/{study_id}/cases/{case}/basin", urlencode(given)
+def basin_page(context: Ctx, request: Request, study_id: StudyId, case: CaseNumber) -> Response:
+    """The form of a basin, and to which regime the case comes from each start of its grid."""
+    study = study_with(context, study_id, case)
+    basins.require_basin(study)
+    given = {name: request.query_params.get(name, "").strip()[:_LONGEST] for name in _FIELDS}
+    texts = dict(given)
+    faults: tuple[Any, ...] = ()
+    asked = ""
+    usual = basins.usual_ends(study)
+    try:
+        texts["x"], texts["y"] = basins.basin_paths(study, texts["x"] or None, texts["y"] or None)
+        _parameters(texts).of(study, case)
+        asked = urlencode({name: text for name, text in texts.items() if text})
+    except FaultError as error:
+        # The first look at a study without starts has no ranges yet.
+        faults = error.faults if any(given.values()) else ()
+    own = f"/studies/{study_id}/cases/{case}/basin"
     return page(
         "basin.html",
-        **frame,
+        status=422 if faults else 200,
+        **study_frame(context, study_id),
         tab="/cases",
         case=case,
-        given=given,
+        given=texts,
         known=basins.initial_values(study),
-        figure=f"{own}/figure?{text}",
-        file=f"/api/v1{own}?{text}",
+        usual=usual,
+        usual_points=USUAL_POINTS,
+        faults=faults,
+        figure=f"{own}/figure?{asked}" if asked else "",
+        file=f"/api/v1{own}?{asked}",
     )
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/basin/figure")
-async def basin(
-    work: Attended,
-    study_id: StudyId,
-    case: CaseNumber,
-    x: Across = None,
-    y: Along = None,
-    x_from: End = None,
-    x_to: End = None,
-    y_from: End = None,
-    y_to: End = None,
-    points: Points = 20,
-) -> Response:
+async def basin(work: Attended, study_id: StudyId, case: CaseNumber, asked: AskedBasin) -> Response:
     """The figure of a basin."""
-    ends = {"x": (x_from, x_to), "y": (y_from, y_to)}
-    study, query = await work.case_of(study_id, case, lambda study: basins.basin_query(study, x, y, ends, points))
+    study, query = await work.case_of(study_id, case, lambda study: asked.of(study, case))
 
     async def make() -> Response:
         return json_response(await work.run_case(basin_plot, study, case, query))
 
     return await unchanging(work, study_id, make)
+
+
+def _parameters(texts: Mapping[str, str]) -> BasinParameters:
+    """What the form gives; FaultError about the number of points."""
+    points = texts["points"] or str(USUAL_POINTS)
+    if not (points.isdecimal() and points.isascii() and 2 <= int(points) <= MAX_BASIN_POINTS):
+        message, allowed = "is not a number of values", f"2 to {MAX_BASIN_POINTS}"
+        raise parameter_error("points", "out-of-range", message, points, allowed)
+    x_from, x_to, y_from, y_to = (texts[name] or None for name in ("x_from", "x_to", "y_from", "y_to"))
+    return BasinParameters(texts["x"] or None, texts["y"] or None, (x_from, x_to), (y_from, y_to), int(points))

@@ -11,6 +11,7 @@ from sprag.service.spec.plan.outline import chooses
 from sprag.service.spec.report import Report, join
 from sprag.worker import models
 from sprag.worker.limits import MAX_CASES
+from sprag.worker.models.start_states import is_initial
 from sprag.worker.study import Axis
 from sprag.worker.sweeps import DOWN, SWEEP, UP
 
@@ -76,7 +77,7 @@ def with_sweep(report: Report, study: Study, swept: tuple[int, str]) -> Study:
             where, "not-used", "needs the settled motion of a vibration drive", way,
             allowed='model "vibration-drive" with `"until": "settled"` in `run`',
         )  # fmt: skip
-    initial = [path for path in axis.paths if path.rpartition(".")[2].startswith("initial_")]
+    initial = [path for path in axis.paths if is_initial(path)]
     if initial:
         report.fault(
             where, "conflict", f"{initial[0]} is an initial value: a case that starts from its neighbour has none", way,

@@ -16,6 +16,7 @@ from sprag.service.spec.machine.clutch import check_laws
 from sprag.service.spec.machine.drive import Drive, read_drive
 from sprag.service.spec.machine.machine import read_plain
 from sprag.service.spec.machine.shaft import check_shaft, read_shaft
+from sprag.service.spec.machine.start_states import check_starts
 from sprag.service.spec.run import read_run, refuse_run
 from sprag.service.spec.schema.drive import drive_schema, run_schema
 from sprag.service.spec.schema.quantity import object_schema, plain_schema
@@ -93,6 +94,8 @@ def _drive_check(report: Report, machine: Machine, axes: Axes, combine: Combine)
                 f"/axes/{k}", "invalid-choice", f"has values of {states[0]} that are not the number of a state",
                 allowed=machine.parameters[states[0]].help,
             )  # fmt: skip
+    if not report.faults:
+        check_starts(report, machine, axes, combine)
     for clutch in machine.clutches:
         if report.faults or not any(path.startswith(clutch.prefix) for path in machine.derive):
             check_laws(report, [clutch], axes, combine)

@@ -54,7 +54,7 @@ class Calibration:
 
 def read_calibration(report: Report, data: object, machine: Machine) -> Calibration | None:
     """The field `calibrate`; None, and the faults recorded, where it is invalid."""
-    found = read_object(report, "/calibrate", data, FIELDS)
+    found = read_object(report, "/calibrate", data, FIELDS, given=True)
     if found is None:
         return None
     before = report.found

@@ -77,7 +77,7 @@ def _refine(report: Report, found: Mapping[str, Any], machine: Machine) -> Outli
 
 
 def _goal(report: Report, found: Mapping[str, Any], machine: Machine) -> Outline | None:
-    data = read_object(report, "/goal", found["goal"], goal.FIELDS)
+    data = read_object(report, "/goal", found["goal"], goal.FIELDS, given=True)
     if data is None:
         return None
     variables = goal.read_variables(report, data.get("vary"), machine)

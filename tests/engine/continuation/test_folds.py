@@ -42,6 +42,14 @@ def test_a_branch_goes_around_its_folds(duffing: Branch) -> None:
         assert product == pytest.approx(math.exp(-0.1 * 2.0 * math.pi / point.parameter), rel=1e-6)
 
 
+def test_a_branch_ends_at_its_range_to_the_last_bit() -> None:
+    low, parameter, high = 1.8, 1.85, 1.87
+    assert low / (high - low) * (high - low) != low
+    made = follow(Duffing(0.1, 1.0, 0.3), [-0.1, 0.0], parameter, Range(low, high))
+    assert (made.points[0].parameter, made.points[-1].parameter) == (low, high)
+    assert made.points[made.start].parameter == parameter
+
+
 def test_folds_of_the_duffing_oscillator_are_those_of_dop853(duffing: Branch) -> None:
     oscillator = Duffing(0.1, 1.0, 0.3)
 

@@ -81,6 +81,9 @@ def test_curves_have_both_directions_and_their_jumps(service: Service, study_id:
     ]
     down = service.get(f"/studies/{study_id}/curves", **QUERY, at=["shaft.load=0.1", "sweep=down"])["curves"]
     assert [curve["y"] for curve in down] == [curves[1]["y"]]
+    for given in ("2", "sideways"):
+        refused = service.http.get(f"{API}/studies/{study_id}/curves", params={**QUERY, "at": f"sweep={given}"})
+        assert [error["allowed"] for error in refused.json()["errors"]] == ["up, down"]
 
 
 def test_csv_and_maps_have_them_too(service: Service, study_id: str) -> None:

@@ -12,7 +12,7 @@ from sprag.service.spec.document import SpecError, parse_spec
 from sprag.service.spec.schema.document import spec_schema
 from sprag.worker import models
 from sprag.worker.models.starts import at_start
-from tests.service.spec_sample import SPEC
+from tests.service.spec_sample import SPEC, changed
 
 SPEED, ANGLE = "shaft.initial_speed", "pendulums.0.initial_angle"
 
@@ -104,3 +104,80 @@ def test_states_of_clutches_are_in_a_study_only_where_they_are_given() -> None:
     with pytest.raises(SpecError) as error:
         parse_spec(spec)
     assert [fault.where for fault in error.value.faults] == ["/base/pendulums/0/initial_clutch"]
+
+
+_PENDULUM = "/base/pendulums/0"
+
+
+@pytest.mark.parametrize(
+    ("changes", "pointer", "code", "allowed"),
+    [
+        ({f"{_PENDULUM}/initial_clutch": 3}, f"{_PENDULUM}/initial_clutch", "conflict", "0 free, 1 take up, 2 engaged"),
+        ({f"{_PENDULUM}/initial_clutch": 4}, f"{_PENDULUM}/initial_clutch", "conflict", "0 free, 1 take up, 2 engaged"),
+        ({f"{_PENDULUM}/initial_clutch": 1, f"{_PENDULUM}/initial_windup": "-0.006 rad"},
+         f"{_PENDULUM}/initial_windup", "out-of-range", "-0.005 .. 0 rad"),
+        ({f"{_PENDULUM}/initial_clutch": 1, f"{_PENDULUM}/initial_windup": 50},
+         f"{_PENDULUM}/initial_windup", "out-of-range", "-0.005 .. 0 rad"),
+        ({f"{_PENDULUM}/initial_clutch": 2, f"{_PENDULUM}/initial_windup": 50, "/base/clutch/windup_limit": 0.02},
+         f"{_PENDULUM}/initial_windup", "out-of-range", "0 .. 0.02 rad"),
+        # Where the windup has its default, the state is what is given.
+        ({f"{_PENDULUM}/initial_clutch": 3, "/base/clutch/windup_limit": 0.02},
+         f"{_PENDULUM}/initial_clutch", "out-of-range", "0.02 .. inf rad"),
+        ({f"{_PENDULUM}/initial_clutch": 4, f"{_PENDULUM}/backlash": 0, "/base/clutch/coefficients": [0.1, 200],
+          "/base/shaft/initial_speed": 20}, f"{_PENDULUM}/initial_speed", "conflict", "20 rad/s"),
+        ({f"{_PENDULUM}/initial_clutch": 1, f"{_PENDULUM}/initial_windup": "-4 mrad",
+          "/axes/2": {"path": "pendulums.0.backlash", "values": [0.005, 0.003]}},
+         f"{_PENDULUM}/initial_windup", "out-of-range", "-0.003 .. 0 rad"),
+        ({f"{_PENDULUM}/initial_windup": "-4 mrad",
+          "/axes/2": {"path": "pendulums.0.initial_clutch", "values": [1, 2]}},
+         f"{_PENDULUM}/initial_windup", "out-of-range", "0 .. inf rad"),
+        ({f"{_PENDULUM}/initial_clutch": 1, f"{_PENDULUM}/initial_windup": "-4 mrad", f"{_PENDULUM}/backlash": ...,
+          "/derive": {"pendulums.0.backlash": "0.3 * pendulums.0.arm / 3 m"}},
+         f"{_PENDULUM}/initial_windup", "out-of-range", "-0.003 .. 0 rad"),
+    ],
+)  # fmt: skip
+def test_states_in_which_no_motion_begins_are_refused(
+    changes: dict[str, Any], pointer: str, code: str, allowed: str
+) -> None:
+    with pytest.raises(SpecError) as error:
+        parse_spec(changed(changes))
+    assert [(fault.where, fault.code, fault.allowed) for fault in error.value.faults] == [(pointer, code, allowed)]
+
+
+def test_every_state_of_a_clutch_can_be_given() -> None:
+    lock = {"backlash": 0, "initial_speed": 20, "initial_clutch": 4}
+    for pendulum, clutch in (
+        ({"initial_clutch": 0, "initial_windup": 3}, {}),
+        ({"initial_clutch": 1, "initial_windup": -0.005}, {}),
+        ({"initial_clutch": 2, "initial_windup": 0.02}, {"windup_limit": 0.02}),
+        ({"initial_clutch": 3, "initial_windup": 0.03}, {"windup_limit": 0.02}),
+        (lock, {"coefficients": [0.1, 200]}),
+    ):
+        spec = changed({"/base/shaft/initial_speed": 20})
+        spec["base"]["pendulums"][0] |= pendulum
+        spec["base"]["clutch"] |= clutch
+        assert parse_spec(spec).study.base["pendulums.0.initial_clutch"] == pendulum["initial_clutch"]
+
+
+def test_starts_leave_the_speeds_of_a_locked_pendulum_alone() -> None:
+    spec = _spec(ranges={ANGLE: [0, 1], SPEED: [1, 2]})
+    spec["base"]["pendulums"][0] |= {"backlash": 0, "initial_clutch": 4}
+    spec["base"]["clutch"]["coefficients"] = [0.1, 200]
+    with pytest.raises(SpecError) as error:
+        parse_spec(spec)
+    assert [(fault.where, fault.code) for fault in error.value.faults] == [(f"/starts/ranges/{SPEED}", "conflict")]
+
+
+def test_null_is_not_a_missing_field() -> None:
+    with pytest.raises(SpecError) as error:
+        parse_spec({**_spec(), "starts": None, "run": None})
+    found = {fault.where: (fault.code, fault.message) for fault in error.value.faults}
+    assert found == dict.fromkeys(("/run", "/starts"), ("wrong-type", "must be an object"))
+
+
+def test_a_million_runs_are_mentioned() -> None:
+    spec = _spec(count=4096)
+    assert not [text for text in parse_spec(spec).warnings if "runs" in text]
+    spec["axes"][0]["linspace"][2] = 32
+    (warning,) = (text for text in parse_spec(spec).warnings if "runs" in text)
+    assert "384 cases with 4,096 starts each are 1,572,864 runs" in warning

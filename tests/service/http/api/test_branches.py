@@ -80,6 +80,7 @@ def test_the_page_has_a_form_and_the_figure(service: Service, settled: str) -> N
         ("along=shaft.load&from=-1", "from", "out-of-range"),
         ("along=shaft.load&to=2 mm", "to", "wrong-unit"),
         ("along=shaft.load&y=speed", "y", "invalid-choice"),
+        ("along=shaft.initial_speed", "along", "conflict"),
     ],
 )
 def test_what_cannot_be_followed_is_refused(

@@ -76,6 +76,7 @@ def test_the_page_has_both_figures(service: Service, settled: str) -> None:
         ("section?phase=1 mm", "phase", "wrong-unit"),
         ("diagram?along=shaft.load&y=speed", "y", "invalid-choice"),
         ("diagram?along=shaft.inertia", "from", "required"),
+        ("diagram?along=pendulums.0.initial_clutch&from=0&to=2", "along", "unknown-name"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(service: Service, settled: str, part: str, parameter: str, code: str) -> None:

@@ -6,11 +6,13 @@ import copy
 import csv
 import html
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from sprag.service.faults import FaultError
 from sprag.service.http.problems import ApiError
 from sprag.service.results import basins
 from sprag.service.results.basins import BasinQuery
@@ -217,6 +219,32 @@ def test_a_basin_is_a_grid_of_two_initial_values(
     # This one is run: all four starts come to the motion of two periods.
     (line,) = service.http.get(figure).json()["data"]
     assert (line["name"], len(line["x"])) == ("0: 100 %, 22.84 rad/s, order 2", 4)
+
+
+def test_the_page_of_a_basin_keeps_its_form(service: Service, started: str) -> None:
+    own = f"/studies/{started}/cases/1/basin"
+    first = service.http.get(own)
+    shown = [text in first.text for text in ('placeholder="30 rad/s"', "data-figure", 'role="alert"')]
+    assert (first.status_code, *shown) == (200, True, False, False)
+    wrong = {"y": "pendulums.0.initial_angle", "y_from": "12 mm", "y_to": "0.2 rad", "points": "many"}
+    for faulty, sentence in ((wrong, "is not a number of values"), ({**wrong, "points": "9"}, "<code>y_from</code>")):
+        page = service.http.get(own, params=faulty)
+        assert page.status_code == 422
+        assert sentence in page.text
+        assert 'name="y_from" value="12 mm"' in page.text
+        assert "data-figure" not in page.text
+
+
+def test_a_basin_has_possible_starts_only(service: Service, started: str) -> None:
+    study = service.store.study(started)
+    state, windup = "pendulums.0.initial_clutch", "pendulums.0.initial_windup"
+    base = {**study.base, state: 1.0, windup: 0.0}
+    ends: basins.Ends = {"x": (None, None), "y": ("-0.005", "0")}
+    taking_up = replace(study, base=base)
+    assert basins.basin_query(taking_up, 1, None, windup, ends, 2).y == (-0.005, 0.0)
+    with pytest.raises(FaultError) as error:
+        basins.basin_query(taking_up, 1, None, windup, {**ends, "y": ("-0.006", "0")}, 2)
+    assert [(fault.where, fault.allowed) for fault in error.value.faults] == [("y", "-0.005 .. 0 rad")]
 
 
 @pytest.mark.parametrize(
