@@ -42,9 +42,9 @@ def _matrices() -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
     return coefficients, integral, derivative, running, ends, slopes
 
 
-_SAMPLES = np.concatenate([[-1.0], POSITIONS, [1.0]])
-_COEFFICIENTS, _INTEGRAL, _DERIVATIVE, _RUNNING, _ENDS, _SLOPES = (np.ascontiguousarray(m) for m in _matrices())
-_TAIL = _COEFFICIENTS[-2:].copy()
+SAMPLES = np.concatenate([[-1.0], POSITIONS, [1.0]])
+COEFFICIENTS, INTEGRAL, _DERIVATIVE, RUNNING, _ENDS, _SLOPES = (np.ascontiguousarray(m) for m in _matrices())
+TAIL = COEFFICIENTS[-2:].copy()
 _TOTAL = WEIGHTS[None, :].copy()
 
 
@@ -143,7 +143,7 @@ class Panels:
     def within(self, values: Floats) -> "Within":
         """Integrals from each panel's own start."""
         totals = np.where(self.half > 0.0, self.half * apply(_TOTAL, values)[..., 0], 0.0)
-        return Within(self.half[..., None] * apply(_RUNNING, values), totals)
+        return Within(self.half[..., None] * apply(RUNNING, values), totals)
 
     def running(self, values: Floats) -> tuple[Floats, Floats]:
         """Integral from 0 to every node, shape (cases, panels, NODES), and to every cut, (cases, panels + 1)."""
@@ -156,7 +156,7 @@ class Panels:
         """Periodic solution of ``T' = slope T + source``: T at the nodes and, shape (cases,), at the angle 0."""
         energy, start = np.empty(slope.shape), np.empty(len(slope))
         kernels.periodic_linear(
-            np.ascontiguousarray(slope), np.ascontiguousarray(source), self.half, _RUNNING, WEIGHTS, energy, start
+            np.ascontiguousarray(slope), np.ascontiguousarray(source), self.half, RUNNING, WEIGHTS, energy, start
         )
         return energy, start
 
@@ -164,7 +164,7 @@ class Panels:
         """Sizes of the last two Legendre coefficients in each panel, (cases, panels), as a measure of its
         resolution.
         """
-        tail = np.abs(apply(_TAIL, values)).sum(axis=2)
+        tail = np.abs(apply(TAIL, values)).sum(axis=2)
         return np.asarray(np.where(self.half > 0.0, tail, 0.0))
 
     def middles(self, chosen: NDArray[np.bool_]) -> Floats:
@@ -202,7 +202,7 @@ class Panels:
 
     def at_rows(self, values: Floats, cases: Integers, points: Points) -> Floats:
         """Values at any number of ``points``, each for the case given by ``cases``."""
-        return series(apply(_COEFFICIENTS, self._rows(values, cases, points.panel)), points.t)
+        return series(apply(COEFFICIENTS, self._rows(values, cases, points.panel)), points.t)
 
     def running_at(self, values: Floats, ends: Floats, points: Points) -> Floats:
         """Running integral at ``points``; ``values`` is the integrand and ``ends`` its integral to every cut."""
@@ -211,7 +211,7 @@ class Panels:
     def running_at_rows(self, values: Floats, ends: Floats, cases: Integers, points: Points) -> Floats:
         """The same at any number of ``points``, each for the case given by ``cases``."""
         start = self._rows(ends, cases, points.panel)
-        rows = apply(_INTEGRAL, apply(_COEFFICIENTS, self._rows(values, cases, points.panel)))
+        rows = apply(INTEGRAL, apply(COEFFICIENTS, self._rows(values, cases, points.panel)))
         return start + self._half_at(cases, points.panel) * series(rows, points.t)
 
     def extremes(self, values: Floats) -> Extremes:
@@ -227,7 +227,7 @@ class Panels:
         cases = len(values)
         value, t, panel = np.empty(cases), np.empty(cases), np.empty(cases, dtype=np.int64)
         kernels.highest(
-            np.ascontiguousarray(values), sign, self.half, _SAMPLES, _ENDS, _SLOPES, _COEFFICIENTS, _DERIVATIVE,
+            np.ascontiguousarray(values), sign, self.half, SAMPLES, _ENDS, _SLOPES, COEFFICIENTS, _DERIVATIVE,
             value, panel, t,
         )  # fmt: skip
         return value, Points(panel, t, self._angle(np.arange(cases), panel, t))
@@ -244,12 +244,12 @@ class Panels:
         case, panel, place = np.nonzero((above[..., 1:] != above[..., :-1]) & (self.half > 0.0)[..., None])
         start = ends[case, panel] - level[case]
         half = self._half_at(case, panel)
-        rows = apply(_INTEGRAL, apply(_COEFFICIENTS, values[case, panel])) if len(case) else np.empty((0, NODES + 1))
+        rows = apply(INTEGRAL, apply(COEFFICIENTS, values[case, panel])) if len(case) else np.empty((0, NODES + 1))
         rows = half[:, None] * rows
         rows[:, 0] += start
         t = np.empty(len(case))
         before, after = height[case, panel, place], height[case, panel, place + 1]
-        kernels.series_roots(rows, _SAMPLES[place], _SAMPLES[place + 1], before, after, t)
+        kernels.series_roots(rows, SAMPLES[place], SAMPLES[place + 1], before, after, t)
         return Crossings(case, panel, t, self._angle(case, panel, t), ~above[case, panel, place])
 
 

@@ -23,7 +23,10 @@ def rough_panels(d: Decomposition) -> tuple[Bools, Bools]:
     drive = np.where(still[..., None], d.fields.drive, d.drive.torque)
     resistance = np.where(still[..., None], d.fields.resistance, d.resistance.torque)
     torque = panels.roughness(drive) + panels.roughness(resistance)
-    scale = (largest_work(panels, drive, resistance) if still.any() else d.most_work)[:, None]
+    work = largest_work(panels, drive, resistance) if still.any() else d.most_work
+    # The torques of an idle motor are rounding errors, which no panel resolves.
+    idle = work <= 1e-9 * d.start
+    scale = np.where(idle, 1e-6 * d.start, work)[:, None]
     fine = (torque * panels.half <= 1e-10 * scale) & _resolved(panels, d.fields.inertia, 1e-11)
     with np.errstate(invalid="ignore"):
         square = _resolved(panels, d.squares, 1e-10) | still

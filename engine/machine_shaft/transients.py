@@ -1,0 +1,137 @@
+"""Transients of one machine over time: run-up from rest, a step of the load, coasting with the drive switched off."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sprag.engine.endings import ENDINGS, Ending
+from sprag.engine.machine_shaft import transient_kernel as kernel
+from sprag.engine.machine_shaft.columns import Columns
+from sprag.engine.machine_shaft.machine import Machine, check_structure
+from sprag.engine.machine_shaft.panels import Panels
+from sprag.engine.machine_shaft.simulate import attempts, settle
+from sprag.engine.machine_shaft.spec import MachineSpec
+from sprag.engine.machine_shaft.transient_bench import Bench, Cycle
+from sprag.engine.machine_shaft.transient_causes import cause_of
+from sprag.engine.machine_shaft.transient_run import OUTCOMES, Course, Kind, Outcome, Run
+from sprag.engine.outcome import Trajectory
+
+__all__ = ["COLUMNS", "KINDS", "RESULTS", "Course", "Kind", "Outcome", "Transient", "transient"]
+
+#: Name and unit of each column over time.
+COLUMNS: tuple[tuple[str, str], ...] = (
+    ("angle", "rad"), ("omega", "rad/s"), ("acceleration", "rad/s^2"), ("energy", "J"), ("inertia", "kg*m^2"),
+    ("drive_torque", "N*m"), ("resisting_torque", "N*m"), ("power", "W"),
+)  # fmt: skip
+#: Name, unit and meaning of each result.
+RESULTS: tuple[tuple[str, str, str], ...] = (
+    ("time", "s", "time of the run-up, to the new steady cycle, or to standstill; empty where that is not reached"),
+    ("duration", "s", "computed time"),
+    ("turns", "1", "revolutions in the computed time"),
+    ("omega.start", "rad/s", "speed at the start"),
+    ("omega.end", "rad/s", "speed at the end"),
+    ("omega.max", "rad/s", "largest speed"),
+    ("omega.min", "rad/s", "smallest speed"),
+    ("drive_torque.max", "N*m", "largest torque of the drive at the main shaft"),
+    ("motor.torque.max", "N*m", "largest torque at the motor's shaft"),
+    ("power.max", "W", "largest power of the drive"),
+    ("work.drive", "J", "work of the drive"),
+    ("work.resistance", "J", "work of operation, weights, springs and friction, negative where they resist"),
+    ("work.slip", "J", "energy lost to the slip of an asynchronous motor, in its rotor"),
+    ("energy.change", "J", "change of the kinetic energy"),
+    ("balance.energy", "1", "energy that is missing from the balance, over the largest of works and energies"),
+    ("before.omega.mean", "rad/s", "mean speed of the steady cycle before"),
+    ("after.omega.mean", "rad/s", "mean speed of the steady cycle to which the shaft comes"),
+    ("after.irregularity", "1", "irregularity of that cycle"),
+)
+_HALVINGS = 8
+KINDS: tuple[Kind, ...] = get_args(Kind)
+
+
+@dataclass(frozen=True, slots=True)
+class Transient:
+    """A computed transient.
+
+    Attributes
+    ----------
+    outcome : str
+        One of ``Outcome``.
+    cause : str
+        A sentence about the end and its cause.
+    results : dict
+        By name, of ``RESULTS``; NaN for missing ones.
+    motion : Trajectory
+        Over time; its ending is that of the steady cycle of the case.
+    """
+
+    outcome: Outcome
+    cause: str
+    results: dict[str, float]
+    motion: Trajectory
+
+
+def _bench(model: MachineSpec, row: Columns, course: Course) -> tuple[Bench | None, Cycle | None, Ending]:
+    """The machine on panels that resolve the cycle before and after; without one where a field is not resolved."""
+    if not np.isnan(Machine(model, row).unassembled()[0]):
+        return None, None, Ending.CANNOT_ASSEMBLE
+    with np.errstate(all="ignore"):
+        *_, (_, solved) = attempts(model, row)
+        settle(model, row, solved)
+    ending, d = ENDINGS[int(solved.endings[0])], solved.decomposition
+    if ending in {Ending.NEGATIVE_INERTIA, Ending.QUADRATURE_NOT_REACHED, Ending.NEAR_SINGULAR}:
+        return None, None, ending
+    if ending is not Ending.OK and course.kind != "run-up":
+        return None, None, ending
+    cuts = np.unique(d.panels.cuts[0])[None, :]
+    for _ in range(_HALVINGS):
+        bench = Bench(model, row, Panels(cuts), float(d.start[0]))
+        after = bench.steady(course.load)
+        if after is None:
+            break
+        rough = bench.panels.roughness(after.energy) > 1e-11 * bench.panels.largest(after.energy)[:, None]
+        if not rough.any():
+            break
+        cuts = np.sort(np.concatenate([cuts, bench.panels.middles(rough)], axis=1), axis=1)
+    return bench, after, ending
+
+
+def transient(model: MachineSpec, columns: Mapping[str, ArrayLike], course: Course, points: int) -> Transient:
+    """Compute a transient of one case.
+
+    Parameters
+    ----------
+    model : MachineSpec
+    columns : mapping
+        As for ``simulate``, scalars only.
+    course : Course
+    points : int
+        Equally spaced times of the table.
+
+    Raises
+    ------
+    MachineError
+        If the structure is not a valid machine.
+    ValueError
+        If a machine without a motor is run up without a torque, or a parameter is missing or unknown.
+    """
+    check_structure(model)
+    if course.kind == "run-up" and model.balance != "motor" and course.torque is None:
+        raise ValueError("the run-up of a machine without a motor needs a torque")
+    row = Columns.of(model, columns, 1)
+    bench, after, ending = _bench(model, row, course)
+    names, units = tuple(name for name, _ in COLUMNS), tuple(unit for _, unit in COLUMNS)
+    if bench is None:
+        nothing = Trajectory(np.empty(0), names, units, np.empty((0, len(names))), {}, ending)
+        return Transient("no_motion", ending.sentence, {name: np.nan for name, *_ in RESULTS}, nothing)
+    before = None if course.kind == "run-up" else bench.steady(1.0)
+    run = Run(bench, course, before, None if course.kind == "coasting" else after)
+    status, totals, _ = run.follow(np.empty(0))
+    times = np.linspace(0.0, totals[kernel.TIME], points)
+    _, _, places = run.follow(times)
+    outcome = OUTCOMES[status]
+    results = run.results(outcome, totals)
+    cause = cause_of(course.kind, outcome, results, run.ends(totals, ending))
+    return Transient(outcome, cause, results, Trajectory(times, names, units, run.values(places), {}, ending))
