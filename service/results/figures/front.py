@@ -89,18 +89,18 @@ def _near(values: NDArray[np.float64], feasible: NDArray[np.bool_]) -> NDArray[n
 
 
 def history_figure(found: Designs, columns: int = 2) -> Figure:
-    """The best value of each goal, and the hypervolume, over the generations; feasible designs where neither is."""
+    """The best value of each goal, the hypervolume, and feasible designs over the generations; only what is known."""
     after = [item for item in history(found.rounds) if item["phase"] != "polish" or item["generation"]]
     last = {item["generation"]: item for item in after}
     at = np.array(sorted(last), dtype=np.float64)
     rows = [last[int(generation)] for generation in at]
     across = Quantity("generation", "1")
-    drawn: list[tuple[str, str, list[float | None]]] = [
+    found_values: list[tuple[str, str, list[float | None]]] = [
         (f"best {goal.name}", found.infos[goal.name].unit, [row["best"][index] for row in rows])
         for index, goal in enumerate(found.plan.best)
     ]
-    if any(row["hypervolume"] is not None for row in rows):
-        drawn.append(("hypervolume", "1", [row["hypervolume"] for row in rows]))
+    found_values.append(("hypervolume", "1", [row["hypervolume"] for row in rows]))
+    drawn = [one for one in found_values if any(value is not None for value in one[2])]
     drawn.append(("feasible designs", "1", [float(row["feasible"]) for row in rows]))
     panels = tuple(
         Panel(

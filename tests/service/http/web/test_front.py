@@ -59,6 +59,12 @@ def test_the_scatter_has_every_design_that_has_not_failed(service: Service) -> N
     assert progress["data"][0]["y"][-1] == history[-1]["best"][0]
 
 
+def test_what_no_generation_has_is_not_drawn(service: Service) -> None:
+    study_id = search(service, subject_to=[{"result": "shaft.speed.mean", "at_least": "1e6 rad/s"}])
+    progress = service.http.get(f"/studies/{study_id}/figures/search").json()
+    assert [(trace["name"], set(trace["y"])) for trace in progress["data"]] == [("feasible designs", {0.0})]
+
+
 def test_what_is_drawn_must_be_a_quantity_of_a_design(service: Service) -> None:
     study_id = search(service, rounds=1, best=[{"result": "efficiency", "max": True}])
     page = service.http.get(f"/studies/{study_id}/front?x=mass")
