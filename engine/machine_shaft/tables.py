@@ -175,7 +175,8 @@ def along_strokes(table: Table, strokes: int) -> tuple[Curve, ...]:
         # Two rows at a dead centre are a jump there.
         first = last + 1 if last + 1 < len(table.rows) and abs(table.rows[last + 1][0] - end) <= 1e-9 else last
     if len(curves) != strokes:
-        raise TableError(f"The indicator diagram has {len(curves)} strokes, but the cycle has {strokes}.")
+        count = f"{len(curves)} stroke{'' if len(curves) == 1 else 's'}"
+        raise TableError(f"The indicator diagram has {count}, but the cycle has {strokes}.")
     return tuple(curves)
 
 

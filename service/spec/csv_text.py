@@ -37,8 +37,10 @@ def read_csv(report: Report, where: str, text: object, most: tuple[int, int], ex
         return None
     columns = len(rows[0].cells) if rows else 0
     if not 2 <= len(rows) <= most[0] + 1 or not 1 <= columns <= most[1]:
+        under = f"has {len(rows) - 1} lines of {columns} columns under its headings"
         report.fault(
-            where, "out-of-range", f"has {max(len(rows) - 1, 0)} lines of {columns} columns under its headings",
+            where, "out-of-range",
+            "is empty" if not rows else "has no lines under its headings" if len(rows) == 1 else under,
             allowed=f"1 to {most[0]:,} lines of 1 to {most[1]:,} columns",
         )  # fmt: skip
         return None

@@ -107,6 +107,11 @@ def warn_machine_shaft(report: Report, study: Study) -> None:
         part["operation"]["quantity"] == "none" and part["mechanism"]["kind"] == "none" for _, part in _parts(study)
     ):
         report.warn("nothing-acts", "/base: has neither a mechanism nor an operation, so the shaft turns evenly")
+    else:
+        for prefix, part in _parts(study):
+            if part["operation"]["quantity"] == "none" and part["mechanism"]["kind"] == "none":
+                where = "/base/" + prefix.rstrip(".").replace(".", "/")
+                report.warn("nothing-acts", f"{where}: has neither a mechanism nor an operation, so it does nothing")
     _shaft_relations(report, study)
 
 

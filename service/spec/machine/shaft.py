@@ -148,12 +148,20 @@ def _unused(report: Report, found: Mapping[str, Any], structure: Mapping[str, An
             "scales a table or formula of the driving torque, but none is given",
             drive["scale"],
         )
+    flywheel = drive.get("flywheel") if isinstance(drive, Mapping) else None
+    if isinstance(flywheel, Mapping) and structure["drive"].get("flywheel") == "rim" and "poisson_ratio" in flywheel:
+        report.warn(
+            "no-effect", "/base/drive/flywheel/poisson_ratio: is not used: the stress of a rim does not depend on it"
+        )
     told = "selects strokes, but this diagram is over the angle"
     owners = [("/base", found, structure)]
     several = zip(found.get("parts") or (), structure.get("parts", ()), strict=True)
     owners += [(f"/base/parts/{k}", given, own) for k, (given, own) in enumerate(several)]
     for pointer, given, own in owners:
         operation = given.get("operation")
+        if isinstance(operation, Mapping) and own["operation"]["quantity"] == "torque" and "sense" in operation:
+            sense = f"{pointer}/operation/sense: is not used: a positive torque always resists; `sense` is for forces"
+            report.warn("no-effect", sense)
         if isinstance(operation, Mapping) and own["operation"]["over"] == "angle" and "during" in operation:
             report.fault(f"{pointer}/operation/during", "not-used", told,
                            operation["during"], allowed='with `over` "stroke" only')  # fmt: skip

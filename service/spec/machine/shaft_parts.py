@@ -68,6 +68,7 @@ ROWS: Final = Listed("rows", 2, machine_shaft.MAX_ROWS)
 _NAME = re.compile(r"[A-Za-z_][A-Za-z_0-9]{0,39}")
 _ANY: Final = 1e30
 ANGLE = Parameter("angle", "phi", "rad", -100.0, 100.0, False, None, "angle of the shaft")
+_PRESSURE = Parameter("pressure", "p", "Pa", 0.0, 1e12, False, None, "absolute pressure")
 _FRACTION = Parameter("fraction", "x", "1", 0.0, 1.0, False, None, "fraction of the stroke")
 
 
@@ -216,8 +217,9 @@ def read_operation(report: Report, data: object, places: dict[str, str], prefix:
 def _beside(report: Report, where: str, found: Mapping[str, Any], form: str) -> bool:
     """Whether there are fields beside a gas or an indicator diagram that do not belong to it; each is a fault."""
     foreign = [name for name in found if name not in {form, "scale", "efficiency"}]
+    what = "a gas" if form == "gas" else "an indicator diagram"
     for name in foreign:
-        told = "does not belong to a gas, which acts on the working part over the whole cycle"
+        told = f"does not belong to {what}, which acts on the working part over the whole cycle"
         report.fault(join(where, name), "not-used", told, found[name], allowed=f"{form}, scale, efficiency")
     return bool(foreign)
 
@@ -238,7 +240,7 @@ def _read_indicator(
     if form is None:
         return None
     places[f"{prefix}operation"] = join(pointer, form)
-    diagram = read_diagram(report, pointer, own, ANGLE if over == "angle" else _FRACTION, value_in("Pa"))
+    diagram = read_diagram(report, pointer, own, ANGLE if over == "angle" else _FRACTION, _PRESSURE)
     return None if diagram is None else {"quantity": "pressure", "over": over, "steps": 0} | diagram
 
 

@@ -18,7 +18,8 @@ _COMMA: Final = re.compile(r"\s*[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?\s*")
 def read_csv_rows(report: Report, where: str, text: object, *columns: Parameter) -> list[list[float]]:
     """Rows with an SI number for each of ``columns``; faults, with their lines, are recorded.
 
-    A heading is a name and, in brackets, a unit, which is SI where there is none: ``angle [deg],torque [kN*m]``.
+    A heading is a name and, in brackets, a unit, which is SI where there is none: ``angle [deg],torque [kN*m]``. A
+    fraction may be in percent.
     """
     example = "headings, then at least two lines, as in " + ",".join(f"{c.path} [{c.unit}]" for c in columns)
     rows = read_csv(report, where, text, (machine_shaft.MAX_ROWS, len(columns)), example)
@@ -35,6 +36,11 @@ def read_csv_rows(report: Report, where: str, text: object, *columns: Parameter)
     units = [(heading[2] or "") if heading else "" for heading in headings]
     before = report.found
     for unit, column in zip(units, columns, strict=True):
+        if column.unit == "1":
+            if unit not in {"", "1", "%"}:
+                message = f"the heading of column {column.path} has a unit, but its numbers have none"
+                report.fault(where, "wrong-unit", message, unit, allowed="no unit, or %")
+            continue
         try:
             parse_exact(f"1 {unit}" if unit else 1, column.unit)
         except QuantityError as error:
@@ -56,13 +62,15 @@ def read_csv_rows(report: Report, where: str, text: object, *columns: Parameter)
 def _read_cell(report: Report, where: str, line: int, cell: str, unit: str, column: Parameter) -> float | None:
     text = cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell.strip()
     try:
-        value: object = f"{text} {unit}" if unit else text
-        if not unit:
-            value = parse_number(text)
-            if value is None:
+        value: object = f"{text} {unit}"
+        if not unit or column.unit == "1":
+            number = parse_number(text)
+            if number is None:
                 raise QuantityError("wrong-type", "is not a number")
+            value = number / 100 if unit == "%" else number
         return to_float(exact(value, column))
     except QuantityError as error:
-        report.fault(where, error.code, f"line {line}, column {column.path}: {error}", cell,
+        told = f"; without a unit in the heading it is in {column.unit}" if not unit and column.unit != "1" else ""
+        report.fault(where, error.code, f"line {line}, column {column.path}: {error}{told}", cell,
                        allowed=column.range_text(), unit=column.unit)  # fmt: skip
         return None

@@ -78,3 +78,44 @@ def test_wrong_tables(operation: dict[str, Any], pointer: str, text: str) -> Non
         operation = operation | {"indicator": own}
     found = problems({"/base/operation": operation, "/base/mean_speed": "600 rpm", "/axes": []})
     assert text in found[f"/base/operation/{pointer}".rstrip("/")].message
+
+
+def test_a_fraction_in_percent_and_texts_without_rows() -> None:
+    def found(**fields: Any) -> Any:
+        operation = {"indicator": INDICATOR | fields}
+        return changed({"/base/operation": operation, "/base/mean_speed": "600 rpm", "/axes": []})
+
+    csv = "x [%],p [bar]\n0,20\n30,8\n100,2\n100,1\n0,6\n"
+    structure = parse_spec(found(csv=csv)).study.structure
+    assert structure is not None
+    assert structure["operation"]["table"]["rows"][1] == [0.3, 8e5]
+    for wrong, sentence in (
+        ("", "is empty"),
+        ("x,p [bar]\n", "has no lines under its headings"),
+        ("x,p [bar]\n0,20\n1,-2\n0,6\n", "line 3, column pressure: is out of range"),
+        ("x [mm],p [bar]\n0,20\n1,2\n0,6\n", "the heading of column fraction has a unit, but its numbers have none"),
+    ):
+        (fault,) = problems(found(csv=wrong))
+        assert (fault.path, fault.message) == ("/base/operation/indicator/csv", sentence)
+    (fault,) = problems(found(csv="a,p [bar]\n0,1\n180,2\n", over="angle"))
+    assert fault.message.endswith("without a unit in the heading it is in rad")
+    (fault,) = problems(changed({"/base/operation": {"indicator": INDICATOR, "sense": "fixed"}}))
+    assert "does not belong to an indicator diagram" in fault.message
+
+
+def test_what_is_given_but_not_used_is_warned_of() -> None:
+    spec = changed({"/base/operation": {"quantity": "torque", "sense": "fixed", "value": "3 N*m"}, "/axes": []})
+    wheel = {"kind": "rim", "diameter": "1 m", "mass": "50 kg", "poisson_ratio": 0.3}
+    spec["base"]["drive"] = {"flywheel": wheel}
+    warnings = parse_spec(spec).warnings
+    assert [str(warning).partition(":")[0] for warning in warnings] == [
+        "/base/drive/flywheel/poisson_ratio", "/base/operation/sense",
+    ]  # fmt: skip
+    wheel["kind"] = "disc"
+    assert len(parse_spec(spec).warnings) == 1
+    part = {name: spec["base"].pop(name) for name in ("mechanism", "operation")}
+    del part["operation"]["sense"]
+    spec["base"]["parts"] = [part, {"crank_angle": "90 deg"}]
+    (warning,) = parse_spec(spec).warnings
+    assert warning == "/base/parts/1: has neither a mechanism nor an operation, so it does nothing"
+    assert warning.code == "nothing-acts"
