@@ -216,7 +216,7 @@ def flags_of(model: str) -> dict[str, str]:
 
 def presentation_of(study: Study) -> Presentation:
     """The presentation of the model of ``study``."""
-    return model_of(study.model).presentation
+    return model_of(study.model).presentation_of(study)
 
 
 def printed_symbol(text: str) -> tuple[str, str] | None:

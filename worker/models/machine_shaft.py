@@ -34,7 +34,7 @@ from sprag.engine.machine_shaft.spec import (
 from sprag.engine.machine_shaft.tables import MAX_ROWS
 from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, case_machine, chunk_result
 from sprag.worker.models.model import Model
-from sprag.worker.models.shaft_presentation import PRESENTATION
+from sprag.worker.models.shaft_presentation import PRESENTATION, presentation_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 
     from sprag.engine.catalogue import Parameter, ResultInfo
     from sprag.engine.outcome import Trajectory
+    from sprag.worker.models.presentation import Presentation
     from sprag.worker.study import Study
 
 __all__ = [
@@ -201,6 +202,10 @@ class MachineShaft(Model):
         }
     )
     presentation = PRESENTATION
+
+    def presentation_of(self, study: Study) -> Presentation:
+        """With the results of its flywheel and motor among the main ones."""
+        return presentation_of(study.structure or {})
 
     def parameters(self) -> tuple[Parameter, ...]:
         return catalogue()

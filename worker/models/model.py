@@ -50,6 +50,10 @@ class Model(Protocol):
         """Presentation of the model to users."""
         return Presentation()
 
+    def presentation_of(self, study: Study) -> Presentation:
+        """The presentation of a study; that of the model unless its machine has more to show."""
+        return self.presentation
+
     def parameters(self) -> tuple[Parameter, ...]:
         """Every numeric parameter: paths in a spec, with placeholders for indices and names."""
         ...

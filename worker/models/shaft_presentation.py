@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -10,6 +11,7 @@ from sprag.worker.models.presentation import Panel, Presentation, Reference
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from typing import Any
 
     from sprag.engine.outcome import Trajectory
 
@@ -65,3 +67,15 @@ PRESENTATION: Final = Presentation(
     motion_note="ω² = S₁ + S₂ + S₃ + S₄: shares of the least energy, of the mean energy above it, of the drive's and "
     "of the resistance's work.",
 )
+
+_OF_FLYWHEEL: Final = ("flywheel.inertia", "flywheel.stress", "flywheel.margin", "flywheel.required_mass")
+_OF_MOTOR: Final = ("motor.speed.mean", "motor.torque.mean", "motor.torque.max", "motor.power.mean")
+
+
+def presentation_of(structure: Mapping[str, Any]) -> Presentation:
+    """The presentation of machine shafts, with the main results of this one's flywheel and motor."""
+    drive = structure.get("drive", {})
+    more: tuple[str, ...] = _OF_FLYWHEEL if drive.get("flywheel") else ()
+    if drive.get("motor") or drive.get("stages"):
+        more += _OF_MOTOR
+    return replace(PRESENTATION, main=PRESENTATION.main + more) if more else PRESENTATION

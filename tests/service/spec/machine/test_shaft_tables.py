@@ -11,6 +11,7 @@ import pytest
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.schema.document import spec_schema
+from sprag.worker import models
 from tests.service.spec.machine.test_shaft import changed, problems
 
 TORQUE = "angle [deg];torque [kN*m]\n0;0,1\n90;0,3\n360;0,1\n"
@@ -65,10 +66,10 @@ def test_an_indicator_diagram() -> None:
         ({"quantity": "torque", "csv": "0;10,5\n3,14;2\n6,28;1\n"}, "csv", "must begin with headings"),
         ({"quantity": "torque", "csv": [[0, 1]]}, "csv", "must be the text of a CSV file"),
         ({"quantity": "torque", "csv": TORQUE, "table": [[0, 1], [1, 2]]}, "", "exactly one"),
-        ({"indicator": INDICATOR, "quantity": "force"}, "quantity", "does not belong to a gas"),
+        ({"indicator": INDICATOR, "quantity": "force"}, "quantity", "does not belong to an indicator diagram"),
         ({"indicator": {**INDICATOR, "csv": ...}}, "indicator", "needs exactly one of table, csv"),
         ({"indicator": {**INDICATOR, "piston_area": ...}}, "indicator/piston_area", "is required"),
-        ({"indicator": {**INDICATOR, "csv": "x,p\n0,1\n1,2\n"}}, "indicator/csv", "has 1 strokes"),
+        ({"indicator": {**INDICATOR, "csv": "x,p\n0,1\n1,2\n"}}, "indicator/csv", "has 1 stroke,"),
         ({"indicator": {**INDICATOR, "csv": "x,p\n0,1\n1.5,2\n"}}, "indicator/csv", "line 3, column fraction"),
     ],
 )
@@ -83,10 +84,10 @@ def test_wrong_tables(operation: dict[str, Any], pointer: str, text: str) -> Non
 def test_a_fraction_in_percent_and_texts_without_rows() -> None:
     def found(**fields: Any) -> Any:
         operation = {"indicator": INDICATOR | fields}
-        return changed({"/base/operation": operation, "/base/mean_speed": "600 rpm", "/axes": []})
+        return {"/base/operation": operation, "/base/mean_speed": "600 rpm", "/axes": []}
 
     csv = "x [%],p [bar]\n0,20\n30,8\n100,2\n100,1\n0,6\n"
-    structure = parse_spec(found(csv=csv)).study.structure
+    structure = parse_spec(changed(found(csv=csv))).study.structure
     assert structure is not None
     assert structure["operation"]["table"]["rows"][1] == [0.3, 8e5]
     for wrong, sentence in (
@@ -95,12 +96,9 @@ def test_a_fraction_in_percent_and_texts_without_rows() -> None:
         ("x,p [bar]\n0,20\n1,-2\n0,6\n", "line 3, column pressure: is out of range"),
         ("x [mm],p [bar]\n0,20\n1,2\n0,6\n", "the heading of column fraction has a unit, but its numbers have none"),
     ):
-        (fault,) = problems(found(csv=wrong))
-        assert (fault.path, fault.message) == ("/base/operation/indicator/csv", sentence)
-    (fault,) = problems(found(csv="a,p [bar]\n0,1\n180,2\n", over="angle"))
+        assert problems(found(csv=wrong))["/base/operation/indicator/csv"].message == sentence
+    (fault,) = problems(found(csv="a,p [bar]\n0,1\n180,2\n", over="angle")).values()
     assert fault.message.endswith("without a unit in the heading it is in rad")
-    (fault,) = problems(changed({"/base/operation": {"indicator": INDICATOR, "sense": "fixed"}}))
-    assert "does not belong to an indicator diagram" in fault.message
 
 
 def test_what_is_given_but_not_used_is_warned_of() -> None:
@@ -119,3 +117,14 @@ def test_what_is_given_but_not_used_is_warned_of() -> None:
     (warning,) = parse_spec(spec).warnings
     assert warning == "/base/parts/1: has neither a mechanism nor an operation, so it does nothing"
     assert warning.code == "nothing-acts"
+
+
+def test_flywheel_and_motor_are_among_the_main_results() -> None:
+    plain = parse_spec(changed({"/axes": []})).study
+    assert not [name for name in models.presentation_of(plain).main if name.startswith(("flywheel", "motor"))]
+    wheel = {"kind": "rim", "diameter": "1 m", "mass": "50 kg"}
+    made = parse_spec(
+        changed({"/base/drive": {"flywheel": wheel, "stages": [{"kind": "gear", "ratio": 3}]}, "/axes": []})
+    )
+    main = models.presentation_of(made.study).main
+    assert {"flywheel.margin", "motor.power.mean", "irregularity"} <= set(main)
