@@ -33,6 +33,8 @@ class _DateTime:
 #: A time as RFC 3339 text in UTC.
 Moment = Annotated[str, _DateTime()]
 Number = float | int | None
+#: Of a parameter: an SI number, or the direction of a sweep, "up" or "down".
+Value = float | str
 
 
 def filled(shape: Callable[..., A], source: object, **given: Any) -> A:

@@ -6,14 +6,17 @@ from typing import Annotated, NotRequired
 
 from typing_extensions import TypedDict
 
-from sprag.service.answers import Doc, Number
+from sprag.service.answers import Doc, Number, Value
 
 
 class Case(TypedDict):
     """One case: a row of results."""
 
     case: int
-    parameters: Annotated[dict[str, float], Doc("values of the axes, every tied path, and of derived parameters, SI")]
+    parameters: Annotated[
+        dict[str, Value],
+        Doc("values of the axes, every tied path, and of derived parameters, SI; `sweep` is its direction"),
+    ]
     ending: Annotated[str, Doc("ok, or why not; pending when it has not been run yet")]
     flags: list[str]
     results: Annotated[
@@ -79,7 +82,7 @@ class Trajectory(TimedValues):
     """Instantaneous values of one case."""
 
     case: int
-    parameters: dict[str, float]
+    parameters: dict[str, Value]
     axis: Annotated[ValueAxis, Doc("what the values stand over")]
     ending: str
 
@@ -88,7 +91,7 @@ class AngleTable(TypedDict):
     """Tables of one case of a machine shaft over the angle of the shaft."""
 
     case: int
-    parameters: dict[str, float]
+    parameters: dict[str, Value]
     axis: Annotated[ValueAxis, Doc("what the values stand over")]
     angles: Annotated[list[float], Doc("rad, from the start of the cycle; none where the case has no motion")]
     variables: Annotated[dict[str, dict[str, str]], Doc("unit of each variable")]
@@ -128,8 +131,8 @@ class Jump(TypedDict):
 class Curve(TypedDict):
     """One curve; its lists of points are aligned."""
 
-    by: dict[str, float]
-    at: dict[str, float]
+    by: dict[str, Value]
+    at: dict[str, Value]
     x: list[float]
     cases: list[int]
     y: dict[str, list[Number]]
@@ -198,7 +201,7 @@ class MapData(TypedDict):
     y: CurveAxis
     z: MapResult
     units: Annotated[dict[str, str], Doc("SI unit of every parameter in x, y and at")]
-    at: dict[str, float]
+    at: dict[str, Value]
     cases: Annotated[list[list[int]], Doc("empty for a refined map, whose values are interpolated: see `points`")]
     endings: Annotated[
         list[list[str]], Doc("of a refined map: interpolated; jump, where it must not be interpolated; pending")
@@ -313,7 +316,7 @@ class EngagementTables(TypedDict):
     """The engagements of one case, and the means of its excitation periods."""
 
     case: int
-    parameters: dict[str, float]
+    parameters: dict[str, Value]
     start: Annotated[float, Doc("start of the reported part, s")]
     end: Annotated[float, Doc("its end, s: after one turn of a periodic motion, or at the end of the window")]
     regime: Annotated[str | None, Doc("regime of the settled motion; null for a run of a given time")]
@@ -326,7 +329,7 @@ class Portrait(TypedDict):
     """How one case approaches its motion: its state once per excitation period, and its orbit."""
 
     case: int
-    parameters: dict[str, float]
+    parameters: dict[str, Value]
     regime: Annotated[str | None, Doc("regime of the settled motion; null for a run of a given time")]
     order: Annotated[int | None, Doc("excitation periods in one turn of the orbit; null where there is none")]
     strobes: Annotated[TimedValues, Doc("at the ends of the excitation periods, from the start of the run")]
@@ -361,7 +364,7 @@ class Branch(TypedDict):
     """The branch of orbits through the settled motion of one case, in order along the branch."""
 
     case: int
-    parameters: dict[str, float]
+    parameters: dict[str, Value]
     along: Annotated[list[str], Doc("paths that have the value of the branch's parameter")]
     unit: Annotated[str, Doc("SI unit of the parameter")]
     low: Annotated[float, Doc("start of the range, SI")]

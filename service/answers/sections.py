@@ -6,14 +6,14 @@ from typing import Annotated
 
 from typing_extensions import TypedDict
 
-from sprag.service.answers import Doc, Number
+from sprag.service.answers import Doc, Number, Value
 
 
 class Sections(TypedDict):
     """Strobes of settled motions at one phase of the excitation: of a case, or along a parameter of it."""
 
     case: int
-    parameters: dict[str, float]
+    parameters: dict[str, Value]
     along: Annotated[list[str], Doc("paths that have the value of the parameter; empty for a section")]
     unit: Annotated[str | None, Doc("SI unit of the parameter; null for a section")]
     phase: Annotated[float, Doc("phase of the excitation at the strobes, rad")]

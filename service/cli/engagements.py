@@ -34,6 +34,7 @@ def engagements(
     as_json: JsonFlag = False,
 ) -> None:
     """Write every engagement of the clutches of one case: start, end, order, torque, work. JSON has the periods too."""
+    from sprag.service.results.directions import case_values
     from sprag.service.results.engagements import engagements_csv, engagements_json
     from sprag.worker.models import ENDING_SENTENCES, OK, run_engagements
 
@@ -42,7 +43,7 @@ def engagements(
     with output(file) as write:
         made = run_engagements(study, case)
         if is_json(file, as_json):
-            write(to_bytes(engagements_json(made, case, study.case_parameters(case))) + b"\n")
+            write(to_bytes(engagements_json(made, case, case_values(study, case))) + b"\n")
         else:
             write(engagements_csv(made, table.value))
     told = f"{len(made.rows)} engagements from {made.start:g} s to {made.end:g} s"

@@ -196,11 +196,12 @@ def _trajectory(study: Study, case: int, start: str | None, end: str | None, poi
 
 def _trajectory_bytes(made: Trajectory, study: Study, case: int, as_json: bool) -> bytes:
     from sprag.service.json_text import to_bytes
+    from sprag.service.results.directions import case_values
     from sprag.service.results.trajectories import trajectory_csv, trajectory_json
 
     if not as_json:
         return trajectory_csv(made)
-    return to_bytes(trajectory_json(made, case, study.case_parameters(case))) + b"\n"
+    return to_bytes(trajectory_json(made, case, case_values(study, case))) + b"\n"
 
 
 def presets(

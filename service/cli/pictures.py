@@ -13,6 +13,7 @@ from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId,
 from sprag.service.cli.remote import connection
 
 if TYPE_CHECKING:
+    from sprag.service.answers import Value
     from sprag.service.client.plain import ServiceClient
     from sprag.service.client.wire import Drawn
 
@@ -205,7 +206,7 @@ def _ends(jump: dict[str, Any], unit: str) -> str:
     return f"{cell_text(jump['low'])} to {cell_text(jump['high'])}" + ("" if unit == "1" else f" {unit}")
 
 
-def held_text(values: Mapping[str, float], units: Mapping[str, str]) -> str:
+def held_text(values: Mapping[str, Value], units: Mapping[str, str]) -> str:
     """The held parameters with their values and units."""
     texts = ((path, cell_text(value), units.get(path, "1")) for path, value in values.items())
     return ", ".join(f"{path} = {value}" + ("" if unit == "1" else f" {unit}") for path, value, unit in texts)

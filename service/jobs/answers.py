@@ -14,6 +14,7 @@ from sprag.service.json_text import numbers, to_bytes
 from sprag.service.results import exports
 from sprag.service.results.calibration import calibration_csv, calibration_json
 from sprag.service.results.curve_cases import draw, draw_map, select
+from sprag.service.results.directions import in_words
 from sprag.service.results.figures.calibration import calibration_figure
 from sprag.service.results.figures.front import front_figure, history_figure
 from sprag.service.results.fronts import front_csv, front_json
@@ -58,7 +59,7 @@ def curves_csv(library: Library, study_id: str, query: CurveQuery) -> bytes:
         points = len(curve.endings)
         kinds: Iterable[tuple[str, list[Any]]] = zip(names, (curve.regimes or [], curve.orders or []), strict=False)
         parts: dict[str, list[Any]] = {
-            **{path: [value] * points for path, value in {**curve.line.by, **curve.line.at}.items()},
+            **{path: [value] * points for path, value in in_words({**curve.line.by, **curve.line.at}).items()},
             "case": curve.line.cases.tolist(),
             curves.selection.x: list(curve.line.x),
             **{info.name: numbers(curve.y[info.name], info.kind == "count") for info in curves.selection.results},

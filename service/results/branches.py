@@ -11,6 +11,7 @@ from sprag.service.answers import filled
 from sprag.service.answers.results import Branch, BranchContact
 from sprag.service.faults import choice_of, parameter_error
 from sprag.service.json_text import numbers, to_bytes
+from sprag.service.results.directions import case_values
 from sprag.service.results.exports import table_csv
 from sprag.service.results.portraits import require_strobes
 from sprag.service.spec.catalogue import unit_of
@@ -146,7 +147,7 @@ def branch_json(made: CaseBranch, study: Study, case: int, along: Along) -> Bran
     """The branch as JSON data."""
     return {
         "case": case,
-        "parameters": study.case_parameters(case),
+        "parameters": case_values(study, case),
         "along": list(along.paths),
         "unit": unit_of(study, along.paths[0]),
         "low": along.low,

@@ -13,6 +13,7 @@ from sprag.service.answers import filled
 from sprag.service.answers.results import Curve as CurveData
 from sprag.service.answers.results import CurvesData, Jump, MapData, MapPoints, MapResult, ResultMeaning
 from sprag.service.json_text import numbers
+from sprag.service.results.directions import in_words
 from sprag.service.results.refined import jumps_of
 from sprag.worker.codes import PENDING
 from sprag.worker.models import WorkerEnding
@@ -96,8 +97,8 @@ class Curve:
     def to_json(self, results: Sequence[ResultInfo]) -> CurveData:
         """The curve as JSON data."""
         data: CurveData = {
-            "by": self.line.by,
-            "at": self.line.at,
+            "by": in_words(self.line.by),
+            "at": in_words(self.line.at),
             "x": list(self.line.x),
             "cases": self.line.cases.tolist(),
             "y": {info.name: numbers(self.y[info.name], info.kind == "count") for info in results},
@@ -182,7 +183,7 @@ class Map:
                 MapResult, self.result, values=[numbers(row, self.result.kind == "count") for row in self.values]
             ),
             "units": {self.x: self.units[0], self.y: self.units[1], **self.at_units},
-            "at": self.at,
+            "at": in_words(self.at),
             "cases": self.cases.tolist(),
             "endings": self.endings,
         }

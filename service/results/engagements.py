@@ -9,11 +9,13 @@ from sprag.service.answers import filled
 from sprag.service.answers.results import EngagementRow, EngagementTables, PeriodRow
 from sprag.service.faults import FaultError
 from sprag.service.json_text import to_bytes
+from sprag.service.results.directions import case_values
 from sprag.service.results.exports import table_csv
 from sprag.worker import models
 from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
+    from sprag.service.answers import Value
     from sprag.service.formats import Format
     from sprag.worker.models import Engagements
     from sprag.worker.study import Study
@@ -42,10 +44,10 @@ def engagements_file(study: Study, case: int, table: Table, form: Format, start:
     made = models.run_engagements(*motion_of(study, case, start))
     if form == "csv":
         return engagements_csv(made, table)
-    return to_bytes(engagements_json(made, case, study.case_parameters(case)))
+    return to_bytes(engagements_json(made, case, case_values(study, case)))
 
 
-def engagements_json(made: Engagements, case: int, parameters: dict[str, float]) -> EngagementTables:
+def engagements_json(made: Engagements, case: int, parameters: dict[str, Value]) -> EngagementTables:
     """Both tables as JSON data; ``parameters`` are the axis parameters of the case, SI."""
     return {
         "case": case,

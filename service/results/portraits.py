@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Final, Literal
 from sprag.service.answers.results import Portrait as PortraitData
 from sprag.service.faults import FaultError
 from sprag.service.json_text import to_bytes
+from sprag.service.results.directions import case_values
 from sprag.service.results.trajectories import timed_values, trajectory_csv
 from sprag.worker import models
 from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
+    from sprag.service.answers import Value
     from sprag.service.formats import Format
     from sprag.worker.models import Portrait
     from sprag.worker.study import Study
@@ -32,10 +34,10 @@ def portrait_file(study: Study, case: int, table: Table, form: Format, start: in
     made = models.run_portrait(*motion_of(study, case, start))
     if form == "csv":
         return trajectory_csv(made.strobes if table == "strobes" else made.orbit)
-    return to_bytes(portrait_json(made, case, study.case_parameters(case)))
+    return to_bytes(portrait_json(made, case, case_values(study, case)))
 
 
-def portrait_json(made: Portrait, case: int, parameters: dict[str, float]) -> PortraitData:
+def portrait_json(made: Portrait, case: int, parameters: dict[str, Value]) -> PortraitData:
     """Strobes and orbit as JSON data; ``parameters`` are the axis parameters of the case, SI."""
     return {
         "case": case,

@@ -10,6 +10,7 @@ import numpy as np
 from sprag.service.faults import choice_of, parameter_error
 from sprag.service.json_text import numbers, to_bytes
 from sprag.service.results.branches import range_of
+from sprag.service.results.directions import case_values
 from sprag.service.results.exports import table_csv
 from sprag.service.results.portraits import require_strobes
 from sprag.service.results.start_states import refuse_impossible
@@ -105,7 +106,7 @@ def sections_json(made: CaseSections, study: Study, case: int, asked: Sampling, 
     """The strobes as JSON data."""
     return {
         "case": case,
-        "parameters": study.case_parameters(case),
+        "parameters": case_values(study, case),
         "along": [] if section else list(asked.paths),
         "unit": None if section else unit_of(study, asked.paths[0]),
         "phase": 2.0 * math.pi * asked.phase,

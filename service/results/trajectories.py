@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 from sprag.service.faults import parameter_error
 from sprag.service.json_text import numbers, to_bytes
+from sprag.service.results.directions import case_values
 from sprag.service.results.exports import table_csv
 from sprag.service.spec.units import PERIOD_NAMES, QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
 from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
+    from sprag.service.answers import Value
     from sprag.service.answers.results import AngleTable, TimedValues, ValueAxis
     from sprag.service.answers.results import Trajectory as TrajectoryData
     from sprag.service.formats import Format
@@ -64,10 +66,10 @@ def trajectory_file(
     made = models.run_trajectory(*motion_of(study, case, which), start, end, points)
     if form == "csv":
         return trajectory_csv(made)
-    return to_bytes(trajectory_json(made, case, study.case_parameters(case)))
+    return to_bytes(trajectory_json(made, case, case_values(study, case)))
 
 
-def trajectory_json(made: Trajectory, case: int, parameters: dict[str, float]) -> AngleTable | TrajectoryData:
+def trajectory_json(made: Trajectory, case: int, parameters: dict[str, Value]) -> AngleTable | TrajectoryData:
     """The values as JSON data; ``parameters`` are the axis parameters of the case, SI."""
     values = timed_values(made)
     if made.along == "time":

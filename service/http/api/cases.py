@@ -17,6 +17,7 @@ from sprag.service.http.respond import choose_format, json_response
 from sprag.service.http.views import study_address
 from sprag.service.http.work import Attended
 from sprag.service.results import trajectories
+from sprag.service.results.directions import case_values
 from sprag.service.results.exports import row_json, rows_json
 from sprag.service.storage.records import CaseRow
 from sprag.worker import models
@@ -93,7 +94,7 @@ def get_case(context: Ctx, study_id: StudyId, case: CaseNumber) -> Response:
     """One case; its ending is `pending` while it has not been run."""
     study = study_with(context, study_id, case)
     row = context.store.case_row(study_id, case)
-    parameters = study.case_parameters(case)
+    parameters = case_values(study, case)
     if row is None:
         names = [info.name for info in models.study_results(study)]
         row = CaseRow(case, PENDING, (), dict.fromkeys(names))

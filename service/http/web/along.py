@@ -8,6 +8,7 @@ from urllib.parse import urlencode
 from fastapi import Query
 
 from sprag.service.http.web.study import study_frame
+from sprag.service.results.branches import ranged_axes
 from sprag.service.results.selection import axis_name
 
 if TYPE_CHECKING:
@@ -20,9 +21,19 @@ End = Annotated[str, Query(alias="to", max_length=80)]
 
 
 def along_frame(
-    context: Context, study_id: str, study: Study, case: int, entered: dict[str, str], start: int | None
+    context: Context,
+    study_id: str,
+    study: Study,
+    case: int,
+    entered: dict[str, str],
+    start: int | None,
+    *,
+    initial: bool = False,
 ) -> dict[str, Any]:
-    """What the template of these pages shows around their figures; ``entered`` are the fields of their form."""
+    """What the template of these pages shows around their figures.
+
+    ``entered`` are the fields of their form, which offers the axes, those of initial values only if ``initial``.
+    """
     return {
         **study_frame(context, study_id),
         **entered,
@@ -30,7 +41,7 @@ def along_frame(
         "case": case,
         "start": "" if start is None else str(start),
         "own": f"/studies/{study_id}/cases/{case}",
-        "choices": [(axis.paths[0], axis_name(study, axis.paths[0])) for axis in study.axes],
+        "choices": [(path, axis_name(study, path)) for path in ranged_axes(study, initial=initial)],
     }
 
 

@@ -60,7 +60,7 @@ def diagram_page(
     return page(
         "diagram.html",
         status=422 if faults else 200,
-        **along_frame(context, study_id, study, case, entered, which),
+        **along_frame(context, study_id, study, case, entered, which, initial=True),
         title="Bifurcation diagram",
         faults=faults,
         variables=variables(study),

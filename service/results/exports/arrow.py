@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import pyarrow as pa
 
+from sprag.service.results.directions import value_columns
 from sprag.service.results.exports.inputs import column_description
 from sprag.service.results.exports.source import machine
 from sprag.service.spec.catalogue import unit_of
+from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
     from sprag.service.results.exports.source import Source
@@ -58,7 +60,7 @@ def schema(source: Source) -> pa.Schema:
     fields += [
         pa.field(
             path,
-            pa.float64(),
+            pa.string() if path == SWEEP else pa.float64(),
             nullable=False,
             metadata={"unit": unit_of(study, path), "description": column_description(study, path)},
         )
@@ -81,9 +83,8 @@ def schema(source: Source) -> pa.Schema:
 
 def batch(source: Source, block: RowBlock, made: pa.Schema) -> pa.RecordBatch:
     """The cases of a block as a batch of `schema`; NaN becomes null."""
-    columns = source.study.columns(block.cases)
     flags = [text.split(",") if text else [] for text in block.flags]
-    arrays = [pa.array(block.cases), *(pa.array(columns[path]) for path in source.study.column_paths)]
+    arrays = [pa.array(block.cases), *map(pa.array, value_columns(source.study, block.cases).values())]
     arrays += [pa.array(block.endings, pa.string()), pa.array(flags, made.field("flags").type)]
     for index, info in enumerate(source.infos):
         column = np.ascontiguousarray(block.values[:, index])

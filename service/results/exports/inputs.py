@@ -47,7 +47,7 @@ def description_of(study: Study, path: str) -> str:
     if path == DRIVE:
         return "number of the drive; 0 is the nominal one"
     if path == SWEEP:
-        return "direction of the sweep: 0 is up, 1 is down"
+        return "direction of the sweep"
     entry = parameter_of(study, path)
     return "" if entry is None else entry.help
 

@@ -18,6 +18,7 @@ from sprag.service.results.exports.spool import spooled
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, flags_mask
 from sprag.worker.derived import blocks
+from sprag.worker.sweeps import DIRECTIONS, DOWN, SWEEP, UP
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -110,7 +111,12 @@ class _Grid:
         for index, axis in enumerate(study.axes):
             dimension, order = (0, slice(None)) if self._together else (index, self._orders[index])
             for path in axis.paths:
-                attributes = {"units": unit_of(study, path), "long_name": description_of(study, path) or path}
+                attributes: dict[str, Any] = {
+                    "units": unit_of(study, path),
+                    "long_name": description_of(study, path) or path,
+                }
+                if path == SWEEP:
+                    attributes |= {"flag_values": [float(UP), float(DOWN)], "flag_meanings": " ".join(DIRECTIONS)}
                 found[path] = xr.Variable(self.dims[dimension], axis.array[order], attributes, unfilled)
         for path in self._drawn:
             position, values = study.varied(path) or (0, np.empty(0))

@@ -8,10 +8,12 @@ from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.json_text import to_bytes
+from sprag.service.results.directions import value_columns
 from sprag.service.results.exports.source import machine
 from sprag.service.spec.catalogue import unit_of
 
 if TYPE_CHECKING:
+    from sprag.service.answers import Value
     from sprag.service.answers.results import Case
     from sprag.service.results.exports.source import Source
     from sprag.service.storage.records import CaseRow, RowBlock
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
 _FORMULA_STARTS: Final = ("=", "+", "-", "@", "\t", "\r")
 
 
-def row_json(row: CaseRow, parameters: dict[str, float]) -> Case:
+def row_json(row: CaseRow, parameters: dict[str, Value]) -> Case:
     """One case as JSON data; ``parameters`` are those on axes and derived ones, SI."""
     return {
         "case": row.case,
@@ -34,7 +36,7 @@ def row_json(row: CaseRow, parameters: dict[str, float]) -> Case:
 
 def rows_json(study: Study, block: RowBlock) -> Iterator[Case]:
     """The cases of a block as `row_json` gives them."""
-    columns = {path: column.tolist() for path, column in study.columns(block.cases).items()}
+    columns = value_columns(study, block.cases)
     for index, row in enumerate(block.rows()):
         yield row_json(row, {path: column[index] for path, column in columns.items()})
 
@@ -65,7 +67,7 @@ def json_lines_pieces(source: Source) -> Iterator[bytes]:
     """One flat object per line, with the names of the columns of `csv_pieces`; null for missing values."""
     study = source.study
     for block in source.blocks:
-        columns = {path: column.tolist() for path, column in study.columns(block.cases).items()}
+        columns = value_columns(study, block.cases)
         for index, row in enumerate(block.rows()):
             parameters = {path: column[index] for path, column in columns.items()}
             flat = {"case": row.case, **parameters, "ending": row.ending, "flags": list(row.flags), **row.results}
@@ -78,10 +80,10 @@ def csv_pieces(source: Source) -> Iterator[bytes]:
     paths = study.column_paths
     yield _csv_lines([["case", *paths, "ending", "flags", *(info.name for info in source.infos)]])
     for block in source.blocks:
-        columns = study.columns(block.cases)
-        parameters = zip(*(columns[path].tolist() for path in paths), strict=True) if paths else iter(lambda: (), None)
+        columns = value_columns(study, block.cases).values()
+        parameters = zip(*columns, strict=True) if paths else iter(lambda: (), None)
         lines = (
-            [row.case, *map(repr, values), row.ending, ";".join(row.flags), *map(_cell, row.results.values())]
+            [row.case, *map(_cell, values), row.ending, ";".join(row.flags), *map(_cell, row.results.values())]
             for row, values in zip(block.rows(), parameters, strict=False)
         )
         yield _csv_lines(lines)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import xlsxwriter
 from xlsxwriter.worksheet import Worksheet
 
+from sprag.service.results.directions import value_columns
 from sprag.service.results.exports.inputs import inputs, run_inputs
 from sprag.service.results.exports.source import given_texts
 from sprag.service.results.exports.spool import spooled
@@ -78,8 +79,7 @@ def _sheet(book: Any, number: int, names: list[str], units: list[str], title: An
 
 
 def _rows(source: Source, block: RowBlock) -> Iterator[list[Any]]:
-    columns = source.study.columns(block.cases)
-    parameters = [columns[path].tolist() for path in source.study.column_paths]
+    parameters = value_columns(source.study, block.cases).values()
     values = block.values.tolist()
     named = [index for index, info in enumerate(source.infos) if info.kind == "category"]
     for index, case in enumerate(block.cases.tolist()):

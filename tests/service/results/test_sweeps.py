@@ -9,8 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from sprag.service.cli.pictures import held_text
+from sprag.service.client.frames import Curves, grid_of, table_of
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.form.spec import field_of, spec_of, values_of
 from sprag.service.jobs.answers import curves_of
@@ -73,7 +76,7 @@ def study_id(service: Service) -> str:
 
 def test_curves_have_both_directions_and_their_jumps(service: Service, study_id: str) -> None:
     curves = service.get(f"/studies/{study_id}/curves", **QUERY, at="shaft.load=0.1")["curves"]
-    assert [curve["by"] for curve in curves] == [{"sweep": 0.0}, {"sweep": 1.0}]
+    assert [curve["by"] for curve in curves] == [{"sweep": "up"}, {"sweep": "down"}]
     assert [curve["y"]["shaft.speed.mean"] for curve in curves] == [UP, DOWN]
     assert [curve["jumps"] for curve in curves] == [
         [{"low": 18.0, "high": 19.0, "why": "order", "results": []}],
@@ -91,11 +94,32 @@ def test_csv_and_maps_have_them_too(service: Service, study_id: str) -> None:
         f"{API}/studies/{study_id}/curves", params={**QUERY, "at": "shaft.load=0.1", "format": "csv"}
     ).text
     rows = list(csv.DictReader(io.StringIO(text)))
+    assert [row["sweep"] for row in rows] == ["up"] * 5 + ["down"] * 5
     assert [row["jump"] for row in rows] == ["0", "0", "1", "0", "0", "1", "0", "0", "0", "0"]
     maps = {"x": "excitation.frequency", "y": "shaft.load", "z": "shaft.speed.mean"}
     up = service.get(f"/studies/{study_id}/map", **maps)
-    assert (up["at"], up["z"]["values"]) == ({"sweep": 0.0}, [UP, UP])
+    assert (up["at"], up["z"]["values"]) == ({"sweep": "up"}, [UP, UP])
     assert service.get(f"/studies/{study_id}/map", **maps, at="sweep=down")["z"]["values"] == [DOWN, DOWN]
+
+
+def test_answers_and_files_have_directions_in_words(service: Service, study_id: str) -> None:
+    def file(form: str) -> bytes:
+        return service.http.get(f"{API}/studies/{study_id}/results", params={"format": form}).content
+
+    both = ["up", "down"]
+    cases = [service.get(f"/studies/{study_id}/cases/{case}") for case in (0, 1)]
+    assert [case["parameters"]["sweep"] for case in cases] == both
+    assert [row["parameters"]["sweep"] for row in service.get(f"/studies/{study_id}/cases")["cases"][:2]] == both
+    assert [row["parameters"]["sweep"] for row in json.loads(file("json"))["rows"][:2]] == both
+    assert [json.loads(line)["sweep"] for line in file("jsonl").splitlines()[:2]] == both
+    assert table_of(file("parquet"))["sweep"].tolist() == both * 10
+    assert pd.read_excel(io.BytesIO(file("xlsx")), skiprows=[1])["sweep"].tolist() == both * 10
+    sweep = grid_of(file("netcdf"))["sweep"]
+    assert (sweep.values.tolist(), sweep.attrs["flag_meanings"]) == ([0.0, 1.0], "up down")
+    drawn = service.get(f"/studies/{study_id}/curves", **QUERY, at="shaft.load=0.1")
+    grid = Curves(drawn).to_xarray()
+    assert grid["shaft.speed.mean"].sel(sweep="down").values.tolist() == DOWN
+    assert held_text(drawn["curves"][1]["by"], drawn["units"]) == "sweep = down"
 
 
 def test_a_figure_tells_directions_by_dashes_and_loads_by_colours(service: Service, study_id: str) -> None:
@@ -146,10 +170,8 @@ def test_pictures_pages_and_files_of_a_sweep(service: Service, study_id: str) ->
     figure = service.http.get(f"/studies/{study_id}/figures/curves", params=QUERY)
     assert "Hysteresis: up and down differ at 17 to 18 Hz" in figure.text
     rows = list(csv.DictReader(io.StringIO(service.http.get(f"{API}/studies/{study_id}/results?format=csv").text)))
-    assert [row["sweep"] for row in rows[:4]] == ["0.0", "1.0", "0.0", "1.0"]
+    assert [row["sweep"] for row in rows[:4]] == ["up", "down", "up", "down"]
     assert [row["flags"] for row in rows if row["flags"]] == ["jumped"] * 4
-    for form in ("xlsx", "parquet", "netcdf", "json"):
-        assert service.http.get(f"{API}/studies/{study_id}/results", params={"format": form}).status_code == 200
     assert service.http.get(f"{API}/studies/{study_id}/report").status_code == 200
 
 

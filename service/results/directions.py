@@ -1,0 +1,36 @@
+"""Parameters of cases as answers and files have them: SI numbers, and the direction of a sweep in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from sprag.worker.sweeps import SWEEP, direction
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from sprag.service.answers import Value
+    from sprag.worker.study import Study
+
+
+def in_words(values: Mapping[str, float]) -> dict[str, Value]:
+    """Values of parameters by path, that of the direction in words."""
+    return {path: direction(value) if path == SWEEP else value for path, value in values.items()}
+
+
+def case_values(study: Study, case: int) -> dict[str, Value]:
+    """The parameters that a case has for itself."""
+    return in_words(study.case_parameters(case))
+
+
+def value_columns(
+    study: Study, cases: Sequence[int] | range | NDArray[np.integer[Any]]
+) -> dict[str, list[float] | list[str]]:
+    """The same of many cases: a list for each of the study's column paths, in their order."""
+    columns = study.columns(cases)
+    return {
+        path: [direction(value) for value in columns[path].tolist()] if path == SWEEP else columns[path].tolist()
+        for path in study.column_paths
+    }
