@@ -22,6 +22,7 @@ _FAULTS = "tests/acceptance/test_faults.py::"
 _KILLS = "tests/acceptance/test_kills.py::"
 _ROUNDS = "tests/contract/test_rounds.py::"
 _CERTIFICATE = "tests/engine/test_certificate.py::"
+_STARTS = "tests/engine/vibration_drive/test_starts.py::"
 _FOLDS = "tests/engine/continuation/test_folds.py::"
 
 
@@ -228,6 +229,83 @@ MUTANTS = (
         "math.ceil(lines / MAX_CHUNKS)) * length",
         "math.ceil(lines / MAX_CHUNKS)) * (length - 1)",
         ("tests/worker/test_sweeps.py::test_a_killed_sweep_goes_on_with_the_same_bits",),
+    ),
+    Mutant(
+        "starts: any two orbits of one kind are the same",
+        "engine/vibration_drive/starts.py",
+        "SAME_ORBIT = 1e-4",
+        "SAME_ORBIT = math.inf",
+        (f"{_STARTS}test_motions_of_one_mean_speed_are_told_apart",),
+    ),
+    Mutant(
+        "starts: orbits compared at one phase only",
+        "engine/vibration_drive/starts.py",
+        "            for shift in range(order):",
+        "            for shift in range(1):",
+        (f"{_STARTS}test_copies_of_an_orbit_a_period_apart_are_one_regime",),
+    ),
+    Mutant(
+        "starts: orbits of different orders are never the same",
+        "engine/vibration_drive/starts.py",
+        "        for other in np.unique(self.orders[lanes[alike]]).tolist():",
+        "        for other in [order]:",
+        (f"{_STARTS}test_orbits_that_repeat_for_ever_alike_are_one_whatever_their_orders",),
+    ),
+    Mutant(
+        "starts: the own start's regime first",
+        "engine/vibration_drive/starts.py",
+        "key=lambda group: (-len(group), int(group[0])))",
+        "key=lambda group: int(group[0]))",
+        (f"{_STARTS}test_motions_of_one_mean_speed_are_told_apart",),
+    ),
+    Mutant(
+        "starts: transients count as motions",
+        "engine/vibration_drive/starts.py",
+        "    for times in LONGER:",
+        "    for times in ():",
+        (f"{_STARTS}test_starts_without_an_orbit_are_run_longer_before_they_count_as_another_motion",),
+    ),
+    Mutant(
+        "starts: transients are run longer only once",
+        "engine/vibration_drive/starts.py",
+        "LONGER = (4, 16)",
+        "LONGER = (4,)",
+        (f"{_STARTS}test_starts_without_an_orbit_are_run_longer_before_they_count_as_another_motion",),
+    ),
+    Mutant(
+        "starts: failed starts do not count in shares",
+        "engine/vibration_drive/starts.py",
+        "    share = reached / len(lanes)",
+        "    share = reached / reached.sum()",
+        (f"{_STARTS}test_starts_that_fail_belong_to_no_regime_and_count_in_the_shares",),
+    ),
+    Mutant(
+        "starts: intervals of another probability",
+        "engine/vibration_drive/starts.py",
+        "_NORMAL = 1.959963984540054",
+        "_NORMAL = 1.644853626951473",
+        (f"{_STARTS}test_shares_have_the_intervals_of_wilson",),
+    ),
+    Mutant(
+        "starts: intervals without the correction for few starts",
+        "engine/vibration_drive/starts.py",
+        "    middle = (share + square / (2 * starts)) / (1 + square / starts)",
+        "    middle = share / (1 + square / starts)",
+        (f"{_STARTS}test_shares_have_the_intervals_of_wilson",),
+    ),
+    Mutant(
+        "starts: intervals of the starts that end ok",
+        "engine/vibration_drive/starts.py",
+        "    low, high = wilson(reached, len(lanes))",
+        "    low, high = wilson(reached, int(reached.sum()))",
+        (f"{_STARTS}test_starts_that_fail_belong_to_no_regime_and_count_in_the_shares",),
+    ),
+    Mutant(
+        "starts: any two irregular motions are the same",
+        "engine/vibration_drive/starts.py",
+        "HALF_WIDTHS = 2.0",
+        "HALF_WIDTHS = 1e9",
+        (f"{_STARTS}test_irregular_motions_are_distinguished_by_their_means",),
     ),
 )
 

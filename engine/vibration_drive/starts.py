@@ -51,8 +51,9 @@ _ALIKE = 1e-3
 #: Difference (SI) of means of machines at rest, which are rounding errors.
 _NOTHING = 1e-12
 _TURN = 2.0 * math.pi
-#: How many times as long starts without an orbit are run where their case seems to have several regimes.
-LONGER = 4
+#: How many times as long starts without an orbit are run where their case seems to have several regimes, and then those
+#: that are left where others came to an orbit by that.
+LONGER = (4, 16)
 #: Starts that are run together: this bounds the memory, and changes no result.
 TOGETHER = 4096
 #: 97.5 % point of the normal distribution.
@@ -91,7 +92,8 @@ def wilson(reached: ArrayLike, starts: int) -> tuple[Floats, Floats]:
     square = _NORMAL**2
     middle = (share + square / (2 * starts)) / (1 + square / starts)
     half = _NORMAL / (1 + square / starts) * np.sqrt(share * (1 - share) / starts + square / (4 * starts**2))
-    return np.maximum(middle - half, 0.0), np.minimum(middle + half, 1.0)
+    # Without rounding errors the ends of a share of 0 or 1 are 0 or 1.
+    return np.clip(middle - half, 0.0, share), np.clip(middle + half, share, 1.0)
 
 
 def settle_starts(
@@ -250,8 +252,14 @@ def _settle_together(
     module = kernel_of(columns, settings.tolerance)
     matrix = case_matrix(spread, settings.run, cases * count)
     motions = _Motions(module, matrix, settings, settled)
-    if _run_longer(spread, settings, motions, count):
-        motions = _Motions(module, matrix, settings, settled)
+    going = _without_orbit(motions, count)
+    for times in LONGER:
+        if len(going):
+            _run_again(spread, replace(settings, at_most=times * settings.at_most), settled, going)
+            motions = _Motions(module, matrix, settings, settled)
+            arrived = going[motions.repeats[going]] // count
+            going = _without_orbit(motions, count)
+            going = going[np.isin(going // count, arrived)]
     own: list[Floats] = []
     further: list[Floats] = []
     rows: list[int] = []
@@ -270,23 +278,25 @@ def _settle_together(
     return StartedBatch(np.stack(own), endings, np.array(rows, dtype=np.int64), np.concatenate(further), members)
 
 
-def _run_longer(columns: Mapping[str, Floats], settings: SettledRun, motions: _Motions, count: int) -> bool:
-    """Run the starts without an orbit longer, from their beginning, in cases that seem to have several regimes.
+def _without_orbit(motions: _Motions, count: int) -> Ints:
+    """The starts without an orbit of the cases that seem to have several regimes.
 
     Chaotic transients last for a random time: an irregular motion beside another one is a transient more often than
-    not. Replaces what they came to; whether there are any.
+    not, and one that some starts have left will be left by the others.
     """
-    settled, again = motions.settled, [np.empty(0, dtype=np.int64)]
+    found = [np.empty(0, dtype=np.int64)]
     for first in range(0, len(motions.ok), count):
         lanes = np.arange(first, first + count)
         if len(motions.regimes(lanes)) > 1:
-            again.append(lanes[motions.ok[lanes] & ~motions.repeats[lanes]])
-    rows = np.concatenate(again)
-    if len(rows):
-        longer = settle(of_cases(columns, rows), replace(settings, at_most=LONGER * settings.at_most), cases=len(rows))
-        settled.values[rows], settled.endings[rows] = longer.values, longer.endings
-        settled.regimes[rows], settled.points[rows] = longer.regimes, longer.points
-    return len(rows) > 0
+            found.append(lanes[motions.ok[lanes] & ~motions.repeats[lanes]])
+    return np.concatenate(found)
+
+
+def _run_again(columns: Mapping[str, Floats], settings: SettledRun, settled: SettledBatch, rows: Ints) -> None:
+    """Run some starts from their beginning; replaces what they came to."""
+    longer = settle(of_cases(columns, rows), settings, cases=len(rows))
+    settled.values[rows], settled.endings[rows] = longer.values, longer.endings
+    settled.regimes[rows], settled.points[rows] = longer.regimes, longer.points
 
 
 def _rows(values: Floats, groups: list[Ints], lanes: Ints) -> Floats:

@@ -73,6 +73,40 @@ def test_copies_of_an_orbit_a_period_apart_are_one_regime() -> None:
     assert np.ptp(points[:, module.SHAFT_SPEED]) > 0.1
 
 
+def test_starts_without_an_orbit_are_run_longer_before_they_count_as_another_motion() -> None:
+    starts = {"shaft.initial_speed": np.linspace(2.0, 30.0, 7)}
+    drive = {**PERIOD_TWO, "shaft.load": 0.22}
+    # After 160 periods two starts are on the orbit, after 640 four; the last ones take a thousand.
+    arrived = [
+        (module.settle(started_columns(drive, starts, 8, 1), SettledRun(at_most=periods), cases=8).regimes == 1).sum()
+        for periods in (160, 640)
+    ]
+    assert arrived == [2, 4]
+    batch = settle_starts(drive, SettledRun(at_most=160), starts, cases=1)
+    (row,) = _rows(batch)
+    assert (row["regime"], row["regime.order"], row["regime.share"]) == (Regime.PERIODIC, 2, 1.0)
+
+
+def test_irregular_motions_are_distinguished_by_their_means() -> None:
+    batch = settle_starts(W1.columns(np.array([385])), SettledRun(), {"shaft.initial_speed": [15.0]}, cases=1)
+    rows = _rows(batch)
+    assert [row["regime"] for row in rows] == [Regime.IRREGULAR] * 2
+    assert [row["shaft.speed.mean"] for row in rows] == pytest.approx([6.202, 6.292], abs=0.01)
+
+
+def test_orbits_that_repeat_for_ever_alike_are_one_whatever_their_orders() -> None:
+    motions = module._Motions.__new__(module._Motions)
+    a, b = [1.0, 0.1, 2.0], [1.5, 0.2, -2.0]
+    sequences = ([a, b], [a], [b, a, b, a], [a, a], [a, b, b, a])
+    motions.orders = np.array([len(sequence) for sequence in sequences])
+    motions.strobes = np.array([(sequence * 4)[:4] for sequence in sequences])
+    motions.kinds, motions.nu = np.full(5, Regime.PERIODIC), np.full(5, 100.0)
+    motions.turns_over = np.zeros((5, 1), dtype=np.bool_)
+    lanes = np.arange(5)
+    assert motions._on_orbit(lanes, 0).tolist() == [True, False, True, False, False]
+    assert motions._on_orbit(lanes, 1).tolist() == [False, True, False, True, False]
+
+
 def test_rest_is_one_regime_whatever_its_order() -> None:
     still = {**TWO_WELLS, "excitation.amplitude_x": 0.0}
     batch = settle_starts(still, SettledRun(), {ANGLE: np.array([0.2, 0.3, 0.5, -0.1])}, cases=1)
@@ -86,6 +120,8 @@ def test_starts_that_fail_belong_to_no_regime_and_count_in_the_shares() -> None:
     assert batch.members.tolist() == [[0, 0, -1]]
     assert ENDINGS[batch.endings[0]] is Ending.OK
     assert row["regime.share"] == pytest.approx(2.0 / 3.0)
+    ends = binomtest(2, 3).proportion_ci(method="wilson")
+    assert (row["regime.share.low"], row["regime.share.high"]) == pytest.approx((ends.low, ends.high), abs=1e-12)
     assert row["starts.failed"] == 1
 
 
@@ -100,11 +136,12 @@ def test_a_case_is_the_same_in_any_batch(monkeypatch: pytest.MonkeyPatch) -> Non
     assert together.further.tolist() == [0, 1, 2]
 
 
-@pytest.mark.parametrize(("reached", "starts"), [(0, 7), (3, 7), (7, 7), (12, 256)])
+@pytest.mark.parametrize(("reached", "starts"), [(0, 7), (3, 7), (7, 7), (12, 256), (256, 256)])
 def test_shares_have_the_intervals_of_wilson(reached: int, starts: int) -> None:
     low, high = wilson(reached, starts)
     exact = binomtest(reached, starts).proportion_ci(method="wilson")
     assert (float(low), float(high)) == pytest.approx((exact.low, exact.high), abs=1e-12)
+    assert low <= reached / starts <= high
 
 
 def test_starts_of_different_numbers_are_refused() -> None:
