@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 
 #: Largest database, in bytes, that is checked at every start; the check takes less than a second.
 CHECKED_BYTES = 256_000_000
+#: The statements that make an empty SQLite database of this revision, in the folder of the migrations; and what
+#: separates them. ``python -m tests.migrations.freeze`` writes the file.
+EMPTY_DATABASE = "empty.sql"
+STATEMENT_END = ";\n\n"
 #: Suffix of a backup that is not complete yet.
 PART_SUFFIX = ".part"
 
@@ -46,9 +50,28 @@ def require_current(session: Session) -> None:
     """Initialise an empty database; raise SchemaError when its revision is not that of this program."""
     found = revision(session)
     if found is None:
-        upgrade(session)
+        if not _create_at_once(session):
+            upgrade(session)
     elif found != HEAD_REVISION:
         raise SchemaError(_other_revision(session, found))
+
+
+def _create_at_once(session: Session) -> bool:
+    """Create the tables of an empty SQLite database by one file of statements; False where the migrations must do it.
+
+    The file has what the migrations make, which take fifty times as long.
+    """
+    if session.on_server:
+        return False
+    text = (_migrations() / EMPTY_DATABASE).read_text(encoding="utf-8")
+    revision_line, *statements = text.rstrip().split(STATEMENT_END)
+    if revision_line != f"-- {HEAD_REVISION}":
+        return False
+    with session.write() as connection:
+        if not sa.inspect(connection).get_table_names():  # no other process was faster
+            for statement in statements:
+                connection.exec_driver_sql(statement)
+    return True
 
 
 def _other_revision(session: Session, found: str) -> str:

@@ -28,7 +28,7 @@ from sprag.worker import models
 from sprag.worker.states import StudyState
 from tests import postgres
 from tests.faults import refused
-from tests.migrations.freeze import FOLDER
+from tests.migrations.freeze import FOLDER, empty_database, statements_of
 from tests.service.spec_sample import changed
 from tests.worker import fakes
 
@@ -215,7 +215,25 @@ def test_a_server_has_the_variants_too(postgres_server: postgres.Server) -> None
         assert [study.variant for study in store.list_studies().studies] == ["", "3"]
 
 
+def test_an_empty_database_is_what_the_migrations_make(file: Path, url: str) -> None:
+    written = Path(migrations.__path__[0], maintenance.EMPTY_DATABASE).read_text(encoding="utf-8")
+    assert written == empty_database(), "run `python -m tests.migrations.freeze`"
+    Store.open(url).close()
+    assert statements_of(file) == written
+
+
+def test_statements_of_another_revision_are_not_used(
+    file: Path, url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "old.sql").write_text(f"-- 0001{maintenance.STATEMENT_END}CREATE TABLE old (x INTEGER)\n")
+    monkeypatch.setattr(maintenance, "EMPTY_DATABASE", str(tmp_path / "old.sql"))
+    with Store.open(url) as store:
+        assert maintenance.revision(store.session) == HEAD_REVISION
+    assert "TABLE old" not in statements_of(file)
+
+
 def test_code_and_migrations_have_the_same_tables(url: str) -> None:
+    upgrade(url)
     with Store.open(url) as store, store.session.read() as connection:
         context = MigrationContext.configure(connection, opts={"compare_type": True})
         assert compare_metadata(context, all_tables()) == []
@@ -308,6 +326,18 @@ def test_a_migration_that_fails_changes_nothing(url: str, file: Path, monkeypatc
     with monkeypatch.context() as patch:
         patch.setattr("alembic.operations.Operations.create_index", fail)
         with pytest.raises(DatabaseError, match="disk"):
+            upgrade(url)
+    assert upgrade(url) == (None, HEAD_REVISION)
+
+
+def test_a_new_database_that_cannot_be_made_stays_empty(
+    url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    statements = (f"-- {HEAD_REVISION}", "CREATE TABLE studies (x INTEGER)", "CREATE TABLE studies (x INTEGER)")
+    (tmp_path / "twice.sql").write_text(maintenance.STATEMENT_END.join(statements))
+    with monkeypatch.context() as patch:
+        patch.setattr(maintenance, "EMPTY_DATABASE", str(tmp_path / "twice.sql"))
+        with pytest.raises(sa.exc.OperationalError, match="already exists"):
             Store.open(url)
     with Store.open(url) as store:
         assert store.list_studies().studies == ()
