@@ -20,7 +20,7 @@ from sprag.engine.machine_shaft.spec import MOVING, Drive
 Floats = NDArray[np.float64]
 
 #: Numbers of motors that are torques and speeds.
-_TORQUES, _SPEEDS = ("stall_torque", "breakdown_torque"), ("no_load_speed", "synchronous_speed")
+_TORQUES, _SPEEDS = ("stall_torque", "breakdown_torque", "scale"), ("no_load_speed", "synchronous_speed", "unit_speed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +64,8 @@ class Train:
         """Numbers of a motor as it acts on the main shaft, with the efficiency of the train."""
         if self.direct:
             return dict(values)
+        if "scale" in values:
+            values = {**values, "unit_speed": np.ones((1, 1, 1))}
         factors = {**dict.fromkeys(_TORQUES, self.ratio), **dict.fromkeys(_SPEEDS, 1.0 / self.ratio)}
         return {name: value * factors.get(name, 1.0) for name, value in values.items()} | {
             "efficiency": self.efficiency

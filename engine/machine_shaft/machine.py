@@ -10,7 +10,7 @@ from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.drive_train import Train
 from sprag.engine.machine_shaft.expressions import RESERVED, Expression
 from sprag.engine.machine_shaft.mechanisms import RodMechanism
-from sprag.engine.machine_shaft.motor import free_speed
+from sprag.engine.machine_shaft.motor import characteristic, free_speed
 from sprag.engine.machine_shaft.operations import SpeedLaw, formula_breaks
 from sprag.engine.machine_shaft.parameters import parameters
 from sprag.engine.machine_shaft.parts import Jumps, ShaftPart, mechanism_of
@@ -55,6 +55,10 @@ def check_structure(spec: MachineSpec) -> None:
         raise StructureError("With a motor the speed follows from the operation, which is not to be found then.")
     if spec.balance == "motor" and spec.drive.motor is None:
         raise StructureError('The balance "motor" needs a motor in the drive.')
+    if spec.balance == "motor" and spec.drive.motor == "table":
+        if spec.drive.table is None:
+            raise StructureError("A motor of the kind table needs a table of its torque over its speed.")
+        characteristic(spec.drive)
     if len(spec.constants) > MAX_CONSTANTS:
         raise StructureError(f"A machine has at most {MAX_CONSTANTS} constants.")
     taken = sorted((RESERVED | {"phi", "x"}) & set(spec.constants))

@@ -2,13 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine.machine_shaft.motor_tables import MotorTable, motor_table
 from sprag.engine.machine_shaft.operations import SpeedLaw
 from sprag.engine.machine_shaft.panels import Panels
-from sprag.engine.machine_shaft.spec import Drive, Motor
+from sprag.engine.machine_shaft.spec import Drive
 
 Floats = NDArray[np.float64]
 
@@ -19,18 +21,42 @@ _CYCLES = 20
 _GUESSES = 4
 
 
-def motor_torque(motor: Motor, values: Mapping[str, Floats], omega: Floats) -> tuple[Floats, Floats]:
+#: What gives a motor's torque by its speed: a formula, or a table.
+Characteristic = Literal["linear", "kloss"] | MotorTable
+
+
+def characteristic(drive: Drive) -> Characteristic:
+    """The characteristic of the motor of a ``drive``.
+
+    Raises
+    ------
+    TableError
+        If its table is not one of a motor.
+    """
+    if drive.motor in {"linear", "kloss"}:
+        return cast("Characteristic", drive.motor)
+    if drive.motor is None or drive.table is None:
+        raise AssertionError("check_structure lets no motor or table be missing")
+    return motor_table(drive.table)
+
+
+def motor_torque(motor: Characteristic, values: Mapping[str, Floats], omega: Floats) -> tuple[Floats, Floats]:
     """Torque in N*m at the speeds ``omega`` (rad/s) and its derivative by the speed.
 
     Linear: M_0 (1 - omega/omega_0). Kloss: 2 M_k/(s/s_k + s_k/s) with the slip s = 1 - omega/omega_s, written so that
-    no slip is singular. With an ``efficiency`` among the values, of a drive train, less of the torque reaches the main
-    shaft, and more of it where the motor brakes.
+    no slip is singular. A table is multiplied by ``scale``; its speeds are multiplied by ``unit_speed``. With an
+    ``efficiency`` among the values, of a drive train, less of the torque reaches the main shaft, and more of it where
+    the motor brakes.
     """
     if "efficiency" in values:
         own = {name: value for name, value in values.items() if name != "efficiency"}
         torque, slope = motor_torque(motor, own, omega)
         passed = np.where(torque >= 0.0, values["efficiency"], 1.0 / values["efficiency"])
         return passed * torque, passed * slope
+    if isinstance(motor, MotorTable):
+        scale, unit = values["scale"], values.get("unit_speed", np.ones((1, 1, 1)))
+        torque, slope = motor.at(omega / unit)
+        return scale * torque, scale / unit * slope
     if motor == "linear":
         stall, free = values["stall_torque"], values["no_load_speed"]
         return stall * (1.0 - omega / free), np.broadcast_to(-stall / free, omega.shape)
@@ -43,17 +69,21 @@ def motor_torque(motor: Motor, values: Mapping[str, Floats], omega: Floats) -> t
 
 def free_speed(drive: Drive, values: Mapping[str, Floats]) -> Floats:
     """Speed in rad/s of the motor's shaft without load; ``values`` by path."""
+    if drive.motor == "table":
+        return np.full((1, 1, 1), cast("MotorTable", characteristic(drive)).free)
     name = "no_load_speed" if drive.motor == "linear" else "synchronous_speed"
     return values.get(f"drive.motor.{name}", np.ones((1, 1, 1)))
 
 
-def steady_speed(motor: Motor, values: Mapping[str, Floats], torque: Floats) -> Floats:
+def steady_speed(motor: Characteristic, values: Mapping[str, Floats], torque: Floats) -> Floats:
     """Speed of the stable branch at which the motor gives ``torque``; that of its largest torque where it cannot."""
     if "efficiency" in values:
         own = {name: value for name, value in values.items() if name != "efficiency"}
         return steady_speed(
             motor, own, torque * np.where(torque >= 0.0, 1.0 / values["efficiency"], values["efficiency"])
         )
+    if isinstance(motor, MotorTable):
+        return values.get("unit_speed", np.ones((1, 1, 1))) * motor.speed_for(torque / values["scale"])
     if motor == "linear":
         return np.asarray(values["no_load_speed"] * (1.0 - torque / values["stall_torque"]))
     most, critical = values["breakdown_torque"], values["breakdown_slip"]
@@ -88,7 +118,7 @@ class LimitCycle:
 
 
 def limit_cycle(
-    motor: Motor,
+    motor: Characteristic,
     values: Mapping[str, Floats],
     panels: Panels,
     cycle: float,
@@ -105,7 +135,7 @@ def limit_cycle(
 
     Parameters
     ----------
-    motor : {"linear", "kloss"}
+    motor : Characteristic
     values : mapping
         Parameters under ``drive.motor.``, each of shape (cases or 1, 1, 1), reduced to the main shaft by
         ``Train.motor``.
@@ -168,7 +198,7 @@ def _load(
 
 
 def _overruns(
-    motor: Motor,
+    motor: Characteristic,
     values: Mapping[str, Floats],
     panels: Panels,
     inertia: Floats,
@@ -178,12 +208,12 @@ def _overruns(
 ) -> NDArray[np.bool_]:
     """Whether the load makes those of the ``cases`` run away that have no steady cycle, and does not stop them.
 
-    The braking torque of a linear motor grows with the speed without bound, and a load that absorbs energy over a cycle
-    slows down every fast shaft: neither is overrun. Kloss's motor is overrun by a load that supplies more than the
-    motor can absorb. In between, a shaft that starts at the synchronous speed is simulated.
+    The braking torque of a linear motor and beyond the end of a table grows with the speed without bound, and a load
+    that absorbs energy over a cycle slows down every fast shaft: neither is overrun. Kloss's motor is overrun by a load
+    that supplies more than the motor can absorb. In between, a shaft that starts at the synchronous speed is simulated.
     """
     out = np.zeros(len(inertia), dtype=np.bool_)
-    if motor == "linear":
+    if motor != "kloss":
         return out
     for case in np.nonzero(cases & (work > 0.0))[0]:
         own = {name: float(value[case if len(value) > 1 else 0, 0, 0]) for name, value in values.items()}
@@ -197,7 +227,9 @@ def _overruns(
     return out
 
 
-def _runs_away(motor: Motor, values: Mapping[str, float], steps: Floats, inertia: Floats, resistance: Floats) -> bool:
+def _runs_away(
+    motor: Characteristic, values: Mapping[str, float], steps: Floats, inertia: Floats, resistance: Floats
+) -> bool:
     """Integrate one case from the synchronous speed, from node to node; False where the shaft stops.
 
     The steps are implicit in the motor's torque where that falls with the speed, to handle stiff motors.
@@ -221,7 +253,7 @@ def _runs_away(motor: Motor, values: Mapping[str, float], steps: Floats, inertia
 
 
 def _torque_and_slope(
-    motor: Motor, values: Mapping[str, Floats], inertia: Floats, energy: Floats
+    motor: Characteristic, values: Mapping[str, Floats], inertia: Floats, energy: Floats
 ) -> tuple[Floats, Floats]:
     omega = np.sqrt(2.0 * energy / inertia)
     torque, slope = motor_torque(motor, values, omega)
@@ -229,7 +261,7 @@ def _torque_and_slope(
 
 
 def _linear_step(
-    motor: Motor,
+    motor: Characteristic,
     values: Mapping[str, Floats],
     panels: Panels,
     inertia: Floats,

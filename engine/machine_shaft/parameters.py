@@ -157,6 +157,7 @@ _MOTOR = {
         Parameter("drive.motor.breakdown_torque", "M_k", "N*m", 0.0, 1e12, True, None, "its largest torque"),
         Parameter("drive.motor.breakdown_slip", "s_k", "1", 0.0, 1e3, True, None, "slip at its largest torque"),
     ),
+    "table": (Parameter("drive.motor.scale", "k_m", "1", 0.0, 1e12, True, 1.0, "factor on the torques of its table"),),
 }
 
 _FLYWHEEL = (

@@ -14,7 +14,7 @@ from sprag.engine.machine_shaft.decomposition import Decomposition, characterist
 from sprag.engine.machine_shaft.drive_train import Train
 from sprag.engine.machine_shaft.flywheel import Flywheel, required_inertia
 from sprag.engine.machine_shaft.machine import Fields, Machine, check_structure
-from sprag.engine.machine_shaft.motor import LimitCycle, limit_cycle
+from sprag.engine.machine_shaft.motor import LimitCycle, characteristic, limit_cycle
 from sprag.engine.machine_shaft.operations import SpeedLaw
 from sprag.engine.machine_shaft.panels import Panels
 from sprag.engine.machine_shaft.pieces import Pieces, pieces
@@ -250,10 +250,8 @@ def _moved(machine: Machine, columns: Columns, panels: Panels, fields: Fields, e
 def _motored(
     spec: MachineSpec, columns: Columns, panels: Panels, cycle: float, fields: Fields, law: SpeedLaw | None
 ) -> LimitCycle:
-    if spec.drive.motor is None:
-        raise AssertionError("check_structure lets no motor be missing")
     values = Train.of(spec.drive, columns.values).motor(columns.under("drive.motor."))
-    return limit_cycle(spec.drive.motor, values, panels, cycle, fields.inertia, fields.resistance, law)
+    return limit_cycle(characteristic(spec.drive), values, panels, cycle, fields.inertia, fields.resistance, law)
 
 
 def _started(

@@ -10,7 +10,7 @@ from sprag.engine.machine_shaft.tables import Interpolation, Table
 MeanSpeed = Literal["midrange", "angle", "time"]
 Balance = Literal["scale", "constant", "refuse", "motor"]
 BalanceSide = Literal["drive", "operation"]
-Motor = Literal["linear", "kloss"]
+Motor = Literal["linear", "kloss", "table"]
 Flywheel = Literal["rim", "disc"]
 Stage = Literal["gear", "belt", "chain", "worm", "screw_nut", "rack"]
 MechanismKind = Literal[
@@ -43,6 +43,7 @@ REVOLUTIONS = tuple(range(1, 13))
 class Drive:
     """The driving torque: ``drive.torque`` (constant), or a table or formula over the angle, or a motor.
 
+    ``table`` is also that of a motor of the kind "table": its torque (N*m) over its speed (rad/s).
     ``stages`` are the kinds of the stages between motor and main shaft, motor first; the torque is then the motor's.
     ``flywheel`` is the shape of one on the main shaft that is given by its dimensions.
     """

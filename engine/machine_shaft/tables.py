@@ -193,3 +193,18 @@ def over_stroke(table: Table) -> Curve:
         raise TableError(f"A table over the stroke runs from 0 to 1 of it, not from {x[0]:g} to {x[-1]:g}.")
     x[0], x[-1] = 0.0, 1.0
     return Curve(_pieces(x, y, table.interpolation), None)
+
+
+@cache
+def over_speed(table: Table) -> Curve:
+    """The table as a function of a speed that ascends from row to row.
+
+    Raises
+    ------
+    TableError
+    """
+    x, y = _checked(table.rows)
+    if np.any(np.diff(x) == 0.0):
+        row = int(np.argmax(np.diff(x) == 0.0))
+        raise TableError(f"A characteristic does not jump: rows {row + 1} and {row + 2} both have {x[row]:g} rad/s.")
+    return Curve(_pieces(x, y, table.interpolation), None)

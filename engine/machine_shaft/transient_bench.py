@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from sprag.engine.machine_shaft.balance import balanced
 from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.machine import Fields, Machine
-from sprag.engine.machine_shaft.motor import limit_cycle
+from sprag.engine.machine_shaft.motor import characteristic, limit_cycle
 from sprag.engine.machine_shaft.panels import COEFFICIENTS, NODES, Panels, apply
 from sprag.engine.machine_shaft.quadrature import product
 from sprag.engine.machine_shaft.spec import MachineSpec
@@ -64,7 +64,9 @@ class Bench:
         resistance = self.resistance(load if self.motor else 1.0)
         if self.motor and self.model.drive.motor:
             with np.errstate(all="ignore"):
-                found = limit_cycle(self.model.drive.motor, self.motor, panels, self.cycle, inertia, resistance)
+                found = limit_cycle(
+                    characteristic(self.model.drive), self.motor, panels, self.cycle, inertia, resistance
+                )
             if found.stalled[0] or found.overrun[0]:
                 return None
             start, drive = found.start, found.drive

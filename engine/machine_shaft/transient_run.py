@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sprag.engine.endings import Ending
 from sprag.engine.machine_shaft import transient_kernel as kernel
-from sprag.engine.machine_shaft.motor import motor_torque
+from sprag.engine.machine_shaft.motor import characteristic, motor_torque
 from sprag.engine.machine_shaft.panels import COEFFICIENTS, INTEGRAL, RUNNING, SAMPLES, TAIL, WEIGHTS, apply
 from sprag.engine.machine_shaft.quadrature import product
 from sprag.engine.machine_shaft.transient_bench import Bench, Cycle
@@ -185,7 +185,7 @@ class Run:
         if self.numbers[kernel.KIND] == 0.0 or self.bench.model.drive.motor is None:
             return np.zeros_like(omega)
         own = {name: value[0, 0] for name, value in self.bench.motor.items()}
-        return motor_torque(self.bench.model.drive.motor, own, omega)[0]
+        return motor_torque(characteristic(self.bench.model.drive), own, omega)[0]
 
     def values(self, places: Floats) -> Floats:
         """The columns of the table from angles and u, shape (m, columns)."""

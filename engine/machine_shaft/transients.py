@@ -12,6 +12,7 @@ from sprag.engine.machine_shaft import transient_kernel as kernel
 from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.machine import Machine, check_structure
 from sprag.engine.machine_shaft.panels import Panels
+from sprag.engine.machine_shaft.problems import StructureError
 from sprag.engine.machine_shaft.simulate import attempts, settle
 from sprag.engine.machine_shaft.spec import MachineSpec
 from sprag.engine.machine_shaft.transient_bench import Bench, Cycle
@@ -118,6 +119,10 @@ def transient(model: MachineSpec, columns: Mapping[str, ArrayLike], course: Cour
         If a machine without a motor is run up without a torque, or a parameter is missing or unknown.
     """
     check_structure(model)
+    if model.balance == "motor" and model.drive.motor == "table":
+        raise StructureError(
+            "Run-up, load steps and coasting are computed for linear and kloss motors, not for tables."
+        )
     if course.kind == "run-up" and model.balance != "motor" and course.torque is None:
         raise ValueError("the run-up of a machine without a motor needs a torque")
     row = Columns.of(model, columns, 1)

@@ -91,7 +91,7 @@ def catalogue() -> tuple[Parameter, ...]:
     kinds: tuple[MechanismKind, ...] = tuple(kind for kind in get_args(MechanismKind) if kind in LINKED)
     every: list[MachineSpec] = [MachineSpec(cycle=max(REVOLUTIONS), constants=("NAME",))]
     every += [MachineSpec(drive=Drive("formula")), MachineSpec(balance="motor", drive=Drive(motor="linear"))]
-    every += [MachineSpec(balance="motor", drive=Drive(motor="kloss"))]
+    every += [MachineSpec(balance="motor", drive=Drive(motor=motor)) for motor in ("kloss", "table")]
     every += [MachineSpec(drive=Drive(flywheel="rim"))]
     every += [MachineSpec(drive=Drive(stages=(stage,))) for stage in get_args(Stage)]
     every += [MachineSpec(mechanism=MechanismChoice(kind)) for kind in kinds]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from sprag.service.spec.described import Listed, choice
-from sprag.service.spec.fields import read_object
+from sprag.service.spec.fields import read_object, read_one
 from sprag.service.spec.machine.shaft_parts import (
     ANGLE,
     numbers_of,
@@ -16,7 +16,7 @@ from sprag.service.spec.machine.shaft_parts import (
     value_in,
 )
 from sprag.service.spec.report import Report, join
-from sprag.worker.models import machine_shaft
+from sprag.worker.models import Parameter, machine_shaft
 
 BALANCE_SIDE: Final = choice(
     "balance_side", "which torque the balance makes constant or scales", "drive", "operation", default="drive"
@@ -26,7 +26,10 @@ _BALANCE_HELP: Final = (
     "one"
 )
 BALANCE: Final = choice("balance", _BALANCE_HELP, "constant", "scale", "refuse", "motor")
-MOTOR: Final = choice("kind", "kind of the motor", "linear", "kloss")
+MOTOR: Final = choice("kind", "kind of the motor", "linear", "kloss", "table")
+#: The rows of a motor's table.
+_SPEED: Final = Parameter("speed", "w", "rad/s", 0.0, 1e6, False, None, "speed of the motor")
+_OF_TABLE: Final = ("table", "csv", "interpolation")
 FLYWHEEL: Final = choice("kind", "shape of the flywheel: a thin rim or a solid disc", "rim", "disc")
 STAGE: Final = choice("kind", "kind of the stage", *machine_shaft.STAGE_KINDS)
 STAGES: Final = Listed("stages", 1, machine_shaft.MAX_STAGES, "stages between motor and main shaft, motor first")
@@ -48,7 +51,10 @@ def read_balance(report: Report, found: Mapping[str, Any], drive: Mapping[str, A
         return balance
     if balance == "motor" and not motor:
         report.fault(
-            "/base/drive/motor", "required", 'is required by the balance "motor"', allowed="a motor, linear or kloss"
+            "/base/drive/motor",
+            "required",
+            'is required by the balance "motor"',
+            allowed="a motor: linear, kloss or table",
         )
         return None
     if balance != "motor" and motor:
@@ -107,7 +113,7 @@ def read_drive(report: Report, data: object, places: dict[str, str]) -> dict[str
             report.fault("/base/drive/torque", "conflict", "cannot be given with a motor, which sets the torque",
                            found["torque"], allowed="a torque or a motor")  # fmt: skip
             return None
-        return _read_motor(report, found["motor"], drive)
+        return _read_motor(report, found["motor"], drive, places)
     torque = found.get("torque")
     if not isinstance(torque, Mapping):
         return drive
@@ -137,13 +143,22 @@ def _read_stages(report: Report, data: object) -> list[str] | None:
     return None if report.found > before else kinds
 
 
-def _read_motor(report: Report, data: object, drive: dict[str, Any]) -> dict[str, Any] | None:
-    found = read_object(report, "/base/drive/motor", data, ("kind", *numbers_under("drive.motor.")))
+def _read_motor(report: Report, data: object, drive: dict[str, Any], places: dict[str, str]) -> dict[str, Any] | None:
+    pointer = "/base/drive/motor"
+    found = read_object(report, pointer, data, ("kind", *numbers_under("drive.motor."), *_OF_TABLE))
     if found is None:
         return None
-    kind = MOTOR.read(report, "/base/drive/motor", found)
+    kind = MOTOR.read(report, pointer, found)
     if kind is None:
         return None
     own = numbers_of({"balance": "motor", "drive": {"motor": kind}}, "drive.motor.")
-    refuse_foreign(report, "/base/drive/motor", found, ("kind", *own), f"a {kind} motor")
-    return drive | {"motor": kind}
+    fields = ("kind", *own, *(_OF_TABLE if kind == "table" else ()))
+    refuse_foreign(report, pointer, found, fields, f"a {kind} motor")
+    if kind != "table":
+        return drive | {"motor": kind}
+    form = read_one(report, pointer, found, ("table", "csv"))
+    diagram = None if form is None else read_diagram(report, pointer, found, _SPEED, value_in("N*m"))
+    if form is None or diagram is None:
+        return None
+    places["drive"] = join(pointer, form)
+    return drive | {"motor": kind, "table": diagram["table"]}

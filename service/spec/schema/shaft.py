@@ -63,13 +63,22 @@ def _diagram(table: str, formula: str) -> Schema:
     }
 
 
+def _rows(table: str) -> Schema:
+    """Fields of a course that is given as a table."""
+    return {name: field for name, field in _diagram(table, "").items() if name != "formula"}
+
+
 def _drive() -> Schema:
     fields = _diagram("angle (rad) and torque (N*m)", "torque in N*m as a formula of phi (rad)")
     diagram = object_schema(fields, description="either a table or a formula")
     numbers = quantities(numbers_under("drive."))
     torque = numbers["torque"]
     motor = object_schema(
-        {"kind": MOTOR.schema(), **quantities(numbers_under("drive.motor."))},
+        {
+            "kind": MOTOR.schema(),
+            **quantities(numbers_under("drive.motor.")),
+            **_rows("speed (rad/s) and torque (N*m)"),
+        },
         required=("kind",),
         description="a motor whose torque depends on its speed",
     )
@@ -121,7 +130,7 @@ def _operation() -> Schema:
                     {
                         "over": INDICATOR_OVER.schema(),
                         **quantities(indicator),
-                        **{name: field for name, field in _diagram(pressure, "").items() if name != "formula"},
+                        **_rows(pressure),
                     },
                     required_of(indicator),
                     "the pressure on the piston as measured",

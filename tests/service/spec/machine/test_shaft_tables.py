@@ -10,6 +10,7 @@ import pytest
 
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.machine.registry import part_of
+from sprag.service.spec.report import SpecError
 from sprag.service.spec.schema.document import spec_schema
 from sprag.worker import models
 from tests.service.spec.machine.test_shaft import changed, problems
@@ -128,3 +129,33 @@ def test_flywheel_and_motor_are_among_the_main_results() -> None:
     )
     main = models.presentation_of(made.study).main
     assert {"flywheel.margin", "motor.power.mean", "irregularity"} <= set(main)
+
+
+def test_a_motor_from_a_table() -> None:
+    motor = {"kind": "table", "csv": "speed [rpm],torque [N*m]\n0,60\n140,50\n150,0\n"}
+    load = {"quantity": "torque", "value": "20 N*m"}
+    changes = {
+        "/base/drive": {"inertia": 30, "motor": motor},
+        "/base/balance": "motor",
+        "/base/operation": load,
+        "/axes": [],
+    }
+    spec = changed(changes)
+    del spec["base"]["mean_speed"]
+    structure = parse_spec(spec).study.structure
+    assert structure is not None
+    assert structure["drive"]["motor"] == "table"
+    assert [row[1] for row in structure["drive"]["table"]["rows"]] == [60.0, 50.0, 0.0]
+    assert structure["drive"]["table"]["rows"][2][0] == pytest.approx(5.0 * math.pi, rel=1e-15)
+    jsonschema.Draft202012Validator(spec_schema()).validate(spec)
+    own = spec["base"]["drive"]["motor"]
+    for wrong, place, sentence in (
+        ({"csv": "speed [rpm],torque [N*m]\n0,60\n140,50\n"}, "/csv", "The characteristic of a motor ends"),
+        ({}, "", "needs exactly one of table, csv"),
+    ):
+        del own["csv"]
+        own |= wrong
+        with pytest.raises(SpecError) as caught:
+            parse_spec(spec)
+        faults = {fault.where: fault.message for fault in caught.value.faults}
+        assert faults["/base/drive/motor" + place].startswith(sentence)
