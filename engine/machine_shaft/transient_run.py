@@ -1,8 +1,5 @@
 """One transient of a machine on its panels: its start, its integration, and its results."""
 
-from dataclasses import dataclass
-from typing import Literal
-
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
@@ -14,44 +11,14 @@ from sprag.engine.machine_shaft.panels import COEFFICIENTS, INTEGRAL, RUNNING, S
 from sprag.engine.machine_shaft.quadrature import product
 from sprag.engine.machine_shaft.transient_bench import Bench, Cycle
 from sprag.engine.machine_shaft.transient_causes import Ends
+from sprag.engine.machine_shaft.transient_course import Course, Outcome
 
 Floats = NDArray[np.float64]
 
-Kind = Literal["run-up", "load-step", "coasting"]
-#: How a transient can end; "no_motion" where there is none to begin with.
-Outcome = Literal["reached", "stopped", "not_started", "not_reached", "too_stiff", "no_motion"]
 #: The outcomes by the number that the kernel gives.
 OUTCOMES: tuple[Outcome, ...] = ("reached", "stopped", "not_started", "not_reached", "too_stiff")
 _TO_INTEGRAL = product(INTEGRAL, COEFFICIENTS)
 _TURN = 2.0 * np.pi
-
-
-@dataclass(frozen=True, slots=True)
-class Course:
-    """The transient that is asked for.
-
-    Attributes
-    ----------
-    kind : {"run-up", "load-step", "coasting"}
-    load : float
-        Factor on the torque of all operations during the transient.
-    angle : float
-        Angle of the shaft (rad) at which it begins.
-    torque : float, optional
-        Constant torque (N*m) that runs up a machine without a motor, at the first shaft of its drive train.
-    within : float
-        Share of the first deviation of the speed from that of the steady cycle at the same angle, at which the cycle
-        counts as reached.
-    revolutions : float
-        Most revolutions that are computed.
-    """
-
-    kind: Kind
-    load: float = 1.0
-    angle: float = 0.0
-    torque: float | None = None
-    within: float = 0.01
-    revolutions: float = 1000.0
 
 
 class Run:

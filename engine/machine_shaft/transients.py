@@ -1,8 +1,6 @@
 """Transients of one machine over time: run-up from rest, a step of the load, coasting with the drive switched off."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,61 +15,11 @@ from sprag.engine.machine_shaft.simulate import attempts, settle
 from sprag.engine.machine_shaft.spec import MachineSpec
 from sprag.engine.machine_shaft.transient_bench import Bench, Cycle
 from sprag.engine.machine_shaft.transient_causes import cause_of
-from sprag.engine.machine_shaft.transient_run import OUTCOMES, Course, Kind, Outcome, Run
+from sprag.engine.machine_shaft.transient_course import COLUMNS, RESULTS, Course, Transient
+from sprag.engine.machine_shaft.transient_run import OUTCOMES, Run
 from sprag.engine.outcome import Trajectory
 
-__all__ = ["COLUMNS", "KINDS", "RESULTS", "Course", "Kind", "Outcome", "Transient", "transient"]
-
-#: Name and unit of each column over time.
-COLUMNS: tuple[tuple[str, str], ...] = (
-    ("angle", "rad"), ("omega", "rad/s"), ("acceleration", "rad/s^2"), ("energy", "J"), ("inertia", "kg*m^2"),
-    ("drive_torque", "N*m"), ("resisting_torque", "N*m"), ("power", "W"),
-)  # fmt: skip
-#: Name, unit and meaning of each result.
-RESULTS: tuple[tuple[str, str, str], ...] = (
-    ("time", "s", "time of the run-up, to the new steady cycle, or to standstill; empty where that is not reached"),
-    ("duration", "s", "computed time"),
-    ("turns", "1", "revolutions in the computed time"),
-    ("omega.start", "rad/s", "speed at the start"),
-    ("omega.end", "rad/s", "speed at the end"),
-    ("omega.max", "rad/s", "largest speed"),
-    ("omega.min", "rad/s", "smallest speed"),
-    ("drive_torque.max", "N*m", "largest torque of the drive at the main shaft"),
-    ("motor.torque.max", "N*m", "largest torque at the motor's shaft"),
-    ("power.max", "W", "largest power of the drive"),
-    ("work.drive", "J", "work of the drive"),
-    ("work.resistance", "J", "work of operation, weights, springs and friction, negative where they resist"),
-    ("work.slip", "J", "energy lost to the slip of an asynchronous motor, in its rotor"),
-    ("energy.change", "J", "change of the kinetic energy"),
-    ("balance.energy", "1", "energy that is missing from the balance, over the largest of works and energies"),
-    ("before.omega.mean", "rad/s", "mean speed of the steady cycle before"),
-    ("after.omega.mean", "rad/s", "mean speed of the steady cycle to which the shaft comes"),
-    ("after.irregularity", "1", "irregularity of that cycle"),
-)
 _HALVINGS = 8
-KINDS: tuple[Kind, ...] = get_args(Kind)
-
-
-@dataclass(frozen=True, slots=True)
-class Transient:
-    """A computed transient.
-
-    Attributes
-    ----------
-    outcome : str
-        One of ``Outcome``.
-    cause : str
-        A sentence about the end and its cause.
-    results : dict
-        By name, of ``RESULTS``; NaN for missing ones.
-    motion : Trajectory
-        Over time; its ending is that of the steady cycle of the case.
-    """
-
-    outcome: Outcome
-    cause: str
-    results: dict[str, float]
-    motion: Trajectory
 
 
 def _bench(model: MachineSpec, row: Columns, course: Course) -> tuple[Bench | None, Cycle | None, Ending]:
@@ -136,6 +84,8 @@ def transient(model: MachineSpec, columns: Mapping[str, ArrayLike], course: Cour
     status, totals, _ = run.follow(np.empty(0))
     times = np.linspace(0.0, totals[kernel.TIME], points)
     _, _, places = run.follow(times)
+    # The end is known without the rounding of the interpolation.
+    places[-1] = totals[kernel.ANGLE], np.sqrt(2.0 * totals[kernel.ENERGY])
     outcome = OUTCOMES[status]
     results = run.results(outcome, totals)
     cause = cause_of(course.kind, outcome, results, run.ends(totals, ending))

@@ -31,6 +31,7 @@ from sprag.service.cli import (
     schedule,
     settle,
     token,
+    transients,
 )
 from sprag.service.cli.console import CommandFailureError, ExitCode, TroubleError, WrongInputError, say, write_text
 from sprag.service.extras import command_for
@@ -76,6 +77,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "trajectory": local.trajectory,
         "engagements": engagements.engagements,
         "branch": branches.branch,
+        "transient": transients.transient,
         "fit": fit.fit,
         "presets": local.presets,
     },

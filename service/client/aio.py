@@ -31,6 +31,7 @@ from sprag.service.client.queries import (
     result_query,
     ribbon_query,
     spec_of,
+    transient_query,
     yield_query,
 )
 from sprag.service.client.study import DEFAULT_SERVER
@@ -64,6 +65,7 @@ if TYPE_CHECKING:
     from sprag.service.answers.results import Branch, Case
     from sprag.service.answers.sections import Sections
     from sprag.service.answers.studies import Preview, StudyDetail, StudySummary
+    from sprag.service.answers.transients import Transient
     from sprag.service.client.queries import Spec
 
 
@@ -278,6 +280,24 @@ class AsyncStudy:
     async def branch(self, case: int, along: str, low: Value | None = None, high: Value | None = None) -> Branch:
         """The branch of periodic motions through that of one case, as `Study.branch` gives it."""
         return cast("Branch", await self._get(f"/cases/{case:d}/branch", branch_query(along, low, high)))
+
+    async def transient(
+        self,
+        case: int,
+        kind: str,
+        *,
+        load: Value | None = None,
+        angle: Value | None = None,
+        torque: Value | None = None,
+        within: Value | None = None,
+        revolutions: Value | None = None,
+        points: int | None = None,
+    ) -> Transient:
+        """The run-up, a load step or the coasting of one case, as `Study.transient` gives it."""
+        query = transient_query(
+            kind, points, load=load, angle=angle, torque=torque, within=within, revolutions=revolutions
+        )
+        return cast("Transient", await self._get(f"/cases/{case:d}/transient", query))
 
     async def diagram(
         self,

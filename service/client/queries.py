@@ -100,6 +100,11 @@ def branch_query(along: str, low: Value | None, high: Value | None, **more: Valu
     return [("along", along), *given({"from": low, "to": high, **more})]
 
 
+def transient_query(kind: str, points: int | None, **settings: Value | None) -> list[tuple[str, str]]:
+    """Query of a transient; None leaves a parameter to the service."""
+    return [("kind", kind), *given({**settings, "points": points})]
+
+
 def given(query: Mapping[str, Value | None]) -> list[tuple[str, str]]:
     """Those parameters of a query that are not None."""
     return [(name, str(value)) for name, value in query.items() if value is not None]

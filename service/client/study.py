@@ -25,6 +25,7 @@ from sprag.service.client.queries import (
     result_query,
     ribbon_query,
     spec_of,
+    transient_query,
     yield_query,
 )
 from sprag.service.client.waiting import Waiting, wait_for
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from sprag.service.answers.results import Branch, Case
     from sprag.service.answers.sections import Sections
     from sprag.service.answers.studies import Preview, StudyDetail, StudySummary
+    from sprag.service.answers.transients import Transient
     from sprag.service.client.queries import Spec
 
 DEFAULT_SERVER = "http://127.0.0.1:8000"
@@ -237,6 +239,40 @@ class Study:
             Range of the parameter, SI numbers or texts with a unit; by default the ends of its axis.
         """
         return cast("Branch", self._client.plain.of_case(self.id, case, "branch", branch_query(along, low, high)))
+
+    def transient(
+        self,
+        case: int,
+        kind: str,
+        *,
+        load: Value | None = None,
+        angle: Value | None = None,
+        torque: Value | None = None,
+        within: Value | None = None,
+        revolutions: Value | None = None,
+        points: int | None = None,
+    ) -> Transient:
+        """The "run-up", a "load-step" or the "coasting" of one machine shaft over time, with its results and cause.
+
+        Parameters
+        ----------
+        case : int
+        kind : str
+        load : float or str, optional
+            Factor on the torque of all operations during it; a load step needs it.
+        angle, torque : float or str, optional
+            Angle at the start and driving torque of a run-up, SI numbers or texts with a unit.
+        within : float or str, optional
+            Share of the first difference in speed at which the steady cycle counts as reached.
+        revolutions : float or str, optional
+            Most revolutions that are computed.
+        points : int, optional
+            Equally spaced times.
+        """
+        query = transient_query(
+            kind, points, load=load, angle=angle, torque=torque, within=within, revolutions=revolutions
+        )
+        return cast("Transient", self._client.plain.of_case(self.id, case, "transient", query))
 
     def diagram(
         self,

@@ -23,6 +23,7 @@ from sprag.service.http.api import (
     calibrations,
     case_branches,
     case_tables,
+    case_transients,
     cases,
     catalogues,
     clutch_fits,
@@ -62,6 +63,7 @@ from sprag.service.http.web import (
 from sprag.service.http.web import diagram as diagram_pages
 from sprag.service.http.web import engagements as engagement_pages
 from sprag.service.http.web import schedules as schedule_pages
+from sprag.service.http.web import transient as transient_pages
 from sprag.service.http.web.form import page as form
 from sprag.service.http.web.laboratory import pages as laboratory
 from sprag.service.jobs import checks
@@ -226,6 +228,7 @@ def _routes() -> APIRouter:
         cases,
         case_branches,
         case_tables,
+        case_transients,
         basins,
         clutch_fits,
         schedules,
@@ -250,6 +253,7 @@ def _routes() -> APIRouter:
         branch_pages,
         diagram_pages,
         basin_pages,
+        transient_pages,
         compare,
         laboratory,
         schedule_pages,

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from sprag.engine.catalogue import Parameter, ResultInfo
+    from sprag.engine.machine_shaft.transient_course import Course, Transient
     from sprag.engine.outcome import Trajectory
     from sprag.worker.models.presentation import Presentation
     from sprag.worker.study import Study
@@ -237,6 +238,15 @@ class MachineShaft(Model):
         columns = case_machine(study, case)
         return trajectory(spec_of(study.structure), columns, np.linspace(start, end, points))
 
+    @property
+    def has_transients(self) -> bool:
+        return True
+
+    def transient(self, study: Study, case: int, course: Course, points: int) -> Transient:
+        from sprag.engine.machine_shaft.transients import transient
+
+        return transient(spec_of(study.structure), case_machine(study, case), course, points)
+
     def estimate_seconds_per_case(self, study: Study) -> float:
         from sprag.engine.machine_shaft.estimate import estimate_seconds
 
@@ -250,7 +260,10 @@ class MachineShaft(Model):
         import sprag.engine.machine_shaft.simulate  # noqa: F401
 
     def load(self, shape: KernelShape) -> None:
-        _run_each_kind()
+        if shape.key:
+            _run_a_transient()
+        else:
+            _run_each_kind()
 
 
 def _run_each_kind() -> None:
@@ -272,3 +285,13 @@ def _run_each_kind() -> None:
             numbers |= {"mean_speed": 10.0, "wanted_irregularity": 0.01}
         simulate(spec, numbers, cases=2)
         trajectory(spec, numbers, [0.0, 1.0])
+
+
+def _run_a_transient() -> None:
+    """Run a short transient, which compiles what all of them share."""
+    from sprag.engine.machine_shaft.transient_course import Course
+    from sprag.engine.machine_shaft.transients import transient
+
+    numbers = {"drive.inertia": 1.0, "drive.motor.no_load_speed": 10.0, "drive.motor.stall_torque": 20.0}
+    spec = MachineSpec(balance="motor", drive=Drive(motor="linear"))
+    transient(spec, numbers, Course("run-up", within=0.5), 2)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from sprag.engine import Ending
     from sprag.engine.catalogue import Parameter, ResultInfo
+    from sprag.engine.machine_shaft.transient_course import Course, Transient
     from sprag.engine.outcome import Basin, Engagements, Portrait, Trajectory
     from sprag.worker.models.branches import Along, CaseBranch
     from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
@@ -154,6 +155,15 @@ class Model(Protocol):
     def sections(self, study: Study, case: int, asked: Sampling) -> CaseSections:
         """Strobes of settled motions along a parameter of a case; ValueError where there are no strobes."""
         raise ValueError(f"a machine of model {self.name} has no strobes")
+
+    @property
+    def has_transients(self) -> bool:
+        """Whether its machines run up, are loaded anew and coast over time, beside their cases."""
+        return False
+
+    def transient(self, study: Study, case: int, course: Course, points: int) -> Transient:
+        """A transient of a case with ``points`` equally spaced times; ValueError where there are none."""
+        raise ValueError(f"a machine of model {self.name} has no transients")
 
     def estimate_seconds_per_case(self, study: Study) -> float:
         """Rough time of one case on one core, in s."""

@@ -23,6 +23,7 @@ from sprag.service.storage.records import CaseRow
 from sprag.worker import models
 from sprag.worker.codes import FLAG_MASKS, PENDING
 from sprag.worker.limits import MAX_PAGE_SIZE, MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
+from sprag.worker.models.transients import has_transients
 
 if TYPE_CHECKING:
     from sprag.service.http.context import Context
@@ -100,6 +101,8 @@ def get_case(context: Ctx, study_id: StudyId, case: CaseNumber) -> Response:
         row = CaseRow(case, PENDING, (), dict.fromkeys(names))
     own = f"{study_address(study_id)}/cases/{case}"
     links = {"self": own, "study": study_address(study_id), "trajectory": f"{own}/trajectory"}
+    if has_transients(study):
+        links["transient"] = f"{own}/transient"
     if models.has_clutches(study):
         links["engagements"] = f"{own}/engagements"
     if models.has_strobes(study):

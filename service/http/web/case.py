@@ -28,6 +28,7 @@ from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 from sprag.worker.codes import PENDING
 from sprag.worker.models.starts import motion_of
+from sprag.worker.models.transients import has_transients
 
 if TYPE_CHECKING:
     from sprag.service.http.context import Context
@@ -147,6 +148,7 @@ def case_page(
         own=own,
         has_clutches=models.has_clutches(study),
         has_strobes=models.has_strobes(study),
+        has_transients=has_transients(study),
         settled=models.is_settled(study.run),
         last=study.cases - 1,
     )

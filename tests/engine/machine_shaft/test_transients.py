@@ -15,7 +15,8 @@ from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.machine import Machine
 from sprag.engine.machine_shaft.motor import motor_torque
 from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
-from sprag.engine.machine_shaft.transients import COLUMNS, RESULTS, Course, Transient, transient
+from sprag.engine.machine_shaft.transient_course import COLUMNS, RESULTS, Course, Transient
+from sprag.engine.machine_shaft.transients import transient
 from tests.engine.machine_shaft.machines import PRESS, PRESS_NUMBERS
 
 TURN = 2.0 * math.pi

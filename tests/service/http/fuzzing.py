@@ -58,6 +58,7 @@ FURTHER_RULES: Final = (
     "get_sensitivity",
     "get_trajectory",
     "get_branch",
+    "get_transient",
     "get_diagram",
     "get_section",
     "get_basin",

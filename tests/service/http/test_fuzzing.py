@@ -39,6 +39,7 @@ NEVER_SERVED = {
             "cases/{case}/engagements",
             "cases/{case}/strobes",
             "cases/{case}/branch",
+            "cases/{case}/transient",
             "cases/{case}/diagram",
             "cases/{case}/section",
             "cases/{case}/basin",

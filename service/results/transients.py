@@ -1,0 +1,120 @@
+"""Transients of one case: what is asked for, the document, and the table as CSV."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from sprag.service.faults import FaultError, choice_of, parameter_error
+from sprag.service.json_text import to_bytes
+from sprag.service.results.trajectories import timed_values, trajectory_csv
+from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
+from sprag.worker import models
+from sprag.worker.models.transients import KINDS, RESULTS, Course, has_motor, has_transients, run_transient
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from sprag.service.answers.transients import Transient as TransientData
+    from sprag.service.formats import Format
+    from sprag.worker.models.transients import Kind, Transient
+    from sprag.worker.study import Study
+
+#: The parameters of a transient besides its kind: unit, smallest and largest value.
+_RANGES: Final = {
+    "load": ("1", 0.0, 1e6), "torque": ("N*m", 0.0, 1e12), "within": ("1", 0.0, 0.9),
+    "revolutions": ("1", 0.0, 1e5), "angle": ("rad", 0.0, math.inf),
+}  # fmt: skip
+#: Those that must be greater than their smallest value.
+_OPEN: Final = frozenset({"torque", "revolutions"})
+_DEVIATION: Final = 0.01
+
+
+def require_transients(study: Study) -> None:
+    """Raise FaultError where the study's machine has no transients."""
+    if not has_transients(study):
+        message = f"A machine of model {study.model} has no transients; its motion over time is its trajectory."
+        raise FaultError("not-found", message)
+
+
+def course_of(study: Study, case: int, kind: str, given: Mapping[str, str | None]) -> Course:
+    """The transient that is asked for.
+
+    Parameters
+    ----------
+    study : Study
+    case : int
+    kind : str
+        One of ``KINDS``.
+    given : mapping
+        ``load``, ``angle``, ``torque``, ``within``, ``revolutions``: SI numbers or quantities with a unit, or None.
+
+    Raises
+    ------
+    FaultError
+        About one of the parameters, or because the machine has no transients.
+    """
+    require_transients(study)
+    chosen: Kind = choice_of("kind", kind, KINDS)
+    motor, end = has_motor(study), models.extent(study, case).end
+    found = {name: _value(name, text, end, motor) for name, text in given.items() if text and text.strip()}
+    if chosen == "load-step" and "load" not in found:
+        message = "a load step needs the factor on the load after it"
+        raise parameter_error("load", "required", message, None, "0 to 1e+06")
+    torque = found.get("torque")
+    if torque is not None and (motor or chosen != "run-up"):
+        why = "the motor gives it" if motor else "only a run-up has one"
+        raise parameter_error("torque", "conflict", f"cannot be given: {why}", given["torque"], "none")
+    if torque is None and chosen == "run-up" and not motor:
+        message = "the run-up of a machine without a motor needs a constant driving torque"
+        raise parameter_error("torque", "required", message, None, "a torque in N*m above 0")
+    within = found.get("within", _DEVIATION if motor else 0.0)
+    return Course(
+        chosen, found.get("load", 1.0), found.get("angle", 0.0), torque, within, found.get("revolutions", 1000.0)
+    )
+
+
+def _value(name: str, text: str | None, end: float, motor: bool) -> float:
+    unit, low, high = _RANGES[name]
+    high = end if name == "angle" else high
+    shown = "a number" if unit == "1" else f"a value in {unit}"
+    try:
+        number, own = split_quantity(text or "")
+        value = parse_quantity(text or "", unit) if own else to_float(number)
+    except QuantityError as error:
+        raise parameter_error(name, error.code, str(error), text, shown) from error
+    least = 1e-9 if name == "within" and motor else low
+    above = name in _OPEN
+    if not (least < value if above else least <= value) or not value <= high:
+        allowed = f"{'above ' if above else ''}{least:g} to {high:g}{'' if unit == '1' else f' {unit}'}"
+        raise parameter_error(name, "out-of-range", "is outside its range", text, allowed)
+    return value
+
+
+def transient_file(study: Study, case: int, course: Course, points: int, form: Format) -> bytes:
+    """Compute the transient and write the file. For the computing process."""
+    made = run_transient(study, case, course, points)
+    return trajectory_csv(made.motion) if form == "csv" else to_bytes(transient_json(made, study, case, course))
+
+
+def transient_json(made: Transient, study: Study, case: int, course: Course) -> TransientData:
+    """The transient as JSON data."""
+    values = timed_values(made.motion)
+    return {
+        "case": case,
+        "parameters": study.case_parameters(case),
+        "kind": course.kind,
+        "load": course.load,
+        "angle": course.angle,
+        "torque": course.torque,
+        "within": course.within,
+        "revolutions": course.revolutions,
+        "outcome": made.outcome,
+        "cause": made.cause,
+        "results": {name: value if math.isfinite(value) else None for name, value in made.results.items()},
+        "units": {name: unit for name, unit, _ in RESULTS},
+        "times": values["times"],
+        "variables": values["variables"],
+        "values": values["values"],
+        "ending": made.motion.ending,
+    }

@@ -1,0 +1,52 @@
+"""The command `sprag transient`."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import Finished
+
+Sprag = Callable[..., Finished]
+
+
+def test_the_example_of_the_guide(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+    guide = (examples.parent / "docs" / "guide-machine-shaft.md").read_text(encoding="utf-8")
+    commands = [line.split() for line in guide.splitlines() if line.startswith("    sprag transient ")]
+    (shown,) = (block.split("```")[0] for block in guide.split("```text\n")[1:] if block.startswith("case 9"))
+    for words, line in zip(commands, shown.splitlines(), strict=True):
+        own = shlex.split(" ".join(words[1:]))
+        own[1], own[-1] = str(examples / Path(own[1]).name), str(tmp_path / own[-1])
+        done = sprag(*own)
+        assert done.code == 0
+        assert done.err.splitlines()[0] == line
+        rows = list(csv.DictReader(Path(own[-1]).read_text(encoding="utf-8").splitlines()))
+        assert (len(rows), float(rows[0]["time"])) == (1000, 0.0)
+
+
+def test_json_and_the_exit_code_of_a_stall(sprag: Sprag, examples: Path) -> None:
+    """Case 27 cuts with 40 kN, which stalls the motor wherever the shaft starts."""
+    done = sprag("transient", examples / "slotter.toml", "--case", 27, "--kind", "run-up", "--format", "json")
+    made = json.loads(done.out)
+    assert done.code == 1
+    assert (made["outcome"], made["ending"], made["results"]["time"]) == ("stopped", "motor_stalled", None)
+    assert "the mean resisting torque" in made["cause"]
+
+
+@pytest.mark.parametrize(
+    ("spec", "words", "said"),
+    [
+        ("slotter.toml", ("--kind", "load-step"), "a load step needs the factor on the load after it"),
+        ("slotter.toml", ("--kind", "coasting", "--case", 10**6), "there is no such case"),
+        ("one_pendulum.json", ("--kind", "coasting"), "has no transients"),
+    ],
+)
+def test_refusals(sprag: Sprag, examples: Path, spec: str, words: tuple[object, ...], said: str) -> None:
+    done = sprag("transient", examples / spec, *words)
+    assert done.code == 2
+    assert said in done.err
