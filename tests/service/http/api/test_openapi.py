@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -168,6 +169,8 @@ def test_every_example_works(service: Service, document: dict[str, Any]) -> None
         if path.endswith("/basin"):
             ranges = {"shaft.initial_speed": [0, 30], "pendulums.0.initial_angle": [-0.1, 0.1]}
             spec = {**SPEC, "starts": {"count": 2, "ranges": ranges}}
+        if path.endswith("/transient"):
+            spec = tomllib.loads((Path(__file__).resolve().parents[4] / "examples" / "slotter.toml").read_text())
         chosen = {"front": search, "calibration": calibration}.get(path.rpartition("/")[2])
         study_id = service.submit(spec) if chosen is None else chosen(service)
         if not path.endswith((":cancel", ":pause", ":resume", ":prioritize")):
