@@ -15,10 +15,9 @@ from sprag.engine.vibration_drive.kernel import kernel_of
 from sprag.engine.vibration_drive.layout import OUT_ENDING
 from sprag.engine.vibration_drive.regimes import Regime, settled_infos
 from sprag.engine.vibration_drive.settle import settle
-from sprag.engine.vibration_drive.simulate import CLUTCH_NAMES, SHAFT_NAMES, sampled
+from sprag.engine.vibration_drive.simulate import CLUTCH_NAMES, SHAFT_NAMES
 from sprag.engine.vibration_drive.strobes import (
     ANGLE,
-    BEGIN,
     CLUTCH,
     PENDULUM_WIDTH,
     SHAFT,
@@ -28,6 +27,7 @@ from sprag.engine.vibration_drive.strobes import (
     WINDUP,
     in_order,
 )
+from sprag.engine.vibration_drive.turn import nothing, turn
 
 Floats = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def portrait(columns: Mapping[str, ArrayLike], run: Run) -> Portrait:
     frequency = values["excitation.frequency"]
     periods = int(run.duration.in_periods(frequency) * (1.0 + 1e-12))
     ending, strobes = _strobes(values, run, periods)
-    return Portrait("", 0, strobes, _nothing(), 0, ending)
+    return Portrait("", 0, strobes, nothing(), 0, ending)
 
 
 def settled_portrait(columns: Mapping[str, ArrayLike], settings: SettledRun, start: Floats | None = None) -> Portrait:
@@ -90,13 +90,10 @@ def settled_portrait(columns: Mapping[str, ArrayLike], settings: SettledRun, sta
         periods = min(periods, max(_LEAST, int(np.ceil(row["regime.settled_after"])) + _TURNS * order))
     _, strobes = _strobes(values, run, periods, start)
     if not order:
-        return Portrait(regime.name.lower() if regime else "", 0, strobes, _nothing(), 0, ending)
-    orbit, points = _orbit(values, run, found.points, order)
-    return Portrait(regime.name.lower(), order, strobes, orbit, points, ending)
-
-
-def _nothing() -> Trajectory:
-    return Trajectory(np.empty(0), (), (), np.empty((0, 0)), {}, Ending.OK)
+        return Portrait(regime.name.lower() if regime else "", 0, strobes, nothing(), 0, ending)
+    each = max(_LEAST_POINTS, min(_POINTS, _ALL_POINTS // order))
+    orbit = turn(values, run, found.points, order, each)
+    return Portrait(regime.name.lower(), order, strobes, orbit, each, ending)
 
 
 def _strobes(
@@ -123,17 +120,3 @@ def _strobes(
         states[f"pendulums.{i}"] = [CLUTCH_NAMES[int(state)] for state in own[:, CLUTCH]]
     times = (numbers + 1) / values["excitation.frequency"]
     return ending, Trajectory(times, tuple(names), tuple(units), np.column_stack(columns), states, ending)
-
-
-def _orbit(values: Mapping[str, float], run: Run, points: Floats, order: int) -> tuple[Trajectory, int]:
-    """One turn of an orbit from the state ``points`` (shape (1, columns)) on it, and its points in a period."""
-    each = max(_LEAST_POINTS, min(_POINTS, _ALL_POINTS // order))
-    begin = float(points[0, BEGIN])
-    # The turn begins with the first whole period.
-    first = np.ceil(begin)
-    matrix = with_lengths(
-        case_matrix(values, run, 1), points[:, BEGIN], np.array([first + order - begin]), windowed=False
-    )
-    turn = np.arange(order * each + 1) / each
-    found = integrate(kernel_of(values, run.tolerance), matrix, run, starts=points, times=first + turn)
-    return sampled(values, found, turn / values["excitation.frequency"]), each

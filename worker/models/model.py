@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from sprag.worker.models.branches import Along, CaseBranch
     from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
     from sprag.worker.models.sections import CaseSections, Sampling
+    from sprag.worker.models.turns import CaseTurn
     from sprag.worker.study import Study
 
     Floats = NDArray[np.float64]
@@ -143,6 +144,10 @@ class Model(Protocol):
         ValueError where its machines have no initial values.
         """
         raise ValueError(f"a machine of model {self.name} has no initial values")
+
+    def turn(self, study: Study, case: int, points: int) -> CaseTurn:
+        """The settled motion of a case of a settled study; ValueError where there are no strobes."""
+        raise ValueError(f"a machine of model {self.name} has no strobes")
 
     def lanes_per_case(self, study: Study) -> int:
         """Runs of the engine that one case of the study takes side by side."""

@@ -44,6 +44,7 @@ from sprag.worker.models.settled import (
 )
 from sprag.worker.models.starts import count_of, further_starts, has_starts
 from sprag.worker.models.swept import start_of, swept
+from sprag.worker.models.turns import CaseTurn, drive_turn
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -297,6 +298,9 @@ class VibrationDrive(Model):
 
         settings = settings_of(study.run) if is_settled(study.run) else run_of(study.run)
         return end_state(case_machine(study, case), settings, start_of(study, case))
+
+    def turn(self, study: Study, case: int, points: int) -> CaseTurn:
+        return drive_turn(study, case, points, _flags)
 
     def lanes_per_case(self, study: Study) -> int:
         return count_of(study.run)
