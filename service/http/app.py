@@ -65,6 +65,7 @@ from sprag.service.http.web import engagements as engagement_pages
 from sprag.service.http.web import schedules as schedule_pages
 from sprag.service.http.web import transient as transient_pages
 from sprag.service.http.web.form import page as form
+from sprag.service.http.web.laboratory import drive as drive_laboratory
 from sprag.service.http.web.laboratory import pages as laboratory
 from sprag.service.jobs import checks
 from sprag.service.jobs.housekeeping import Housekeeping
@@ -255,6 +256,7 @@ def _routes() -> APIRouter:
         basin_pages,
         transient_pages,
         compare,
+        drive_laboratory,
         laboratory,
         schedule_pages,
         login,

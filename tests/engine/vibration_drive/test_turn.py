@@ -22,9 +22,7 @@ def _result(found: SettledTurn, name: str) -> float:
     return float(found.values[[info.name for info in settled_infos(1)].index(name)])
 
 
-@pytest.mark.parametrize(
-    ("machine", "regime"), [(TWO, Regime.PERIODIC), (TWO | {"shaft.load": 0.0}, Regime.COASTING)]
-)
+@pytest.mark.parametrize(("machine", "regime"), [(TWO, Regime.PERIODIC), (TWO | {"shaft.load": 0.0}, Regime.COASTING)])
 def test_one_search_gives_results_orbit_and_state(machine: Columns, regime: Regime) -> None:
     found = settled_turn(machine, SettledRun(), 800)
     batch = settle(machine, SettledRun(), cases=1)

@@ -40,5 +40,5 @@ def overridden(spec: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, 
         place = base
         for key in parents:
             place = place[int(key)] if isinstance(place, list) else place.setdefault(key, {})
-        place[name] = value
+        place[int(name) if isinstance(place, list) else name] = value
     return {**{key: value for key, value in spec.items() if key not in WHICH_CASES}, "base": base}
