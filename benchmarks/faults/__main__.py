@@ -20,6 +20,7 @@ from benchmarks.faults.powercut import powercut
 from benchmarks.faults.rounds import rounds
 from benchmarks.faults.served_rounds import served_rounds
 from benchmarks.faults.stopped import stopped
+from benchmarks.faults.sweeps import sweeps
 
 
 def main() -> None:
@@ -47,6 +48,9 @@ def main() -> None:
         "servedrounds", served_rounds, "kill -9 of processes of a service in a study that chooses its own cases",
         count=20, seed=1,
     )  # fmt: skip
+    drill(
+        "sweeps", sweeps, "kill -9 of processes of a service in the middle of swept lines", count=20, seed=1, lines=30
+    )
     drill("stopped", stopped, "dispatchers are stopped, replaced and woken", cases=4_000, rounds=10, seed=1)
     drill(
         "badcases", badcases, "cases that crash or never return",

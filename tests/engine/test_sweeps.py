@@ -16,6 +16,7 @@ from sprag.engine.vibration_drive.portrait import settled_portrait
 from sprag.engine.vibration_drive.regimes import Regime, settled_infos
 from sprag.engine.vibration_drive.settle import SettledBatch, settle
 from sprag.engine.vibration_drive.simulate import trajectory
+from sprag.engine.vibration_drive.start_states import end_state
 from sprag.engine.vibration_drive.strobes import ANGLE, BEGIN, FRACTION, SHAFT_SPEED, SHAFT_WIDTH, continued
 from sprag.engine.vibration_drive.sweep import Begun, sweep, whole_periods
 
@@ -68,6 +69,17 @@ def test_a_case_continues_the_state_of_its_neighbour() -> None:
     run_up = NAMES.index("runup.time")
     assert np.isfinite(found.batch.values[3, run_up])
     assert np.isnan(found.batch.values[:3, run_up]).all()
+
+
+def test_a_jump_is_narrowed_by_a_sweep_from_the_end_of_the_case_before_it() -> None:
+    found = sweep(_columns(FREQUENCIES), SettledRun(), DOWN)
+    assert found.jumped[0]  # between 16.475 and 16 Hz
+    state = end_state(_case(_columns(FREQUENCIES), 1), SettledRun(), found.starts[1:2])
+    assert state is not None
+    finer = np.linspace(16.0, 16.475, 5)
+    again = sweep(_columns(finer) | state, SettledRun(), np.array([[4, 3, 2, 1, 0]]))
+    assert _speeds(again.batch)[[4, 0]] == pytest.approx(_speeds(found.batch)[[1, 0]], rel=1e-9)
+    assert again.jumped.sum() == 1
 
 
 def test_a_line_has_the_same_bits_beside_others() -> None:
