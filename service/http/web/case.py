@@ -177,7 +177,7 @@ async def motion_picture(
     async def make() -> Response:
         made = await work.run_case(models.run_trajectory, *motion_of(study, case, which), *span, SAMPLES // 3)
         title = f"{study.name}, case {case}"
-        return await picture(draw_motion, "svg", made, models.presentation_of(study), title).response(work)
+        return await picture(draw_motion, "svg", made, models.presentation_of(study), title, ()).response(work)
 
     return await unchanging(work, study_id, make)
 

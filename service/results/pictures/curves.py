@@ -74,9 +74,17 @@ def draw_compare(drawn: Sequence[tuple[str, Curves]], picture: Picture) -> bytes
     return draw_figure(curves_figure(drawn), "", picture)
 
 
-def draw_motion(made: Trajectory, shown: Presentation, title: str, picture: Picture) -> bytes:
-    """The motion of one case: its variables, and below them the states of the parts of the machine."""
-    return draw_figure(motion_figure(made, shown), title, picture)
+def draw_motion(
+    made: Trajectory,
+    shown: Presentation,
+    title: str,
+    held: Sequence[tuple[str, Trajectory]],
+    picture: Picture,
+) -> bytes:
+    """The motion of one case, beside others with their names: its variables, and below them the states of the parts of
+    the machine.
+    """
+    return draw_figure(motion_figure(made, shown, held), title, picture)
 
 
 def draw_portrait(made: Portrait, shown: Presentation, title: str, picture: Picture) -> bytes:

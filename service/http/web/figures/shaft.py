@@ -12,24 +12,46 @@ from sprag.service.spec.fields import WHICH_CASES
 from sprag.worker import models
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
+    from sprag.worker.models import Trajectory
     from sprag.worker.study import Study
 
 #: Angles at which a machine is drawn.
 SAMPLES: Final = 1441
 
 
-def machine_case(study: Study) -> dict[str, Any]:
-    """Ending, results and figure of a machine's first case. For the computing process."""
+def machine_case(study: Study, held: Sequence[tuple[str, Study]] = ()) -> dict[str, Any]:
+    """Ending, results and figure of a machine's first case, beside others with their names. For the computing process.
+
+    ``held`` of the answer are ending and results of the others.
+    """
+    found = _results(study)
+    beside = [_results(other) for _, other in held]
+    figure = None
+    if found["ending"] == models.OK:
+        motions = [
+            (name, _whole(other)) for (name, other), own in zip(held, beside, strict=True) if own["ending"] == models.OK
+        ]
+        figure = plotly_figure(motion_figure(_whole(study), models.presentation_of(study), motions))
+    return {**found, "figure": figure, "held": beside}
+
+
+def irregularities(study: Study, others: Sequence[Study]) -> list[tuple[str, float | None]]:
+    """Ending and irregularity of a machine's first case, and of others. For the computing process."""
+    cases = [_results(each) for each in (study, *others)]
+    return [(case["ending"], case["results"]["irregularity"]) for case in cases]
+
+
+def _results(study: Study) -> dict[str, Any]:
     rows = models.run_chunk(study, 0, 1)
     infos = models.study_results(study)
     values = {info.name: numbers(rows.values[0, index : index + 1])[0] for index, info in enumerate(infos)}
-    found: dict[str, Any] = {"ending": rows.endings[0], "results": values, "figure": None}
-    if rows.endings[0] == models.OK:
-        whole = models.run_trajectory(study, 0, 0.0, models.extent(study, 0).end, SAMPLES)
-        found["figure"] = plotly_figure(motion_figure(whole, models.presentation_of(study)))
-    return found
+    return {"ending": rows.endings[0], "results": values}
+
+
+def _whole(study: Study) -> Trajectory:
+    return models.run_trajectory(study, 0, 0.0, models.extent(study, 0).end, SAMPLES)
 
 
 def overridden(spec: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
 from sprag.service.faults import Fault
 from sprag.service.http.web.figures.fit import FitChart, fit_chart
+from sprag.service.http.web.figures.linkage import Drawing, drawings
 from sprag.service.http.web.form.entries import Faults
-from sprag.service.http.web.form.spec import clutch_pointers, field_of, pendulums_of, spec_of
+from sprag.service.http.web.form.shaft_spec import step_of
+from sprag.service.http.web.form.spec import clutch_pointers, field_of, is_shaft, pendulums_of, spec_of
 from sprag.service.jobs.preview import preview_json
 from sprag.service.results.fits import fit_json
 from sprag.service.results.wording import unit_text
@@ -32,13 +34,18 @@ if TYPE_CHECKING:
     Known = Callable[[Study], int]
 
 
+#: Angle of the shaft in the sketch of a form, in degrees.
+_SKETCHED: Final = 60.0
+
+
 @dataclass(slots=True)
 class Checked:
     """The result of checking a filled form.
 
     ``faults`` contains the messages by field ("" for general ones); ``preview`` is None while there are any. ``fits``
     contains the report and the picture of each clutch that could be fitted, regardless of other faults; ``notes`` the
-    assumptions about measured data. ``finish`` is the deadline, which is not part of the spec.
+    assumptions about measured data. ``finish`` is the deadline, which is not part of the spec. ``sketch`` contains the
+    mechanisms of a machine shaft.
     """
 
     spec: dict[str, Any]
@@ -50,6 +57,7 @@ class Checked:
     finish_text: str = ""
     notes: list[str] = field(default_factory=list)
     empty: frozenset[str] = frozenset()
+    sketch: tuple[Drawing, ...] = ()
 
     @property
     def query(self) -> str:
@@ -107,11 +115,14 @@ def check_form(
             if not (name in faults and name.endswith("/data")):
                 texts = found.faults.setdefault(name, [])
                 # One field can stand for several places of the spec, as the value of a parameter at all points does.
-                texts += [text for text in [message(item)] if text not in texts]
+                text = step_of(item.where or "") + message(item)
+                texts += [text] if text not in texts else []
     if found.faults:
         found.parsed = None
     if found.parsed is not None:
         found.preview = preview_json(found.parsed, chunking, known(found.parsed.study), left)
+        if is_shaft(values):
+            found.sketch = drawings(found.parsed.study, _SKETCHED)
     for pointer in clutch_pointers(values):
         if values.get(f"{pointer}/kind") == "data":
             found.notes += _assumed(values.get(f"{pointer}/data", ""))

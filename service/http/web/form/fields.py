@@ -18,7 +18,7 @@ from sprag.service.spec.units import example
 from sprag.worker import models
 from sprag.worker.models import Parameter
 
-#: The model that the form describes field by field; others are given as text.
+#: The model that the form describes unless another is chosen.
 FORM_MODEL: Final = "vibration-drive"
 _SECTIONS: Final = {"excitation": "Vibration of the base", "shaft": "Output shaft", "gravity": "Surroundings"}
 
@@ -55,18 +55,19 @@ def sections() -> list[Section]:
     found = []
     for name, title in _SECTIONS.items():
         entries = [entry for entry in catalogue if entry.path.split(".")[0] == name]
-        found.append(Section(title, f"/base/{name}", tuple(_field(entry, entry.path) for entry in entries)))
+        found.append(Section(title, f"/base/{name}", tuple(field_for(entry, entry.path) for entry in entries)))
     return found
 
 
 def pendulum(index: int) -> Section:
     """The section of one pendulum."""
     entries = [entry for entry in models.parameter_catalogue(FORM_MODEL) if entry.path.startswith("pendulums.N.")]
-    fields = tuple(_field(entry, entry.path.replace(".N.", f".{index}.")) for entry in entries)
+    fields = tuple(field_for(entry, entry.path.replace(".N.", f".{index}.")) for entry in entries)
     return Section(f"Pendulum {index}", f"/base/pendulums/{index}", fields)
 
 
-def _field(entry: Parameter, path: str) -> Field:
+def field_for(entry: Parameter, path: str) -> Field:
+    """The field of a parameter at ``path`` of the base."""
     text = example(entry.unit).split('"')
     return Field(
         name="/base/" + path.replace(".", "/"),
@@ -144,10 +145,10 @@ class Choice:
 Groups = list[tuple[str, list[Choice]]]
 
 
-def result_choices(pendulums: int, *, numbers: bool = False) -> Groups:
+def result_choices(pendulums: int, *, numbers: bool = False, model: str = FORM_MODEL) -> Groups:
     """The results that a search can ask for, by group; with ``numbers`` no categories."""
     groups: dict[str, list[Choice]] = {}
-    for entry in models.result_catalogue(FORM_MODEL):
+    for entry in models.result_catalogue(model):
         for index in range(pendulums if ".N." in entry.name else 1):
             name = entry.name.replace(".N.", f".{index}.")
             parts = name.split(".")

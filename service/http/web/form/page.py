@@ -7,6 +7,7 @@ import json
 import secrets
 from collections.abc import Mapping
 from typing import Annotated, Any, Final
+from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request
 from starlette.concurrency import run_in_threadpool
@@ -22,6 +23,7 @@ from sprag.service.http.web.form.check import Checked
 from sprag.service.http.web.form.entries import Values
 from sprag.service.http.web.form.fields import (
     FORM_MODEL,
+    Groups,
     categories,
     degree_field,
     path_choices,
@@ -33,12 +35,15 @@ from sprag.service.http.web.form.fields import (
     sections,
 )
 from sprag.service.http.web.form.goal import GOAL_DEFAULTS, LIMITS
-from sprag.service.http.web.form.parts import PARTS, add_row, copy, count_of, drop, drop_row
+from sprag.service.http.web.form.parts import PARTS, add_part, add_row, copy, count_of, drop, drop_row
+from sprag.service.http.web.form.shaft import blocks, shaft_paths
+from sprag.service.http.web.form.shaft_spec import base_of
 from sprag.service.http.web.form.spec import (
     FORMULA,
     REFINE_DEFAULTS,
     clutch_pointers,
     is_search,
+    is_shaft,
     pendulums_of,
     spec_of,
     values_of,
@@ -68,6 +73,14 @@ EMPTY_FORM: Final[Values] = {
     **REFINE_DEFAULTS,
     **GOAL_DEFAULTS,
 }
+#: Initial values of an empty form of a machine shaft.
+EMPTY_SHAFT: Final[Values] = {
+    **{name: text for name, text in EMPTY_FORM.items() if not name.startswith(("/run/", "/base/", "pendulums"))},
+    "model": models.MACHINE_SHAFT,
+    "/base/mechanism": "slider_crank",
+    "/base/operation": "steps",
+    "/refine/results": "irregularity",
+}
 #: Beginnings of the fields of the other question, which the page keeps though it does not show them.
 _OF_AXES: Final = ("/axes/", "/refine/", "/combine")
 _OF_SEARCH: Final = ("/goal/",)
@@ -84,14 +97,14 @@ async def new_study(
     case: Annotated[int | None, Query(ge=0)] = None,
     along: Annotated[str | None, Query(max_length=200)] = None,
     mode: Annotated[str, Query(max_length=10)] = "form",
+    model: Annotated[str, Query(max_length=40)] = FORM_MODEL,
 ) -> Response:
     """The form, empty or filled in from an example or from another study, or one case of it, alone or along a
     parameter.
     """
     spec = await run_in_threadpool(_start, context, preset, clone, case, along)
     if spec is None:
-        values = {"/text": "", "format": "json"} if mode == "text" else with_clutch_defaults(dict(EMPTY_FORM))
-        return form_page(request, values, None)
+        return form_page(request, _empty(mode, model), None)
     try:
         values = values_of(spec)
     except ValueError:
@@ -102,6 +115,13 @@ async def new_study(
         values["/name"] = f"{values['/name']} (copy)"
     checked = await look_over(context, work, values)
     return await run_in_threadpool(form_page, request, values, checked)
+
+
+def _empty(mode: str, model: str) -> Values:
+    """The values of a form that begins with nothing."""
+    if mode == "text":
+        return {"/text": "", "format": "json"}
+    return dict(EMPTY_SHAFT) if model == models.MACHINE_SHAFT else with_clutch_defaults(dict(EMPTY_FORM))
 
 
 def _start(
@@ -131,7 +151,15 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
         return await run_in_threadpool(_submit, context, request, values, checked, made)
     reshape(values, wanted)
     checked = await look_over(context, work, values)
+    if wanted == "laboratory" and checked.preview is not None:
+        return RedirectResponse(f"/laboratory?{machine_query(checked.spec)}", status_code=303)
     return await run_in_threadpool(form_page, request, values, checked)
+
+
+def machine_query(spec: Mapping[str, Any]) -> str:
+    """The machine of a spec as the parameters of the laboratory's address."""
+    text = json.dumps(spec["base"], separators=(",", ":"), ensure_ascii=False)
+    return urlencode({"machine": "own", "base": text})
 
 
 def _submit(context: Context, request: Request, values: Values, checked: Checked, made: Submission | None) -> Response:
@@ -158,6 +186,7 @@ async def check(context: Ctx, work: Attended, request: Request, values: Form) ->
         return {
             "faults": checked.faults,
             "panel": fragment("_form_panel.html", checked=checked, address=_address(request)),
+            "sketch": fragment("_linkage.html", drawings=checked.sketch) if checked.sketch else "",
             "fits": {
                 pointer: fragment("_form_fit.html", fit=fit, chart=chart, pointer="")
                 for pointer, (fit, chart) in checked.fits.items()
@@ -188,6 +217,8 @@ def reshape(values: Values, wanted: str) -> None:
         drop(values, f"/base/pendulums/{count - 1}/")
         drop(values, f"{OWN}pendulums/{count - 1}/")
         values["pendulums"] = str(max(count - 1, 1))
+    elif action == "add-parts":
+        add_part(values)
     elif part in PARTS and verb == "add":
         add_row(values, part)
     elif part in PARTS and verb == "drop" and index.isdigit():
@@ -217,8 +248,9 @@ def _adapt_formulas(values: Values, index: int) -> None:
 
 def form_page(request: Request, values: Values, checked: Checked | None, status: int = 200) -> Response:
     """The page with the form filled in with ``values``; ``checked`` is None where they were not checked."""
-    text_mode = "/text" in values
+    text_mode, shaft = "/text" in values, is_shaft(values)
     laws = {} if text_mode else {pointer: _coefficients(values, pointer) for pointer in clutch_pointers(values)}
+    model = models.MACHINE_SHAFT if shaft else FORM_MODEL
     prefixes = {pointer.removeprefix("/base/").replace("/", ".") + ".": count for pointer, count in laws.items()}
     return page(
         "new_text.html" if text_mode else "new.html",
@@ -229,24 +261,26 @@ def form_page(request: Request, values: Values, checked: Checked | None, status:
         begun=checked is not None,
         address=_address(request),
         key=values.get("key") or secrets.token_hex(8),
-        sections=sections(),
-        pendulums=[pendulum(index) for index in range(0 if text_mode else pendulums_of(values))],
+        shaft=shaft,
+        blocks=blocks(values) if shaft else [],
+        sections=[] if shaft else sections(),
+        pendulums=[pendulum(index) for index in range(0 if text_mode or shaft else pendulums_of(values))],
         most_pendulums=MAX_PENDULUMS,
         parts=PARTS,
         rows={name: range(0 if text_mode else count_of(values, name)) for name in PARTS},
         search=is_search(values),
         kept=_kept(values),
         clutches=list(laws),
-        choices=[] if text_mode else path_choices(pendulums_of(values), prefixes),
-        presets=[preset for preset in map(preset_of, preset_names()) if text_mode or _fits_form(preset)],
+        choices=[] if text_mode else _paths(values, prefixes),
+        presets=[preset for preset in map(preset_of, preset_names()) if text_mode or _fits_form(preset, shaft=shaft)],
         most_coefficients=models.MAX_COEFFICIENTS,
         run=run_fields(),
         refine=refine_fields(),
         limits=LIMITS,
         categories=categories(),
         search_fields=search_fields(),
-        goals=result_choices(pendulums_of(values), numbers=True),
-        limited=result_choices(pendulums_of(values)),
+        goals=result_choices(pendulums_of(values), numbers=True, model=model),
+        limited=result_choices(pendulums_of(values), model=model),
         degree_field=degree_field,
         batch=with_batch(values),
         own_name=own_name,
@@ -255,16 +289,34 @@ def form_page(request: Request, values: Values, checked: Checked | None, status:
     )
 
 
+def _paths(values: Values, prefixes: dict[str, int]) -> Groups:
+    """The parameters that can vary, by group."""
+    if is_shaft(values):
+        return shaft_paths(base_of(values, {}))
+    return path_choices(pendulums_of(values), prefixes)
+
+
 def _kept(values: Values) -> Values:
-    """The fields of the question that the form does not ask, so that what was entered is there when it is."""
+    """The fields that the form does not show, so that what was entered is there when it does."""
     others: tuple[str, ...] = _OF_AXES if is_search(values) else _OF_SEARCH
     if not with_batch(values):
         others = (*others, *_OF_BATCH)
+    if is_shaft(values):
+        shown = {entry.name for block in blocks(values) for entry in block.entries}
+        return {
+            name: text for name, text in values.items()
+            if name.startswith(others) or (name.startswith("/base/") and name not in shown)
+        }  # fmt: skip
     return {name: text for name, text in values.items() if name.startswith(others)}
 
 
-def _fits_form(preset: Mapping[str, Any]) -> bool:
-    return bool(preset["spec"]["model"] == FORM_MODEL)
+def _fits_form(preset: Mapping[str, Any], *, shaft: bool) -> bool:
+    if preset["spec"]["model"] != (models.MACHINE_SHAFT if shaft else FORM_MODEL):
+        return False
+    try:
+        return bool(values_of(preset["spec"]))
+    except ValueError:
+        return False
 
 
 def _coefficients(values: Values, pointer: str) -> int:

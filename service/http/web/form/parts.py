@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
@@ -9,6 +10,7 @@ from typing import Final
 from sprag.service.http.web.form.entries import Values, count_in
 from sprag.service.spec.plan import goal
 from sprag.worker.limits import MAX_AXES
+from sprag.worker.models import machine_shaft
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +38,8 @@ PARTS: Final = {
     "best": Part("/goal/best", goal.BEST.high, ("result",), {"toward": "max"}),
     "subject_to": Part("/goal/subject_to", goal.SUBJECT_TO.high, ("result", "value"), {"kind": "at_most"}),
     "at": Part("/goal/at", MAX_AXES, ("path", "values")),
+    "stages": Part("/base/drive/stages", machine_shaft.MAX_STAGES, ("kind",)),
+    "parts": Part("/base/parts", machine_shaft.MAX_PARTS, ("mechanism",)),
 }
 
 
@@ -60,6 +64,27 @@ def add_row(values: Values, name: str) -> None:
     if count < part.most:
         values |= {f"{part.pointer}/{count}/{entry}": text for entry, text in part.new.items()}
         values[name] = str(count + 1)
+
+
+def add_part(values: Values) -> None:
+    """Add a part to a machine shaft, as a copy of its last one; its only mechanism becomes the first of them."""
+    count = count_of(values, "parts")
+    if not count:
+        for name in ("mechanism", "operation"):
+            copy(values, f"/base/{name}", f"/base/parts/0/{name}")
+            drop(values, f"/base/{name}")
+            _rename(values, f"{name}.", f"parts.0.{name}.")
+        count = 1
+    if count < PARTS["parts"].most:
+        copy(values, f"/base/parts/{count - 1}/", f"/base/parts/{count}/")
+        values["parts"] = str(count + 1)
+
+
+def _rename(values: Values, old: str, new: str) -> None:
+    """Replace the beginning of paths that vary or are in formulas."""
+    for name, text in values.items():
+        if name.endswith(("/path", "/tied")) or text.startswith("="):
+            values[name] = re.sub(rf"(?<![\w.]){re.escape(old)}", new, text)
 
 
 def drop_row(values: Values, name: str, index: int) -> None:

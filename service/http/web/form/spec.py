@@ -21,6 +21,7 @@ from sprag.service.http.web.form.entries import (
 from sprag.service.http.web.form.fields import FORM_MODEL, pendulum, sections
 from sprag.service.http.web.form.goal import GOAL_DEFAULTS, field_of_goal, goal_of, goal_values
 from sprag.service.http.web.form.parts import count_of
+from sprag.service.http.web.form.shaft_spec import base_of, field_of_base, values_of_base
 from sprag.service.http.web.form.tolerances import FIELDS as TOLERANT
 from sprag.service.http.web.form.tolerances import field_of_tolerance, tolerance_values, tolerances_of
 from sprag.service.spec.axes.sweep import SWEPT
@@ -29,7 +30,7 @@ from sprag.service.spec.measured import MeasuredDataError, parse_measured
 from sprag.service.spec.plan import refine
 from sprag.service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
 from sprag.service.spec.units import QuantityError, parse_quantity
-from sprag.worker.models import MAX_PENDULUMS, SETTLED
+from sprag.worker.models import MACHINE_SHAFT, MAX_PENDULUMS, SETTLED
 
 #: Fields of an axis for each way of giving its values.
 WAYS: Final = {
@@ -49,6 +50,8 @@ TIMED: Final = "time"
 _FIELDS: Final = frozenset(
     {"sprag", "model", "name", "base", "run", "axes", "combine", "derive", "refine", "goal", *TOLERANT}
 )
+#: Fields of the spec of a machine shaft that the form has.
+_SHAFT_FIELDS: Final = _FIELDS - {"run", *TOLERANT}
 #: Beginning of a field with the formula of a derived parameter.
 FORMULA: Final = "="
 
@@ -58,13 +61,20 @@ def pendulums_of(values: Mapping[str, str]) -> int:
     return count_in(values, "pendulums", 1, 1, MAX_PENDULUMS)
 
 
+def is_shaft(values: Mapping[str, str]) -> bool:
+    """Whether the form describes a machine shaft, not a vibration drive."""
+    return values.get("model") == MACHINE_SHAFT
+
+
 def is_search(values: Mapping[str, str]) -> bool:
     """Whether the form asks for the best designs, not for cases along axes."""
     return values.get("asks") == "goal"
 
 
 def clutch_pointers(values: Mapping[str, str]) -> list[str]:
-    """JSON Pointers of the form's clutches: one for all pendulums, or one in each."""
+    """JSON Pointers of the form's clutches: one for all pendulums, or one in each; a machine shaft has none."""
+    if is_shaft(values):
+        return []
     if values.get("clutches") == "own":
         return [f"/base/pendulums/{index}/clutch" for index in range(pendulums_of(values))]
     return ["/base/clutch"]
@@ -73,6 +83,30 @@ def clutch_pointers(values: Mapping[str, str]) -> list[str]:
 def spec_of(values: Mapping[str, str]) -> tuple[dict[str, Any], Faults]:
     """The spec of a filled form, and the faults, by field, of what cannot be expressed as a spec."""
     faults: Faults = {}
+    shaft = is_shaft(values)
+    base = base_of(values, faults) if shaft else _drive_base(values, faults)
+    model = MACHINE_SHAFT if shaft else FORM_MODEL
+    spec: dict[str, Any] = {"sprag": 1, "model": model, **_given(values, "/name", "name"), "base": base}
+    if "name" in spec:
+        spec["name"] = values["/name"].strip()
+    derive = _formulas(base)
+    if derive:
+        spec["derive"] = derive
+    if not shaft:
+        spec["run"] = _run(values)
+        spec |= tolerances_of(values)
+    if is_search(values):
+        return spec | {"goal": goal_of(values, faults)}, faults
+    axes = [_axis(values, index) for index in range(count_of(values, "axes"))]
+    spec["axes"] = [axis for axis in axes if axis is not None]
+    spec["combine"] = values.get("/combine", "grid")
+    if any("adaptive" in axis for axis in spec["axes"]):
+        spec["refine"] = _refine(values)
+    return spec, faults
+
+
+def _drive_base(values: Mapping[str, str], faults: Faults) -> dict[str, Any]:
+    """The base of a vibration drive."""
     base: dict[str, Any] = {}
     for section in sections():
         name = section.pointer.rsplit("/", maxsplit=1)[-1]
@@ -90,22 +124,7 @@ def spec_of(values: Mapping[str, str]) -> tuple[dict[str, Any], Faults]:
             base["clutch"] = clutch
         else:
             base["pendulums"][int(pointer.split("/")[3])]["clutch"] = clutch
-    spec: dict[str, Any] = {"sprag": 1, "model": FORM_MODEL, **_given(values, "/name", "name"), "base": base}
-    if "name" in spec:
-        spec["name"] = values["/name"].strip()
-    derive = _formulas(base)
-    if derive:
-        spec["derive"] = derive
-    spec["run"] = _run(values)
-    spec |= tolerances_of(values)
-    if is_search(values):
-        return spec | {"goal": goal_of(values, faults)}, faults
-    axes = [_axis(values, index) for index in range(count_of(values, "axes"))]
-    spec["axes"] = [axis for axis in axes if axis is not None]
-    spec["combine"] = values.get("/combine", "grid")
-    if any("adaptive" in axis for axis in spec["axes"]):
-        spec["refine"] = _refine(values)
-    return spec, faults
+    return base
 
 
 def _refine(values: Mapping[str, str]) -> dict[str, Any]:
@@ -218,6 +237,8 @@ def field_of(pointer: str, values: Mapping[str, str]) -> str:
         return field_of_goal(pointer, values)
     if pointer.startswith("/tolerances"):
         return field_of_tolerance(pointer, values)
+    if is_shaft(values) and pointer.startswith("/base"):
+        return field_of_base(pointer, values)
     match = re.fullmatch(r"/axes/(\d+)(?:/(.*))?", pointer)
     if match:
         # Axes that are not filled in are not in the spec.
@@ -243,15 +264,32 @@ def field_of(pointer: str, values: Mapping[str, str]) -> str:
 
 def values_of(spec: Mapping[str, Any]) -> Values:
     """The form's values for ``spec``; raises ValueError where the form cannot show it."""
-    if spec.get("model") != FORM_MODEL:
+    shaft = spec.get("model") == MACHINE_SHAFT
+    if not shaft and spec.get("model") != FORM_MODEL:
         raise ValueError("the form describes another model")
-    if not set(spec) <= _FIELDS or spec.get("combine", "grid") not in ("grid", "zip"):
+    if not set(spec) <= (_SHAFT_FIELDS if shaft else _FIELDS) or spec.get("combine", "grid") not in ("grid", "zip"):
         raise ValueError("the form has no fields for all of this spec")
     if not all(isinstance(axis, Mapping) and _plain_axis(axis) for axis in spec.get("axes", ())):
         raise ValueError("the form has no fields for all of these axes")
     values: Values = {"/name": str(spec.get("name", "")), "/combine": str(spec.get("combine", "grid"))}
     formulas = {path: f"{FORMULA} {text}" for path, text in formulas_of(spec).items()}
     base: Mapping[str, Any] = with_values(spec["base"], formulas)
+    values |= {"model": MACHINE_SHAFT} | values_of_base(base) if shaft else _drive_values(spec, base)
+    values |= {"asks": "goal" if "goal" in spec else "axes"} | REFINE_DEFAULTS
+    values |= goal_values(spec["goal"]) if "goal" in spec else GOAL_DEFAULTS
+    for key, content in spec.get("refine", {}).items():
+        values[f"/refine/{key}"] = "; ".join(content) if key == "results" else text_of(content)
+    if not shaft:
+        values |= tolerance_values(spec, int(values["pendulums"]))
+    values["axes"] = str(len(spec.get("axes", ())))
+    for index, axis in enumerate(spec.get("axes", ())):
+        values |= _axis_values(f"/axes/{index}", axis)
+    return values
+
+
+def _drive_values(spec: Mapping[str, Any], base: Mapping[str, Any]) -> Values:
+    """The form's values for base and run of a vibration drive."""
+    values: Values = {}
     for key, content in base.items():
         if key == "clutch":
             values |= _clutch_values("/base/clutch", content)
@@ -273,14 +311,6 @@ def values_of(spec: Mapping[str, Any]) -> Values:
             values |= {f"/run/window/{index}": text_of(item) for index, item in enumerate(content)}
         else:
             values[f"/run/{key}"] = text_of(content)
-    values |= {"asks": "goal" if "goal" in spec else "axes"} | REFINE_DEFAULTS
-    values |= goal_values(spec["goal"]) if "goal" in spec else GOAL_DEFAULTS
-    for key, content in spec.get("refine", {}).items():
-        values[f"/refine/{key}"] = "; ".join(content) if key == "results" else text_of(content)
-    values |= tolerance_values(spec, int(values["pendulums"]))
-    values["axes"] = str(len(spec.get("axes", ())))
-    for index, axis in enumerate(spec.get("axes", ())):
-        values |= _axis_values(f"/axes/{index}", axis)
     return values
 
 

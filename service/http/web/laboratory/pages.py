@@ -2,29 +2,34 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
+from urllib.parse import urlencode
 
 from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from sprag.service.http.drawing import picture
+from sprag.service.http.drawing import picture, table
 from sprag.service.http.problems import ApiError
 from sprag.service.http.respond import json_response
 from sprag.service.http.views import preset_of
-from sprag.service.http.web.figures.shaft import SAMPLES, machine_case
+from sprag.service.http.web.figures.shaft import SAMPLES, irregularities, machine_case
 from sprag.service.http.web.form.page import form_page, look_over
-from sprag.service.http.web.laboratory.questions import QUESTIONS, question_spec
-from sprag.service.http.web.laboratory.setting import machines, setting
+from sprag.service.http.web.form.spec import values_of
+from sprag.service.http.web.laboratory.questions import QUESTIONS, estimates, question_spec
+from sprag.service.http.web.laboratory.setting import MOST_HELD, held_settings, machines, setting
 from sprag.service.http.web.laboratory.sliders import position
 from sprag.service.http.web.templates import fragment, page, spec_text
-from sprag.service.http.work import Attended
+from sprag.service.http.work import Attended, Work
 from sprag.service.results.pictures.curves import draw_motion
+from sprag.service.results.trajectories import trajectory_csv
 from sprag.service.results.wording import number
 from sprag.worker import models
 
 if TYPE_CHECKING:
     from sprag.service.http.web.laboratory.setting import Setting
+    from sprag.worker.models import Trajectory
+    from sprag.worker.study import Study
 
 router = APIRouter(include_in_schema=False)
 
@@ -37,47 +42,86 @@ _TOLD: Final = (
 )  # fmt: skip
 
 
+#: Names of the held machines.
+_NAMES: Final = "ABC"
+
+
 @router.get("/laboratory")
 async def laboratory(work: Attended) -> Response:
     """The laboratory."""
-    chosen = await work.check(setting, dict(work.request.query_params))
+    chosen, held = await _chosen(work)
     # The first compilation takes seconds: the page is shown immediately, and its script waits for the numbers.
     ready = models.is_compiled(models.shape_of(chosen.study))
-    case = await work.run_case(machine_case, chosen.study) if ready and not chosen.faults else None
+    case = await _case(work, chosen, held) if ready and not chosen.faults else None
     return page(
         "laboratory.html",
         status=422 if chosen.faults else 200,
-        chosen=chosen,
         machines=[preset_of(name) for name in machines()],
         position=position,
         drawings=chosen.sketch,
-        answer=_told(chosen, case),
-        picture=f"/laboratory/picture.svg?{chosen.query}",
-        figure=f"/laboratory/figure?{chosen.query}",
+        picture=f"/laboratory/picture.svg?{_query(chosen, held)}",
+        figure=f"/laboratory/figure?{_query(chosen, held)}",
+        **_parts(work, chosen, held, case),
     )
 
 
-def _told(chosen: Setting, case: dict[str, Any] | None) -> str:
+async def _chosen(work: Work) -> tuple[Setting, list[Setting]]:
+    """The setting of an address, and those that it holds."""
+    given = work.request.query_params
+    chosen = await work.check(setting, dict(given))
+    return chosen, await work.check(held_settings, given.getlist("held")) if "held" in given else []
+
+
+async def _case(work: Work, chosen: Setting, held: list[Setting]) -> dict[str, Any]:
+    named = [(_NAMES[index], each.study) for index, each in enumerate(held)]
+    return await work.run_case(machine_case, chosen.study, named)
+
+
+def _query(chosen: Setting, held: list[Setting]) -> str:
+    """The setting and those that are held as parameters of a URL."""
+    return "&".join([chosen.query, *(urlencode({"held": each.query}) for each in held)])
+
+
+def _parts(work: Work, chosen: Setting, held: list[Setting], case: dict[str, Any] | None) -> dict[str, Any]:
+    """What the page and its answers say about a setting: the answer that is always in sight, and all results."""
     infos = {info.name: info for info in models.study_results(chosen.study)}
-    return fragment(
-        "_laboratory_answer.html",
-        chosen=chosen,
-        case=case,
-        told=[] if case is None else [(infos[name], case["results"][name]) for name in _TOLD if name in infos],
-        sentence="" if case is None else models.ENDING_SENTENCES.get(case["ending"], ""),
-        questions=QUESTIONS,
-    )
+    cases = [] if case is None else [case, *case["held"]]
+    values = {
+        "chosen": chosen,
+        "case": case,
+        "told": [(infos[name], [each["results"][name] for each in cases]) for name in _TOLD if name in infos and cases],
+        "held": [
+            {
+                "name": _NAMES[index],
+                "setting": each,
+                "without": _query(chosen, [other for other in held if other is not each]),
+                "case": None if case is None else case["held"][index],
+            }
+            for index, each in enumerate(held)
+        ],
+        "hold": _query(chosen, [*held, chosen]) if len(held) < MOST_HELD else "",
+        "query": _query(chosen, held),
+        "sentence": "" if case is None else models.ENDING_SENTENCES.get(case["ending"], ""),
+        "questions": QUESTIONS,
+        "now": work.context.store.clock.now().isoformat(),
+    }
+    return values | {
+        "answer": fragment("_laboratory_answer.html", **values),
+        "results": fragment("_laboratory_results.html", **values),
+    }
 
 
 @router.get("/laboratory/figure")
 async def laboratory_figure(work: Attended) -> Response:
     """Picture and numbers of a setting, for the sliders."""
-    chosen = await work.check(setting, dict(work.request.query_params))
-    case = None if chosen.faults else await work.run_case(machine_case, chosen.study)
+    chosen, held = await _chosen(work)
+    case = None if chosen.faults else await _case(work, chosen, held)
+    parts = _parts(work, chosen, held, case)
     return json_response(
         {
             "figure": None if case is None else case["figure"],
-            "answer": _told(chosen, case),
+            "answer": parts["answer"],
+            "results": parts["results"],
             "sketch": fragment("_linkage.html", drawings=chosen.sketch),
             "faults": chosen.faults,
             "values": {slider.path: number(slider.value) for slider in chosen.sliders},
@@ -85,16 +129,47 @@ async def laboratory_figure(work: Attended) -> Response:
     )
 
 
-@router.get("/laboratory/picture.svg")
-async def laboratory_picture(work: Attended) -> Response:
-    """The motion as one picture, for pages without JavaScript."""
-    chosen = await work.check(setting, dict(work.request.query_params))
+@router.get("/laboratory/picture.{form}")
+async def laboratory_picture(work: Attended, form: Literal["svg", "png", "csv"]) -> Response:
+    """The motion as one picture or as a table, also for pages without JavaScript."""
+    chosen, held = await _chosen(work)
     if chosen.faults:
         raise ApiError("invalid-spec", "; ".join(text for texts in chosen.faults.values() for text in texts))
-    end = models.extent(chosen.study, 0).end
-    made = await work.run_case(models.run_trajectory, chosen.study, 0, 0.0, end, SAMPLES // 4)
+    motions = [await work.run_case(_motion, each.study) for each in (chosen, *held)]
+    if form == "csv":
+        return table(await run_in_threadpool(trajectory_csv, motions[0]), "csv", "laboratory")
+    beside = [(_NAMES[index], motion) for index, motion in enumerate(motions[1:]) if motion.times.size]
     shown = models.presentation_of(chosen.study)
-    return await picture(draw_motion, "svg", made, shown, chosen.study.name).response(work)
+    return await picture(draw_motion, form, motions[0], shown, chosen.study.name, beside).response(work)
+
+
+def _motion(study: Study) -> Trajectory:
+    return models.run_trajectory(study, 0, 0.0, models.extent(study, 0).end, SAMPLES // 4)
+
+
+@router.get("/laboratory/questions")
+async def laboratory_questions(work: Attended) -> Response:
+    """Questions with a blank for an estimate, and the answers to those that have one."""
+    chosen = await work.check(setting, dict(work.request.query_params))
+    asked = [] if chosen.faults else await work.check(estimates, chosen, dict(work.request.query_params))
+    answers: list[tuple[str, float | None]] = []
+    if asked:
+        answers = await work.run_case(irregularities, chosen.study, [each.study for each in asked])
+    return page(
+        "laboratory_questions.html",
+        chosen=chosen,
+        now=answers[0] if answers else None,
+        asked=list(zip(asked, answers[1:], strict=True)),
+        sentences=models.ENDING_SENTENCES,
+        questions=QUESTIONS,
+    )
+
+
+@router.get("/laboratory/form")
+async def laboratory_form(work: Attended) -> Response:
+    """The current machine in the form for a new study."""
+    chosen = await work.check(setting, dict(work.request.query_params))
+    return await _in_form(work, {**chosen.spec, "axes": []})
 
 
 @router.get("/laboratory/study")
@@ -103,5 +178,13 @@ async def laboratory_study(work: Attended, question: str = "inertia") -> Respons
     chosen = await work.check(setting, dict(work.request.query_params))
     if question not in QUESTIONS:
         raise ApiError("not-found", f"Unknown question; known questions: {', '.join(QUESTIONS)}.")
-    values = {"/text": spec_text(question_spec(chosen, question)), "format": "json"}
+    return await _in_form(work, question_spec(chosen, question))
+
+
+async def _in_form(work: Work, spec: dict[str, Any]) -> Response:
+    """A study in the form, or as text where the form cannot show it."""
+    try:
+        values = values_of(spec)
+    except ValueError:
+        values = {"/text": spec_text(spec), "format": "json"}
     return await run_in_threadpool(form_page, work.request, values, await look_over(work.context, work, values))

@@ -15,7 +15,8 @@ from sprag.service.http.web.figures.linkage import Drawing, drawings
 from sprag.service.http.web.figures.shaft import overridden
 from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.entries import plain
-from sprag.service.http.web.laboratory.sliders import Slider, group_of, in_order, slider_of
+from sprag.service.http.web.form.shaft import group_of
+from sprag.service.http.web.laboratory.sliders import Slider, in_order, slider_of
 from sprag.service.presets import preset_names
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.report import SpecError
@@ -75,6 +76,11 @@ class Setting:
     def machine(self) -> list[tuple[str, str]]:
         """The machine as parameters of a URL, without what was changed."""
         return [("machine", self.name), *([("base", self.base)] if self.base else [])]
+
+    @property
+    def changed(self) -> list[Slider]:
+        """The numbers that are not the machine's own."""
+        return [slider for slider in self.sliders if slider.text != slider.own]
 
     @property
     def query(self) -> str:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from sprag.service.http.web.form.shaft import part_of
 from sprag.service.results.wording import words
 from sprag.service.spec.numbers import parse_number
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity
@@ -23,11 +23,6 @@ _OTHERS: Final = (0.5, 2.0)
 _SHOWN: Final = {"rad": ("deg", math.pi / 180.0), "rad/s": ("rpm", math.pi / 30.0)}
 #: Angles, in rad, whose sliders do not depend on the machine's own value.
 _ANGLES: Final = {"crank_angle": (-2.0 * math.pi, 2.0 * math.pi), "inclination": (-math.pi, math.pi)}
-_PART: Final = re.compile(r"parts\.(\d+)\.")
-_GROUPS: Final = (
-    ("drive.flywheel.", "Flywheel"), ("drive.motor.", "Motor"), ("drive.stages.", "Stages"), ("drive.", "Drive"),
-    ("mechanism.", "Mechanism"), ("operation.", "Operation"), ("constants.", "Constants"),
-)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,19 +51,6 @@ class Slider:
     shown: str = ""
     factor: float = 1.0
     first: bool = True
-
-
-def part_of(path: str) -> tuple[int, str]:
-    """Number of the part that ``path`` belongs to, from 1, and the path within it; 0 for the machine itself."""
-    found = _PART.match(path)
-    return (0, path) if found is None else (int(found[1]) + 1, path[found.end() :])
-
-
-def group_of(path: str) -> str:
-    """Heading under which a number stands."""
-    part, own = part_of(path)
-    title = next((title for prefix, title in _GROUPS if own.startswith(prefix)), "Machine")
-    return f"Part {part}: {title.lower()}" if part else title
 
 
 def slider_of(own: Study, study: Study, path: str, text: str) -> Slider:

@@ -56,6 +56,8 @@ const check = async () => {
     if (field) field.toggleAttribute("aria-invalid", messages.length > 0);
     if (field && messages.length) field.setAttribute("aria-invalid", "true");
   }
+  const sketch = document.getElementById("sketch");
+  if (sketch && found.sketch) sketch.innerHTML = found.sketch;
   const open = [...panel.querySelectorAll("details")].map((part) => part.open);
   panel.innerHTML = found.panel;
   panel.querySelectorAll("details").forEach((part, index) => { part.open = Boolean(open[index]); });
@@ -95,10 +97,10 @@ const newShape = async (extra) => {
 };
 
 const mark = (event) => {
-  for (const part of document.querySelectorAll(".sketch .shown")) part.classList.remove("shown");
+  for (const part of document.querySelectorAll("[data-mark].shown")) part.classList.remove("shown");
   const wanted = event.target.dataset && event.target.dataset.for;
   if (!wanted) return;
-  for (const part of document.querySelectorAll(".sketch [data-mark]")) {
+  for (const part of document.querySelectorAll("[data-mark]")) {
     const names = part.dataset.mark.split(" ");
     const meant = names.includes(wanted) || (wanted === "inertia" && event.target.name.includes("/shaft/") && names.includes("shaft"));
     const other = wanted === "inertia" && event.target.name.includes("/shaft/") && names.includes("mass");

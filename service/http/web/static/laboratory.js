@@ -44,6 +44,7 @@ const ask = async () => {
       place.textContent = texts.join("; ");
     }
     answer.innerHTML = found.answer;
+    document.getElementById("results").innerHTML = found.results;
     plot.classList.toggle("stale", !found.figure);
     sketch.classList.toggle("stale", !found.figure);
     if (found.figure) {

@@ -1,0 +1,104 @@
+"""The fields of a machine shaft's form: every machine that comes with the program goes through them unchanged."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from sprag.service.http.views import preset_of
+from sprag.service.http.web.form.check import check_form
+from sprag.service.http.web.form.page import EMPTY_SHAFT, reshape
+from sprag.service.http.web.form.spec import field_of, spec_of, values_of
+from sprag.service.presets import preset_names
+from sprag.service.spec.document import parse_spec
+from sprag.worker.chunking import Chunking
+
+SHAFTS = [name for name in preset_names() if preset_of(name)["spec"]["model"] == "machine-shaft"]
+PRESS: dict[str, Any] = preset_of("press")["spec"]
+
+
+@pytest.mark.parametrize("name", SHAFTS)
+def test_a_machine_goes_through_the_form_unchanged(name: str) -> None:
+    spec = preset_of(name)["spec"]
+    again, faults = spec_of(values_of(spec))
+    assert faults == {}
+    assert parse_spec(again).study == parse_spec(spec).study
+
+
+def test_choices_that_a_machine_uses_survive_the_form() -> None:
+    base = PRESS["base"] | {
+        "drive": {
+            "inertia": 20, "torque": {"formula": "k + 0*phi"}, "flywheel": {"kind": "disc", "diameter": 1, "mass": 50}
+        },
+        "balance": "scale", "constants": {"k": 30},
+    }  # fmt: skip
+    mechanism = {**base["mechanism"]["slider_crank"], "bodies": "two_mass", "weights": "all"}
+    del mechanism["rod_inertia"]
+    base["mechanism"] = {"slider_crank": mechanism}
+    base["operation"] = {"quantity": "force", "over": "stroke", "during": "both", "table": [[0, "1 kN"], [1, "3 kN"]]}
+    spec = {"sprag": 1, "model": "machine-shaft", "name": "all", "base": base, "axes": []}
+    assert parse_spec(spec_of(values_of(spec))[0]).study == parse_spec(spec).study
+
+
+def test_a_measured_motor_goes_through_the_form() -> None:
+    rows = [["0 rpm", "60 N*m"], ["120 rpm", "40 N*m"], ["150 rpm", "0 N*m"]]
+    drive = {"inertia": 60, "motor": {"kind": "table", "table": rows, "interpolation": "linear"}}
+    base = {name: value for name, value in PRESS["base"].items() if name not in {"mean_speed", "balance"}}
+    base |= {"drive": drive, "operation": {"quantity": "torque", "value": 20}}
+    spec = {"sprag": 1, "model": "machine-shaft", "name": "motor", "base": base, "axes": []}
+    assert parse_spec(spec_of(values_of(spec))[0]).study == parse_spec(spec).study
+
+
+def test_what_the_form_has_no_field_for_is_given_as_text() -> None:
+    with pytest.raises(ValueError, match="no fields"):
+        values_of({**PRESS, "base": {**PRESS["base"], "operation": {"quantity": "force", "value": {"odd": 1}}}})
+    with pytest.raises(ValueError, match="no fields"):
+        values_of({**PRESS, "tolerances": {}})
+
+
+def test_a_second_part_is_a_copy_of_the_first_and_paths_follow() -> None:
+    values = values_of({**PRESS, "axes": [{"path": "operation.scale", "values": [1, 2]}]})
+    values["/base/mechanism/slider_crank/rod"] = "= 4 * mechanism.slider_crank.crank"
+    reshape(values, "add-parts")
+    reshape(values, "add-parts")
+    values["/base/parts/2/crank_angle"] = "240 deg"
+    reshape(values, "drop-parts 1")
+    spec, _ = spec_of(values)
+    first, second = spec["base"]["parts"]
+    assert "mechanism" not in spec["base"]
+    assert first == {name: second[name] for name in first}
+    assert second["crank_angle"] == "240 deg"
+    assert spec["axes"][0]["path"] == "parts.0.operation.scale"
+    assert spec["derive"]["parts.1.mechanism.slider_crank.rod"] == "4 * parts.0.mechanism.slider_crank.crank"
+
+
+@pytest.mark.parametrize(
+    ("pointer", "field"),
+    [
+        ("/base/mechanism/slider_crank/crank", "/base/mechanism/slider_crank/crank"),
+        ("/base/operation/steps/0/from", "/base/operation/steps"),
+        ("/base/drive/motor", "drive_is"),
+        ("/base/mechanism", "/base/mechanism"),
+        ("/base", ""),
+    ],
+)
+def test_a_fault_stands_beside_its_field(pointer: str, field: str) -> None:
+    assert field_of(pointer, values_of(PRESS)) == field
+
+
+def test_an_empty_form_says_what_is_missing_and_a_wrong_step_which_one() -> None:
+    checked = check_form(
+        {**EMPTY_SHAFT, "/base/operation/steps": "0 deg; 10 deg; 1 kN\n10 deg; 400 m; 1 kN"}, Chunking()
+    )
+    assert {"/base/mean_speed", "/base/drive/inertia", "/base/mechanism/slider_crank/crank"} <= set(checked.faults)
+    assert checked.faults["/base/operation/steps"][0].startswith("step 2, to: ")
+    assert checked.preview is None
+
+
+def test_a_filled_form_has_cost_and_sketch() -> None:
+    checked = check_form(values_of(PRESS), Chunking())
+    assert checked.faults == {}
+    assert checked.preview is not None
+    assert checked.preview["cases"] == 52
+    assert [drawing.title for drawing in checked.sketch] == ["Slider crank"]
