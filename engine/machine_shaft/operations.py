@@ -279,6 +279,24 @@ class Operation:
         force = (self._pressure(phi, self._stroke) - v["indicator.back_pressure"]) * v["indicator.piston_area"]
         return np.asarray(scale * force * way_slope)
 
+    def push(self, phi: Floats, way_slope: Floats, omega: Floats | None) -> Floats:
+        """Force on the working part along its forward stroke in N, if nothing is lost; 0 for a torque on the shaft."""
+        choice, v = self._choice, self._values
+        if choice.quantity in {"none", "torque"} or self._stroke is None:
+            return 0.0 * phi
+        if choice.quantity == "gas":
+            return np.asarray(v["scale"] * self._gas(phi, self._stroke))
+        if choice.quantity == "pressure":
+            excess = self._pressure(phi, self._stroke) - v["indicator.back_pressure"]
+            return np.asarray(v["scale"] * excess * v["indicator.piston_area"])
+        if omega is None or not self.follows_speed or self._expression is None:
+            diagram = self._diagram(phi)
+        else:
+            environment = self._environment(phi) | {"omega": (omega, 0.0)}
+            diagram = self._in_strokes(np.asarray(self._expression.evaluate(environment)[0]), phi)
+        against = np.sign(way_slope) if choice.sense == "resisting" else np.ones(1)
+        return np.asarray(-v["scale"] * diagram * against)
+
     def _pressure(self, phi: Floats, stroke: Stroke) -> Floats:
         """Pressure on the piston in Pa; the strokes of a cycle are counted from the start of the first forward one."""
         if self._curve is not None:

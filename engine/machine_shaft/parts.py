@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine.machine_shaft.bearings import JointForces, joint_forces
 from sprag.engine.machine_shaft.cams import Cam
 from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.expressions import Expression
@@ -223,6 +224,20 @@ class ShaftPart:
         else:
             torque = self._operation.torque(own, way_slope)
         return PartFields(inertia, slope, torque + self._carried(own, motion), torque)
+
+    def joint_forces(
+        self, phi: Floats, squares: Floats, acceleration: Floats, omega: Floats | None, factor: float
+    ) -> JointForces:
+        """Forces in the joints of a slider-crank at angles of the shaft, with a ``factor`` on its operation.
+
+        ``squares`` (rad^2/s^2) and ``acceleration`` (rad/s^2) are omega^2 and the acceleration of the shaft there; the
+        other parameters are as in ``fields``.
+        """
+        own, motion = self.own_angle(phi), self.motion(phi)
+        assert motion is not None
+        push = factor * self._operation.push(own, motion.way_slope, omega)
+        rods = self._gravity if self.choice.mechanism.weights == "all" else 0.0 * self._gravity
+        return joint_forces(self.values, own, squares, acceleration, push, self._gravity, rods)
 
     def _inertia(self, own: Floats, motion: Motion | None) -> tuple[Floats, Floats]:
         if motion is not None:

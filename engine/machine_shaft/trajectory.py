@@ -38,6 +38,12 @@ COLUMNS: tuple[tuple[str, str], ...] = (
 _PART_COLUMNS: tuple[tuple[str, str], ...] = (("way", "m"), ("inertia", "kg*m^2"), ("resisting_torque", "N*m"))
 
 
+#: Columns of each slider-crank, after the prefix of its part: forces in its joints.
+_JOINT_COLUMNS: tuple[tuple[str, str], ...] = (
+    ("crank_pin.force", "N"), ("crank_pin.x", "N"), ("crank_pin.y", "N"), ("guide.force", "N"),
+)  # fmt: skip
+
+
 def columns_of(model: MachineSpec) -> tuple[tuple[str, str], ...]:
     """Name and SI unit of each column of the tables of a machine."""
     own = (
@@ -45,7 +51,12 @@ def columns_of(model: MachineSpec) -> tuple[tuple[str, str], ...]:
         for prefix, part in model.every_part() if prefix
         for name, unit in _PART_COLUMNS if name != "way" or part.mechanism.kind in LINKED
     )  # fmt: skip
-    return (*COLUMNS, *own)
+    joints = (
+        (f"{prefix}{name}", unit)
+        for prefix, part in model.every_part() if part.mechanism.kind == "slider_crank"
+        for name, unit in _JOINT_COLUMNS
+    )  # fmt: skip
+    return (*COLUMNS, *own, *joints)
 
 
 def trajectory(model: MachineSpec, columns: Mapping[str, ArrayLike], angles: ArrayLike) -> Trajectory:
@@ -93,8 +104,10 @@ def trajectory(model: MachineSpec, columns: Mapping[str, ArrayLike], angles: Arr
     if ending is not Ending.OK:
         return made(nothing[:, 0], nothing, ending)
     table = _table(solved.decomposition, model.phi_c, np.minimum(asked, cycle))
+    machine, places = Machine(model, row), np.minimum(asked, cycle)
     if model.parts:
-        table |= _part_table(Machine(model, row), solved, np.minimum(asked, cycle))
+        table |= _part_table(machine, solved, places)
+    table |= _joint_table(machine, solved, places)
     values = np.column_stack([table[name] for name in names])
     every = np.sort(np.mod(solved.decomposition.crossings.angle, cycle))
     return made(asked, values, ending, tuple(float(angle) for angle in every))
@@ -139,13 +152,33 @@ def _table(d: Decomposition, chosen: int | None, angles: Floats) -> dict[str, Fl
     }
 
 
+def _factor(machine: Machine, solved: Solved) -> float:
+    """Factor of the balance on the operations, 0 where a constant load is in their place."""
+    if machine.spec.balance_side != "operation":
+        return 1.0
+    return float(np.nan_to_num(solved.results["balance.factor"][0], nan=0.0))
+
+
+def _joint_table(machine: Machine, solved: Solved, angles: Floats) -> dict[str, Floats]:
+    """Forces in the joints of the slider-cranks."""
+    d = solved.decomposition
+    table: dict[str, Floats] = {}
+    points, cases = d.panels.locate(0, angles), np.zeros(len(angles), dtype=np.int64)
+    factor, acceleration = _factor(machine, solved), d.acceleration()
+    for part in machine.parts:
+        if part.choice.mechanism.kind != "slider_crank":
+            continue
+        forces = part.joint_forces(d.panels.angles, d.squares, acceleration, solved.omega, factor)
+        x, y, guide = (d.panels.at_rows(np.ascontiguousarray(force), cases, points) for force in forces)
+        own = {"crank_pin.force": np.hypot(x, y), "crank_pin.x": x, "crank_pin.y": y, "guide.force": guide}
+        table |= {f"{part.prefix}{name}": values for name, values in own.items()}
+    return table
+
+
 def _part_table(machine: Machine, solved: Solved, angles: Floats) -> dict[str, Floats]:
     """Travel, inertia and torque of each part; a constant load in place of the operations belongs to none."""
     panels, cases = solved.decomposition.panels, np.zeros(len(angles), dtype=np.int64)
-    points = panels.locate(0, angles)
-    factor = 1.0
-    if machine.spec.balance_side == "operation":
-        factor = float(np.nan_to_num(solved.results["balance.factor"][0], nan=0.0))
+    points, factor = panels.locate(0, angles), _factor(machine, solved)
     table = {}
     for part in machine.parts:
         fields, motion = part.fields(panels.angles, solved.omega), part.motion(panels.angles)

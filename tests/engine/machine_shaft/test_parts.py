@@ -125,9 +125,8 @@ def test_energy_closes_over_the_cycle_and_over_each_part() -> None:
     pieces, order = 360, 8
     nodes, weights = np.polynomial.legendre.leggauss(order)
     found = trajectory(spec, numbers, [0.0])
-    assert found.names[-9:] == tuple(
-        f"parts.{k}.{name}" for k in range(3) for name in ("way", "inertia", "resisting_torque")
-    )
+    of_parts = [name for name in found.names if name.startswith("parts.") and not name.endswith(("force", ".x", ".y"))]
+    assert of_parts == [f"parts.{k}.{name}" for k in range(3) for name in ("way", "inertia", "resisting_torque")]
     cuts = np.unique(np.concatenate([np.linspace(0.0, 2.0 * math.pi, pieces + 1), _kinks(spec, numbers)]))
     half = 0.5 * np.diff(cuts)
     angles = (cuts[:-1] + half)[:, None] + half[:, None] * nodes
