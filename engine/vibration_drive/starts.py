@@ -56,6 +56,8 @@ _TURN = 2.0 * math.pi
 LONGER = (4, 16)
 #: Starts that are run together: this bounds the memory, and changes no result.
 TOGETHER = 4096
+#: Periods that starts are run again together, for the same reason.
+PERIODS_TOGETHER = 4000 * TOGETHER
 #: 97.5 % point of the normal distribution.
 _NORMAL = 1.959963984540054
 _OK = ENDINGS.index(Ending.OK)
@@ -294,9 +296,12 @@ def _without_orbit(motions: _Motions, count: int) -> Ints:
 
 def _run_again(columns: Mapping[str, Floats], settings: SettledRun, settled: SettledBatch, rows: Ints) -> None:
     """Run some starts from their beginning; replaces what they came to."""
-    longer = settle(of_cases(columns, rows), settings, cases=len(rows))
-    settled.values[rows], settled.endings[rows] = longer.values, longer.endings
-    settled.regimes[rows], settled.points[rows] = longer.regimes, longer.points
+    step = max(1, PERIODS_TOGETHER // settings.at_most)
+    for first in range(0, len(rows), step):
+        some = rows[first : first + step]
+        longer = settle(of_cases(columns, some), settings, cases=len(some))
+        settled.values[some], settled.endings[some] = longer.values, longer.endings
+        settled.regimes[some], settled.points[some] = longer.regimes, longer.points
 
 
 def _rows(values: Floats, groups: list[Ints], lanes: Ints) -> Floats:

@@ -73,7 +73,9 @@ def test_copies_of_an_orbit_a_period_apart_are_one_regime() -> None:
     assert np.ptp(points[:, module.SHAFT_SPEED]) > 0.1
 
 
-def test_starts_without_an_orbit_are_run_longer_before_they_count_as_another_motion() -> None:
+def test_starts_without_an_orbit_are_run_longer_before_they_count_as_another_motion(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     starts = {"shaft.initial_speed": np.linspace(2.0, 30.0, 7)}
     drive = {**PERIOD_TWO, "shaft.load": 0.22}
     # After 160 periods two starts are on the orbit, after 640 four; the last ones take a thousand.
@@ -85,6 +87,9 @@ def test_starts_without_an_orbit_are_run_longer_before_they_count_as_another_mot
     batch = settle_starts(drive, SettledRun(at_most=160), starts, cases=1)
     (row,) = _rows(batch)
     assert (row["regime"], row["regime.order"], row["regime.share"]) == (Regime.PERIODIC, 2, 1.0)
+    monkeypatch.setattr(module, "PERIODS_TOGETHER", 2000)
+    apart = settle_starts(drive, SettledRun(at_most=160), starts, cases=1)
+    assert apart.values.tobytes() == batch.values.tobytes()
 
 
 def test_irregular_motions_are_distinguished_by_their_means() -> None:
