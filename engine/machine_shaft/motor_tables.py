@@ -1,6 +1,8 @@
 """The characteristic of a motor as measured: a table of its torque over its speed."""
 
+import math
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,9 @@ Floats = NDArray[np.float64]
 
 #: Speeds at which the falling branch is sampled for the first guess of a steady speed.
 _SAMPLES = 513
+#: From four values within a piece to the coefficients of its cubic.
+_ROWS = [[105, -105, 63, -15], [-568, 1128, -744, 184], [960, -2496, 2112, -576], [-512, 1536, -1536, 512]]
+_TO_POWERS = np.array(_ROWS, dtype=np.float64) / 48.0
 
 
 class MotorTable:
@@ -42,6 +47,16 @@ class MotorTable:
         outside = np.where(omega < low, self._outside[0], self._outside[1])
         beyond = omega != inside
         return self._curve(inside) + outside * (omega - inside), np.where(beyond, outside, self._curve.slope(inside))
+
+    def pieces(self) -> Floats:
+        """Its cubic pieces, shape (m, 6): the end of each, the speed that it counts from, four coefficients."""
+        x, u = self._curve.knots, np.array([0.125, 0.375, 0.625, 0.875])
+        rows = [[x[0], x[0], float(self._curve(x[:1])[0]), self._outside[0], 0.0, 0.0]]
+        for low, high in pairwise(x.tolist()):
+            powers = [math.fsum(row * self._curve(low + (high - low) * u)) for row in _TO_POWERS]
+            rows.append([high, low, *(power / (high - low) ** k for k, power in enumerate(powers))])
+        rows.append([np.inf, x[-1], float(self._curve(x[-1:])[0]), self._outside[1], 0.0, 0.0])
+        return np.array(rows)
 
     def speed_for(self, torque: Floats) -> Floats:
         """Speed on the falling branch, in rad/s, for a torque; that of the largest torque where it cannot give it."""

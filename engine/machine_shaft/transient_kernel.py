@@ -24,9 +24,10 @@ Floats = NDArray[np.float64]
 REACHED, STOPPED, NOT_STARTED, TURNED, EXHAUSTED = range(5)
 #: Rows of the table of a panel; the resisting torque has one or more rows, by the speed.
 INERTIA, DRIVE, TARGET, RESISTANCE = range(4)
-#: Numbers of a run: the motor's kind (0 none, 1 linear, 2 Kloss), its three numbers, the efficiency behind it, the
-#: speed to which the rows of the resisting torque extend, the factor on the target's sqrt(2 T), from which side it is
-#: approached (0: no target), and the largest angle.
+#: Numbers of a run: the motor's kind (0 none, 1 linear, 2 Kloss, 3 a table), its three numbers (of a table the unit of
+#: its speeds and the factor on its torques), the efficiency behind it, the speed to which the rows of the resisting
+#: torque extend, the factor on the target's sqrt(2 T), the side from which it is approached (0: no target), the
+#: largest angle.
 KIND, FIRST, SECOND, THIRD, EFFICIENCY, FASTEST, FACTOR, SIDE, FARTHEST = range(9)
 #: Totals of a run.
 WORK_DRIVE, WORK_RESISTANCE, WORK_SLIP, SPEED_MAX, SPEED_MIN, TORQUE_MAX, POWER_MAX = range(7)
@@ -66,7 +67,18 @@ def resisting(table: Floats, x: float, omega: float, fastest: float) -> float:
 
 
 @part
-def motor_pull(run: Floats, omega: float) -> tuple[float, float]:
+def tabulated(pieces: Floats, omega: float) -> float:
+    """Value at ``omega`` of cubic pieces: rows of the end of a piece, the speed that it counts from, four powers."""
+    row = 0
+    while omega >= pieces[row, 0]:
+        row += 1
+    d = omega - pieces[row, 1]
+    value: float = pieces[row, 2] + d * (pieces[row, 3] + d * (pieces[row, 4] + d * pieces[row, 5]))
+    return value
+
+
+@part
+def motor_pull(run: Floats, pieces: Floats, omega: float) -> tuple[float, float]:
     """Torque of the motor on the main shaft behind the losses, and the power lost to its slip, in W."""
     if run[KIND] == 1.0:
         own, slip_power = run[SECOND] * (1.0 - omega / run[FIRST]), 0.0
@@ -74,18 +86,20 @@ def motor_pull(run: Floats, omega: float) -> tuple[float, float]:
         slip = 1.0 - omega / run[FIRST]
         own = 2.0 * run[SECOND] * run[THIRD] * slip / (slip * slip + run[THIRD] * run[THIRD])
         slip_power = own * slip * run[FIRST]
+    elif run[KIND] == 3.0:
+        own, slip_power = run[SECOND] * tabulated(pieces, omega / run[FIRST]), 0.0
     else:
         return 0.0, 0.0
     return own * run[EFFICIENCY] if own >= 0.0 else own / run[EFFICIENCY], slip_power
 
 
 @part
-def rates(table: Floats, half: float, run: Floats, v: Floats, j: int) -> None:
+def rates(table: Floats, half: float, run: Floats, pieces: Floats, v: Floats, j: int) -> None:
     """Rates and powers at node ``j`` of the values ``v``."""
     x, u = v[X, j], v[U, j]
     root = np.sqrt(chebyshev(table[INERTIA], x))
     omega = u / root
-    pull, slip_power = motor_pull(run, omega)
+    pull, slip_power = motor_pull(run, pieces, omega)
     drive = chebyshev(table[DRIVE], x) + pull
     load = resisting(table, x, omega, run[FASTEST])
     v[FX, j] = omega / half
@@ -105,7 +119,7 @@ def total_of(weights: Floats, values: Floats) -> float:
 
 @part
 def collocate(
-    table: Floats, half: float, run: Floats, x0: float, u0: float, h: float, lands: bool,
+    table: Floats, half: float, run: Floats, pieces: Floats, x0: float, u0: float, h: float, lands: bool,
     running: Floats, weights: Floats, tail: Floats, v: Floats,
 ) -> tuple[float, int]:  # fmt: skip
     """Solve one step of the length ``h``, or to the end of the panel; its length and sweeps, 0 sweeps if it failed."""
@@ -115,7 +129,7 @@ def collocate(
     before = np.inf
     for sweep in range(1, _MOST_SWEEPS + 1):
         for j in range(nodes):
-            rates(table, half, run, v, j)
+            rates(table, half, run, pieces, v, j)
         if lands:
             pace = total_of(weights, v[FX])
             if sweep > 2:
@@ -145,7 +159,7 @@ def collocate(
     else:
         return h, 0
     for j in range(nodes):
-        rates(table, half, run, v, j)
+        rates(table, half, run, pieces, v, j)
     rough = 0.0
     for k in range(2):
         rough = max(rough, 0.5 * h * abs(total_of(tail[k], v[FX])))
@@ -189,10 +203,12 @@ def peak(values: Floats, best: float, places: Floats, to_series: Floats, scratch
 
 
 @part
-def ahead(table: Floats, half: float, run: Floats, x0: float, u0: float, hint: float, v: Floats) -> tuple[float, bool]:
+def ahead(
+    table: Floats, half: float, run: Floats, pieces: Floats, x0: float, u0: float, hint: float, v: Floats
+) -> tuple[float, bool]:
     """A first guess of the length of a step, and whether that leads to the end of the panel; 0 where nothing moves."""
     v[X, 0], v[U, 0] = x0, u0
-    rates(table, half, run, v, 0)
+    rates(table, half, run, pieces, v, 0)
     pace = v[FX, 0]
     gain = v[FU, 0] / np.sqrt(chebyshev(table[INERTIA], x0)) / half
     if pace <= 0.0 and gain <= 0.0:
@@ -237,13 +253,13 @@ def event_time(
 
 @part
 def solve_step(
-    table: Floats, half: float, run: Floats, x0: float, u0: float, h: float, lands: bool, hint: float,
+    table: Floats, half: float, run: Floats, pieces: Floats, x0: float, u0: float, h: float, lands: bool, hint: float,
     running: Floats, weights: Floats, tail: Floats, v: Floats,
 ) -> tuple[float, float, bool]:  # fmt: skip
     """A step as long as it can be: its length, the hint for the next one, and whether it lands; 0 if none is."""
     least = 1e-13 * h
     while h > least:
-        solved, sweeps = collocate(table, half, run, x0, u0, h, lands, running, weights, tail, v)
+        solved, sweeps = collocate(table, half, run, pieces, x0, u0, h, lands, running, weights, tail, v)
         if sweeps > 0:
             low = v[U, 0]
             for j in range(len(weights)):
@@ -293,8 +309,9 @@ def sample(
 
 @compiled
 def follow(
-    cuts: Floats, tables: Floats, run: Floats, state: Floats, times: Floats, out: Floats, totals: Floats,
-    running: Floats, weights: Floats, tail: Floats, to_series: Floats, to_integral: Floats, places: Floats,
+    cuts: Floats, tables: Floats, run: Floats, pieces: Floats, state: Floats, times: Floats, out: Floats,
+    totals: Floats, running: Floats, weights: Floats, tail: Floats, to_series: Floats, to_integral: Floats,
+    places: Floats,
 ) -> int:  # fmt: skip
     """Integrate from ``state`` until the target is reached, the shaft stops, or the farthest angle is passed.
 
@@ -307,14 +324,16 @@ def follow(
         resisting torque.
     run, state : arrays
         Numbers of the run, and where it begins.
+    pieces : array, shape (m, 6)
+        The motor's table.
     times, out : arrays, shapes (m,) and (m, 2)
         Ascending times, and the angle and u there, written up to the end.
     totals : array, written
     running, weights, tail, to_series, to_integral, places : arrays
         Of the panels' nodes.
     """
-    panels, nodes = len(tables), len(weights)
-    v, scratch = np.empty((ROWS, nodes)), np.empty(nodes + 2)
+    panels = len(tables)
+    v, scratch = np.empty((ROWS, len(weights))), np.empty(len(weights) + 2)
     p, x, u, clock, turned = int(state[PANEL]), state[PLACE], state[ROOT], state[CLOCK], state[CYCLES]
     cycle, hint, next_time, status = cuts[panels], np.inf, 0, EXHAUSTED
     sided = run[SIDE] != 0.0
@@ -325,11 +344,11 @@ def follow(
         if turned + cuts[p] + half * (1.0 + x) >= run[FARTHEST]:
             status = TURNED
             break
-        h, lands = ahead(table, half, run, x, u, hint, v)
+        h, lands = ahead(table, half, run, pieces, x, u, hint, v)
         if h == 0.0:
             status = NOT_STARTED if totals[STEPS] == 0.0 else STOPPED
             break
-        h, hint, lands = solve_step(table, half, run, x, u, h, lands, hint, running, weights, tail, v)
+        h, hint, lands = solve_step(table, half, run, pieces, x, u, h, lands, hint, running, weights, tail, v)
         if h == 0.0:
             break
         x1 = x + 0.5 * h * total_of(weights, v[FX])
@@ -338,7 +357,7 @@ def follow(
         if stops or (sided and off_target(table, run, 1.0 if lands else x1, u1) <= 0.0):
             status = STOPPED if stops else REACHED
             h = event_time(table, run, h, x, u, stops, to_integral, v, scratch)
-            collocate(table, half, run, x, u, h, False, running, weights, tail, v)
+            collocate(table, half, run, pieces, x, u, h, False, running, weights, tail, v)
             lands = False
             x1 = x + 0.5 * h * total_of(weights, v[FX])
             u1 = 0.0 if stops else u + 0.5 * h * total_of(weights, v[FU])
@@ -349,9 +368,10 @@ def follow(
             p, x = p + 1, -1.0
             if p == panels:
                 p, turned = 0, turned + cycle
+        # The load is not known beyond the speeds of its rows.
+        if status == EXHAUSTED and tables.shape[1] > RESISTANCE + 1 and totals[SPEED_MAX] > run[FASTEST]:
+            status = TURNED
     totals[TIME], totals[ENERGY] = clock, 0.5 * u * u
     totals[ANGLE] = turned + cuts[p] + 0.5 * (cuts[p + 1] - cuts[p]) * (1.0 + x)
-    while next_time < len(times):
-        out[next_time, 0], out[next_time, 1] = totals[ANGLE], u
-        next_time += 1
+    out[next_time:, 0], out[next_time:, 1] = totals[ANGLE], u
     return status

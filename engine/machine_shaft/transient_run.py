@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from sprag.engine.endings import Ending
 from sprag.engine.machine_shaft import transient_kernel as kernel
 from sprag.engine.machine_shaft.motor import characteristic, motor_torque
+from sprag.engine.machine_shaft.motor_tables import MotorTable
 from sprag.engine.machine_shaft.panels import COEFFICIENTS, INTEGRAL, RUNNING, SAMPLES, TAIL, WEIGHTS, apply
 from sprag.engine.machine_shaft.quadrature import product
 from sprag.engine.machine_shaft.transient_bench import Bench, Cycle
@@ -28,31 +29,36 @@ class Run:
         self.bench, self.course, self.before, self.after = bench, course, before, after
         panels, train = bench.panels, bench.machine.train
         self.cuts = np.ascontiguousarray(panels.cuts[0])
-        self.resistance = bench.resistance(course.load)
+        self.pieces = np.full((1, 6), np.inf)
         self.drive = np.zeros_like(bench.drive) if course.kind == "coasting" else bench.drive
         if course.kind == "run-up" and not bench.motor:
             torque = train.at_shaft(np.full((1, 1, 1), course.torque))
             self.drive = np.ascontiguousarray(np.broadcast_to(torque, bench.drive.shape))
         self.numbers = np.zeros(9)
-        self.numbers[kernel.FASTEST] = 1.0
+        self.numbers[kernel.FASTEST] = bench.fastest(before, after)
+        self.loads = bench.resistance(course.load, float(self.numbers[kernel.FASTEST]))
         self.numbers[kernel.FARTHEST] = course.angle + _TURN * course.revolutions
         if bench.motor and course.kind != "coasting":
             self._switch_on()
         self.state = self._begin()
         target = np.ones_like(self.drive) if after is None else after.energy
-        self.tables = bench.table(bench.fields.inertia, self.drive, target, self.resistance)
+        self.tables = bench.table(bench.fields.inertia, self.drive, target, *self.loads)
         if after is not None:
             self._aim(after)
 
     def _switch_on(self) -> None:
         names = {"linear": ("no_load_speed", "stall_torque"),
-                 "kloss": ("synchronous_speed", "breakdown_torque", "breakdown_slip")}  # fmt: skip
+                 "kloss": ("synchronous_speed", "breakdown_torque", "breakdown_slip"),
+                 "table": ("unit_speed", "scale")}  # fmt: skip
         kind = self.bench.model.drive.motor or "linear"
         own = {name: float(value[0, 0, 0]) for name, value in self.bench.motor.items()}
         self.numbers[kernel.KIND] = 1.0 + tuple(names).index(kind)
         self.numbers[kernel.EFFICIENCY] = own.get("efficiency", 1.0)
         for place, name in enumerate(names[kind], start=kernel.FIRST):
-            self.numbers[place] = own[name]
+            self.numbers[place] = own.get(name, 1.0)
+        motor = characteristic(self.bench.model.drive)
+        if isinstance(motor, MotorTable):
+            self.pieces = motor.pieces()
 
     def _begin(self) -> Floats:
         """The state at the start: at rest, or in the steady cycle before."""
@@ -84,7 +90,7 @@ class Run:
         totals[kernel.SPEED_MAX] = totals[kernel.SPEED_MIN] = start
         totals[kernel.TORQUE_MAX] = totals[kernel.POWER_MAX] = -np.inf
         status = kernel.follow(
-            self.cuts, self.tables, self.numbers, self.state.copy(), times, out, totals, RUNNING, WEIGHTS,
+            self.cuts, self.tables, self.numbers, self.pieces, self.state.copy(), times, out, totals, RUNNING, WEIGHTS,
             TAIL, COEFFICIENTS, _TO_INTEGRAL, SAMPLES,
         )  # fmt: skip
         return int(status), totals, out
@@ -134,18 +140,32 @@ class Run:
             most = standing
             if self.numbers[kernel.KIND] == 2.0 and self.numbers[kernel.THIRD] < 1.0:
                 most = float(self.numbers[kernel.SECOND] * self.numbers[kernel.EFFICIENCY])
+            elif self.numbers[kernel.KIND] == 3.0:
+                most = float(self._pull(np.linspace(0.0, self.numbers[kernel.FASTEST], 2001)).max())
+        resisting = self.load_at(np.zeros(self.drive.shape))
         friction = float(self.bench.row.row("friction_torque")[0])
         return Ends(
             angle=float(angle[0]),
             drive=standing,
             largest_drive=most,
-            resistance=float(bench.at(self.resistance, angle)[0]),
-            mean_resistance=float(bench.panels.integral(self.resistance)[0]) / bench.cycle,
+            resistance=float(bench.at(resisting, angle)[0]),
+            mean_resistance=float(bench.panels.integral(resisting)[0]) / bench.cycle,
             turns_back=float(bench.at(bench.passive, angle)[0]) + 2.0 * friction < 0.0,
             within=self.course.within,
             cycle=self.after is not None,
             no_cycle="" if ending is Ending.OK else ending.sentence,
         )
+
+    def load_at(self, omega: Floats, angle: Floats | None = None) -> Floats:
+        """Resisting torque at speeds: at the nodes, or at angles of that shape."""
+        z = 2.0 * omega / self.numbers[kernel.FASTEST] - 1.0
+        terms = self.loads if angle is None else [self.bench.at(own, angle) for own in self.loads]
+        before, now = np.ones_like(z), z
+        total = terms[0] + 0.0 * z
+        for own in terms[1:]:
+            total = total + own * now
+            before, now = now, 2.0 * z * now - before
+        return np.asarray(total)
 
     def _pull(self, omega: Floats) -> Floats:
         """Torque of the motor on the main shaft at speeds, shape (m,)."""
@@ -160,7 +180,7 @@ class Run:
         angle, u = np.mod(places[:, 0], bench.cycle), places[:, 1]
         inertia, slope = bench.at(bench.fields.inertia, angle), bench.at(bench.fields.slope, angle)
         omega = u / np.sqrt(inertia)
-        drive, resistance = bench.at(self.drive, angle) + self._pull(omega), bench.at(self.resistance, angle)
+        drive, resistance = bench.at(self.drive, angle) + self._pull(omega), self.load_at(omega, angle)
         acceleration = (drive + resistance - 0.5 * omega**2 * slope) / inertia
         energy = 0.5 * u * u
         return np.column_stack([places[:, 0], omega, acceleration, energy, inertia, drive, resistance, drive * omega])

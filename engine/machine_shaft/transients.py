@@ -3,23 +3,34 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.machine_shaft import transient_kernel as kernel
 from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.machine import Machine, check_structure
 from sprag.engine.machine_shaft.panels import Panels
-from sprag.engine.machine_shaft.problems import StructureError
-from sprag.engine.machine_shaft.simulate import attempts, settle
+from sprag.engine.machine_shaft.simulate import Solved, attempts, settle
 from sprag.engine.machine_shaft.spec import MachineSpec
 from sprag.engine.machine_shaft.transient_bench import Bench, Cycle
-from sprag.engine.machine_shaft.transient_causes import cause_of
+from sprag.engine.machine_shaft.transient_causes import ROUGH_LOAD, cause_of
 from sprag.engine.machine_shaft.transient_course import COLUMNS, RESULTS, Course, Transient
 from sprag.engine.machine_shaft.transient_run import OUTCOMES, Run
 from sprag.engine.outcome import Trajectory
 
+Floats = NDArray[np.float64]
+
+_NAMES, _UNITS = tuple(name for name, _ in COLUMNS), tuple(unit for _, unit in COLUMNS)
 _HALVINGS = 8
+
+
+def _speeds(solved: Solved, panels: Panels) -> Floats | None:
+    """Speeds of the case at the nodes of other panels; None where no torque follows the speed."""
+    if solved.omega is None or not np.isfinite(solved.decomposition.start[0]):
+        return None
+    own, angles = solved.decomposition.panels, panels.angles.ravel()
+    found = own.at_rows(solved.omega, np.zeros(len(angles), dtype=np.int64), own.locate(0, angles))
+    return np.ascontiguousarray(found.reshape(panels.angles.shape))
 
 
 def _bench(model: MachineSpec, row: Columns, course: Course) -> tuple[Bench | None, Cycle | None, Ending]:
@@ -36,7 +47,8 @@ def _bench(model: MachineSpec, row: Columns, course: Course) -> tuple[Bench | No
         return None, None, ending
     cuts = np.unique(d.panels.cuts[0])[None, :]
     for _ in range(_HALVINGS):
-        bench = Bench(model, row, Panels(cuts), float(d.start[0]))
+        panels = Panels(cuts)
+        bench = Bench(model, row, panels, float(d.start[0]), _speeds(solved, panels))
         after = bench.steady(course.load)
         if after is None:
             break
@@ -67,20 +79,16 @@ def transient(model: MachineSpec, columns: Mapping[str, ArrayLike], course: Cour
         If a machine without a motor is run up without a torque, or a parameter is missing or unknown.
     """
     check_structure(model)
-    if model.balance == "motor" and model.drive.motor == "table":
-        raise StructureError(
-            "Run-up, load steps and coasting are computed for linear and kloss motors, not for tables."
-        )
     if course.kind == "run-up" and model.balance != "motor" and course.torque is None:
         raise ValueError("the run-up of a machine without a motor needs a torque")
     row = Columns.of(model, columns, 1)
     bench, after, ending = _bench(model, row, course)
-    names, units = tuple(name for name, _ in COLUMNS), tuple(unit for _, unit in COLUMNS)
     if bench is None:
-        nothing = Trajectory(np.empty(0), names, units, np.empty((0, len(names))), {}, ending)
-        return Transient("no_motion", ending.sentence, {name: np.nan for name, *_ in RESULTS}, nothing)
+        return _nothing(ending, ending.sentence)
     before = None if course.kind == "run-up" else bench.steady(1.0)
     run = Run(bench, course, before, None if course.kind == "coasting" else after)
+    if not run.loads:
+        return _nothing(ending, ROUGH_LOAD)
     status, totals, _ = run.follow(np.empty(0))
     times = np.linspace(0.0, totals[kernel.TIME], points)
     _, _, places = run.follow(times)
@@ -89,4 +97,10 @@ def transient(model: MachineSpec, columns: Mapping[str, ArrayLike], course: Cour
     outcome = OUTCOMES[status]
     results = run.results(outcome, totals)
     cause = cause_of(course.kind, outcome, results, run.ends(totals, ending))
-    return Transient(outcome, cause, results, Trajectory(times, names, units, run.values(places), {}, ending))
+    return Transient(outcome, cause, results, Trajectory(times, _NAMES, _UNITS, run.values(places), {}, ending))
+
+
+def _nothing(ending: Ending, cause: str) -> Transient:
+    """The answer where there is no motion."""
+    motion = Trajectory(np.empty(0), _NAMES, _UNITS, np.empty((0, len(_NAMES))), {}, ending)
+    return Transient("no_motion", cause, {name: np.nan for name, *_ in RESULTS}, motion)

@@ -15,6 +15,7 @@ from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.machine import Machine
 from sprag.engine.machine_shaft.motor import motor_torque
 from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
+from sprag.engine.machine_shaft.tables import Table
 from sprag.engine.machine_shaft.transient_course import COLUMNS, RESULTS, Course, Transient
 from sprag.engine.machine_shaft.transients import transient
 from tests.engine.machine_shaft.machines import PRESS, PRESS_NUMBERS
@@ -181,6 +182,41 @@ def test_the_steady_cycle_is_that_of_the_case() -> None:
     late = made.motion.times > made.motion.times[-1] - TURN / made.results["after.omega.mean"]
     spread = np.ptp(column(made, "omega")[late]) / made.results["after.omega.mean"]
     assert spread == pytest.approx(made.results["after.irregularity"], rel=1e-2)
+
+
+def test_a_measured_motor_is_a_linear_one_where_it_is_straight() -> None:
+    table = Table(((0.0, 50.0), (60.0, 20.0), (100.0, 0.0), (120.0, -10.0)), "linear")
+    spec = MachineSpec(balance="motor", drive=Drive(motor="table", table=table, stages=("gear",)))
+    numbers = {"drive.inertia": 8.0, "drive.stages.0.ratio": 2.0, "drive.stages.0.efficiency": 0.9}
+    made = run(spec, numbers, Course("run-up", within=0.02))
+    decay = 8.0 * 50.0 / (50.0 * 2.0 * 0.9)
+    assert made.results["time"] == pytest.approx(-decay * math.log(0.02), rel=1e-10)
+    speeds = 50.0 * (1.0 - np.exp(-made.motion.times / decay))
+    assert np.max(np.abs(column(made, "omega") - speeds)) < 1e-8
+    assert np.max(np.abs(column(made, "acceleration") - 50.0 / decay * np.exp(-made.motion.times / decay))) < 1e-7
+    assert made.results["motor.torque.max"] == pytest.approx(50.0, rel=1e-10)
+
+
+def test_loads_that_follow_the_speed() -> None:
+    """A viscous brake on a linear motor, and a fan that slows down the shaft by the angle, never quite to rest."""
+    viscous = replace(LINEAR, operation=OperationChoice("torque", "formula", formula="0.125*omega"))
+    made = run(viscous, LINEAR_NUMBERS, Course("load-step", load=3.0, within=0.1))
+    before, after, decay = 50.0 / 0.625, 50.0 / 0.875, 2.0 / 0.875
+    assert made.results["before.omega.mean"] == pytest.approx(before, rel=1e-10)
+    assert made.results["after.omega.mean"] == pytest.approx(after, rel=1e-10)
+    assert made.results["time"] == pytest.approx(-decay * math.log(0.1), rel=1e-9)
+    speeds = after + (before - after) * np.exp(-made.motion.times / decay)
+    assert np.max(np.abs(column(made, "omega") - speeds)) < 1e-8
+    assert np.max(np.abs(column(made, "resisting_torque") + 0.375 * speeds)) < 1e-8
+    fan = MachineSpec(operation=OperationChoice("torque", "formula", formula="0.01*omega^2"))
+    slowed = run(fan, {"mean_speed": 30.0, "drive.inertia": 2.0}, Course("coasting", revolutions=20.0))
+    speeds = 30.0 * np.exp(-0.01 / 2.0 * column(slowed, "angle"))
+    assert np.max(np.abs(column(slowed, "omega") - speeds)) < 1e-8
+    assert slowed.outcome == "not_reached"
+    rough = replace(fan, operation=OperationChoice("torque", "formula", formula="max(omega, 20)"))
+    refused = transient(rough, {"mean_speed": 30.0, "drive.inertia": 2.0}, Course("coasting"), 5)
+    assert refused.outcome == "no_motion"
+    assert "not smooth in the speed" in refused.cause
 
 
 def test_each_stall_has_its_own_cause() -> None:
