@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sprag.service.cli.console import ExitCode, WrongInputError, say, write_json, wrong_option
-from sprag.service.cli.files import is_json, output, read_study, require_cases, to_file
+from sprag.service.cli.console import ExitCode, say, write_json
+from sprag.service.cli.files import is_json, output, to_file
 from sprag.service.cli.local import ValueFormat
+from sprag.service.cli.motions import StartOption, naming_options, study_of
 from sprag.service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
-from sprag.service.faults import Fault, FaultError
 from sprag.service.json_text import to_bytes
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ def branch(
     high: Annotated[
         str | None, typer.Option("--to", metavar="VALUE", help="End of the range; default: that of its axis.")
     ] = None,
+    start: StartOption = None,
     points: PointsFile = None,
     file: OutputFile = None,
     form: Annotated[
@@ -38,14 +39,15 @@ def branch(
     as_json: JsonFlag = False,
 ) -> None:
     """Follow the periodic motion of one case along a parameter: stable and unstable, folds, doublings, grazings."""
-    from sprag.service.results.branches import branch_csv, branch_json
+    from sprag.service.results.branches import along_of, branch_csv, branch_json
     from sprag.worker.models.branches import run_branch
+    from sprag.worker.models.starts import motion_of
 
-    study = read_study(spec, points).study
-    require_cases(study, [case])
-    asked = _along(study, case, along, low, high)
+    study = study_of(spec, points, case, start)
+    with naming_options(study):
+        asked = along_of(study, case, along, low, high)
     with output(file) as write:
-        made = run_branch(study, case, asked)
+        made = run_branch(*motion_of(study, case, start), asked)
         written = is_json(file, as_json) if form is None else form is ValueFormat.JSON
         content = to_bytes(branch_json(made, study, case, asked)) + b"\n" if written else branch_csv(made, asked)
         write(content)
@@ -54,21 +56,6 @@ def branch(
         write_json({"file": file, "case": case, "points": len(made.parameters), "specials": len(made.specials)})
     if made.note:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
-
-
-def _along(study: Study, case: int, along: str, low: str | None, high: str | None) -> Along:
-    from sprag.service.results.branches import along_of
-
-    try:
-        return along_of(study, case, along, low, high)
-    except FaultError as error:
-        if not error.faults:
-            raise wrong_option("/model", "wrong-type", "has no strobes", study.model, detail=error.detail) from error
-        raise WrongInputError("invalid-parameter", "invalid option", tuple(map(_option, error.faults))) from error
-
-
-def _option(fault: Fault) -> Fault:
-    return Fault(f"--{fault.where}", fault.code, fault.message, fault.value, fault.allowed)
 
 
 def _report(made: CaseBranch, study: Study, asked: Along, case: int) -> None:

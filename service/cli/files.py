@@ -103,8 +103,10 @@ def read_spec(path: str, points: str | None = None, limit: int = MAX_DATA_BYTES)
     return {**rest, "axes": [{"points": decode(points, read_bytes(points, limit))}]}
 
 
-def read_study(path: str, points: str | None = None) -> ParsedSpec:
+def read_study(path: str, points: str | None = None, change: Callable[[object], object] | None = None) -> ParsedSpec:
     """The checked study of a spec file, with the cases in ``points`` if given (see `read_spec`).
+
+    ``change`` completes the spec before it is read further; its SpecError is reported like the others.
 
     Raises WrongInputError with every problem found.
     """
@@ -113,7 +115,7 @@ def read_study(path: str, points: str | None = None) -> ParsedSpec:
     data = read_spec(path, points)
     with naming_points(points):
         try:
-            return parse_spec(data)
+            return parse_spec(data if change is None else change(data))
         except SpecError as error:
             raise spec_failure(path, error) from error
 

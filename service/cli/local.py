@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import UTC, datetime
 from enum import StrEnum
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -100,7 +102,7 @@ def preview(
     finish = _finish(finish_by)
     left = None if finish is None else (finish - datetime.now(UTC)).total_seconds()
     settings = read_settings(database=db, processes=processes)
-    parsed = read_study(spec, points)
+    parsed = read_study(spec, points, partial(_with_start, settings) if db is not None else None)
     reusable = 0 if db is None else _reusable(settings, parsed)
     chunking = Chunking(0, settings.pool_processes, settings.chunk_timeout)
     made = preview_json(parsed, chunking, reusable, left, _START_SECONDS)
@@ -254,8 +256,8 @@ def run(
     from sprag.service.results.unaffected import Unaffected
 
     finish = _finish(finish_by)
-    parsed = read_study(spec, points)
     settings = read_settings(database=db, processes=processes, chunk_cases=chunk)
+    parsed = read_study(spec, points, partial(_with_start, settings) if db is not None else None)
     _say_warnings(parsed)
     start = time.monotonic()
     with (
@@ -292,6 +294,19 @@ def run(
         say(str(record.reason))
     if record.ok != record.cases:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
+
+
+def _with_start(settings: Settings, spec: object) -> object:
+    """The spec with the initial values of the case in the database from whose end it starts, if it names one."""
+    from sprag.service.jobs.start_from import with_start
+    from sprag.service.spec.machine.drive import START
+    from sprag.service.storage.store import Store
+
+    base = spec.get("base") if isinstance(spec, Mapping) else None
+    if not (isinstance(base, Mapping) and START in base):
+        return spec
+    with Store.open(settings.database_url) as store:
+        return with_start(store, spec)
 
 
 def _remark(now: Progress, finish_by: str | None) -> str:

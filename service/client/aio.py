@@ -13,25 +13,23 @@ from typing import TYPE_CHECKING, Any, cast
 import httpx
 
 from sprag.service.client.batches import Ribbon, Yield
+from sprag.service.client.cases import AsyncCaseAnswers
 from sprag.service.client.errors import ServiceError, UnreachableError
 from sprag.service.client.frames import Curves, grid_of, table_of
 from sprag.service.client.queries import (
     Progressing,
     Value,
-    branch_query,
     case_query,
     curve_query,
     extension,
     finish_text,
     form_of,
     front_query,
-    given,
     longer_query,
     reporting,
     result_query,
     ribbon_query,
     spec_of,
-    transient_query,
     yield_query,
 )
 from sprag.service.client.study import DEFAULT_SERVER
@@ -43,12 +41,10 @@ from sprag.service.client.wire import (
     Query,
     connection_options,
     document,
-    engagements_path,
     is_event,
     reason,
     refusal,
     require_finite,
-    strobes_path,
     study_path,
     within,
 )
@@ -62,10 +58,8 @@ if TYPE_CHECKING:
 
     from sprag.service.answers.calibration import CalibrationReport
     from sprag.service.answers.goals import FrontReport
-    from sprag.service.answers.results import Branch, Case
-    from sprag.service.answers.sections import Sections
+    from sprag.service.answers.results import Case
     from sprag.service.answers.studies import Preview, StudyDetail, StudySummary
-    from sprag.service.answers.transients import Transient
     from sprag.service.client.queries import Spec
 
 
@@ -172,7 +166,7 @@ class AsyncClient:
             token = [("page_token", page["next_page_token"])]
 
 
-class AsyncStudy:
+class AsyncStudy(AsyncCaseAnswers):
     """One study of the service."""
 
     def __init__(self, client: AsyncClient, study_id: str) -> None:
@@ -225,13 +219,16 @@ class AsyncStudy:
         *,
         by: str | Sequence[str] = (),
         at: Mapping[str, Value] | None = None,
+        number: int | None = None,
     ) -> Curves:
         """Results against one axis, as `Study.curves` gives them."""
-        return Curves(cast("Any", await self._get("/curves", curve_query(x, y, by, at))))
+        return Curves(cast("Any", await self._get("/curves", curve_query(x, y, by, at, number))))
 
-    async def map(self, x: str, y: str, z: str, *, at: Mapping[str, Value] | None = None) -> dict[str, Any]:
+    async def map(
+        self, x: str, y: str, z: str, *, at: Mapping[str, Value] | None = None, number: int | None = None
+    ) -> dict[str, Any]:
         """One result ``z`` over two axes."""
-        return await self._get("/map", [*curve_query(x, y, (), at), ("z", z)])
+        return await self._get("/map", [*curve_query(x, y, (), at, number), ("z", z)])
 
     async def sensitivity(self, y: str | Sequence[str]) -> dict[str, Any]:
         """Main effects of every axis on results, and shares of their variance."""
@@ -269,56 +266,8 @@ class AsyncStudy:
         """The designs of a study with a goal, as `Study.front` gives them."""
         return cast("FrontReport", await self._get("/front", front_query(limit, exact)))
 
-    async def engagements(self, case: int) -> dict[str, Any]:
-        """Every engagement of the clutches of one case, as `Study.engagements` gives them."""
-        return await self._client.request("GET", engagements_path(self.id, case))
-
-    async def strobes(self, case: int) -> dict[str, Any]:
-        """The state of one case once per excitation period, and its orbit, as `Study.strobes` gives them."""
-        return await self._client.request("GET", strobes_path(self.id, case))
-
-    async def branch(self, case: int, along: str, low: Value | None = None, high: Value | None = None) -> Branch:
-        """The branch of periodic motions through that of one case, as `Study.branch` gives it."""
-        return cast("Branch", await self._get(f"/cases/{case:d}/branch", branch_query(along, low, high)))
-
-    async def transient(
-        self,
-        case: int,
-        kind: str,
-        *,
-        load: Value | None = None,
-        angle: Value | None = None,
-        torque: Value | None = None,
-        within: Value | None = None,
-        revolutions: Value | None = None,
-        points: int | None = None,
-    ) -> Transient:
-        """The run-up, a load step or the coasting of one case, as `Study.transient` gives it."""
-        query = transient_query(
-            kind, points, load=load, angle=angle, torque=torque, within=within, revolutions=revolutions
-        )
-        return cast("Transient", await self._get(f"/cases/{case:d}/transient", query))
-
-    async def diagram(
-        self,
-        case: int,
-        along: str,
-        low: Value | None = None,
-        high: Value | None = None,
-        *,
-        phase: Value | None = None,
-        points: int | None = None,
-        strobes: int | None = None,
-    ) -> Sections:
-        """The bifurcation diagram of one case, as `Study.diagram` gives it."""
-        query = branch_query(along, low, high, phase=phase, points=points, strobes=strobes)
-        return cast("Sections", await self._get(f"/cases/{case:d}/diagram", query))
-
-    async def section(self, case: int, phase: Value | None = None, strobes: int | None = None) -> Sections:
-        """The Poincare section of one case, as `Study.section` gives it."""
-        return cast(
-            "Sections", await self._get(f"/cases/{case:d}/section", given({"phase": phase, "strobes": strobes}))
-        )
+    async def _of_case(self, case: int, part: str = "", query: Query = ()) -> dict[str, Any]:
+        return await self._get(f"/cases/{case:d}{part}", query)
 
     async def cases(
         self, *, ending: str | None = None, regime: str | None = None, flag: str | None = None

@@ -21,14 +21,12 @@ from sprag.service.client.wire import (
     case_path,
     connection_options,
     document,
-    engagements_path,
     front_path,
     is_event,
     reason,
     refusal,
     require_finite,
     schedule_path,
-    strobes_path,
     study_path,
     within,
 )
@@ -151,16 +149,8 @@ class ServiceClient:
                 return
             token = [("page_token", page["next_page_token"])]
 
-    def engagements(self, study_id: str, case: int) -> dict[str, Any]:
-        """The engagements of the clutches of one case, and the means of its excitation periods."""
-        return self._json("GET", engagements_path(study_id, case))
-
-    def strobes(self, study_id: str, case: int) -> dict[str, Any]:
-        """The state of one case once per excitation period, and its orbit."""
-        return self._json("GET", strobes_path(study_id, case))
-
     def of_case(self, study_id: str, case: int, part: str, query: Query) -> dict[str, Any]:
-        """A part of one case: the "branch" or "diagram" of its motion along a parameter, or its "section"."""
+        """One case, or a part of it, such as "/branch"."""
         return self._json("GET", case_path(study_id, case, part), params=list(query))
 
     def download(self, path: str, query: Query = ()) -> Iterator[bytes]:

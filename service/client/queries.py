@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from sprag.service.answers.studies import StudyDetail
 
 Value = float | int | str
+Ends = tuple[Value, Value]
 Spec = Mapping[str, Any]
 
 
@@ -49,7 +50,11 @@ def spec_of(spec: Spec | str | PathLike[str]) -> Spec:
 
 
 def curve_query(
-    x: str | None, y: str | Sequence[str], by: str | Sequence[str], at: Mapping[str, Value] | None
+    x: str | None,
+    y: str | Sequence[str],
+    by: str | Sequence[str],
+    at: Mapping[str, Value] | None,
+    number: int | None = None,
 ) -> list[tuple[str, str]]:
     """Query of curves: ``at`` maps paths to values, SI numbers or texts with a unit."""
     query = [
@@ -57,7 +62,8 @@ def curve_query(
         *(("y", name) for name in _listed(y)),
         *(("by", path) for path in _listed(by)),
     ]
-    return query + [("at", f"{path}={value}") for path, value in (at or {}).items()]
+    query += [("at", f"{path}={value}") for path, value in (at or {}).items()]
+    return query + given({"number": number})
 
 
 def ribbon_query(
@@ -103,6 +109,18 @@ def branch_query(along: str, low: Value | None, high: Value | None, **more: Valu
 def transient_query(kind: str, points: int | None, **settings: Value | None) -> list[tuple[str, str]]:
     """Query of a transient; None leaves a parameter to the service."""
     return [("kind", kind), *given({**settings, "points": points})]
+
+
+def basin_query(
+    x: str | None, y: str | None, x_range: Ends | None, y_range: Ends | None, points: int | None
+) -> list[tuple[str, str]]:
+    """Query of a basin; None leaves a parameter to the service."""
+    ends = {
+        f"{name}_{place}": value
+        for name, values in (("x", x_range), ("y", y_range))
+        for place, value in zip(("from", "to"), values or (None, None), strict=True)
+    }
+    return given({"x": x, "y": y, **ends, "points": points})
 
 
 def given(query: Mapping[str, Value | None]) -> list[tuple[str, str]]:

@@ -8,24 +8,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from sprag.service.client.batches import Ribbon, Yield
+from sprag.service.client.cases import CaseAnswers
 from sprag.service.client.frames import Curves, grid_of, table_of
 from sprag.service.client.plain import ServiceClient
 from sprag.service.client.queries import (
     Progressing,
     Value,
-    branch_query,
     case_query,
     curve_query,
     extension,
     finish_text,
     form_of,
     front_query,
-    given,
     reporting,
     result_query,
     ribbon_query,
     spec_of,
-    transient_query,
     yield_query,
 )
 from sprag.service.client.waiting import Waiting, wait_for
@@ -40,11 +38,10 @@ if TYPE_CHECKING:
 
     from sprag.service.answers.calibration import CalibrationReport
     from sprag.service.answers.goals import FrontReport
-    from sprag.service.answers.results import Branch, Case
-    from sprag.service.answers.sections import Sections
+    from sprag.service.answers.results import Case
     from sprag.service.answers.studies import Preview, StudyDetail, StudySummary
-    from sprag.service.answers.transients import Transient
     from sprag.service.client.queries import Spec
+    from sprag.service.client.wire import Query
 
 DEFAULT_SERVER = "http://127.0.0.1:8000"
 
@@ -112,7 +109,7 @@ class Client:
         return cast("Iterator[StudySummary]", self.plain.studies([("state", state)] if state else []))
 
 
-class Study:
+class Study(CaseAnswers):
     """One study of the service. ``id`` is its public name."""
 
     def __init__(self, client: Client, study_id: str) -> None:
@@ -150,16 +147,20 @@ class Study:
         *,
         by: str | Sequence[str] = (),
         at: Mapping[str, Value] | None = None,
+        number: int | None = None,
     ) -> Curves:
         """Results ``y`` against axis ``x``, a curve for each value of the axes ``by``, others held ``at`` values.
 
-        Without ``x`` or ``y``, the curves that the page of the study shows first.
+        ``number`` is that of the regime in cases with many starts, by default 0, the most frequent one. Without ``x``
+        or ``y``, the curves that the page of the study shows first.
         """
-        return Curves(cast("Any", self._client.plain.drawn(self.id, "curves", curve_query(x, y, by, at))))
+        return Curves(cast("Any", self._client.plain.drawn(self.id, "curves", curve_query(x, y, by, at, number))))
 
-    def map(self, x: str, y: str, z: str, *, at: Mapping[str, Value] | None = None) -> dict[str, Any]:
-        """One result ``z`` over two axes."""
-        query = [*curve_query(x, y, (), at), ("z", z)]
+    def map(
+        self, x: str, y: str, z: str, *, at: Mapping[str, Value] | None = None, number: int | None = None
+    ) -> dict[str, Any]:
+        """One result ``z`` over two axes; ``number`` is that of the regime, as for `curves`."""
+        query = [*curve_query(x, y, (), at, number), ("z", z)]
         return self._client.plain.drawn(self.id, "map", query)
 
     def sensitivity(self, y: str | Sequence[str]) -> dict[str, Any]:
@@ -219,84 +220,8 @@ class Study:
         """
         return cast("FrontReport", self._client.plain.front(self.id, front_query(limit, exact)))
 
-    def engagements(self, case: int) -> dict[str, Any]:
-        """Every engagement of the clutches of one case ("engagements"), and the means of its "periods"."""
-        return self._client.plain.engagements(self.id, case)
-
-    def strobes(self, case: int) -> dict[str, Any]:
-        """The state of one case once per excitation period ("strobes"), and its "orbit" if it has one."""
-        return self._client.plain.strobes(self.id, case)
-
-    def branch(self, case: int, along: str, low: Value | None = None, high: Value | None = None) -> Branch:
-        """The branch of periodic motions through that of one case, stable and unstable, with its special points.
-
-        Parameters
-        ----------
-        case : int
-        along : str
-            Path of the parameter, such as "shaft.load"; several joined by commas get one value.
-        low, high : float or str, optional
-            Range of the parameter, SI numbers or texts with a unit; by default the ends of its axis.
-        """
-        return cast("Branch", self._client.plain.of_case(self.id, case, "branch", branch_query(along, low, high)))
-
-    def transient(
-        self,
-        case: int,
-        kind: str,
-        *,
-        load: Value | None = None,
-        angle: Value | None = None,
-        torque: Value | None = None,
-        within: Value | None = None,
-        revolutions: Value | None = None,
-        points: int | None = None,
-    ) -> Transient:
-        """The "run-up", a "load-step" or the "coasting" of one machine shaft over time, with its results and cause.
-
-        Parameters
-        ----------
-        case : int
-        kind : str
-        load : float or str, optional
-            Factor on the torque of all operations during it; a load step needs it.
-        angle, torque : float or str, optional
-            Angle at the start and driving torque of a run-up, SI numbers or texts with a unit.
-        within : float or str, optional
-            Share of the first difference in speed at which the steady cycle counts as reached.
-        revolutions : float or str, optional
-            Most revolutions that are computed.
-        points : int, optional
-            Equally spaced times.
-        """
-        query = transient_query(
-            kind, points, load=load, angle=angle, torque=torque, within=within, revolutions=revolutions
-        )
-        return cast("Transient", self._client.plain.of_case(self.id, case, "transient", query))
-
-    def diagram(
-        self,
-        case: int,
-        along: str,
-        low: Value | None = None,
-        high: Value | None = None,
-        *,
-        phase: Value | None = None,
-        points: int | None = None,
-        strobes: int | None = None,
-    ) -> Sections:
-        """The bifurcation diagram of one case: strobes of its settled motions at ``points`` values of a parameter.
-
-        ``along``, ``low`` and ``high`` are as of `branch`; ``phase`` is that of the excitation, in rad or a text with a
-        unit; ``strobes`` is the most for each motion.
-        """
-        query = branch_query(along, low, high, phase=phase, points=points, strobes=strobes)
-        return cast("Sections", self._client.plain.of_case(self.id, case, "diagram", query))
-
-    def section(self, case: int, phase: Value | None = None, strobes: int | None = None) -> Sections:
-        """The Poincare section of one case: strobes of its settled motion at a phase of the excitation."""
-        query = given({"phase": phase, "strobes": strobes})
-        return cast("Sections", self._client.plain.of_case(self.id, case, "section", query))
+    def _of_case(self, case: int, part: str = "", query: Query = ()) -> dict[str, Any]:
+        return self._client.plain.of_case(self.id, case, part, query)
 
     def cases(self, *, ending: str | None = None, regime: str | None = None, flag: str | None = None) -> Iterator[Case]:
         """Every finished case in order of the numbers, or those with an ending, a regime and a flag only."""

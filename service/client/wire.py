@@ -86,11 +86,6 @@ def study_path(study_id: str) -> str:
     return f"/studies/{quote(study_id, safe='')}"
 
 
-def engagements_path(study_id: str, case: int) -> str:
-    """Address of the engagements of a case under the API."""
-    return f"{study_path(study_id)}/cases/{case:d}/engagements"
-
-
 def calibration_path(study_id: str) -> str:
     """The path of what a calibration has found."""
     return f"{study_path(study_id)}/calibration"
@@ -101,14 +96,9 @@ def front_path(study_id: str) -> str:
     return f"{study_path(study_id)}/front"
 
 
-def strobes_path(study_id: str, case: int) -> str:
-    """Address of the strobes of a case under the API."""
-    return f"{study_path(study_id)}/cases/{case:d}/strobes"
-
-
 def case_path(study_id: str, case: int, part: str) -> str:
-    """Address of a part of a case under the API, such as its branch."""
-    return f"{study_path(study_id)}/cases/{case:d}/{part}"
+    """Address of a case under the API, or of a part of it, such as "/branch"."""
+    return f"{study_path(study_id)}/cases/{case:d}{part}"
 
 
 def schedule_path(schedule_id: str) -> str:

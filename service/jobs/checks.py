@@ -5,6 +5,8 @@ Their answers are small, or bytes ready to be sent or stored, so that the servic
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -21,12 +23,13 @@ from sprag.service.spec.document import load_spec, parse_spec
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.longer import longer_spec
 from sprag.service.spec.machine.shaft_check import compile_elsewhere
+from sprag.service.spec.report import SpecError
 from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.pool.child_process import uncounted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
     from datetime import datetime
 
     from sprag.service.spec.text import Format
@@ -134,9 +137,11 @@ def clutch_fit(content: bytes, form: Format) -> bytes:
     return to_bytes(fit_json(read_fit(load_spec(content, form))))
 
 
-def schedule_body(content: bytes, form: Format, now: datetime, old: ScheduleFields | None = None) -> ScheduleFields:
+def schedule_body(
+    library: Library, content: bytes, form: Format, now: datetime, old: ScheduleFields | None = None
+) -> ScheduleFields:
     """`schedule_fields` of the body of a request."""
-    return schedule_fields(load_spec(content, form), now, old)
+    return schedule_fields(library, load_spec(content, form), now, old)
 
 
 def body_hash(content: bytes, form: Format) -> str:
@@ -144,6 +149,14 @@ def body_hash(content: bytes, form: Format) -> str:
     return hash_of(load_spec(content, form))
 
 
-def schedule_fields(data: object, now: datetime, old: ScheduleFields | None = None) -> ScheduleFields:
-    """The fields of a new schedule, or of an ``old`` one with changes; raises SpecError."""
+def schedule_fields(library: Library, data: object, now: datetime, old: ScheduleFields | None = None) -> ScheduleFields:
+    """The fields of a new schedule, or of an ``old`` one with changes; raises SpecError.
+
+    Its studies start from the end of a case as it is now: the schedule stays complete when that study is deleted.
+    """
+    if isinstance(data, Mapping) and "spec" in data:
+        try:
+            data = {**data, "spec": with_start(library.store, data["spec"])}
+        except SpecError as error:
+            raise SpecError(replace(fault, where=f"/spec{fault.where}") for fault in error.faults) from error
     return read_fields(data, now) if old is None else change_fields(old, data, now)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from sprag.service.spec.fields import read_object, read_whole
 from sprag.service.spec.machine.drive import START
-from sprag.service.spec.machine.shaft_check import NotCompiledError
+from sprag.service.spec.machine.shaft_check import NotCompiledError, compiles_here
 from sprag.service.spec.report import Report
 from sprag.service.storage.errors import StudyNotFoundError
 from sprag.worker import models
@@ -24,7 +24,7 @@ _POINTER = f"/base/{START}"
 def with_start(store: Store, data: Any) -> Any:
     """The spec ``data`` with the initial values that go on from the case that its `base.start` names; else unchanged.
 
-    Raises SpecError, and NotCompiledError where the kernel for that case has to be compiled first.
+    Raises SpecError, and NotCompiledError where the kernel for that case has to be compiled first, elsewhere.
     """
     base = data.get("base") if isinstance(data, Mapping) else None
     if not isinstance(base, Mapping) or START not in base:
@@ -35,7 +35,7 @@ def with_start(store: Store, data: Any) -> Any:
     assert source is not None
     study, case = source
     shape = models.shape_of(study)
-    if not models.is_compiled(shape):
+    if not (compiles_here() or models.is_compiled(shape)):
         raise NotCompiledError(shape)
     values = models.run_end_state(study, case)
     if values is None:

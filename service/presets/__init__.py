@@ -32,6 +32,10 @@ ABOUT: Final[dict[str, About]] = {
         "are accurate to within 1 %",
         "the rig of one_pendulum",
     ),
+    "two_motions": About(
+        "two motions at one load: up and down differ where the frequency rises and falls through 16.25 to 16.5 Hz",
+        "the rig of one_pendulum with a load of 0.4 N*m",
+    ),
     "press": About(
         "a crank press whose irregularity falls with the flywheel; too little inertia at low speed is an ending of its "
         "own",

@@ -137,7 +137,9 @@ def _made(context: Context, record: ScheduleRecord) -> Response:
 
 async def _fields(context: Context, work: Work, received: Body, old: ScheduleFields | None) -> ScheduleFields:
     with _told():
-        return await work.check(checks.schedule_body, received.content, received.format, context.store.clock.now(), old)
+        return await work.check(
+            checks.schedule_body, context.library, received.content, received.format, context.store.clock.now(), old
+        )
 
 
 @contextmanager

@@ -92,7 +92,7 @@ async def _save(context: Context, work: Work, values: Values, schedule_id: str |
     faults: dict[str, list[str]] = {}
     try:
         data, old = await run_in_threadpool(_asked, context, values, schedule_id)
-        fields = await work.check(checks.schedule_fields, data, now, old)
+        fields = await work.check(checks.schedule_fields, work.context.library, data, now, old)
         if schedule_id is None:
             await run_in_threadpool(context.store.create_schedule, fields)
         else:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 PENDULUMS = Listed("pendulums", 1, MAX_PENDULUMS)
 #: Field of the base that a service replaces by the initial values that go on from the end of a case.
 START = "start"
+_WHERE_STARTS = "submission to that service, or `sprag run --db` with its database"
 _PENDULUM_PATH = re.compile(r"pendulums\.([0-9]{1,9})\.(.+)")
 _CLUTCH_PATH = re.compile(r"(?:pendulums\.[0-9]{1,9}\.)?clutch\.(.+)")
 
@@ -89,7 +90,13 @@ def read_drive(report: Report, data: object) -> Drive:
         return machine
     if START in found:
         message = "refers to a study of a service, which replaces it by initial values"
-        report.fault(f"/base/{START}", "not-used", message, found[START], allowed="submission to that service")
+        report.fault(
+            f"/base/{START}",
+            "not-used",
+            message,
+            found[START],
+            allowed=_WHERE_STARTS,
+        )
     for section in sections:
         entries = [entry for entry in catalogue if entry.path.split(".")[0] == section]
         pointer = join("/base", section)

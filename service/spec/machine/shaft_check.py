@@ -49,6 +49,11 @@ def compile_elsewhere() -> None:
     _compiles_here = False
 
 
+def compiles_here() -> bool:
+    """Whether checks in this process compile the kernels that they need."""
+    return _compiles_here
+
+
 @cache
 def _load(shape: KernelShape) -> None:
     """Load the kernels from the cache on disk, once per process, outside the time limit of any spec."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from datetime import UTC, datetime
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 
 from sprag.service.http.api.schedules import EXAMPLE
 from sprag.service.jobs.scheduler import Scheduler
+from sprag.worker import models
 from tests.service.conftest import Service
 from tests.service.schedules.conftest import Clock
 from tests.service.timed_spec import SPEC
@@ -36,6 +38,26 @@ def test_the_interface_keeps_changes_disables_and_deletes(service: Service, cloc
     assert service.http.get(address).status_code == 404
     assert service.http.patch(address, json={}).status_code == 404
     assert service.get("/schedules") == {"schedules": []}
+
+
+def test_studies_of_a_schedule_start_from_the_end_of_a_case(
+    service: Service, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(models, "run_end_state", lambda *_: {"shaft.initial_speed": 2.5})
+    monkeypatch.setattr(models, "is_compiled", lambda _: True)
+    spec: dict[str, Any] = copy.deepcopy(SPEC)
+    spec["base"]["start"] = {"study": service.submit(), "case": 0}
+    spec["base"]["shaft"].pop("initial_speed", None)
+    made = service.http.post(API, json={"spec": spec, "at": "2026-01-01T02:00"})
+    assert made.status_code == 201, made.text
+    base = made.json()["spec"]["base"]
+    assert (base["shaft"]["initial_speed"], "start" in base) == (2.5, False)
+    clock.set("2026-01-01T02:00")
+    Scheduler(service.store).look()
+    assert [study["name"] for study in service.get("/studies")["studies"]].count(SPEC["name"]) == 2
+    spec["base"]["start"]["case"] = 10**6
+    wrong = service.http.post(API, json={"spec": spec, "at": "2026-01-01T03:00"})
+    assert (wrong.status_code, wrong.json()["errors"][0]["pointer"]) == (422, "/spec/base/start/case")
 
 
 def test_the_same_key_keeps_a_schedule_once(service: Service, clock: Clock) -> None:

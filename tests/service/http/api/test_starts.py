@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sprag.service.client import Client
 from sprag.service.faults import FaultError
 from sprag.service.http.problems import ApiError
 from sprag.service.results import basins
@@ -21,7 +22,7 @@ from sprag.worker import models
 from sprag.worker.models import Basin, ChunkResult, FurtherRows
 from sprag.worker.models.starts import motion_of
 from sprag.worker.study import Study
-from tests.service.conftest import API, Service
+from tests.service.conftest import API, PortalTransport, Service
 from tests.service.timed_spec import SPEC
 
 SPEED = "shaft.initial_speed"
@@ -188,6 +189,26 @@ def test_a_study_begins_at_the_end_of_a_case(service: Service, started: str, mon
     spec["base"]["shaft"]["initial_speed"] = 1
     answer = service.http.post(f"{API}/studies", json=spec)
     assert [fault["pointer"] for fault in answer.json()["errors"]] == ["/base/shaft/initial_speed"]
+
+
+def test_the_client_has_the_motions_of_a_case(
+    service: Service, started: str, portal: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(basins, "basin_of", _basin)
+    y = "pendulums.0.initial_angle"
+    with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
+        study = client.study(started)
+        one, two = study.regimes(1)
+        assert (one["number"], two["results"]["regime.start"]) == (0, 5)
+        grid = study.basin(1, y=y, y_range=("-10 deg", 0.2), points=2)
+        assert (grid["x"], grid["numbers"], grid["y_values"][1]) == (SPEED, [[0, 1], [0, -1]], 0.2)
+        curves = study.curves("shaft.load", "shaft.speed.mean", number=1)
+        assert curves.data["curves"][0]["y"]["shaft.speed.mean"] == [None, 3.5]
+        service.computer.answer = lambda *_: b"{}"
+        values = service.store.study(started).run["starts"]["values"][SPEED]
+        for call in (study.strobes, study.engagements, study.section):
+            call(1, start=5)
+            assert 5 in service.computer.calls[-1] or service.computer.calls[-1][1].base[SPEED] == values[4]
 
 
 def _basin(study: Study, case: int, query: BasinQuery) -> Basin:
