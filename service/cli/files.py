@@ -8,13 +8,14 @@ import glob
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Literal, cast
 
 from sprag.service.cli.console import CommandFailureError, TroubleError, WrongInputError, wrong_option
+from sprag.service.cli.table_files import named, with_tables
 from sprag.service.faults import Fault, Kind
 from sprag.service.spec.report import SpecError
 from sprag.service.stale_files import mark, sweep
@@ -82,13 +83,17 @@ def _format(path: str, data: bytes) -> Literal["json", "toml"]:
     return "json" if data.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] in (b"{", b"[", b"") else "toml"
 
 
-def read_spec(path: str, points: str | None = None, limit: int = MAX_DATA_BYTES) -> object:
+def read_spec(
+    path: str, points: str | None = None, limit: int = MAX_DATA_BYTES, files: Sequence[str] | None = None
+) -> object:
     """The plain data of the spec in a JSON or TOML file, or standard input for "-".
 
-    The cases of the CSV file ``points``, if given, replace the spec's axes; it may have ``limit`` bytes. Raises
-    WrongInputError with every problem found.
+    The cases of the CSV file ``points``, if given, replace the spec's axes; it may have ``limit`` bytes. The
+    CSV files of ``files`` (``PLACE=FILE``) are tables of the machine. Raises WrongInputError with every problem found.
     """
     from sprag.service.spec.text import load_spec
+
+    tables = named(files or ())
 
     if path == points == "-":
         raise wrong_option("--points", "conflict", "standard input is the spec already", allowed="a file")
@@ -97,14 +102,21 @@ def read_spec(path: str, points: str | None = None, limit: int = MAX_DATA_BYTES)
         spec = load_spec(data, _format(path, data))
     except SpecError as error:
         raise spec_failure(path, error) from error
+    if tables and isinstance(spec, Mapping):
+        spec = with_tables(spec, [(place, decode(name, read_bytes(name, limit))) for place, name in tables])
     if points is None or not isinstance(spec, Mapping):
         return spec
     rest = {name: part for name, part in spec.items() if name not in DESIGN_FIELDS}
     return {**rest, "axes": [{"points": decode(points, read_bytes(points, limit))}]}
 
 
-def read_study(path: str, points: str | None = None, change: Callable[[object], object] | None = None) -> ParsedSpec:
-    """The checked study of a spec file, with the cases in ``points`` if given (see `read_spec`).
+def read_study(
+    path: str,
+    points: str | None = None,
+    change: Callable[[object], object] | None = None,
+    files: Sequence[str] | None = None,
+) -> ParsedSpec:
+    """The checked study of a spec file, with the cases in ``points`` and the tables in ``files`` (see `read_spec`).
 
     ``change`` completes the spec before it is read further; its SpecError is reported like the others.
 
@@ -112,7 +124,7 @@ def read_study(path: str, points: str | None = None, change: Callable[[object], 
     """
     from sprag.service.spec.document import parse_spec
 
-    data = read_spec(path, points)
+    data = read_spec(path, points, files=files)
     with naming_points(points):
         try:
             return parse_spec(data if change is None else change(data))

@@ -26,7 +26,17 @@ from sprag.service.cli.console import (
     wrong_option,
 )
 from sprag.service.cli.files import is_json, output, read_study, require_cases, to_file
-from sprag.service.cli.options import ChunkCases, FinishBy, Fresh, JsonFlag, OutputFile, PointsFile, Processes, SpecFile
+from sprag.service.cli.options import (
+    ChunkCases,
+    FinishBy,
+    Fresh,
+    JsonFlag,
+    OutputFile,
+    PointsFile,
+    Processes,
+    SpecFile,
+    TableFiles,
+)
 from sprag.service.cli.remote import TableFormat, table_format
 from sprag.service.cli.running import run_parsed
 from sprag.service.cli.settings import read_settings
@@ -57,10 +67,10 @@ class ValueFormat(StrEnum):
 _START_SECONDS = 2.0
 
 
-def validate(spec: SpecFile, points: PointsFile = None, as_json: JsonFlag = False) -> None:
+def validate(spec: SpecFile, points: PointsFile = None, tables: TableFiles = None, as_json: JsonFlag = False) -> None:
     """Check a spec: report all faults and warnings."""
     try:
-        parsed = read_study(spec, points)
+        parsed = read_study(spec, points, files=tables)
     except WrongInputError as failure:
         if not as_json or not failure.faults:
             raise
@@ -88,6 +98,7 @@ def _say_warnings(parsed: ParsedSpec) -> None:
 def preview(
     spec: SpecFile,
     points: PointsFile = None,
+    tables: TableFiles = None,
     db: Annotated[
         str | None, typer.Option("--db", metavar="URL", help="Database to search for cases that it already has.")
     ] = None,
@@ -102,7 +113,7 @@ def preview(
     finish = _finish(finish_by)
     left = None if finish is None else (finish - datetime.now(UTC)).total_seconds()
     settings = read_settings(database=db, processes=processes)
-    parsed = read_study(spec, points, partial(_with_start, settings) if db is not None else None)
+    parsed = read_study(spec, points, partial(_with_start, settings) if db is not None else None, tables)
     reusable = 0 if db is None else _reusable(settings, parsed)
     chunking = Chunking(0, settings.pool_processes, settings.chunk_timeout)
     made = preview_json(parsed, chunking, reusable, left, _START_SECONDS)
@@ -147,6 +158,7 @@ def _reusable(settings: Settings, parsed: ParsedSpec) -> int:
 def trajectory(
     spec: SpecFile,
     case: Annotated[int, typer.Option("--case", min=0, metavar="N", help="Number of the case, from 0.")] = 0,
+    tables: TableFiles = None,
     file: OutputFile = None,
     form: Annotated[
         ValueFormat | None, typer.Option("--format", help="Default: by the name of FILE, otherwise csv.")
@@ -165,7 +177,7 @@ def trajectory(
     """Write the instantaneous values of one case: angles, speeds, torques, powers, states."""
     from sprag.worker.models import ENDING_SENTENCES, OK
 
-    study = read_study(spec).study
+    study = read_study(spec, files=tables).study
     with output(file) as write:
         made = _trajectory(study, case, start, end, points)
         written = is_json(file, as_json) if form is None else form is ValueFormat.JSON
@@ -237,6 +249,7 @@ def presets(
 def run(
     spec: SpecFile,
     points: PointsFile = None,
+    tables: TableFiles = None,
     file: OutputFile = None,
     form: Annotated[
         TableFormat | None, typer.Option("--format", help="Default: by the name of FILE, otherwise csv.")
@@ -257,7 +270,7 @@ def run(
 
     finish = _finish(finish_by)
     settings = read_settings(database=db, processes=processes, chunk_cases=chunk)
-    parsed = read_study(spec, points, partial(_with_start, settings) if db is not None else None)
+    parsed = read_study(spec, points, partial(_with_start, settings) if db is not None else None, tables)
     _say_warnings(parsed)
     start = time.monotonic()
     with (

@@ -22,6 +22,14 @@ PointsFile = Annotated[
         help="CSV file of cases, instead of the spec's axes; its header names the parameters.",
     ),
 ]
+TableFiles = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--file",
+        metavar="PLACE=FILE",
+        help="CSV file in place of a table of the machine, as operation=torque.csv; may be repeated.",
+    ),
+]
 OutputFile = Annotated[
     str | None, typer.Option("-o", "--output", metavar="FILE", help="File to write; default: standard output.")
 ]

@@ -33,6 +33,7 @@ from sprag.service.cli.options import (
     Server,
     SpecFile,
     StudyId,
+    TableFiles,
     Token,
     Wait,
     WaitTimeout,
@@ -115,6 +116,7 @@ def _option(parameter: object) -> str:
 def submit(
     spec: SpecFile,
     points: PointsFile = None,
+    tables: TableFiles = None,
     wait: Wait = False,
     key: Annotated[
         str | None, typer.Option("--key", metavar="KEY", help="Idempotency key: the same key submits the study once.")
@@ -128,7 +130,7 @@ def submit(
     as_json: JsonFlag = False,
 ) -> None:
     """Submit a study to the service and print its id."""
-    data = read_spec(spec, points, MAX_BODY_BYTES)
+    data = read_spec(spec, points, MAX_BODY_BYTES, tables)
     with naming_points(points), connection(server, token) as client:
         submitted(client, client.create_study(data, key, priority, fresh, finish_by), wait, timeout, as_json)
 

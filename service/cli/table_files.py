@@ -1,0 +1,60 @@
+"""Tables of a machine from CSV files: ``--file operation=torque.csv`` puts a file's text in place of a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from sprag.service.cli.console import WrongInputError, wrong_option
+
+_ALLOWED = "PLACE=FILE, such as operation=torque.csv, drive.motor=motor.csv or parts.0.operation.indicator=p.csv"
+
+
+def named(files: Sequence[str]) -> list[tuple[str, str]]:
+    """Places and names of files; WrongInputError where one is not ``PLACE=FILE``."""
+    found = [(place.strip(), name) for place, _, name in (text.partition("=") for text in files)]
+    for text, (place, name) in zip(files, found, strict=True):
+        if not place or not name:
+            raise wrong_option("--file", "wrong-type", "is not a place and a file", text, allowed=_ALLOWED)
+    return found
+
+
+def with_tables(spec: Mapping[str, Any], texts: Sequence[tuple[str, str]]) -> dict[str, Any]:
+    """The spec with the CSV texts at their places in ``base``, instead of the tables there.
+
+    Raises
+    ------
+    WrongInputError
+        Where the spec has no such place.
+    """
+    made = {**spec, "base": _copied(spec.get("base"))}
+    for place, text in texts:
+        found: Any = made["base"]
+        for name in place.removesuffix(".csv").split("."):
+            found = _within(found, name)
+            if found is None:
+                raise _missing(place)
+        if not isinstance(found, dict):
+            raise _missing(place)
+        for form in ("table", "formula", "value", "steps"):
+            found.pop(form, None)
+        found["csv"] = text
+    return made
+
+
+def _missing(place: str) -> WrongInputError:
+    message = "there is no such part in the base of the spec, to which a table could be given"
+    return wrong_option("--file", "unknown-name", message, place, allowed=_ALLOWED)
+
+
+def _within(data: Any, name: str) -> Any:
+    """A member of an object or of a list; None where there is none."""
+    if isinstance(data, list):
+        return data[int(name)] if name.isdecimal() and int(name) < len(data) else None
+    return data.get(name) if isinstance(data, dict) else None
+
+
+def _copied(data: Any) -> Any:
+    if isinstance(data, Mapping):
+        return {name: _copied(part) for name, part in data.items()}
+    return [_copied(part) for part in data] if isinstance(data, list) else data
