@@ -28,8 +28,8 @@ demo: $(RUNTIME)
 serve: $(RUNTIME)
 	@$(BIN)/sprag serve
 
-# The tests of one file share processes and servers, so they stay together. Many wait for processes of the program, so that three run
-# side by side even on two cores.
+# The tests of one file share processes and servers, so they stay together, as do some files (TOGETHER in tests/conftest.py).
+# Many wait for processes of the program, so that three run side by side even on two cores.
 test: check
 	$(BIN)/python -m pytest --numprocesses 3 --dist loadfile --no-loadscope-reorder
 

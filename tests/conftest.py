@@ -31,21 +31,46 @@ LONG = (
     "acceptance/test_readme.py",
     "service/http/test_fuzzing.py",
     "engine/compile/test_ways.py",
+    "service/http/web/test_study_pages.py",
     "acceptance/test_faults.py",
     "engine/vibration_drive/test_against_scipy.py",
-    "service/http/web/test_study_pages.py",
+    "acceptance/test_commands.py",
+    "acceptance/test_kills.py",
     "service/storage/test_postgres.py",
     "worker/executors/test_dask.py",
     "acceptance/test_cut_link.py",
-    "acceptance/test_kills.py",
     "acceptance/test_same_rows.py",
-    "acceptance/test_commands.py",
-    "service/http/web/test_designers.py",
     "acceptance/test_wheel.py",
     "engine/test_odd_drives.py",
-    "service/http/web/test_nights.py",
     "worker/executors/test_executors.py",
 )
+
+
+#: Files that share a server or a browser, which each process of tests starts for itself: one process runs them.
+TOGETHER = (
+    tuple(
+        f"tests/service/http/web/test_{name}.py"
+        for name in ("connection", "designers", "laboratory", "nights", "paper_and_phones", "study_pages")
+    ),
+    tuple(f"tests/acceptance/test_{name}.py" for name in ("bad_input", "commands", "notebook")),
+)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """With ``--dist loadfile``, one process runs the files of a group of `TOGETHER`."""
+    if config.getoption("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    first = {name: names[0] for names in TOGETHER for name in names}
+
+    class LoadGroups(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file: str = super()._split_scope(nodeid)
+            return first.get(file, file)
+
+    return LoadGroups(config, log)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

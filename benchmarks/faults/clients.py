@@ -28,7 +28,7 @@ class _Client(threading.Thread):
 
     def run(self) -> None:
         """Ask until the end."""
-        with httpx.Client(base_url=self._address, timeout=60.0, trust_env=False) as http:
+        with httpx.Client(base_url=self._address, timeout=harness.PATIENCE, trust_env=False) as http:
             while time.monotonic() < self._end:
                 begin = time.monotonic()
                 try:

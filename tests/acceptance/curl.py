@@ -36,7 +36,7 @@ def main(arguments: list[str]) -> int:
     headers = {} if body is None else {"Content-Type": "application/json"}
     method = method or ("GET" if body is None else "POST")
     answer = httpx.request(
-        method, url, params=data if written else None, content=body, headers=headers, timeout=60, trust_env=False
+        method, url, params=data if written else None, content=body, headers=headers, timeout=600, trust_env=False
     )
     if target is None:
         sys.stdout.buffer.write(answer.content)

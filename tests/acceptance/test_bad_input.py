@@ -9,7 +9,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from tests.acceptance.processes import EXAMPLES, Service
+from tests.acceptance.processes import EXAMPLES, SECONDS, Service
 from tests.conftest import Finished
 from tests.wrong_specs import BASE, WRONG, changed
 
@@ -19,7 +19,7 @@ JSON = {"Content-Type": "application/json"}
 @pytest.fixture(scope="module")
 def http(running: Service) -> Iterator[httpx.Client]:
     """One client of the service: to make one takes longer than a request."""
-    with httpx.Client(base_url=f"{running.address}/api/v1", timeout=60) as client:
+    with httpx.Client(base_url=f"{running.address}/api/v1", timeout=SECONDS) as client:
         yield client
 
 

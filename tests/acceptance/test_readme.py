@@ -57,7 +57,7 @@ def test_the_demonstration(demonstration: tuple[Path, Ended]) -> None:
     address = re.search(r"http://127\.0\.0\.1:\d+", done.err)
     assert address is not None
     with pytest.raises(httpx.ConnectError):
-        httpx.get(address[0], timeout=60)
+        httpx.get(address[0], timeout=SECONDS)
 
 
 def test_every_command_of_the_readme_does_what_it_says(tmp_path: Path, demonstration: tuple[Path, Ended]) -> None:

@@ -20,7 +20,7 @@ from tests.acceptance.processes import SECONDS, service
 from tests.service.timed_spec import SPEC
 
 # Pages wait for processes that start, on a machine that is busy with other tests.
-expect.set_options(timeout=90_000)
+expect.set_options(timeout=1000 * SECONDS)
 
 #: The first one draws the same without the windows, tabs and menus of a whole browser, at half the cost.
 _NAMES = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -90,9 +90,9 @@ def chromium() -> str:
     return found
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def browser(chromium: str) -> Iterator[Browser]:
-    """One browser for the tests of a module; its event loop ends with them."""
+    """One browser for the tests of this folder; its event loop, in which no other could run, ends with them."""
     with sync_playwright() as playwright:
         opened = playwright.chromium.launch(executable_path=chromium, args=_OPTIONS)
         yield opened
@@ -104,7 +104,7 @@ def office(tmp_path_factory: pytest.TempPathFactory, chromium: str) -> Iterator[
     """A service with a database of its own, for all tests."""
     with (
         service(tmp_path_factory.mktemp("office"), SPRAG_PROCESSES="1") as started,
-        httpx.Client(base_url=started.address, timeout=60.0) as client,
+        httpx.Client(base_url=started.address, timeout=SECONDS) as client,
     ):
         yield Office(started.address, client)
 
@@ -120,7 +120,7 @@ def visitor(browser: Browser, office: Office, request: pytest.FixtureRequest) ->
     """A tab at desktop width (or as ``tab`` marks it); no page may ask another host or break a script."""
     options = {"viewport": {"width": 1280, "height": 900}, "accept_downloads": True, **getattr(request, "param", {})}
     context = browser.new_context(base_url=office.address, **options)
-    context.set_default_timeout(90_000)
+    context.set_default_timeout(1000 * SECONDS)
     page = context.new_page()
     found = Visitor(page)
     page.on("request", found.note_request)

@@ -16,6 +16,7 @@ from sprag.service.settings import Settings
 from sprag.service.storage.scopes import TokenScope
 from sprag.service.storage.store import Store
 from sprag.worker.models import ChunkResult
+from tests.acceptance.processes import SECONDS
 from tests.service.conftest import InThread, made_up
 from tests.service.timed_spec import SPEC
 from tests.serving import served
@@ -23,7 +24,7 @@ from tests.serving import served
 if TYPE_CHECKING:
     from playwright.sync_api import BrowserContext
 
-expect.set_options(timeout=90_000)
+expect.set_options(timeout=1000 * SECONDS)
 PLAIN = {"java_script_enabled": False}
 
 
@@ -85,7 +86,7 @@ def tab(house: House, browser: Browser, request: pytest.FixtureRequest) -> Itera
     """A tab at the service, with JavaScript and without."""
     context = browser.new_context(base_url=house.address, viewport={"width": 1280, "height": 900}, **request.param)
     # The first page reads all presets, which takes a machine that is busy with other tests many seconds.
-    context.set_default_timeout(90_000)
+    context.set_default_timeout(1000 * SECONDS)
     yield context.new_page()
     context.close()
 
