@@ -6,24 +6,6 @@ const sketch = document.getElementById("sketch"), angle = document.getElementByI
 const dial = document.querySelector("[data-angle]"), turn = document.querySelector("[data-turn]");
 let busy = false, again = false, old = false;
 
-// Sliders that show another unit than SI move in that unit, and write it beside the number.
-const endsOf = (slider) => [slider.dataset.low, slider.dataset.high].map((end) => Number(end) / Number(slider.dataset.factor || 1));
-
-const valueOf = (slider) => {
-  const [low, high] = endsOf(slider), share = slider.value / 1000;
-  const value = "log" in slider.dataset ? low * (high / low) ** share : low + (high - low) * share;
-  return [String(Number(value.toPrecision(4))), slider.dataset.shown].filter(Boolean).join(" ");
-};
-
-const positionOf = (slider, text) => {
-  const [, digits, unit] = text.trim().match(/^([-+\d.eE]+)\s*(.*)$/) || [];
-  if (!digits || !Number.isFinite(Number(digits)) || (unit && unit !== slider.dataset.shown)) return null;
-  const value = unit ? Number(digits) : Number(digits) / Number(slider.dataset.factor || 1);
-  const [low, high] = endsOf(slider);
-  const share = "log" in slider.dataset ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
-  return Math.min(Math.max(1000 * share, 0), 1000);
-};
-
 // Numbers that are always in sight, and those that were changed.
 const query = () => {
   const found = new FormData(lab);
@@ -66,12 +48,12 @@ const ask = async () => {
 for (const slider of lab.querySelectorAll("input[type=range]")) {
   const field = document.getElementById(slider.dataset.for);
   slider.addEventListener("input", () => {
-    field.value = valueOf(slider);
+    field.value = sprag.slider.textOf(slider);
     slider.setAttribute("aria-valuetext", field.value);
     ask();
   });
   field.addEventListener("input", () => {
-    const place = positionOf(slider, field.value);
+    const place = sprag.slider.positionOf(slider, field.value);
     if (place !== null) slider.value = place;
   });
 }

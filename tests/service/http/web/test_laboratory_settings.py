@@ -1,0 +1,101 @@
+"""Settings of the laboratory: what an address says, and what it is refused for."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from urllib.parse import parse_qsl
+
+import pytest
+
+from sprag.service.http.problems import ApiError
+from sprag.service.http.views import preset_of
+from sprag.service.http.web.figures.shaft import irregularities, machine_case
+from sprag.service.http.web.laboratory.questions import estimates, question_spec
+from sprag.service.http.web.laboratory.setting import MOST_HELD, held_settings, machines, setting
+from sprag.service.spec.document import parse_spec
+
+BASE = json.dumps(preset_of("press")["spec"]["base"])
+
+
+def test_an_address_gives_the_setting_again() -> None:
+    chosen = setting(
+        {"machine": "press", "drive.inertia": "30", "mechanism.slider_crank.crank": "90 mm", "angle": "400"}
+    )
+    again = setting(dict(parse_qsl(chosen.query)))
+    assert again.study == chosen.study
+    assert [slider.path for slider in chosen.changed] == ["drive.inertia", "mechanism.slider_crank.crank"]
+    assert (chosen.angle, chosen.faults) == (400.0, {})
+    assert chosen.groups["Mechanism"]
+
+
+@pytest.mark.parametrize("name", machines())
+def test_every_machine_has_a_sketch_for_each_of_its_parts(name: str) -> None:
+    chosen = setting({"machine": name})
+    assert len(chosen.sketch) == len((chosen.study.structure or {}).get("parts", ("one",)))
+    assert all(0.0 < drawing.width <= 420.0 and 0.0 < drawing.height <= 260.0 for drawing in chosen.sketch)
+
+
+def test_a_machine_of_its_own_is_in_the_address() -> None:
+    chosen = setting({"machine": "own", "base": BASE, "drive.inertia": "-1"})
+    assert "out of range" in chosen.faults["drive.inertia"][0]
+    assert setting(dict(parse_qsl(chosen.query))).base == BASE
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"machine": "none"}, "Unknown machine"),
+        ({"machine": "own", "base": "{"}, "JSON"),
+        ({"machine": "own", "base": "[]"}, "JSON object"),
+        ({"machine": "own", "base": " " * 12_001}, "at most 12000 characters; got 12001"),
+        ({"machine": "own", "base": '{"drive": {"inertia": 1}}'}, "mean_speed"),
+    ],
+)
+def test_an_address_that_is_no_machine_is_refused(given: dict[str, str], told: str) -> None:
+    with pytest.raises(ApiError, match=told):
+        setting(given)
+
+
+def test_held_machines_are_a_few_valid_ones() -> None:
+    with pytest.raises(ApiError, match=f"At most {MOST_HELD}"):
+        held_settings(["machine=press"] * (MOST_HELD + 1))
+    with pytest.raises(ApiError, match="out of range"):
+        held_settings(["machine=press&drive.inertia=-1"])
+
+
+def test_an_angle_that_is_none_is_said_beside_its_field() -> None:
+    assert "allowed" in setting({"machine": "press", "angle": "soon"}).faults["angle"][0]
+    assert setting({"machine": "press", "angle": "0.5 rad"}).angle == pytest.approx(28.6478897565)
+
+
+def test_estimates_are_of_the_machine_with_one_change() -> None:
+    chosen = setting({"machine": "press"})
+    asked = estimates(chosen, {"estimate.inertia": "0.2", "estimate.masses": "3"})
+    assert [(each.name, each.value, bool(each.fault)) for each in asked] == [
+        ("inertia", 0.2, False), ("masses", None, True), ("load", None, False),
+    ]  # fmt: skip
+    assert [each.study.base["drive.inertia"] for each in asked] == [30.0, 15.0, 15.0]
+    assert asked[1].study.base["mechanism.slider_crank.rod_inertia"] == pytest.approx(0.06)
+    now, *after = irregularities(chosen.study, [each.study for each in asked])
+    doubled = machine_case(setting({"machine": "press", "drive.inertia": "30"}).study)
+    assert after[0] == ("ok", doubled["results"]["irregularity"])
+    assert all(value is not None and now[1] is not None and value < now[1] for _, value in (after[0], after[2]))
+
+
+def test_a_question_is_a_study_of_exactly_what_is_set() -> None:
+    chosen = setting({"machine": "press", "operation.scale": "0.5"})
+    study = parse_spec(question_spec(chosen, "inertia")).study
+    assert study.base == chosen.study.base
+    assert study.cases == 25
+
+
+def test_held_machines_are_drawn_beside_the_current_one() -> None:
+    press = setting({"machine": "press"}).study
+    slow = replace(press, base={**press.base, "mean_speed": 2.0})
+    case = machine_case(press, [("A", press), ("B", slow)])
+    names = {trace["name"] for trace in case["figure"]["data"]}
+    assert {"A: ω", "A: T", "A: ω² = S₁ + S₂ + S₃ + S₄"} <= names
+    # A machine that stops within the cycle has no lines.
+    assert case["held"][1]["ending"] == "inertia_insufficient"
+    assert not any(name.startswith("B") for name in names)
