@@ -96,6 +96,9 @@ class UnbalancedWorkError(MachineError):
     ending = Ending.UNBALANCED_WORK
 
     def __init__(self, drive: float, resistance: float, scaled: str = "", friction: float = 0.0) -> None:
+        # A work that is the rounding error of the other one is zero.
+        most = max(abs(drive), abs(resistance))
+        drive, resistance = (0.0 if abs(work) <= 1e-12 * most else work for work in (drive, resistance))
         super().__init__(
             f"The work over a cycle is not zero: the drive does {drive:.6g} J and the resistance {resistance:.6g} J. "
             + self._advice(drive, resistance, scaled, friction)

@@ -84,13 +84,14 @@ def warn_machine_shaft(report: Report, study: Study) -> None:
         _plausible(report, study, path, _PLAUSIBLE_SHAFT)
     structure = study.structure or {}
     operation_found = structure.get("balance_side") == "operation"
-    acts = any(part["operation"]["quantity"] != "none" for _, part in _parts(study))
-    if structure["balance"] == "constant" and operation_found and acts:
-        report.warn(
-            "replaced-value",
-            '/base/operation: is not used: the balance "constant" on the side of the operation replaces it by a '
-            'constant torque; choose "scale" to keep its shape',
-        )
+    for prefix, part in _parts(study):
+        if structure["balance"] == "constant" and operation_found and part["operation"]["quantity"] != "none":
+            where = "/base/" + f"{prefix}operation".replace(".", "/")
+            report.warn(
+                "replaced-value",
+                f'{where}: is not used: the balance "constant" on the side of the operation replaces it by a '
+                'constant torque; choose "scale" to keep its shape',
+            )
     if (
         structure["balance"] == "constant"
         and not operation_found

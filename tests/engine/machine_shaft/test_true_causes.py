@@ -10,7 +10,12 @@ import pytest
 
 from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.machine_shaft.checked import check
-from sprag.engine.machine_shaft.problems import MotorOverrunError, MotorStalledError, NearSingularError
+from sprag.engine.machine_shaft.problems import (
+    MotorOverrunError,
+    MotorStalledError,
+    NearSingularError,
+    UnbalancedWorkError,
+)
 from sprag.engine.machine_shaft.simulate import simulate
 from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
 from tests.engine.machine_shaft.machines import NAMES, PRESS, PRESS_NUMBERS, ending_of, one
@@ -131,3 +136,9 @@ def test_an_inertia_that_is_zero_at_dead_centre_is_not_positive() -> None:
         "drive.inertia": 0.0, "mechanism.slider_crank.rod_mass": 0.0, "mechanism.slider_crank.rod_inertia": 0.0,
     }  # fmt: skip
     assert ending_of(PRESS, numbers) is Ending.NEGATIVE_INERTIA
+
+
+def test_a_work_that_is_a_rounding_error_is_shown_as_zero() -> None:
+    swinging = MachineSpec(balance="refuse", operation=OperationChoice("torque", "formula", formula="10*sin(phi)"))
+    with pytest.raises(UnbalancedWorkError, match=r"the drive does 31\.4159 J and the resistance 0 J"):
+        check(swinging, {"mean_speed": 10.0, "drive.inertia": 20.0, "drive.torque": 5.0})

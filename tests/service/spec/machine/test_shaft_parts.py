@@ -76,3 +76,14 @@ def test_parts_are_warned_of_like_a_single_mechanism() -> None:
     found = parse_spec(changed(changes)).warnings
     assert warned(found)["warning_codes"] == ["no-discharge"]
     assert found[0].startswith("/axes/0 (parts.1.operation.gas.discharge_pressure): ")
+
+
+def test_replaced_operations_are_warned_of_at_their_parts() -> None:
+    given = of_parts(0, 90) | {
+        "/base/drive/torque": 100,
+        "/base/balance": "constant",
+        "/base/balance_side": "operation",
+    }
+    found = parse_spec(changed(given)).warnings
+    assert [warning.code for warning in found] == ["replaced-value"] * 2
+    assert [str(warning).partition(":")[0] for warning in found] == [f"/base/parts/{k}/operation" for k in range(2)]
