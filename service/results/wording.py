@@ -15,7 +15,10 @@ _THIN: Final = "\N{NARROW NO-BREAK SPACE}"
 _RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 #: Significant digits of numbers on pages; files and the API have all digits.
 _DIGITS: Final = 5
-_GREEK: Final = {"beta": "β", "chi": "χ", "delta": "δ", "lambda": "λ", "phi": "φ", "w": "ω"}
+_GREEK: Final = {
+    "alpha": "α", "beta": "β", "chi": "χ", "delta": "δ", "eta": "η", "lambda": "λ", "nu": "ν", "phi": "φ", "rho": "ρ",
+    "w": "ω",
+}  # fmt: skip
 
 
 def number(value: float | str | None, digits: int = _DIGITS) -> str:
