@@ -6,9 +6,12 @@ reading and writing them takes seconds during which nobody else would be answere
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
 
 from sprag.service.json_text import numbers, to_bytes
 from sprag.service.results import exports
@@ -30,6 +33,8 @@ if TYPE_CHECKING:
     from sprag.service.jobs.checks import Library
     from sprag.service.results.curves import Curve, CurveQuery, Curves, Map
 
+#: Further motions of each case that a picture marks.
+_MOST_FURTHER: Final = 4
 #: Numbers of curves or a map that are read and written in about ten milliseconds.
 FEW: Final = 20_000
 
@@ -39,6 +44,20 @@ def curves_of(library: Library, study_id: str, query: CurveQuery) -> Curves:
     study = library.store.study(study_id)
     selection = select(study, models.study_results(study), query)
     return draw(selection, partial(library.store.rows_for_cases, study_id, number=query.number))
+
+
+def curves_drawn(library: Library, study_id: str, query: CurveQuery) -> Curves:
+    """The same for a picture: with the other motions of cases that have several, where the most frequent are drawn."""
+    curves, study = curves_of(library, study_id, query), library.store.study(study_id)
+    further: list[Curve] = []
+    if query.number == 0 and models.numbered_by(study.model, models.variant_of(study)) is not None:
+        for number in range(1, _MOST_FURTHER + 1):
+            found = curves_of(library, study_id, replace(query, number=number)).curves
+            known = [curve for curve in found if any(np.isfinite(y).any() for y in curve.y.values())]
+            if not known:
+                break
+            further += known
+    return replace(curves, further=tuple(further))
 
 
 def curves_json(library: Library, study_id: str, query: CurveQuery) -> bytes:
@@ -93,7 +112,7 @@ def _not_joined(curve: Curve, names: list[str]) -> dict[str, list[Any]]:
 
 def curves_picture(library: Library, study_id: str, query: CurveQuery, title: str, form: pictures.Picture) -> bytes:
     """The curves as a picture."""
-    return pictures.draw_curves(curves_of(library, study_id, query), title, form)
+    return pictures.draw_curves(curves_drawn(library, study_id, query), title, form)
 
 
 def map_of(library: Library, study_id: str, query: CurveQuery) -> Map:

@@ -117,10 +117,11 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Curves:
-    """Curves over one axis."""
+    """Curves over one axis; ``further`` are those of the other motions of cases that have several, for pictures."""
 
     selection: Selection
     curves: tuple[Curve, ...]
+    further: tuple[Curve, ...] = ()
 
     def to_json(self) -> CurvesData:
         """The document described in docs/http.md: null for a missing number, with the ending that explains it."""

@@ -14,7 +14,7 @@ from sprag.service.http.drawing import Drawing, conditional, placed
 from sprag.service.http.respond import JSON, json_response
 from sprag.service.http.web.choice import MapQuery, curve_query, map_query, pairs_of
 from sprag.service.http.web.figures import answers
-from sprag.service.http.web.study import fixed_choices, orders_address, study_frame
+from sprag.service.http.web.study import fixed_choices, orders_address, regime_maps, study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.results.curve_cases import select
@@ -25,6 +25,7 @@ from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.selection import SelectionError
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
+from sprag.worker.models.starts import has_starts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -77,6 +78,8 @@ def curves_page(context: Ctx, request: Request, study_id: StudyId) -> Response:
         pictured=values <= pictures.MAX_PICTURE_POINTS,
         settled=models.is_settled(study.run),
         orders=orders_address(study, study_id),
+        regime_maps=regime_maps(study, study_id),
+        many_starts=has_starts(study.run),
         held=held,
     )
 

@@ -37,6 +37,7 @@ from sprag.service.spec.numbers import parse_number
 from sprag.service.storage.records import Kinds
 from sprag.worker import models
 from sprag.worker.models.parameters import parameter_of
+from sprag.worker.models.starts import has_starts
 from sprag.worker.planning.calibrate.plan import CALIBRATE
 from sprag.worker.planning.goals.plan import GOAL
 from sprag.worker.states import TRANSITIONS, StudyEvent, StudyState
@@ -116,6 +117,7 @@ def _study_page(context: Context, study_id: str, fits: Mapping[str, tuple[Clutch
         shown=models.presentation_of(study),
         **_main_figure(study, study_id, query),
         orders=orders_address(study, study_id),
+        regime_maps=regime_maps(study, study_id),
         only_row=None if first is None else first.results.items(),
         units={info.name: info.unit for info in models.study_results(study)},
         inputs=inputs(study, frame["study"]["spec"]),
@@ -318,7 +320,21 @@ def _plain(text: str | None) -> float | None:
 
 def orders_address(study: Study, study_id: str) -> str | None:
     """URL of the map of the periods after which motions repeat; None where there is none."""
-    query = map_query(study, models.study_results(study), QueryParams({"z": ORDER}))
-    if query is None or map_plan(study) is not None or not models.is_settled(study.run):
+    return _map_address(study, study_id, ORDER) if models.is_settled(study.run) else None
+
+
+def regime_maps(study: Study, study_id: str) -> list[tuple[str, str]]:
+    """Text and URL of each map of how many motions cases have; none of cases with one start."""
+    if not has_starts(study.run):
+        return []
+    shown = (("number of motions", "regime.count"), ("share of the rarest motion", "regime.share.least"))
+    addresses = [(text, _map_address(study, study_id, name)) for text, name in shown]
+    return [(text, address) for text, address in addresses if address is not None]
+
+
+def _map_address(study: Study, study_id: str, z: str) -> str | None:
+    """URL of the map of a result; None where no two parameters span one."""
+    query = map_query(study, models.study_results(study), QueryParams({"z": z}))
+    if query is None or map_plan(study) is not None:
         return None
     return f"/studies/{study_id}/map?{urlencode(pairs_of(query))}"

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 #: Most points of all lines of a panel together, and the least and the most of one line: five per column of pixels of a
 #: wide picture.
 _MOST_POINTS: Final = 24_000
+#: Name of the points of other motions than those that the lines are of.
+OTHER_MOTIONS: Final = "other motions of the same cases"
 _LEAST_POINTS: Final = 400
 _LINE_POINTS: Final = 6_000
 
@@ -56,7 +58,7 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1, *, by_u
     panels = []
     for index, infos in enumerate(groups.values()):
         y = Quantity(infos[0].name if len(infos) == 1 else "", infos[0].unit)
-        parts = tuple(_lines(lines, labels, infos, listed=index == 0))
+        parts = (*_lines(lines, labels, infos, listed=index == 0), *_further(drawn, infos, listed=index == 0))
         directions = [f", {word}" for word in DIRECTIONS] if _both(lines) else [""]
         styles = tuple(f"{info.name}{word}" for info in infos for word in directions) if len(infos) > 1 else ()
         bands = tuple(_bands(lines, infos)) if len(drawn) == 1 else ()
@@ -136,6 +138,30 @@ def _lines(
                 stretches=_stretches(curve, info, regimes, x),
                 # A line needs y as a function of x; the points of a zip may go back and forth.
                 joined=bool(np.all(np.diff(x) > 0.0)),
+            )
+
+
+def _further(drawn: Sequence[tuple[str, Curves]], infos: Sequence[ResultInfo], *, listed: bool) -> Iterator[Line]:
+    """The other motions of cases that have several, as points in the colour of their curve."""
+    curves = drawn[0][1] if len(drawn) == 1 else None
+    if curves is None or not curves.further:
+        return
+    own = [curve.line.by for curve in curves.curves]
+    colours = line_colours(len(own))
+    for count, curve in enumerate(curves.further):
+        index = own.index(curve.line.by)
+        for place, info in enumerate(infos):
+            kept = np.isfinite(curve.y[info.name])
+            yield Line(
+                OTHER_MOTIONS,
+                np.asarray(curve.line.x)[kept],
+                curve.y[info.name][kept],
+                colours[index],
+                style=place,
+                key=str(index),
+                listed=listed and count == place == 0,
+                cases=curve.line.cases[kept],
+                joined=False,
             )
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from sprag.service.http.web.figures.maps import map_figure
 from sprag.service.http.web.figures.plotly import Data, plotly_figure
-from sprag.service.jobs.answers import curves_of, map_of
+from sprag.service.jobs.answers import curves_drawn, map_of
 from sprag.service.jobs.batch_answers import ribbon_of, yield_of
 from sprag.service.json_text import to_bytes
 from sprag.service.results.basins import basin_of, units_of
@@ -33,7 +33,7 @@ SAMPLES: Final = 6000
 
 def curves_json(library: Library, study_id: str, query: CurveQuery, columns: int) -> bytes:
     """The figure of curves, as JSON text."""
-    return to_bytes(plotly_figure(curves_figure([("", curves_of(library, study_id, query))], columns)))
+    return to_bytes(plotly_figure(curves_figure([("", curves_drawn(library, study_id, query))], columns)))
 
 
 def map_json(library: Library, study_id: str, query: CurveQuery, contours: bool) -> bytes:

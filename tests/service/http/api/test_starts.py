@@ -87,6 +87,30 @@ def test_curves_are_those_of_one_regime(service: Service, started: str) -> None:
     assert curve(number=1) == [None, 3.5]
 
 
+def test_pictures_mark_the_other_motions(service: Service, started: str) -> None:
+    asked = {"x": "shaft.load", "y": "shaft.speed.mean"}
+    traces = service.http.get(f"/studies/{started}/figures/curves", params=asked).json()["data"]
+    (further,) = (trace for trace in traces if trace.get("name") == "other motions of the same cases")
+    assert (further["x"], further["y"], further["mode"]) == ([0.2], [3.5], "markers")
+    assert service.http.get(f"{API}/studies/{started}/curves", params={**asked, "format": "svg"}).status_code == 200
+    assert "Single points are other motions" in service.http.get(f"/studies/{started}/curves").text
+
+
+def test_maps_of_the_motions_are_a_click_away(service: Service) -> None:
+    spec = copy.deepcopy(SPEC)
+    spec.pop("run", None)
+    spec.pop("combine", None)
+    spec["axes"] = [
+        {"path": "shaft.load", "values": [0.1, 0.2]},
+        {"path": "excitation.frequency", "values": [20, 25]},
+    ]
+    study_id = service.submit({**spec, "starts": {"count": 8, "ranges": {SPEED: [1, 30]}}})
+    text = html.unescape(service.http.get(f"/studies/{study_id}/curves").text)
+    for name in ("regime.count", "regime.share.least"):
+        (address,) = re.findall(rf'href="(/studies/{study_id}/map\?[^"]*z={re.escape(name)}[^"]*)"', text)
+        assert service.http.get(address).status_code == 200
+
+
 def test_other_studies_have_one_regime_a_case(service: Service) -> None:
     study_id = service.submit()
     answer = service.http.get(f"{API}/studies/{study_id}/curves", params={"number": 1})
