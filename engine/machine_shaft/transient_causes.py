@@ -32,7 +32,7 @@ class Ends:
     cycle : bool
         Whether there is a steady cycle to come to.
     no_cycle : str
-        Why the case has no steady cycle; "" where it has one.
+        Why there is none.
     """
 
     angle: float

@@ -20,6 +20,7 @@ Floats = NDArray[np.float64]
 OUTCOMES: tuple[Outcome, ...] = ("reached", "stopped", "not_started", "not_reached", "too_stiff")
 _TO_INTEGRAL = product(INTEGRAL, COEFFICIENTS)
 _TURN = 2.0 * np.pi
+_FIXED_DRIVE = "The torque of the drive does not follow the speed, so it balances no other load."
 
 
 class Run:
@@ -153,7 +154,7 @@ class Run:
             turns_back=float(bench.at(bench.passive, angle)[0]) + 2.0 * friction < 0.0,
             within=self.course.within,
             cycle=self.after is not None,
-            no_cycle="" if ending is Ending.OK else ending.sentence,
+            no_cycle=_FIXED_DRIVE if ending is Ending.OK else ending.sentence,
         )
 
     def load_at(self, omega: Floats, angle: Floats | None = None) -> Floats:

@@ -86,7 +86,9 @@ def transient(model: MachineSpec, columns: Mapping[str, ArrayLike], course: Cour
     if bench is None:
         return _nothing(ending, ending.sentence)
     before = None if course.kind == "run-up" else bench.steady(1.0)
-    run = Run(bench, course, before, None if course.kind == "coasting" else after)
+    if course.kind == "coasting" or (course.kind == "load-step" and not bench.motor):
+        after = None
+    run = Run(bench, course, before, after)
     if not run.loads:
         return _nothing(ending, ROUGH_LOAD)
     status, totals, _ = run.follow(np.empty(0))

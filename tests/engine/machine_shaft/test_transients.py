@@ -233,6 +233,21 @@ def test_each_stall_has_its_own_cause() -> None:
     assert math.isnan(spent.results["time"])
 
 
+def test_a_drive_that_does_not_follow_the_speed_has_no_new_cycle() -> None:
+    """A constant torque of 5 N*m accelerates the unloaded shaft, and loses against twice its load."""
+    spec = MachineSpec(operation=OperationChoice("torque"))
+    numbers = {"mean_speed": 30.0, "drive.inertia": 2.0, "operation.value": 5.0}
+    freed = run(spec, numbers, Course("load-step", load=0.0, revolutions=10.0))
+    assert freed.outcome == "not_reached"
+    assert "does not follow the speed" in freed.cause
+    assert math.isnan(freed.results["after.omega.mean"])
+    time = freed.results["duration"]
+    assert freed.results["omega.end"] == pytest.approx(30.0 + 2.5 * time, rel=1e-11)
+    slowed = run(spec, numbers, Course("load-step", load=2.0))
+    assert (slowed.outcome, slowed.results["duration"]) == ("stopped", pytest.approx(12.0, rel=1e-11))
+    assert "the mean resisting torque, 10 N*m, exceeds the largest torque of the drive, 5 N*m" in slowed.cause
+
+
 def test_a_machine_without_a_cycle() -> None:
     far = transient(PRESS, PRESS_NUMBERS | {"mechanism.slider_crank.rod": 0.09}, Course("coasting"), 5)
     assert (far.outcome, far.motion.ending) == ("no_motion", Ending.CANNOT_ASSEMBLE)
