@@ -185,7 +185,7 @@ def running(folder: Path, *options: object, **environment: str) -> Iterator[Serv
 
 def asked(database: Path, query: str, *values: object) -> Any:
     """The first column of the first row that the database gives."""
-    connection = sqlite_driver().connect(f"file:{database}?mode=ro", uri=True, timeout=60)
+    connection = sqlite_driver().connect(f"file:{database}?mode=ro", uri=True, timeout=PATIENCE)
     try:
         row = connection.execute(query, values).fetchone()
         return None if row is None else row[0]

@@ -74,7 +74,7 @@ def kills(
 
 def _count_claims(database: Path) -> None:
     """Let the database itself count the cases of every claim."""
-    connection = sqlite_driver().connect(database, timeout=60)
+    connection = sqlite_driver().connect(database, timeout=harness.PATIENCE)
     connection.executescript(
         "CREATE TABLE drill_claims (study INTEGER, cases INTEGER);"
         "INSERT INTO drill_claims SELECT study, count FROM chunks WHERE state <> 'waiting';"
@@ -94,7 +94,7 @@ def kill(service: harness.Service, draw: random.Random) -> str:
         harness.until(service.dispatcher, "there is a dispatcher")
         if (dispatcher := service.dispatcher()) is not None:
             dispatcher.kill()
-            dispatcher.wait(60)
+            dispatcher.wait(harness.PATIENCE)
     else:
         harness.until(service.pool, "there is a pool")
         if pool := service.pool():

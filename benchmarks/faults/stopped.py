@@ -45,13 +45,13 @@ def stopped(folder: Path, *, cases: int, rounds: int, seed: int, periods: float 
             harness.until(lambda before=before: harness.asked(database, _LATEST) > before, "the second takes over")
             time.sleep(draw.uniform(0.0, 0.2))
             workers[-2].send_signal(signal.SIGCONT)
-            assert workers[-2].wait(60) == 3, logs[number].read_text()
+            assert workers[-2].wait(harness.PATIENCE) == 3, logs[number].read_text()
             assert "another dispatcher has taken over" in logs[number].read_text()
         harness.until(
             lambda: harness.asked(database, "SELECT finished_at FROM studies WHERE id = ?", study), "the study ends"
         )
         workers[-1].terminate()
-        assert workers[-1].wait(60) == 0, logs[-1].read_text()
+        assert workers[-1].wait(harness.PATIENCE) == 0, logs[-1].read_text()
     finally:
         for worker in workers:
             worker.kill()

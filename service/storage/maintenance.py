@@ -50,8 +50,7 @@ def require_current(session: Session) -> None:
     """Initialise an empty database; raise SchemaError when its revision is not that of this program."""
     found = revision(session)
     if found is None:
-        if not _create_at_once(session):
-            upgrade(session)
+        upgrade(session)
     elif found != HEAD_REVISION:
         raise SchemaError(_other_revision(session, found))
 
@@ -105,20 +104,26 @@ def upgrade(session: Session) -> tuple[str | None, str]:
 
     Raises SchemaError when the database belongs to a newer program.
     """
+    before = revision(session)
+    if before is not None and before not in known_revisions():
+        raise SchemaError(_other_revision(session, before))
+    if before is not None or not _create_at_once(session):
+        migrate(session)
+    return before, HEAD_REVISION
+
+
+def migrate(session: Session) -> None:
+    """Run the migrations that the database lacks, in one transaction."""
     from alembic import command
     from alembic.config import Config
 
     # Alembic's messages about its progress are for authors of migrations, not for users.
     logging.getLogger("alembic").setLevel(logging.WARNING)
-    before = revision(session)
-    if before is not None and before not in known_revisions():
-        raise SchemaError(_other_revision(session, before))
     config = Config()
     config.set_main_option("script_location", str(_migrations()).replace("%", "%%"))
     with session.write() as connection:
         config.attributes["connection"] = connection
         command.upgrade(config, "head")
-    return before, HEAD_REVISION
 
 
 def require_sound(session: Session) -> None:

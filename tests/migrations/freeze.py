@@ -46,7 +46,7 @@ def empty_database() -> str:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "empty.sqlite3"
         session = Session(f"sqlite:///{file}")
-        maintenance.upgrade(session)
+        maintenance.migrate(session)
         session.close()
         return statements_of(file)
 
