@@ -112,6 +112,10 @@ def _orders(last: Floats, earlier: Floats, limit: float) -> Ints:
         long_before = earlier[:, _KEPT - ago - order : _KEPT - ago]
         apart = np.maximum(np.abs(turn - before), np.abs(turn - long_before)).max(axis=(1, 2))
         found[apart < limit * units] = order
+    for order in range(_HIGHEST // 2, 0, -1):
+        # Rounding errors decide whether one turn or several repeat within the limit first.
+        apart = np.abs(last[:, -order:] - last[:, -2 * order : -order]).max(axis=(1, 2))
+        found[(found % order == 0) & (found > 0) & (apart < _SAME * units)] = order
     return found
 
 
