@@ -81,6 +81,7 @@ def shots(ids: list[str]) -> list[tuple[str, str, tuple[int, int], bool]]:
         ("cases", f"/studies/{one}/cases?sort=-power.useful.mean", DESKTOP, False),
         ("case", f"/studies/{two}/cases/45", DESKTOP, True),
         ("laboratory", "/laboratory?machine=press", (1280, 1000), False),
+        ("laboratory-drive", "/laboratory/drive?shaft.load=0.2&held=shaft.load%3D0.4", (1280, 1000), False),
         ("schedules", "/schedules/new", DESKTOP, True),
         ("compare", f"/compare?study={one}&study={two}&study={fitted}", DESKTOP, True),
     ]
