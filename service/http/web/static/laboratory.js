@@ -32,8 +32,8 @@ const ask = async () => {
     if (found.figure) {
       sketch.innerHTML = found.sketch;
       pose();
+      found.figure.layout.shapes = lines(found.figure);
       await sprag.show(plot, found.figure);
-      point();
     }
   } catch (error) {
     plot.classList.add("stale");
@@ -94,12 +94,17 @@ const pose = () => {
   }
 };
 
-// A line across all panels of the picture, at the angle of the sketch.
-const point = () => {
-  if (!sprag.figures.has(plot)) return;
+// A line across all panels of the picture, at the angle of the sketch; part of the figure, so that paper has it too.
+const lines = (figure) => {
   const x = Number(dial.value), line = { type: "line", x0: x, x1: x, y0: 0, y1: 1, yref: "paper", line: { color: sprag.colour("--accent"), width: 1 } };
-  const axes = [...new Set(plot.data.map((trace) => trace.xaxis || "x"))];
-  Plotly.relayout(plot, { shapes: axes.map((xref) => ({ ...line, xref })) });
+  return [...new Set(figure.data.map((trace) => trace.xaxis || "x"))].map((xref) => ({ ...line, xref }));
+};
+
+const point = () => {
+  const figure = sprag.figures.get(plot);
+  if (!figure) return;
+  figure.layout.shapes = lines(figure);
+  Plotly.relayout(plot, { shapes: figure.layout.shapes });
 };
 
 let pointing = false;
