@@ -33,7 +33,7 @@ ABOUT: Final[dict[str, About]] = {
         "the rig of one_pendulum",
     ),
     "two_motions": About(
-        "two motions at one load: up and down differ where the frequency rises and falls through 16.25 to 16.5 Hz",
+        "two motions at one load: up and down differ where the frequency rises and falls between 16.1 and 16.6 Hz",
         "the rig of one_pendulum with a load of 0.4 N*m",
     ),
     "press": About(

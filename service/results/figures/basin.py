@@ -30,7 +30,7 @@ def basin_figure(made: Basin, paths: tuple[str, str], units: tuple[str, str]) ->
         )
     x, y = (Quantity(path, unit) for path, unit in zip(paths, units, strict=True))
     counts = f"{len(made.values)} {'regime' if len(made.values) == 1 else 'regimes'} from {made.members.size:,} starts."
-    return Figure(x, (Panel(y, tuple(lines)),), family=(Quantity("regime", "1"),), heading=counts)
+    return Figure(x, (Panel(y, tuple(lines)),), heading=counts)
 
 
 def _label(made: Basin, regime: int) -> str:
