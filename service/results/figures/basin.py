@@ -29,8 +29,8 @@ def basin_figure(made: Basin, paths: tuple[str, str], units: tuple[str, str]) ->
             Line(_label(made, regime), across[inside], along[inside], colour, max(regime, 0), str(regime), joined=False)
         )
     x, y = (Quantity(path, unit) for path, unit in zip(paths, units, strict=True))
-    counts = f"{len(made.values)} {'regime' if len(made.values) == 1 else 'regimes'} from {made.members.size:,} starts."
-    return Figure(x, (Panel(y, tuple(lines)),), heading=counts)
+    counts = f"{len(made.values)} {'regime' if len(made.values) == 1 else 'regimes'} from {made.members.size:,} starts"
+    return Figure(x, (Panel(y, tuple(lines)),), family=(Quantity(counts, "1"),))
 
 
 def _label(made: Basin, regime: int) -> str:
