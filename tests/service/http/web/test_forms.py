@@ -32,14 +32,14 @@ EXAMPLES = Path(__file__).resolve().parents[4] / "examples"
 
 
 def drives() -> list[dict[str, Any]]:
-    """Every study of a vibration drive that comes with the program."""
+    """Every study of a vibration drive that comes with the program and that the form has fields for."""
     files = [preset_text(name) for name in preset_names()]
     files += [(path.name, path.read_text()) for path in EXAMPLES.iterdir() if path.suffix in (".json", ".toml")]
     specs = [load_spec(text, format_of(name)) for name, text in files]
     return [
         spec
         for spec in specs
-        if isinstance(spec, dict) and spec.get("model") == "vibration-drive" and "goal" not in spec
+        if isinstance(spec, dict) and spec.get("model") == "vibration-drive" and not {"goal", "starts"} & set(spec)
     ]
 
 
