@@ -54,7 +54,7 @@ def motor_torque(motor: Characteristic, values: Mapping[str, Floats], omega: Flo
         passed = np.where(torque >= 0.0, values["efficiency"], 1.0 / values["efficiency"])
         return passed * torque, passed * slope
     if isinstance(motor, MotorTable):
-        scale, unit = values["scale"], values.get("unit_speed", np.ones((1, 1, 1)))
+        scale, unit = values["scale"], values.get("unit_speed", np.float64(1.0))
         torque, slope = motor.at(omega / unit)
         return scale * torque, scale / unit * slope
     if motor == "linear":

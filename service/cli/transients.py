@@ -10,7 +10,7 @@ import typer
 from sprag.service.cli.console import ExitCode, WrongInputError, say, write_json, wrong_option
 from sprag.service.cli.files import is_json, output, read_study, require_cases, to_file
 from sprag.service.cli.local import ValueFormat
-from sprag.service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
+from sprag.service.cli.options import JsonFlag, OutputFile, SpecFile, TableFiles
 from sprag.service.faults import Fault, FaultError
 from sprag.service.json_text import to_bytes
 from sprag.worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
@@ -48,7 +48,7 @@ def transient(
     points: Annotated[
         int, typer.Option(min=MIN_TRAJECTORY_POINTS, max=MAX_TRAJECTORY_POINTS, help="Equally spaced times.")
     ] = 1000,
-    values: PointsFile = None,
+    tables: TableFiles = None,
     file: OutputFile = None,
     form: Annotated[
         ValueFormat | None, typer.Option("--format", help="Default: by the name of FILE, otherwise csv.")
@@ -60,7 +60,7 @@ def transient(
     from sprag.service.results.transients import transient_json
     from sprag.worker.models.transients import run_transient
 
-    study = read_study(spec, values).study
+    study = read_study(spec, files=tables).study
     require_cases(study, [case])
     given = {"load": load, "angle": angle, "torque": torque, "within": within, "revolutions": revolutions}
     course = _course(study, case, kind, given)

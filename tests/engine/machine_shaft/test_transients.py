@@ -195,6 +195,9 @@ def test_a_measured_motor_is_a_linear_one_where_it_is_straight() -> None:
     assert np.max(np.abs(column(made, "omega") - speeds)) < 1e-8
     assert np.max(np.abs(column(made, "acceleration") - 50.0 / decay * np.exp(-made.motion.times / decay))) < 1e-7
     assert made.results["motor.torque.max"] == pytest.approx(50.0, rel=1e-10)
+    direct = replace(spec, drive=Drive(motor="table", table=table))
+    made = run(direct, {"drive.inertia": 8.0}, Course("run-up", within=0.02))
+    assert made.results["time"] == pytest.approx(-8.0 * 100.0 / 50.0 * math.log(0.02), rel=1e-10)
 
 
 def test_loads_that_follow_the_speed() -> None:

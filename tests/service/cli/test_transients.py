@@ -50,3 +50,14 @@ def test_refusals(sprag: Sprag, examples: Path, spec: str, words: tuple[object, 
     done = sprag("transient", examples / spec, *words)
     assert done.code == 2
     assert said in done.err
+
+
+def test_points_and_tables_of_files(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+    (tmp_path / "cut.csv").write_text("x,force [kN]\n0,4\n1,4\n", encoding="utf-8")
+    words = ("transient", examples / "slotter.toml", "--case", 9, "--kind", "coasting", "--points", 3)
+    done = sprag(*words)
+    assert done.code == 0
+    assert len(done.out.splitlines()) == 1 + 3
+    wrong = sprag(*words, "--file", f"nowhere={tmp_path / 'cut.csv'}")
+    assert wrong.code == 2
+    assert "nowhere" in wrong.err
