@@ -63,6 +63,7 @@ def test_the_page_has_a_form_results_and_a_figure(service: Service) -> None:
     page = service.http.get(f"{own}/transient?kind=coasting&load=").text
     assert "The shaft stops after" in page
     assert f"{own}/transient/figure?kind=coasting" in page
+    assert '<span class="ending ok">stopped</span>' in page
     drawn = service.http.get(f"{own}/transient/figure?kind=load-step&load=0").json()["data"]
     names = ["speed", "mean before", "mean of the steady cycle", "drive", "resistance", "kinetic energy"]
     assert [trace["name"] for trace in drawn if trace.get("name")] == names
