@@ -42,6 +42,7 @@ _FIRST_PERIODS = 4
 #: Result with the start that a row describes.
 _START = "regime.start"
 
+Columns = Annotated[int, Query(ge=1, le=2)]
 Begin = Annotated[str, Query(alias="from", max_length=80)]
 End = Annotated[str, Query(alias="to", max_length=80)]
 
@@ -142,7 +143,7 @@ def case_page(
         begin=begin,
         end=end,
         extent=extent,
-        figures=f"{own}/motion?{query}",
+        figures=f"{own}/motion?columns=2&{query}",
         picture=f"{own}/motion.svg?{query}",
         file=f"/api/v1{own}/trajectory?{query}&points={SAMPLES}&format=csv",
         own=own,
@@ -156,13 +157,19 @@ def case_page(
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/motion")
 async def motion(
-    work: Attended, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = "", which: StartNumber = None
+    work: Attended,
+    study_id: StudyId,
+    case: CaseNumber,
+    begin: Begin = "",
+    end: End = "",
+    which: StartNumber = None,
+    columns: Columns = 2,
 ) -> Response:
     """The figures of a motion."""
     study, span = await work.case_of(study_id, case, lambda study: _span(study, case, begin, end), which)
 
     async def make() -> Response:
-        return json_response(await work.run_case(motion_figures, *motion_of(study, case, which), *span))
+        return json_response(await work.run_case(motion_figures, *motion_of(study, case, which), *span, columns))
 
     return await unchanging(work, study_id, make)
 
@@ -187,7 +194,7 @@ async def strobes(
     work: Attended,
     study_id: StudyId,
     case: CaseNumber,
-    columns: Annotated[int, Query(ge=1, le=2)] = 2,
+    columns: Columns = 2,
     which: StartNumber = None,
 ) -> Response:
     """The figure of a case's strobes and its orbit: how it approaches its motion."""

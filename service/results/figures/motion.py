@@ -20,8 +20,10 @@ if TYPE_CHECKING:
 _MOST_POINTS: Final = 2400
 
 
-def motion_figure(made: Trajectory, shown: Presentation, held: Sequence[tuple[str, Trajectory]] = ()) -> Figure:
-    """The model's panels over time, above the states of its parts; over the angle two in a row, in degrees.
+def motion_figure(
+    made: Trajectory, shown: Presentation, held: Sequence[tuple[str, Trajectory]] = (), columns: int = 2
+) -> Figure:
+    """The model's panels over time, above the states of its parts; over the angle ``columns`` in a row, in degrees.
 
     ``held`` are other motions of the model with their names, drawn beside it.
     """
@@ -51,7 +53,7 @@ def motion_figure(made: Trajectory, shown: Presentation, held: Sequence[tuple[st
     return Figure(
         Quantity("φ, angle of the shaft", "°") if angle else Quantity("time", "s"),
         tuple(panels),
-        columns=2 if angle else 1,
+        columns=columns if angle else 1,
         spans={words(name): tuple(_spans(made, list(states))) for name, states in made.states.items()},
         looks=shown.states,
         motion=True,

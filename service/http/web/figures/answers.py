@@ -67,14 +67,16 @@ def yield_json(library: Library, study_id: str, query: YieldQuery) -> bytes:
     return to_bytes(plotly_figure(yield_figure(yield_of(library, study_id, query))))
 
 
-def motion_figures(study: Study, case: int, start: float, end: float) -> dict[str, Data]:
-    """Run the case again and draw it. For the computing process."""
+def motion_figures(study: Study, case: int, start: float, end: float, columns: int) -> dict[str, Data]:
+    """Run the case again and draw it, over the angle with so many panels in a row. For the computing process."""
     made = models.run_trajectory(study, case, start, end, SAMPLES)
     shown = models.presentation_of(study)
     if made.times.size == 0 or made.times[-1] == start < end:
         told = {"data": [], "layout": {}, "note": _no_motion(study, case, made.ending)}
         return {"motion": told, **({"phase": told} if shown.portrait else {})}
-    figures = {"motion": motion_figure(made, shown), **({"phase": phase_figure(made, shown)} if shown.portrait else {})}
+    figures = {"motion": motion_figure(made, shown, columns=columns)}
+    if shown.portrait:
+        figures["phase"] = phase_figure(made, shown)
     return {name: plotly_figure(figure) for name, figure in figures.items()}
 
 

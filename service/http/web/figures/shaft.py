@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 SAMPLES: Final = 1441
 
 
-def machine_case(study: Study, held: Sequence[tuple[str, Study]] = ()) -> dict[str, Any]:
+def machine_case(study: Study, held: Sequence[tuple[str, Study]] = (), columns: int = 2) -> dict[str, Any]:
     """Ending, results and figure of a machine's first case, beside others with their names. For the computing process.
 
-    ``held`` of the answer are ending and results of the others.
+    ``held`` of the answer are ending and results of the others; the figure has ``columns`` panels in a row.
     """
     found = _results(study)
     beside = [_results(other) for _, other in held]
@@ -33,7 +33,7 @@ def machine_case(study: Study, held: Sequence[tuple[str, Study]] = ()) -> dict[s
         motions = [
             (name, _whole(other)) for (name, other), own in zip(held, beside, strict=True) if own["ending"] == models.OK
         ]
-        figure = plotly_figure(motion_figure(_whole(study), models.presentation_of(study), motions))
+        figure = plotly_figure(motion_figure(_whole(study), models.presentation_of(study), motions, columns))
     return {**found, "figure": figure, "held": beside}
 
 

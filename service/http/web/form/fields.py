@@ -78,9 +78,16 @@ def field_for(entry: Parameter, path: str) -> Field:
         help=entry.help,
         range=range_words(entry),
         required=entry.default is None,
-        default="" if entry.default is None else number(entry.default, 8),
+        default=_default_text(entry.default),
         example=text[1] if len(text) > 1 else "",
     )
+
+
+def _default_text(value: float | None) -> str:
+    """What a field without an entry shows; a parameter without a bound has none."""
+    if value is None:
+        return ""
+    return number(value, 8) if math.isfinite(value) else "none"
 
 
 def run_fields() -> dict[str, Field]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 from urllib.parse import urlencode
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Query
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
@@ -72,9 +72,9 @@ async def _chosen(work: Work) -> tuple[Setting, list[Setting]]:
     return chosen, await work.check(held_settings, given.getlist("held")) if "held" in given else []
 
 
-async def _case(work: Work, chosen: Setting, held: list[Setting]) -> dict[str, Any]:
+async def _case(work: Work, chosen: Setting, held: list[Setting], columns: int = 2) -> dict[str, Any]:
     named = [(_NAMES[index], each.study) for index, each in enumerate(held)]
-    return await work.run_case(machine_case, chosen.study, named)
+    return await work.run_case(machine_case, chosen.study, named, columns)
 
 
 def _query(chosen: Setting, held: list[Setting]) -> str:
@@ -112,10 +112,10 @@ def _parts(work: Work, chosen: Setting, held: list[Setting], case: dict[str, Any
 
 
 @router.get("/laboratory/figure")
-async def laboratory_figure(work: Attended) -> Response:
+async def laboratory_figure(work: Attended, columns: Annotated[int, Query(ge=1, le=2)] = 2) -> Response:
     """Picture and numbers of a setting, for the sliders."""
     chosen, held = await _chosen(work)
-    case = None if chosen.faults else await _case(work, chosen, held)
+    case = None if chosen.faults else await _case(work, chosen, held, columns)
     parts = _parts(work, chosen, held, case)
     return json_response(
         {

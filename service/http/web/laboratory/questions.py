@@ -77,9 +77,12 @@ def estimates(chosen: Setting, given: Mapping[str, str]) -> list[Estimate]:
 
 
 def _estimate(text: str) -> tuple[float | None, str]:
-    value = parse_number(text) if text else None
+    if not text:
+        return None, ""
+    value = parse_number(text)
     if value is None or not 0.0 <= value <= 2.0:
-        return None, f"must be a number; got {text}; allowed: 0 to 2" if text else ""
+        what = "must be a number" if value is None else "is out of range"
+        return None, f"{what}; got {text}; allowed: 0 to 2"
     return value, ""
 
 

@@ -9,6 +9,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import parse_qsl, urlencode
 
+from sprag.service.faults import shown
 from sprag.service.http.problems import ApiError
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.figures.linkage import Drawing, drawings
@@ -126,7 +127,7 @@ def held_settings(queries: list[str]) -> list[Setting]:
         raise ApiError("invalid-parameter", f"At most {MOST_HELD} machines can be held; got {len(queries)}.")
     found = [setting(dict(parse_qsl(query, max_num_fields=2000))) for query in queries]
     if any(held.faults for held in found):
-        texts = [text for held in found for texts in held.faults.values() for text in texts]
+        texts = [f"{path}: {text}" for held in found for path, texts in held.faults.items() for text in texts]
         raise ApiError("invalid-spec", f"A held machine is invalid: {'; '.join(texts)}.")
     return found
 
@@ -159,7 +160,7 @@ def _angle(text: str, faults: dict[str, list[str]]) -> float:
     try:
         found = float(value) if isinstance(value, int | float) else math.degrees(parse_quantity(value, "rad"))
     except QuantityError as error:
-        faults["angle"] = [f"{error}; allowed: an angle in degrees"]
+        faults["angle"] = [f"{error}; got {shown(value)}; allowed: an angle in degrees"]
         return 0.0
     if abs(found) > 1e6:
         faults["angle"] = [f"out of range; got {found:g}; allowed: -1000000 to 1000000 deg"]

@@ -5,7 +5,7 @@
 const motion = document.getElementById("motion"), phase = document.getElementById("phase");
 
 const showMotion = async (address) => {
-  const figures = await sprag.fetchJson(address);
+  const figures = await sprag.fetchJson(sprag.narrowed(motion, address));
   await sprag.show(motion, figures.motion);
   if (phase && figures.phase) await sprag.show(phase, figures.phase);
 };

@@ -19,7 +19,7 @@ const ask = async () => {
   busy = true;
   try {
     const asked = query();
-    const found = await sprag.fetchJson(`/laboratory/figure?${asked}`);
+    const found = await sprag.fetchJson(sprag.narrowed(plot, `/laboratory/figure?columns=2&${asked}`));
     history.replaceState(null, "", `/laboratory?${asked}`);
     for (const place of document.querySelectorAll(".lab .wrong")) {
       const texts = found.faults[place.id.slice("wrong:".length)] || [];

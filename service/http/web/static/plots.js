@@ -109,10 +109,12 @@ sprag.show = async (element, figure) => {
   }
 };
 
+// The address of a figure, whose panels stand one below the other in a narrow place.
+sprag.narrowed = (element, address) => element.clientWidth < NARROW ? address.replace("columns=2", "columns=1") : address;
+
 sprag.draw = async (element) => {
   try {
-    const address = element.clientWidth < NARROW ? element.dataset.figure.replace("columns=2", "columns=1") : element.dataset.figure;
-    await sprag.show(element, await sprag.fetchJson(address));
+    await sprag.show(element, await sprag.fetchJson(sprag.narrowed(element, element.dataset.figure)));
     element.classList.remove("stale");
   } catch (error) {
     if (error instanceof sprag.LostError) { // the picture is out of date until the connection is restored

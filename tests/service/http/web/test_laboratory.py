@@ -77,6 +77,15 @@ def test_the_sketch_turns_with_the_angle_as_the_server_draws_it(visitor: Visitor
     assert {"T_mean", "T_min", "T_0", "φ_c", "ω² = S₁ + S₂ + S₃ + S₄"} <= names
 
 
+def test_panels_stand_below_each_other_in_a_narrow_place(office: Office) -> None:
+    def left(columns: int) -> set[float]:
+        layout = office.http.get(f"/laboratory/figure?machine=press&columns={columns}").json()["figure"]["layout"]
+        return {axis["domain"][0] for name, axis in layout.items() if name.startswith("xaxis")}
+
+    assert left(1) == {0.0}
+    assert len(left(2)) == 2
+
+
 def _numbers(points: str | None) -> list[float]:
     return [float(text) for text in re.split("[ ,]", points or "")]
 
