@@ -50,7 +50,17 @@ LONG = (
 TOGETHER = (
     tuple(
         f"tests/service/http/web/test_{name}.py"
-        for name in ("connection", "designers", "laboratory", "nights", "paper_and_phones", "study_pages")
+        for name in (
+            "connection",
+            "designers",
+            "drive_laboratory",
+            "goal_forms",
+            "laboratory",
+            "lesson",
+            "nights",
+            "paper_and_phones",
+            "study_pages",
+        )
     ),
     tuple(f"tests/acceptance/test_{name}.py" for name in ("bad_input", "commands", "notebook")),
 )

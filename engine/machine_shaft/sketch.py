@@ -52,10 +52,16 @@ class Sketch:
 
     def turned(self, angle: float) -> "Sketch":
         """The sketch turned counterclockwise about the shaft."""
-        matrix = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-        joints = {name: points @ matrix for name, points in self.joints.items()}
+        joints = {name: _turned(points, angle) for name, points in self.joints.items()}
         # What slides without turning of its own turns with its guide.
         still = np.full(len(next(iter(joints.values()))), angle)
         turns = {"": still} | {name: values + angle for name, values in self.turns.items()}
-        guides = [points @ matrix for points in self.guides]
+        guides = [_turned(points, angle) for points in self.guides]
         return Sketch(joints, turns, self.bars, self.plates, self.pivots, guides)
+
+
+def _turned(points: Floats, angle: float) -> Floats:
+    """Points of shape (k, 2), turned counterclockwise about the origin."""
+    x, y = points[:, 0], points[:, 1]
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.stack([x * cos - y * sin, x * sin + y * cos], axis=1)

@@ -49,7 +49,7 @@ def _with_ram(sketch: Sketch, pin: str, ram: Floats, direction: float = 0.0) -> 
     sketch.turns["ram"] = np.full(len(ram), direction)
     sketch.plates.append(Plate("ram", _rectangle(2.2 * size, 1.4 * size), ("ram_mass", "inclination"), "ram"))
     along, across = np.array([np.cos(direction), np.sin(direction)]), np.array([-np.sin(direction), np.cos(direction)])
-    way = (ram - ram[0]) @ along
+    way = ((ram - ram[0]) * along).sum(axis=1)
     for side in (-0.75, 0.75):
         ends = [ram[0] + along * (way.min() - 1.6 * size), ram[0] + along * (way.max() + 1.6 * size)]
         sketch.guides.append(np.array(ends) + side * size * across)

@@ -90,9 +90,9 @@ def chromium() -> str:
     return found
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def browser(chromium: str) -> Iterator[Browser]:
-    """One browser for the tests of this folder; its event loop, in which no other could run, ends with them."""
+    """One browser for the tests of a module; its event loop, in which no other could run, ends with them."""
     with sync_playwright() as playwright:
         opened = playwright.chromium.launch(executable_path=chromium, args=_OPTIONS)
         yield opened
