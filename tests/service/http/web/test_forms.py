@@ -378,7 +378,7 @@ def test_a_part_after_the_run_stopped_is_a_sentence(monkeypatch: pytest.MonkeyPa
         return models.Trajectory(times, (), (), np.zeros((times.size, 0)), {}, "chatter")
 
     monkeypatch.setattr(models, "run_trajectory", stopped)
-    figures = motion_figures(study, 0, 0.5, 0.6)
+    figures = motion_figures(study, 0, 0.5, 0.6, 2)
     sentence = "There is no motion in this part: the run stopped at about t = 0.012 s with chatter."
     assert {name: figure["note"] for name, figure in figures.items()} == {"motion": sentence, "phase": sentence}
     assert figures["motion"]["layout"] == {}
