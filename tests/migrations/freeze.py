@@ -1,7 +1,6 @@
 """Writes the frozen database of the present revision: ``python -m tests.migrations.freeze``, once for each revision.
 
-The text is never changed afterwards: it is what users of that revision have on their disks. The file by which new
-databases are made is written too, and again by every later revision.
+The text is never changed afterwards: it is what users of that revision have on their disks.
 """
 
 from __future__ import annotations
@@ -10,9 +9,6 @@ import sqlite3
 import tempfile
 from pathlib import Path
 
-import sprag.migrations as migrations
-from sprag.service.storage import maintenance
-from sprag.service.storage.session import Session
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import HEAD_REVISION
 from sprag.worker.chunking import Chunking
@@ -41,28 +37,9 @@ def fill(store: Store) -> None:
     store.commit(epoch, chunks[0], fakes.result(0, 2))
 
 
-def empty_database() -> str:
-    """The statements for an empty database of the present revision, as the migrations make it."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "empty.sqlite3"
-        session = Session(f"sqlite:///{file}")
-        maintenance.migrate(session)
-        session.close()
-        return statements_of(file)
-
-
-def statements_of(file: Path) -> str:
-    """The statements that make the tables and the rows of a database of the present revision."""
-    connection = sqlite3.connect(file)
-    lines = [line.removesuffix(";") for line in connection.iterdump() if line.startswith(("CREATE", "INSERT"))]
-    connection.close()
-    return maintenance.STATEMENT_END.join([f"-- {HEAD_REVISION}", *lines]) + "\n"
-
-
 def main() -> None:
-    """Write the files of the present revision; its frozen database must not be there yet."""
+    """Write the frozen database of the present revision, which must not be there yet."""
     target = FOLDER / f"{HEAD_REVISION}.sql"
-    Path(migrations.__path__[0], maintenance.EMPTY_DATABASE).write_text(empty_database(), encoding="utf-8")
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "frozen.sqlite3"
         with Store.open(f"sqlite:///{file}", chunking=Chunking(cases=2), clock=fakes.HandClock()) as store:

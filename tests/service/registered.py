@@ -28,5 +28,5 @@ def create_table(settings: Settings, name: str) -> None:
     """Make the table of a model in the database of a service, as a migration would."""
     session = Session(settings.database_url)
     with session.write() as connection:
-        results_table(name, "").create(connection)
+        results_table(name, "").create(connection, checkfirst=True)
     session.close()
