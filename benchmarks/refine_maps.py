@@ -99,7 +99,7 @@ def compare(problem: Problem, error: float, start: int, finest: int) -> None:
     surface = np.stack([found.at(name, x, y) for name in problem.results], axis=2)
     counts = np.isfinite(surface)
     grid, least = (finest + 1) ** 2, uniform(values, ranges, error) ** 2
-    held = ", ".join(f"{share:.1%}" for share in found.told.values())
+    held = ", ".join(f"{share:.1%}" for share in found.jumps_share.values())
     estimate = "unknown" if found.error is None else f"{found.error:.2%}"
     print(
         f"{problem.name}\n  {len(found.x)} cases, {rounds} rounds; error "

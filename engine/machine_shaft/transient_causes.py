@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-#: Why there is no transient with a load that jumps or has a kink over the speed.
+#: The refusal of a load that jumps or has a kink over the speed.
 ROUGH_LOAD = (
     "The load is not smooth in the speed: a transient needs a formula without abs, sign, step, floor, mod, min, max "
     "or comparisons of omega."

@@ -276,6 +276,16 @@ def solve_step(
 
 
 @part
+def end_of_step(
+    table: Floats, half: float, run: Floats, pieces: Floats, x0: float, u0: float, h: float,
+    running: Floats, weights: Floats, tail: Floats, v: Floats,
+) -> tuple[float, float]:  # fmt: skip
+    """Solve a step of the length ``h``: the position and u at its end."""
+    collocate(table, half, run, pieces, x0, u0, h, False, running, weights, tail, v)
+    return x0 + 0.5 * h * total_of(weights, v[FX]), u0 + 0.5 * h * total_of(weights, v[FU])
+
+
+@part
 def add_up(h: float, u1: float, v: Floats, weights: Floats, places: Floats, to_series: Floats, scratch: Floats,
            totals: Floats) -> None:  # fmt: skip
     """Add a step to the totals."""
@@ -357,10 +367,8 @@ def follow(
         if stops or (sided and off_target(table, run, 1.0 if lands else x1, u1) <= 0.0):
             status = STOPPED if stops else REACHED
             h = event_time(table, run, h, x, u, stops, to_integral, v, scratch)
-            collocate(table, half, run, pieces, x, u, h, False, running, weights, tail, v)
-            lands = False
-            x1 = x + 0.5 * h * total_of(weights, v[FX])
-            u1 = 0.0 if stops else u + 0.5 * h * total_of(weights, v[FU])
+            x1, u1 = end_of_step(table, half, run, pieces, x, u, h, running, weights, tail, v)
+            lands, u1 = False, 0.0 if stops else u1
         add_up(h, u1, v, weights, places, to_series, scratch, totals)
         next_time = sample(turned + cuts[p], half, h, x, u, clock, times, next_time, to_integral, v, scratch, out)
         clock, u, x = clock + h, u1, x1

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.outcome import Trajectory
 from sprag.engine.run import Run, SettledRun
-from sprag.engine.vibration_drive.cases import case_matrix, pendulum_count, scalars, with_lengths
+from sprag.engine.vibration_drive.cases import case_matrix, scalars, with_lengths
 from sprag.engine.vibration_drive.integration import integrate
 from sprag.engine.vibration_drive.kernel import kernel_of
-from sprag.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag.engine.vibration_drive.regimes import Regime
 from sprag.engine.vibration_drive.settle import settle
 from sprag.engine.vibration_drive.simulate import sampled
 from sprag.engine.vibration_drive.start_states import as_parameters
@@ -79,8 +79,7 @@ def settled_turn(
     regime, ending, results = Regime(int(found.regimes[0])), ENDINGS[int(found.endings[0])], found.values[0]
     if ending is not Ending.OK:
         return SettledTurn(results, regime, 0, nothing(ending), None, ending)
-    names = [info.name for info in settled_infos(pendulum_count(values))]
-    order = int(results[names.index("regime.order")]) if regime.repeats else 0
+    order = int(found.orders[0]) if regime.repeats else 0
     periods = order or _PERIODS
     motion = turn(values, settings.run, found.points, periods, max(16, points // periods))
     rows, arrived = whole_periods(values, settings, found.points)

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from sprag.service.cli.console import ExitCode, say, write_json
 from sprag.service.cli.files import is_json, output, to_file
-from sprag.service.cli.local import ValueFormat
-from sprag.service.cli.motions import StartOption, naming_options, study_of
-from sprag.service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
+from sprag.service.cli.motions import naming_options, study_of
+from sprag.service.cli.options import (
+    AlongOption,
+    CaseOption,
+    FromOption,
+    JsonFlag,
+    OutputFile,
+    PointsFile,
+    SpecFile,
+    StartOption,
+    ToOption,
+    ValueFormat,
+    ValueFormatOption,
+)
 from sprag.service.json_text import to_bytes
 
 if TYPE_CHECKING:
@@ -20,22 +31,14 @@ if TYPE_CHECKING:
 
 def branch(
     spec: SpecFile,
-    along: Annotated[
-        str, typer.Option("--along", metavar="PATH", help="Parameter, or several joined by commas with one value.")
-    ],
-    case: Annotated[int, typer.Option("--case", min=0, metavar="N", help="Number of the case, from 0.")] = 0,
-    low: Annotated[
-        str | None, typer.Option("--from", metavar="VALUE", help="Start of the range; default: that of its axis.")
-    ] = None,
-    high: Annotated[
-        str | None, typer.Option("--to", metavar="VALUE", help="End of the range; default: that of its axis.")
-    ] = None,
+    along: AlongOption,
+    case: CaseOption = 0,
+    low: FromOption = None,
+    high: ToOption = None,
     start: StartOption = None,
     points: PointsFile = None,
     file: OutputFile = None,
-    form: Annotated[
-        ValueFormat | None, typer.Option("--format", help="Default: by the name of FILE, otherwise csv.")
-    ] = None,
+    form: ValueFormatOption = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Follow the periodic motion of one case along a parameter: stable and unstable, folds, doublings, grazings."""

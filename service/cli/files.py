@@ -46,7 +46,7 @@ def read_bytes(path: str, limit: int) -> bytes:
 
     Raises WrongInputError when there is no such file, it is a directory, cannot be read or is too large.
     """
-    with _told(path):
+    with _naming(path):
         if path == "-":
             data = sys.stdin.buffer.read(limit + 1)
         else:
@@ -175,16 +175,16 @@ def output(path: str | None) -> Iterator[Write]:
     if path is None or path == "-":
         sys.stdout.flush()
         yield _writer(sys.stdout.buffer, "standard output")
-        with _told("standard output"):
+        with _naming("standard output"):
             sys.stdout.buffer.flush()
         return
     target = Path(path)
-    with _told(target):
+    with _naming(target):
         if target.is_dir():
             raise WrongInputError("invalid-file", f"{path}: is a directory")
         through = target.exists() and not target.is_file()  # devices and pipes are written to, never replaced
     if through:
-        with _told(target):
+        with _naming(target):
             file = target.open("wb")
         with _closed(file, target):
             yield _writer(file, target)
@@ -205,7 +205,7 @@ def is_json(path: str | None, as_json: bool) -> bool:
 
 def _replaced(target: Path) -> Iterator[Write]:
     prefix = f".{target.name[:100]}."
-    with _told(target):
+    with _naming(target):
         sweep(target.parent.glob(f"{glob.escape(prefix)}*.part"))
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=prefix, suffix=".part")
         mark(handle)
@@ -213,7 +213,7 @@ def _replaced(target: Path) -> Iterator[Write]:
         file = os.fdopen(handle, "wb")
         with _closed(file, target):
             yield _writer(file, target)
-        with _told(target):
+        with _naming(target):
             os.chmod(name, 0o666 & ~_umask())
             os.replace(name, target)
     finally:
@@ -222,7 +222,7 @@ def _replaced(target: Path) -> Iterator[Write]:
 
 
 @contextmanager
-def _told(path: Path | str) -> Iterator[None]:
+def _naming(path: Path | str) -> Iterator[None]:
     """Convert operating system errors to failures that name the file; a closed pipe is not a failure."""
     try:
         yield
@@ -243,13 +243,13 @@ def _closed(file: IO[bytes], path: Path) -> Iterator[None]:
         with suppress(OSError):
             file.close()
         raise
-    with _told(path):
+    with _naming(path):
         file.close()
 
 
 def _writer(file: IO[bytes], path: Path | str) -> Write:
     def write(piece: bytes) -> None:
-        with _told(path):
+        with _naming(path):
             file.write(piece)
 
     return write

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import UTC, datetime
-from enum import StrEnum
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
@@ -36,6 +35,8 @@ from sprag.service.cli.options import (
     Processes,
     SpecFile,
     TableFiles,
+    ValueFormat,
+    ValueFormatOption,
 )
 from sprag.service.cli.remote import TableFormat, table_format
 from sprag.service.cli.running import run_parsed
@@ -54,13 +55,6 @@ if TYPE_CHECKING:
     from sprag.service.storage.records import Progress
     from sprag.worker.models import Trajectory
     from sprag.worker.study import Study
-
-
-class ValueFormat(StrEnum):
-    """Formats of instantaneous values."""
-
-    CSV = "csv"
-    JSON = "json"
 
 
 #: Rough start time (s) of the program and its pool of processes.
@@ -160,9 +154,7 @@ def trajectory(
     case: Annotated[int, typer.Option("--case", min=0, metavar="N", help="Number of the case, from 0.")] = 0,
     tables: TableFiles = None,
     file: OutputFile = None,
-    form: Annotated[
-        ValueFormat | None, typer.Option("--format", help="Default: by the name of FILE, otherwise csv.")
-    ] = None,
+    form: ValueFormatOption = None,
     start: Annotated[
         str | None, typer.Option("--from", metavar="TIME", help='First time, in s, or as "40 periods"; default: 0.')
     ] = None,

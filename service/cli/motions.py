@@ -10,23 +10,26 @@ import typer
 
 from sprag.service.cli.console import WrongInputError, show_table, write_json, wrong_option
 from sprag.service.cli.files import is_json, output, read_study, require_cases
-from sprag.service.cli.local import ValueFormat
-from sprag.service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
+from sprag.service.cli.options import (
+    AlongOption,
+    CaseOption,
+    FromOption,
+    JsonFlag,
+    OutputFile,
+    PointsFile,
+    SpecFile,
+    StartOption,
+    ToOption,
+    ValueFormat,
+    ValueFormatOption,
+)
 from sprag.service.faults import Fault, FaultError
-from sprag.worker.limits import MAX_BASIN_POINTS, MAX_STARTS
+from sprag.worker.limits import MAX_BASIN_POINTS
 
 if TYPE_CHECKING:
     from sprag.service.formats import Format
     from sprag.worker.study import Study
 
-CaseOption = Annotated[int, typer.Option("--case", min=0, metavar="N", help="Number of the case, from 0.")]
-StartOption = Annotated[
-    int | None,
-    typer.Option("--start", min=0, max=MAX_STARTS - 1, metavar="K", help="Start of a case with many; default: 0."),
-]
-FormatOption = Annotated[
-    ValueFormat | None, typer.Option("--format", help="Default: by the name of FILE, otherwise csv.")
-]
 _Phase = Annotated[str | None, typer.Option("--phase", metavar="ANGLE", help="Phase of the excitation; default: 0.")]
 _End = Annotated[
     str | None, typer.Option(metavar="VALUE", help="SI or with a unit; default: as in the study's starts.")
@@ -40,23 +43,17 @@ _SHOWN = (
 
 def diagram(
     spec: SpecFile,
-    along: Annotated[
-        str, typer.Option("--along", metavar="PATH", help="Parameter, or several joined by commas with one value.")
-    ],
+    along: AlongOption,
     case: CaseOption = 0,
-    low: Annotated[
-        str | None, typer.Option("--from", metavar="VALUE", help="Start of the range; default: that of its axis.")
-    ] = None,
-    high: Annotated[
-        str | None, typer.Option("--to", metavar="VALUE", help="End of the range; default: that of its axis.")
-    ] = None,
+    low: FromOption = None,
+    high: ToOption = None,
     phase: _Phase = None,
     values: Annotated[int, typer.Option(min=2, max=500, help="Equally spaced values of the parameter.")] = 200,
     strobes: Annotated[int, typer.Option(min=1, max=200, help="Most strobes of each motion.")] = 64,
     start: StartOption = None,
     points: PointsFile = None,
     file: OutputFile = None,
-    form: FormatOption = None,
+    form: ValueFormatOption = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Bifurcation diagram: the strobes of the settled motions of one case along a parameter."""
@@ -76,7 +73,7 @@ def section(
     start: StartOption = None,
     points: PointsFile = None,
     file: OutputFile = None,
-    form: FormatOption = None,
+    form: ValueFormatOption = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Poincare section: the strobes of the settled motion of one case at a phase of the excitation."""
@@ -102,7 +99,7 @@ def basin(
     grid: Annotated[int, typer.Option("--grid", min=2, max=MAX_BASIN_POINTS, help="Values of each.")] = 20,
     points: PointsFile = None,
     file: OutputFile = None,
-    form: FormatOption = None,
+    form: ValueFormatOption = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Basin: the regime to which one case comes from each start of a grid of two initial values."""
@@ -145,25 +142,23 @@ def regimes(spec: SpecFile, case: CaseOption = 0, points: PointsFile = None, as_
 
 def study_of(spec: str, points: str | None, case: int, start: int | None) -> Study:
     """The study of a file, which has that case and that start of it."""
-    from sprag.worker.models.starts import count_of
+    from sprag.service.results.start_states import check_start
 
     study = read_study(spec, points).study
     require_cases(study, [case])
-    count = count_of(study.run)
-    if start is not None and start >= count:
-        raise wrong_option("--start", "out-of-range", "there is no such start", start, allowed=f"0 .. {count - 1}")
+    with naming_options(study):
+        check_start(study, start)
     return study
 
 
 @contextmanager
-def naming_options(study: Study) -> Iterator[None]:
+def naming_options(study: Study, lacks: str = "has no motion that settles") -> Iterator[None]:
     """Name the options of a command instead of the parameters of a request; WrongInputError for each fault."""
     try:
         yield
     except FaultError as error:
         if not error.faults:
-            message = "has no motion that settles"
-            raise wrong_option("/model", "wrong-type", message, study.model, detail=error.detail) from error
+            raise wrong_option("/model", "wrong-type", lacks, study.model, detail=error.detail) from error
         raise WrongInputError("invalid-parameter", "invalid option", tuple(map(_option, error.faults))) from error
 
 

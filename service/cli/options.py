@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 import math
+from enum import StrEnum
 from typing import Annotated
 
 import typer
 
+from sprag.worker.limits import MAX_STARTS
+
 #: Default address of `sprag serve`.
 DEFAULT_SERVER = "http://127.0.0.1:8000"
+
+
+class ValueFormat(StrEnum):
+    """Formats of instantaneous values."""
+
+    CSV = "csv"
+    JSON = "json"
+
 
 JsonFlag = Annotated[
     bool, typer.Option("--json", help="Data as JSON on standard output, failures as JSON on standard error.")
@@ -21,6 +32,23 @@ PointsFile = Annotated[
         metavar="FILE",
         help="CSV file of cases, instead of the spec's axes; its header names the parameters.",
     ),
+]
+CaseOption = Annotated[int, typer.Option("--case", min=0, metavar="N", help="Number of the case, from 0.")]
+StartOption = Annotated[
+    int | None,
+    typer.Option("--start", min=0, max=MAX_STARTS - 1, metavar="K", help="Start of a case with many; default: 0."),
+]
+AlongOption = Annotated[
+    str, typer.Option("--along", metavar="PATH", help="Parameter, or several joined by commas with one value.")
+]
+FromOption = Annotated[
+    str | None, typer.Option("--from", metavar="VALUE", help="Start of the range; default: that of its axis.")
+]
+ToOption = Annotated[
+    str | None, typer.Option("--to", metavar="VALUE", help="End of the range; default: that of its axis.")
+]
+ValueFormatOption = Annotated[
+    ValueFormat | None, typer.Option("--format", help="Default: by the name of FILE, otherwise csv.")
 ]
 TableFiles = Annotated[
     list[str] | None,

@@ -7,25 +7,29 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sprag.service.cli.console import ExitCode, WrongInputError, say, write_json, wrong_option
+from sprag.service.cli.console import ExitCode, say, write_json
 from sprag.service.cli.files import is_json, output, read_study, require_cases, to_file
-from sprag.service.cli.local import ValueFormat
-from sprag.service.cli.options import JsonFlag, OutputFile, SpecFile, TableFiles
-from sprag.service.faults import Fault, FaultError
+from sprag.service.cli.motions import naming_options
+from sprag.service.cli.options import (
+    CaseOption,
+    JsonFlag,
+    OutputFile,
+    SpecFile,
+    TableFiles,
+    ValueFormat,
+    ValueFormatOption,
+)
 from sprag.service.json_text import to_bytes
 from sprag.worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from sprag.worker.models.transients import Course, Transient
-    from sprag.worker.study import Study
+    from sprag.worker.models.transients import Transient
 
 
 def transient(
     spec: SpecFile,
     kind: Annotated[str, typer.Option("--kind", metavar="KIND", help="run-up, load-step or coasting.")],
-    case: Annotated[int, typer.Option("--case", min=0, metavar="N", help="Number of the case, from 0.")] = 0,
+    case: CaseOption = 0,
     load: Annotated[
         str | None, typer.Option("--load", metavar="FACTOR", help="Factor on all operations during it; default: 1.")
     ] = None,
@@ -50,20 +54,19 @@ def transient(
     ] = 1000,
     tables: TableFiles = None,
     file: OutputFile = None,
-    form: Annotated[
-        ValueFormat | None, typer.Option("--format", help="Default: by the name of FILE, otherwise csv.")
-    ] = None,
+    form: ValueFormatOption = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Compute the run-up from rest of a machine shaft, a step of its load, or its coasting, over time."""
     from sprag.service.results.trajectories import trajectory_csv
-    from sprag.service.results.transients import transient_json
+    from sprag.service.results.transients import course_of, transient_json
     from sprag.worker.models.transients import run_transient
 
     study = read_study(spec, files=tables).study
     require_cases(study, [case])
     given = {"load": load, "angle": angle, "torque": torque, "within": within, "revolutions": revolutions}
-    course = _course(study, case, kind, given)
+    with naming_options(study, "has no transients"):
+        course = course_of(study, case, kind, given)
     with output(file) as write:
         made = run_transient(study, case, course, points)
         written = is_json(file, as_json) if form is None else form is ValueFormat.JSON
@@ -76,22 +79,6 @@ def transient(
         write_json({"file": file, "case": case, "outcome": made.outcome, "cause": made.cause})
     if made.outcome != ("stopped" if course.kind == "coasting" else "reached"):
         raise typer.Exit(ExitCode.NOT_ALL_OK)
-
-
-def _course(study: Study, case: int, kind: str, given: Mapping[str, str | None]) -> Course:
-    from sprag.service.results.transients import course_of
-
-    try:
-        return course_of(study, case, kind, given)
-    except FaultError as error:
-        if not error.faults:
-            message = "has no transients"
-            raise wrong_option("/model", "wrong-type", message, study.model, detail=error.detail) from error
-        raise WrongInputError("invalid-parameter", "invalid option", tuple(map(_option, error.faults))) from error
-
-
-def _option(fault: Fault) -> Fault:
-    return Fault(f"--{fault.where}", fault.code, fault.message, fault.value, fault.allowed)
 
 
 def _report(made: Transient, case: int) -> None:

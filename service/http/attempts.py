@@ -73,8 +73,8 @@ class Attempts:
         client = scope.get("client")
         address = str(client[0]) if client else _UNKNOWN
         # The nearest proxy wrote the last entry; each earlier one is trusted only if a trusted proxy wrote it.
-        told = ",".join(Headers(scope=scope).getlist("x-forwarded-for")).split(",")
-        for entry in reversed(told):
+        entries = ",".join(Headers(scope=scope).getlist("x-forwarded-for")).split(",")
+        for entry in reversed(entries):
             if not self._is_trusted(address) or _parsed(entry.strip()) is None:
                 break
             address = str(_parsed(entry.strip()))

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Final, cast
 from fastapi import Depends, Path, Query, Request
 from starlette.convertors import Convertor, register_url_convertor
 
-from sprag.service.faults import parameter_error
 from sprag.service.http.computer import Computes
 from sprag.service.http.problems import ApiError
 from sprag.service.http.shares import Shares
@@ -19,7 +18,6 @@ from sprag.service.results.unaffected import Unaffected
 from sprag.service.settings import Settings
 from sprag.service.storage.store import Store
 from sprag.worker.limits import MAX_CASES, MAX_CHECKS_EACH, MAX_COMPUTATIONS_EACH, MAX_STARTS, MAX_STREAMS
-from sprag.worker.models.starts import count_of
 
 if TYPE_CHECKING:
     from sprag.worker.study import Study
@@ -120,10 +118,3 @@ StartNumber = Annotated[
         description="of a case with many starts: which of them; by default 0, its own",
     ),
 ]
-
-
-def check_start(study: Study, start: int | None) -> None:
-    """Refuse a number of a start that the cases of the study do not have."""
-    count = count_of(study.run)
-    if start is not None and start >= count:
-        raise parameter_error("start", "out-of-range", "there is no such start", start, f"0 to {count - 1}")

@@ -10,7 +10,8 @@ from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
 from sprag.service.http.access import OPEN
-from sprag.service.http.context import check_start, study_with
+from sprag.service.http.context import study_with
+from sprag.service.results.start_states import check_start
 from sprag.service.spec.machine.shaft_check import NotCompiledError
 from sprag.worker import models
 

@@ -180,12 +180,12 @@ def _stand_by(store: Store, lock: OneHolder, stopping: Callable[[], bool], say: 
     if lock.take():
         return True
     say(f"another worker (process {lock.holder()}) is working on {store.session.location}; waiting for it to stop")
-    told = False
+    reported = False
     while not lock.take():
         if stopping():
             return False
-        if not told and (silence := store.silence() or 0.0) > SILENT_SECONDS:
-            told = True
+        if not reported and (silence := store.silence() or 0.0) > SILENT_SECONDS:
+            reported = True
             say(
                 f"process {lock.holder()} has not responded for {silence:.0f} s; stop it, or continue without it: "
                 "`sprag worker --take-over`"

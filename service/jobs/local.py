@@ -194,11 +194,11 @@ class _Watch:
         if self._report is not None:
             self._report(self._store.progress(self._id))
         if not record.over:
-            raise StudyHeldError(f"the study was held: {_told(record, passing=passing)}")
+            raise StudyHeldError(f"the study was held: {_why_held(record, passing=passing)}")
         return record
 
 
-def _told(record: StudyRecord, *, passing: bool) -> str:
+def _why_held(record: StudyRecord, *, passing: bool) -> str:
     """Why the study was held, and what to do where it was for lack of space."""
     reason = record.reason or "it was paused"
     cause = next((reason.removesuffix(later) for later in _LATER if reason.endswith(later)), None)

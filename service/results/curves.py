@@ -173,8 +173,15 @@ class Map:
             "z": numbers(known.values),
             "cases": known.cases.tolist(),
         }
-        told = {"error_asked": known.asked, "error": known.error, "jumps_share": known.told, "passed": known.passed}
-        return {**self._grid(), "cases": [], "points": points, **told}  # type: ignore[typeddict-item]
+        return {
+            **self._grid(),
+            "cases": [],
+            "points": points,
+            "error_asked": known.asked,
+            "error": known.error,
+            "jumps_share": known.jumps_share,
+            "passed": known.passed,
+        }
 
     def _grid(self) -> MapData:
         data: MapData = {

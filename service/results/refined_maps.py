@@ -40,7 +40,7 @@ class RefinedMap:
     ----------
     asked, error : float
         The requested error, and the estimated one outside jumps (None: not known yet), relative to the range.
-    told : float
+    jumps_share : float
         Share of the map that is not interpolated.
     passed : bool
         Whether no more points are needed.
@@ -51,7 +51,7 @@ class RefinedMap:
 
     asked: float
     error: float | None
-    told: float
+    jumps_share: float
     passed: bool
     x: NDArray[np.float64]
     y: NDArray[np.float64]
@@ -61,7 +61,7 @@ class RefinedMap:
     @property
     def sentence(self) -> str:
         """How right the map is, for people."""
-        outside = f" outside jumps ({percent(self.told)} of the map)" if self.told else ""
+        outside = f" outside jumps ({percent(self.jumps_share)} of the map)" if self.jumps_share else ""
         return reached(self.asked, self.error, outside, passed=self.passed)
 
 
@@ -102,7 +102,7 @@ def draw_refined_map(
     known = RefinedMap(
         plan.error,
         own.errors[z],
-        own.told[z],
+        own.jumps_share[z],
         own.passed,
         columns[0],
         columns[1],

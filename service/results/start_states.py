@@ -1,4 +1,4 @@
-"""The check of initial values that vary on the pages and in the pictures of a case."""
+"""The checks of what a request says of the starts of a case."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ from typing import TYPE_CHECKING
 
 from sprag.service.faults import parameter_error
 from sprag.worker.models.start_states import impossible_starts, is_state
+from sprag.worker.models.starts import count_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
+
+    from sprag.worker.study import Study
 
 
 def refuse_impossible(
@@ -32,3 +35,10 @@ def refuse_impossible(
         for found in impossible_starts({**machine, **corner}):
             name = names.get(found.path, next(iter(names.values())))
             raise parameter_error(name, found.code, f"{found.path} {found.message}", found.value, found.allowed)
+
+
+def check_start(study: Study, start: int | None) -> None:
+    """Refuse a number of a start that the cases of the study do not have."""
+    count = count_of(study.run)
+    if start is not None and start >= count:
+        raise parameter_error("start", "out-of-range", "there is no such start", start, f"0 to {count - 1}")

@@ -37,7 +37,7 @@ def unknown_result(infos: Iterable[ResultInfo], name: str) -> str:
 
 def axes_json(study: Study) -> list[AxisInfo]:
     """The axes of a study as JSON data, without the full lists of values."""
-    told = [(axis, values_told(study, axis)) for axis in study.axes]
+    shown = [(axis, shown_values(study, axis)) for axis in study.axes]
     return [
         {
             "paths": list(axis.paths),
@@ -46,10 +46,10 @@ def axes_json(study: Study) -> list[AxisInfo]:
             "first": float(values[0]),
             "last": float(values[-1]),
         }
-        for axis, values in told
+        for axis, values in shown
     ]
 
 
-def values_told(study: Study, axis: Axis) -> NDArray[np.float64]:
+def shown_values(study: Study, axis: Axis) -> NDArray[np.float64]:
     """The values of an axis for people; of a study that chooses its cases each of its values once, ascending."""
     return axis.array if study.plan is None else np.unique(axis.array)

@@ -75,22 +75,22 @@ class Described:
 
     def schema(self) -> dict[str, Any]:
         """Its JSON Schema."""
-        told: dict[str, Any] = {"description": self.help} if self.help else {}
+        schema: dict[str, Any] = {"description": self.help} if self.help else {}
         if self.kind == "periods":
-            told["description"] += f": {self.low:,} to {self.high:,}"
-            return {"type": "string", "examples": [self.default_text], "default": self.default_text, **told}
+            schema["description"] += f": {self.low:,} to {self.high:,}"
+            return {"type": "string", "examples": [self.default_text], "default": self.default_text, **schema}
         if self.kind == "time":
-            return {"type": ["number", "string"], "examples": ["60 periods", "2 s", 2.0], "minimum": 0, **told}
+            return {"type": ["number", "string"], "examples": ["60 periods", "2 s", 2.0], "minimum": 0, **schema}
         if self.kind == "text":
             return {"type": ["number", "string"], "default": self.default, "description": f"{self.help}: {self.limits}"}
         if self.default is not None:
-            told["default"] = self.default
+            schema["default"] = self.default
         if self.kind == "choice":
-            return {"enum": list(self.values), **told}
+            return {"enum": list(self.values), **schema}
         if self.kind == "flag":
-            return {"type": "boolean", **told}
+            return {"type": "boolean", **schema}
         kind = "integer" if self.kind == "whole" else "number"
-        return {"type": kind, "minimum": self.low, "maximum": self.high, **told}
+        return {"type": kind, "minimum": self.low, "maximum": self.high, **schema}
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,9 +137,9 @@ class Listed:
 
     def schema(self, item: dict[str, Any]) -> dict[str, Any]:
         """Its JSON Schema, ``item`` being that of each item."""
-        told = {"description": self.help} if self.help else {}
+        schema = {"description": self.help} if self.help else {}
         least = {"minItems": self.low} if self.low else {}
-        return {"type": "array", **least, "maxItems": self.high, "items": item, **told}
+        return {"type": "array", **least, "maxItems": self.high, "items": item, **schema}
 
 
 def choice(name: str, help: str, *values: str, default: str | None = None) -> Described:

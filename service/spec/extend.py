@@ -133,6 +133,6 @@ def _add(
     else:
         bases = list(dict.fromkeys(study.base[path] for path in paths))
         if len(bases) > 1:
-            told = [quantity_text(base, machine.parameters[paths[0]].unit) for base in bases]
-            report.fault(join(pointer, "path"), "conflict", "ties parameters whose values in the base differ", told)
+            texts = [quantity_text(base, machine.parameters[paths[0]].unit) for base in bases]
+            report.fault(join(pointer, "path"), "conflict", "ties parameters whose values in the base differ", texts)
         axes.append({"path": list(paths), "values": list(dict.fromkeys([*bases, *values.tolist()]))})

@@ -121,9 +121,9 @@ def read_one(report: Report, pointer: str, found: Mapping[str, Any], names: Sequ
     given = [name for name in names if name in found]
     if len(given) == 1:
         return given[0]
-    told = f"{len(given)} are given: {', '.join(given)}" if given else "none is given"
+    count = f"{len(given)} are given: {', '.join(given)}" if given else "none is given"
     listed = ", ".join(names)
-    report.fault(pointer, "exactly-one", f"needs exactly one of {listed}; {told}", allowed=f"one of {listed}")
+    report.fault(pointer, "exactly-one", f"needs exactly one of {listed}; {count}", allowed=f"one of {listed}")
     return None
 
 

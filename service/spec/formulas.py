@@ -89,7 +89,7 @@ def read_formula(text: str, units: dict[str, str], unit: str) -> Formula:
     try:
         expression = Expression(scan.converted, units)
     except ExpressionError as error:
-        raise FormulaError("invalid-formula", scan.told(error)) from None
+        raise FormulaError("invalid-formula", scan.located(error)) from None
     found = _Dimensions(scan, units).of(expression.root)
     wanted = _powers(unit)
     if not _alike(found, wanted):
@@ -129,7 +129,7 @@ class _Scan:
             self._places.append((length, position))
         self.converted = "".join(parts)
 
-    def told(self, error: ExpressionError) -> str:
+    def located(self, error: ExpressionError) -> str:
         """The message of a fault in the converted formula, with the position in the original one."""
         if error.position is None:
             return str(error)

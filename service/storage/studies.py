@@ -149,7 +149,7 @@ class Studies(Orders):
                 )
             announce(connection)
             written = connection.execute(sa.select(*RECORD_COLUMNS).where(STUDIES.c.number == number)).one()
-            return self._told(connection, record_of(written))
+            return self._with_silence(connection, record_of(written))
 
     def get_study(self, study_id: str) -> StudyRecord:
         """The study of that id; raises StudyNotFoundError."""
@@ -157,9 +157,9 @@ class Studies(Orders):
             return self._study_record(connection, study_id)
 
     def _study_record(self, connection: sa.Connection, study_id: str) -> StudyRecord:
-        return self._told(connection, record_of(self._row(connection, study_id, *RECORD_COLUMNS)))
+        return self._with_silence(connection, record_of(self._row(connection, study_id, *RECORD_COLUMNS)))
 
-    def _told(self, connection: sa.Connection, record: StudyRecord) -> StudyRecord:
+    def _with_silence(self, connection: sa.Connection, record: StudyRecord) -> StudyRecord:
         """The study; where its worker is silent and cannot record a reason itself, with that reason."""
         if record.reason is not None or not record.state.going:
             return record
@@ -222,7 +222,7 @@ class Studies(Orders):
             query = query.where(STUDIES.c.state == state.value)
         with self.session.read() as connection:
             rows = connection.execute(query.order_by(STUDIES.c.number.desc()).limit(size + 1)).all()
-            records = tuple(self._told(connection, record_of(row)) for row in rows[:size])
+            records = tuple(self._with_silence(connection, record_of(row)) for row in rows[:size])
         return StudyPage(records, str(records[-1].number) if len(rows) > size else None)
 
     def waiting_studies(self) -> int:
@@ -262,7 +262,7 @@ class Studies(Orders):
             rounds = None
             if row.most_cases is not None:
                 rounds = RoundProgress(latest_round(connection, row.number), row.most_rounds, row.most_cases)
-            record = self._told(connection, record_of(row))
+            record = self._with_silence(connection, record_of(row))
         now = self.clock.now()
         state = StudyState(row.state)
         uneven = models.regime_info(models.result_infos(row.model, row.variant)) is not None

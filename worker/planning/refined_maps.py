@@ -96,7 +96,7 @@ class Map(Described):
         return np.where((owner < 0) | self.jumps[name][cell], np.nan, (1.0 - v) * below + v * above)
 
     @property
-    def told(self) -> dict[str, float]:
+    def jumps_share(self) -> dict[str, float]:
         """Share of the map's area that is not interpolated, by result."""
         size = np.prod(self.cells[:, 2:] - self.cells[:, :2], axis=1)
         whole = float(np.prod([axis.high - axis.low for axis in self._samples.plan.adaptive]))
@@ -108,7 +108,7 @@ class Map(Described):
             "points": len(self.x),
             "failed": int((~self.ok).sum()),
             "errors": self.errors,
-            "told": self.told,
+            "jumps_share": self.jumps_share,
             "passed": self.passed,
         }
 

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Depends
 from starlette.responses import Response
 
 from sprag.service.answers.results import BasinData
-from sprag.service.http.api.document import files, format_query, problems
+from sprag.service.http.api.document import CASE_PROBLEMS, files, format_query, problems
 from sprag.service.http.basin_query import AskedBasin
 from sprag.service.http.context import CaseNumber, StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, picture
@@ -21,18 +21,13 @@ from sprag.service.results.pictures.curves import draw_basin
 
 router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
 
-_PROBLEMS = (
-    "invalid-parameter", "study-not-found", "case-not-found", "not-found", "not-acceptable", "not-computed",
-    "timed-out", "too-many-requests", "unavailable", "too-costly",
-)  # fmt: skip
-
 
 @router.get(
     "/{case:case}/basin",
     response_model=BasinData,
     responses={
         **files("The grid as JSON or CSV, or a picture.", DRAWN_FORMATS.values()),
-        **problems(*_PROBLEMS),
+        **problems(*CASE_PROBLEMS, "too-costly"),
     },
 )
 async def get_basin(

@@ -9,7 +9,7 @@ from starlette.responses import Response
 
 from sprag.service.answers.results import Branch
 from sprag.service.answers.sections import Sections
-from sprag.service.http.api.document import files, format_query, problems
+from sprag.service.http.api.document import CASE_PROBLEMS, files, format_query, problems
 from sprag.service.http.context import CaseNumber, StartNumber, StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, picture
 from sprag.service.http.drawing import table as written
@@ -32,11 +32,6 @@ if TYPE_CHECKING:
     from sprag.worker.study import Study
 
 router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
-
-_PROBLEMS = (
-    "invalid-parameter", "study-not-found", "case-not-found", "not-found", "not-acceptable", "not-computed",
-    "timed-out", "too-costly", "too-many-requests", "unavailable",
-)  # fmt: skip
 
 Paths = Annotated[
     str,
@@ -64,7 +59,7 @@ Phase = Annotated[
     response_model=Branch,
     responses={
         **files("The branch as JSON, its points as CSV, or a picture.", DRAWN_FORMATS.values()),
-        **problems(*_PROBLEMS),
+        **problems(*CASE_PROBLEMS, "too-costly"),
     },
 )
 async def get_branch(
@@ -97,7 +92,7 @@ async def get_branch(
     response_model=Sections,
     responses={
         **files("The strobes as JSON or CSV, or a picture.", DRAWN_FORMATS.values()),
-        **problems(*_PROBLEMS),
+        **problems(*CASE_PROBLEMS, "too-costly"),
     },
 )
 async def get_diagram(
@@ -138,7 +133,7 @@ async def get_diagram(
     response_model=Sections,
     responses={
         **files("The strobes as JSON or CSV, or a picture.", DRAWN_FORMATS.values()),
-        **problems(*_PROBLEMS),
+        **problems(*CASE_PROBLEMS, "too-costly"),
     },
 )
 async def get_section(

@@ -9,7 +9,7 @@ from starlette.responses import Response
 
 from sprag.service.answers.results import EngagementTables, Portrait
 from sprag.service.faults import choice_of
-from sprag.service.http.api.document import files, format_query, one_of, problems
+from sprag.service.http.api.document import CASE_PROBLEMS, files, format_query, one_of, problems
 from sprag.service.http.context import CaseNumber, StartNumber, StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, TABLE_FORMATS, picture
 from sprag.service.http.drawing import table as written
@@ -23,18 +23,13 @@ from sprag.worker.models.starts import motion_of
 
 router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
 
-_PROBLEMS = (
-    "invalid-parameter", "study-not-found", "case-not-found", "not-found", "not-acceptable", "not-computed",
-    "timed-out", "too-many-requests", "unavailable",
-)  # fmt: skip
-
 
 @router.get(
     "/{case:case}/engagements",
     response_model=EngagementTables,
     responses={
         **files("Both tables as JSON, or one of them as CSV.", TABLE_FORMATS.values()),
-        **problems(*_PROBLEMS),
+        **problems(*CASE_PROBLEMS),
     },
 )
 async def get_engagements(
@@ -60,7 +55,7 @@ async def get_engagements(
     response_model=Portrait,
     responses={
         **files("Strobes and orbit as JSON, one of them as CSV, or a picture.", DRAWN_FORMATS.values()),
-        **problems(*_PROBLEMS, "too-costly"),
+        **problems(*CASE_PROBLEMS, "too-costly"),
     },
 )
 async def get_strobes(

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Depends, Query
 from starlette.responses import Response
 
 from sprag.service.answers.transients import Transient
-from sprag.service.http.api.document import files, format_query, one_of, problems
+from sprag.service.http.api.document import CASE_PROBLEMS, files, format_query, one_of, problems
 from sprag.service.http.context import CaseNumber, StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, picture, table
 from sprag.service.http.requests import strict_query
@@ -25,11 +25,6 @@ if TYPE_CHECKING:
     from sprag.worker.study import Study
 
 router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
-
-_PROBLEMS = (
-    "invalid-parameter", "study-not-found", "case-not-found", "not-found", "not-acceptable", "not-computed",
-    "timed-out", "too-costly", "too-many-requests", "unavailable",
-)  # fmt: skip
 
 Kind = Annotated[
     str,
@@ -60,7 +55,7 @@ Revolutions = Annotated[str | None, Query(description="most revolutions that are
     response_model=Transient,
     responses={
         **files("The transient as JSON, its values over time as CSV, or a picture.", DRAWN_FORMATS.values()),
-        **problems(*_PROBLEMS),
+        **problems(*CASE_PROBLEMS, "too-costly"),
     },
 )
 async def get_transient(

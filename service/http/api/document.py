@@ -20,6 +20,11 @@ _METRICS: Final = "/metrics"
 _SCHEMAS: Final = "#/components/schemas/"
 #: Problems that any operation of the API may answer with.
 _EVERYWHERE: Final = ("unauthorized", "too-many-attempts", "wrong-host", "internal", "unavailable")
+#: Problems of operations that run one case of a study again.
+CASE_PROBLEMS: Final = (
+    "invalid-parameter", "study-not-found", "case-not-found", "not-found", "not-acceptable", "not-computed",
+    "timed-out", "too-many-requests", "unavailable",
+)  # fmt: skip
 _UNSAFE: Final = ("cross-site", "read-only", "too-slow")
 
 _TEXT: Final = {"type": "string"}

@@ -122,7 +122,7 @@ async def create_schedule(
     if idempotency_key is None:
         return await run_in_threadpool(keep, await _fields(context, work, received, None), None, "")
     # Before the fields are read: a future time may have passed since the key was first sent.
-    with _told():
+    with _as_problems():
         body_hash = await work.check(checks.body_hash, received.content, received.format)
     known = await run_in_threadpool(store.schedule_of_key, idempotency_key, body_hash)
     if known is not None:
@@ -136,14 +136,14 @@ def _made(context: Context, record: ScheduleRecord) -> Response:
 
 
 async def _fields(context: Context, work: Work, received: Body, old: ScheduleFields | None) -> ScheduleFields:
-    with _told():
+    with _as_problems():
         return await work.check(
             checks.schedule_body, context.library, received.content, received.format, context.store.clock.now(), old
         )
 
 
 @contextmanager
-def _told() -> Iterator[None]:
+def _as_problems() -> Iterator[None]:
     """Convert the faults of a body to an ApiError."""
     try:
         yield

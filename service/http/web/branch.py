@@ -10,7 +10,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError
-from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, check_start, study_with
+from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, study_with
 from sprag.service.http.respond import json_response
 from sprag.service.http.web.along import Begin, End, Text, along_frame, query_of
 from sprag.service.http.web.figures.plotly import plotly_figure
@@ -19,6 +19,7 @@ from sprag.service.http.work import Attended
 from sprag.service.results.branches import along_of, neighbours, result_of, usual_along
 from sprag.service.results.figures.branch import OwnCases, branch_figure
 from sprag.service.results.portraits import require_strobes
+from sprag.service.results.start_states import check_start
 from sprag.worker.models.branches import branch_results, run_branch
 from sprag.worker.models.starts import motion_of
 

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError
-from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, check_start, study_with
+from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, study_with
 from sprag.service.http.drawing import picture, unchanging
 from sprag.service.http.respond import json_response
 from sprag.service.http.web.figures.answers import SAMPLES, motion_figures, strobes_figure
@@ -22,6 +22,7 @@ from sprag.service.results.pictures.curves import draw_motion
 from sprag.service.results.portraits import require_strobes
 from sprag.service.results.regimes import ORDER
 from sprag.service.results.selection import axis_name, own_paths
+from sprag.service.results.start_states import check_start
 from sprag.service.results.sweeps import direction_texts
 from sprag.service.results.wording import number
 from sprag.service.spec.catalogue import unit_of

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError
-from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, check_start, study_with
+from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, study_with
 from sprag.service.http.drawing import unchanging
 from sprag.service.http.respond import json_response
 from sprag.service.http.web.along import Begin, End, Text, along_frame, query_of
@@ -19,6 +19,7 @@ from sprag.service.results.branches import usual_along
 from sprag.service.results.figures.sections import diagram_figure, section_figure
 from sprag.service.results.portraits import require_strobes
 from sprag.service.results.sections import diagram_of, section_of, variable_of, variables
+from sprag.service.results.start_states import check_start
 from sprag.worker.models.sections import run_sections
 from sprag.worker.models.starts import motion_of
 

@@ -181,11 +181,11 @@ def _main_figure(study: Study, study_id: str, query: CurveQuery | None) -> dict[
     mapped = map_query(study, models.study_results(study), QueryParams()) if map_plan(study) is not None else None
     if mapped is not None:
         kind, pairs, more = "map", pairs_of(mapped), ("kind", "heatmap")
-        told = f"{mapped.z} over {mapped.x} and {mapped.y}"
+        text = f"{mapped.z} over {mapped.x} and {mapped.y}"
         drawable = True
     else:
         kind, pairs, more = "curves", pairs_of(query), ("columns", "2")
-        told = caption(study, query)
+        text = caption(study, query)
         drawable = _drawable(drawn_numbers(study, query))
     picture = f"{views.study_address(study_id)}/{kind}?{urlencode([*pairs, ('format', 'svg')])}"
     return {
@@ -195,7 +195,7 @@ def _main_figure(study: Study, study_id: str, query: CurveQuery | None) -> dict[
         "others": f"/studies/{study_id}/{kind}?{urlencode(pairs)}",
         "kind": kind.capitalize(),
         "invitation": "Choose others with",
-        "caption": told,
+        "caption": text,
     }
 
 

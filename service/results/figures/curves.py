@@ -78,11 +78,11 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1, *, by_u
         looks,
         most=most,
         note=_nothing(drawn),
-        below=_told(drawn[0][1]) if len(drawn) == 1 else "",
+        below=_remark(drawn[0][1]) if len(drawn) == 1 else "",
     )
 
 
-def _told(curves: Curves) -> str:
+def _remark(curves: Curves) -> str:
     """How right refined curves are, or what a sweep up and down differ in."""
     if curves.selection.swept:
         return hysteresis(curves)

@@ -30,7 +30,7 @@ def read_correlations(
     columns : path -> number of its draw, for every parameter that is drawn
     """
     matrix = np.eye(dimensions)
-    told: list[dict[str, Any]] = []
+    described: list[dict[str, Any]] = []
     before = report.found
     for index, item in enumerate(CORRELATIONS.read(report, pointer, data) or ()):
         where = join(pointer, index)
@@ -47,16 +47,16 @@ def read_correlations(
                 report.fault(join(where, "between"), "repeated", message, found["between"], allowed="each pair once")
                 break
             matrix[a, b] = matrix[b, a] = coefficient
-        told.append({"between": list(found["between"]), "coefficient": coefficient})
-    if report.found == before and told:
+        described.append({"between": list(found["between"]), "coefficient": coefficient})
+    if report.found == before and described:
         least = float(np.linalg.eigvalsh(matrix)[0])
         if least < _LEAST:
             report.fault(
                 pointer, "conflict",
                 f"contradict each other: the matrix of the correlations is not positive definite, its least eigenvalue "
-                f"is {least:.3g}", [one["coefficient"] for one in told], allowed="coefficients closer to 0",
+                f"is {least:.3g}", [one["coefficient"] for one in described], allowed="coefficients closer to 0",
             )  # fmt: skip
-    return matrix, told
+    return matrix, described
 
 
 def _read_pairs(report: Report, pointer: str, data: object, columns: Mapping[str, int]) -> list[tuple[int, int]]:

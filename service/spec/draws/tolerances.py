@@ -83,7 +83,7 @@ def read_tolerances(
         drawn += _read_item(report, join("/tolerances", index), item, machine, axes or ())
     _check_once(report, drawn)
     names = {path: k for k, one in enumerate(drawn) for path in one.tolerance.paths}
-    matrix, told = read_correlations(report, found.get("correlations", []), names, len(drawn))
+    matrix, pairs = read_correlations(report, found.get("correlations", []), names, len(drawn))
     if report.found > before or axes is None or items is None:
         return None
     drives = settings["drives"]
@@ -97,7 +97,7 @@ def read_tolerances(
         _warn_of_cut(report, one)
     unit = correlated(unit_sample(settings["draws"], drives, settings["seed"], len(drawn)), matrix)
     columns = [one.distribution.quantile(unit[:, k]) for k, one in enumerate(drawn)]
-    about = {"seed": settings["seed"], "draws": settings["draws"], "correlations": told}
+    about = {"seed": settings["seed"], "draws": settings["draws"], "correlations": pairs}
     return Spread([one.tolerance for one in drawn], np.stack(columns, axis=1), about)
 
 

@@ -95,9 +95,9 @@ def read_refined_axes(
     check_paths(report, every)
     count = sum(map(is_adaptive, items))
     if count not in {1, 2} and not any(kind in item for item in items if isinstance(item, Mapping) for kind in _OTHER):
-        told = "no axis is adaptive" if not count else f"{count} axes are adaptive"
+        counted = "no axis is adaptive" if not count else f"{count} axes are adaptive"
         report.fault(
-            "/axes", "exactly-one", told, allowed='one axis with "adaptive": [from, to] for curves, two for a map'
+            "/axes", "exactly-one", counted, allowed='one axis with "adaptive": [from, to] for curves, two for a map'
         )
     return None if report.found > before else (tuple(fixed), tuple(adaptive))
 

@@ -44,7 +44,7 @@ def test_tables_of_one_case(sprag: Sprag, tmp_path: Path) -> None:
     [
         (("diagram", "one_pendulum.json", "--along", "shaft.lode"), "--along"),
         (("section", "one_pendulum.json", "--phase", "400 deg"), "--phase"),
-        (("section", "coexisting_motions.json", "--start", 32), "0 .. 31"),
+        (("section", "coexisting_motions.json", "--start", 32), "0 to 31"),
         (("basin", "one_pendulum.json", "--x", SPEED), "--x-from"),
         (("regimes", "one_pendulum.json"), "/starts"),
         (("section", "press.toml"), "settle"),

@@ -119,8 +119,8 @@ def test_a_jump_is_told_in_narrow_cells_and_nowhere_else() -> None:
         both = missing[1:] | missing[:-1] if axis == 0 else missing[:, 1:] | missing[:, :-1]
         assert both[over].all()
     assert np.nanquantile(errors_of(found, "a", cliff), 0.99) <= plan.error
-    assert found.told["a"] < 0.05
-    assert found.told["b"] == 0.0
+    assert found.jumps_share["a"] < 0.05
+    assert found.jumps_share["b"] == 0.0
     assert len(found.x) < 65 * 65 / 4
     assert step.summary["passed"]
 
@@ -141,13 +141,13 @@ def test_failed_cases_are_told() -> None:
 def test_a_study_of_failures_ends() -> None:
     found, step = map_of(PLAN, lambda x, y: {"a": x + y, "ok": np.zeros(len(x))})
     assert (step.summary["error"], step.summary["passed"]) == (None, True)
-    assert found.told == {"a": pytest.approx(1.0)}
+    assert found.jumps_share == {"a": pytest.approx(1.0)}
 
 
 def test_scatter_takes_no_more_than_the_finest_grid() -> None:
     found, _ = map_of(replace(PLAN, finest=16), lambda x, y: {"a": np.sin(1e6 * x + 2e6 * y)})
     assert 150 < len(found.x) <= 17 * 17
-    assert found.told["a"] > 0.8
+    assert found.jumps_share["a"] > 0.8
 
 
 def test_extremes_of_irregular_motion_are_told_and_not_refined() -> None:
@@ -162,8 +162,8 @@ def test_extremes_of_irregular_motion_are_told_and_not_refined() -> None:
         }  # fmt: skip
 
     found, _ = map_of(plan, function)
-    assert found.told["mean"] == 0.0
-    assert found.told["max"] == pytest.approx(0.5, abs=0.1)
+    assert found.jumps_share["mean"] == 0.0
+    assert found.jumps_share["max"] == pytest.approx(0.5, abs=0.1)
     assert (found.x > 30.0).sum() < 65 * 32 / 4
 
 

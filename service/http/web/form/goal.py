@@ -81,8 +81,8 @@ def _points(values: Mapping[str, str], faults: Faults) -> list[dict[str, Any]]:
         if not column:
             faults[f"{pointer}/values"] = ["is required; allowed: one value for each operating point"]
         elif len(column) != len(first):
-            told = f"must have as many values as the first parameter, {len(first)}; got {len(column)}"
-            faults[f"{pointer}/values"] = [f"{told}; allowed: one value for each operating point"]
+            message = f"must have as many values as the first parameter, {len(first)}; got {len(column)}"
+            faults[f"{pointer}/values"] = [f"{message}; allowed: one value for each operating point"]
         columns.setdefault(path, column)
     return [dict(zip(columns, point, strict=True)) for point in zip(*columns.values(), strict=False)]
 

@@ -182,7 +182,7 @@ def _clutch(values: Mapping[str, str], pointer: str, faults: Faults) -> dict[str
             measured = parse_measured(text, parse_quantity)
             found["data"] = measured.rows.tolist()
         except MeasuredDataError as error:
-            faults[f"{pointer}/data"] = [_told(fault) for fault in error.faults]
+            faults[f"{pointer}/data"] = [_fault_text(fault) for fault in error.faults]
     found |= _given(values, f"{pointer}/accuracy", "accuracy") | _given(values, f"{pointer}/max_degree", "max_degree")
     # An unticked box is not sent, so both values are written explicitly.
     found["through_origin"] = values.get(f"{pointer}/through_origin") == "on"
@@ -190,7 +190,7 @@ def _clutch(values: Mapping[str, str], pointer: str, faults: Faults) -> dict[str
     return found
 
 
-def _told(fault: Fault) -> str:
+def _fault_text(fault: Fault) -> str:
     """A fault of measured data as a sentence: the line, the fault, the value, what is allowed."""
     parts = [f"{fault.where}: {fault.message}", *([] if fault.value is None else [f"got {fault.value}"])]
     return "; ".join([*parts, *([f"allowed: {fault.allowed}"] if fault.allowed else [])])
