@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query
-from starlette.responses import Response
+from starlette.responses import RedirectResponse, Response
 
 from sprag.service.faults import FaultError
 from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, study_with
 from sprag.service.http.drawing import picture, unchanging
 from sprag.service.http.respond import json_response
 from sprag.service.http.web.figures.answers import SAMPLES, motion_figures, strobes_figure
+from sprag.service.http.web.form.own_machine import case_address, has_laboratory
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
@@ -151,6 +152,7 @@ def case_page(
         has_clutches=models.has_clutches(study),
         has_strobes=models.has_strobes(study),
         has_transients=has_transients(study),
+        has_laboratory=has_laboratory(study.model),
         settled=models.is_settled(study.run),
         last=study.cases - 1,
     )
@@ -175,6 +177,17 @@ async def motion(
     return await unchanging(work, study_id, make)
 
 
+@router.get("/studies/{study_id:study}/cases/{case:case}/laboratory")
+async def in_laboratory(work: Attended, study_id: StudyId, case: CaseNumber, which: StartNumber = None) -> Response:
+    """The machine of a case in the laboratory, in the motion that the case comes to."""
+    study, spec = await work.case_of(study_id, case, lambda _: work.context.store.spec(study_id), which)
+    moving = models.has_strobes(study)
+    state = await work.run_case(models.run_end_state, *motion_of(study, case, which)) if moving else None
+    mark = f"{study_id}/{case}" if which is None else f"{study_id}/{case}/{which}"
+    address = await work.check(case_address, spec, study, case, mark, state or {})
+    return RedirectResponse(address, status_code=303)
+
+
 @router.get("/studies/{study_id:study}/cases/{case:case}/motion.svg")
 async def motion_picture(
     work: Attended, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = "", which: StartNumber = None
@@ -185,7 +198,7 @@ async def motion_picture(
     async def make() -> Response:
         made = await work.run_case(models.run_trajectory, *motion_of(study, case, which), *span, SAMPLES // 3)
         title = f"{study.name}, case {case}"
-        return await picture(draw_motion, "svg", made, models.presentation_of(study), title, ()).response(work)
+        return await picture(draw_motion, "svg", made, models.presentation_of(study), title, (), None).response(work)
 
     return await unchanging(work, study_id, make)
 

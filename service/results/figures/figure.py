@@ -131,6 +131,7 @@ class Figure:
     most : most points of a drawn line, where there are more than can be distinguished
     note : a sentence, where there is nothing to draw
     below : a sentence below the panels
+    at : x of a line across all panels of a picture; pages draw theirs where their own slider stands
     """
 
     x: Quantity
@@ -149,6 +150,7 @@ class Figure:
     most: int = 6_000
     note: str = ""
     below: str = ""
+    at: float | None = None
 
     @property
     def apart(self) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
@@ -79,12 +80,13 @@ def draw_motion(
     shown: Presentation,
     title: str,
     held: Sequence[tuple[str, Trajectory]],
+    at: float | None,
     picture: Picture,
 ) -> bytes:
     """The motion of one case, beside others with their names: its variables, and below them the states of the parts of
-    the machine.
+    the machine. A line marks the place ``at`` (time in s, angle in degrees).
     """
-    return draw_figure(motion_figure(made, shown, held), title, picture)
+    return draw_figure(replace(motion_figure(made, shown, held), at=at), title, picture)
 
 
 def draw_portrait(made: Portrait, shown: Presentation, title: str, picture: Picture) -> bytes:
@@ -189,23 +191,31 @@ def _paint_panel(figure: Figure, axes: Axes, panel: Panel, drawn: Described) -> 
         named = [line for line in panel.lines if line.listed]
         if len(named) > 1:
             axes.legend([handle(line) for line in named], [line.name for line in named], fontsize=8)
+    if drawn.at is not None:
+        axes.axvline(drawn.at, color="0.35", linewidth=0.9)
     if drawn.motion and len(panel.lines) > 1:
-        axes.legend(fontsize=8, loc="upper right", framealpha=0.8)
+        _legend_above(axes, columns=5)
     if panel.styles:
         handles = [
             Line2D([], [], color="0.3", linestyle=style, marker=marker, markersize=3.0, label=name)
             for name, (style, marker) in zip(panel.styles, STYLES * len(panel.styles), strict=False)
         ]
-        # Above the plot, where it hides no point.
-        axes.legend(
-            handles=handles,
-            fontsize=8,
-            ncols=min(len(handles), 3),
-            frameon=False,
-            loc="lower right",
-            bbox_to_anchor=(1.0, 1.0),
-            borderaxespad=0.2,
-        )
+        _legend_above(axes, columns=3, handles=handles)
+
+
+def _legend_above(axes: Axes, columns: int, **entries: Any) -> None:
+    """A legend above a plot, where it hides no point; by default of all its lines."""
+    handles = entries.get("handles") or axes.get_legend_handles_labels()[0]
+    axes.legend(
+        handles=handles,
+        fontsize=8,
+        ncols=min(len(handles), columns),
+        frameon=False,
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.2,
+        columnspacing=1.2,
+    )
 
 
 def _paint_line(axes: Axes, line: Line, *, thin: bool) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
+from sprag.service.results.wording import unit_text
 from sprag.worker.pool.child_process import uncounted
 
 if TYPE_CHECKING:
@@ -24,14 +25,14 @@ def load_matplotlib() -> None:
 
 def axis_label(name: str, unit: str, brackets: str = "()") -> str:
     """The label of an axis: the name, and its unit in ``brackets`` where it has one."""
-    return f"{name} {brackets[:1]}{unit}{brackets[1:]}" if unit != "1" else name
+    return f"{name} {brackets[:1]}{unit_text(unit)}{brackets[1:]}" if unit != "1" else name
 
 
 def quantity_label(quantity: Quantity) -> str:
     """The same for a quantity; only the unit where it has no name."""
     if quantity.name:
         return axis_label(quantity.name, quantity.unit)
-    return "dimensionless" if quantity.unit == "1" else quantity.unit
+    return "dimensionless" if quantity.unit == "1" else unit_text(quantity.unit)
 
 
 def writable(text: str, family: str | None = None) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.results.figures.turn import turn_figure
+from sprag.service.results.trajectories import trajectory_csv
 from sprag.worker import models
 from sprag.worker.models.turns import CaseTurn, case_turn
 
@@ -40,6 +41,12 @@ def curves_of(study: Study, held: Study | None) -> Figure | None:
     made = case_turn(study, 0, _SAMPLES)
     other = None if held is None else case_turn(held, 0, _SAMPLES)
     return _figure(study, made, held, other) if made.motion.times.size else None
+
+
+def turn_table(study: Study) -> bytes | None:
+    """The settled motion of a drive as CSV; None where there is none. For the computing process."""
+    motion = case_turn(study, 0, _SAMPLES).motion
+    return trajectory_csv(motion) if motion.times.size else None
 
 
 def _figure(study: Study, made: CaseTurn, held: Study | None, other: CaseTurn | None) -> Figure:

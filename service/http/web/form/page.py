@@ -7,7 +7,6 @@ import json
 import secrets
 from collections.abc import Mapping
 from typing import Annotated, Any, Final
-from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request
 from starlette.concurrency import run_in_threadpool
@@ -19,7 +18,7 @@ from sprag.service.http.problems import ApiError, api_error
 from sprag.service.http.respond import json_response
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form import study_check
-from sprag.service.http.web.form.check import Checked
+from sprag.service.http.web.form.check import Checked, message
 from sprag.service.http.web.form.entries import Values
 from sprag.service.http.web.form.fields import (
     FORM_MODEL,
@@ -35,6 +34,7 @@ from sprag.service.http.web.form.fields import (
     sections,
 )
 from sprag.service.http.web.form.goal import GOAL_DEFAULTS, LIMITS
+from sprag.service.http.web.form.own_machine import laboratory_address
 from sprag.service.http.web.form.parts import PARTS, add_part, add_row, copy, count_of, drop, drop_row
 from sprag.service.http.web.form.shaft import blocks, shaft_paths
 from sprag.service.http.web.form.shaft_spec import base_of
@@ -56,6 +56,7 @@ from sprag.service.http.work import Attended, Work
 from sprag.service.jobs.submission import Submission, take_in
 from sprag.service.presets import preset_names
 from sprag.service.spec.design import design_spec
+from sprag.service.spec.report import SpecError
 from sprag.worker import models
 from sprag.worker.models import MAX_PENDULUMS
 
@@ -152,14 +153,14 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
     reshape(values, wanted)
     checked = await look_over(context, work, values)
     if wanted == "laboratory" and checked.preview is not None:
-        return RedirectResponse(f"/laboratory?{machine_query(checked.spec)}", status_code=303)
+        try:
+            address = await work.check(laboratory_address, checked.spec)
+        except SpecError as error:
+            told = "; ".join(f"{item.where or 'the spec'}: {message(item)}" for item in error.faults)
+            checked.faults.setdefault("", []).append(f"The laboratory shows one machine, which this is not: {told}")
+        else:
+            return RedirectResponse(address, status_code=303)
     return await run_in_threadpool(form_page, request, values, checked)
-
-
-def machine_query(spec: Mapping[str, Any]) -> str:
-    """The machine of a spec as the parameters of the laboratory's address."""
-    text = json.dumps(spec["base"], separators=(",", ":"), ensure_ascii=False)
-    return urlencode({"machine": "own", "base": text})
 
 
 def _submit(context: Context, request: Request, values: Values, checked: Checked, made: Submission | None) -> Response:
@@ -287,6 +288,15 @@ def form_page(request: Request, values: Values, checked: Checked | None, status:
         drive_fields=drive_fields(),
         distributions=distributions(),
     )
+
+
+async def spec_in_form(work: Work, spec: dict[str, Any]) -> Response:
+    """A spec in the form, or as text where the form cannot show it."""
+    try:
+        values = values_of(spec)
+    except ValueError:
+        values = {"/text": spec_text(spec), "format": "json"}
+    return await run_in_threadpool(form_page, work.request, values, await look_over(work.context, work, values))
 
 
 def _paths(values: Values, prefixes: dict[str, int]) -> Groups:

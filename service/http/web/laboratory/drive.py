@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 from urllib.parse import parse_qsl, urlencode
 
 from fastapi import APIRouter
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from sprag.service.http.drawing import picture
+from sprag.service.http.drawing import picture, table
 from sprag.service.http.problems import ApiError
 from sprag.service.http.respond import json_response
-from sprag.service.http.web.figures.drive import curves_of, drive_case
-from sprag.service.http.web.form.page import form_page, look_over
+from sprag.service.http.web.figures.drive import curves_of, drive_case, turn_table
+from sprag.service.http.web.form.page import spec_in_form
 from sprag.service.http.web.laboratory.drive_setting import Setting, machines, setting, title_of, written
 from sprag.service.http.web.laboratory.sliders import position
-from sprag.service.http.web.templates import fragment, page, spec_text
+from sprag.service.http.web.templates import fragment, page
 from sprag.service.http.work import Attended
 from sprag.service.results.pictures.curves import draw_figure
 from sprag.worker import models
@@ -112,7 +111,7 @@ def _answer(chosen: Setting, held: Setting | None, case: dict[str, Any] | None) 
 def _details(chosen: Setting, held: Setting | None, case: dict[str, Any] | None) -> str:
     """The further results, and the studies that can be made of the setting."""
     shown = _shown(chosen, held, case, (*_MAIN, *_FURTHER))
-    return fragment("_drive_laboratory_details.html", **shown, studies=STUDIES)
+    return fragment("_drive_laboratory_details.html", **shown, studies=STUDIES, query=_query(chosen, held))
 
 
 def _shown(
@@ -169,16 +168,28 @@ async def drive_figure(work: Attended) -> Response:
     )
 
 
-@router.get(f"{_OWN}/picture.svg")
-async def drive_curves(work: Attended) -> Response:
-    """The curves as a picture, for pages without JavaScript."""
+@router.get(f"{_OWN}/picture.{{form}}")
+async def drive_curves(work: Attended, form: Literal["svg", "png", "csv"]) -> Response:
+    """The motion as one picture or as a table, also for pages without JavaScript."""
     chosen, held = await work.check(_settings, dict(work.request.query_params))
     if chosen.faults:
         raise ApiError("invalid-spec", "; ".join(text for texts in chosen.faults.values() for text in texts))
-    figure = await work.run_case(curves_of, chosen.study, _study(held))
-    if figure is None:
-        raise ApiError("not-found", "The case did not end ok, so it has no motion to draw.")
-    return await picture(draw_figure, "svg", figure, chosen.study.name).response(work)
+    if form == "csv":
+        content = await work.run_case(turn_table, chosen.study)
+        if content is not None:
+            return table(content, "csv", "laboratory")
+    else:
+        figure = await work.run_case(curves_of, chosen.study, _study(held))
+        if figure is not None:
+            return await picture(draw_figure, form, figure, chosen.study.name).response(work)
+    raise ApiError("not-found", "The case did not end ok, so it has no motion to draw.")
+
+
+@router.get(f"{_OWN}/form")
+async def drive_form(work: Attended) -> Response:
+    """The current drive in the form for a new study."""
+    chosen, _ = await work.check(_settings, dict(work.request.query_params))
+    return await spec_in_form(work, {**chosen.spec, "axes": []})
 
 
 @router.get(f"{_OWN}/study")
@@ -190,6 +201,5 @@ async def drive_study(work: Attended, along: str = "load") -> Response:
     word, path = STUDIES[along]
     slider = next(slider for slider in chosen.sliders if slider.path == path)
     axis = {"path": path, "linspace": [written(slider, slider.low), written(slider, slider.high), _VALUES]}
-    spec = {**chosen.spec, "name": f"{chosen.title}: characteristic against {word}", "axes": [axis]}
-    values = {"/text": spec_text(spec), "format": "json"}
-    return await run_in_threadpool(form_page, work.request, values, await look_over(work.context, work, values))
+    name = f"{chosen.title[:100]}: characteristic against {word}"
+    return await spec_in_form(work, {**chosen.spec, "name": name, "axes": [axis]})

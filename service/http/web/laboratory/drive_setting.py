@@ -9,12 +9,11 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
-from sprag.service.http.problems import ApiError
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.figures.shaft import overridden
-from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.entries import plain
-from sprag.service.http.web.laboratory.sliders import Slider, quantity_text, value_of
+from sprag.service.http.web.form.own_machine import OWN, case_page, machine_of, read_machine
+from sprag.service.http.web.laboratory.sliders import Slider, faults_by_field, quantity_text, value_of
 from sprag.service.presets import preset_names
 from sprag.service.results.wording import words
 from sprag.service.spec.document import parse_spec
@@ -61,6 +60,8 @@ _RANGES: Final[dict[str, Range]] = {
     "backlash": Range("Clutch", "Backlash", 0.0, 5.0, 0.02),
     "clutch.coefficients.1": Range("Clutch", "Stiffness", 0.1, 10.0, logarithmic=True),
     "damping": Range("Pendulum", "Damping", 0.0, 5.0, 0.02),
+    "mass": Range("Pendulum", "Mass", 0.0, 2.0),
+    "arm": Range("Pendulum", "Arm", 0.0, 2.0, unit="mm", size=1e-3),
     "inertia": Range("Pendulum", "Inertia", 0.5, 2.0, logarithmic=True),
     "spring_rate": Range("Pendulum", "Spring rate", 0.5, 2.0, logarithmic=True),
 }
@@ -72,19 +73,31 @@ _OF_CLUTCH: Final = (".initial_windup", ".initial_clutch")
 class Setting:
     """A drive with the numbers of a URL; ``faults``, by path, of invalid ones.
 
-    ``further`` are the numbers without a slider as given, ``state`` the initial values from which it starts, both by
-    path; ``freed`` is whether clutches start free because the drive cannot have the given states of its clutches.
+    ``machine`` is the drive as parameters of a URL, without what was changed. ``further`` are the numbers without a
+    slider as given, ``state`` the initial values from which it starts, both by path; ``freed`` is whether clutches
+    start free because the drive cannot have the given states of its clutches.
     """
 
-    name: str
+    machine: tuple[tuple[str, str], ...]
     title: str
     spec: dict[str, Any]
     study: Study
     sliders: list[Slider]
     faults: dict[str, list[str]]
+    warnings: tuple[str, ...]
     further: dict[str, str]
     state: dict[str, str]
     freed: bool
+
+    @property
+    def name(self) -> str:
+        """Name of the drive."""
+        return self.machine[0][1]
+
+    @property
+    def case(self) -> str:
+        """Page of the case that the drive comes from; "" where it comes from none."""
+        return case_page(dict(self.machine).get("case", ""))
 
     @property
     def groups(self) -> dict[str, list[Slider]]:
@@ -98,7 +111,7 @@ class Setting:
     def query(self) -> str:
         """The setting as parameters of a URL."""
         numbers = {slider.path: slider.text for slider in self.sliders} | self.further | self.state
-        return urlencode([("machine", self.name), *numbers.items()])
+        return urlencode([*self.machine, *numbers.items()])
 
 
 @lru_cache(maxsize=1)
@@ -122,56 +135,38 @@ def setting(given: Mapping[str, str]) -> Setting:
 
     With ``start=rest`` the initial values given do not count.
     """
-    name = given.get("machine") or next(iter(machines()), "")
-    if name not in machines():
-        raise ApiError("not-found", f"Unknown machine; known machines: {', '.join(machines()) or 'none'}.")
-    spec, own = _own(name)
+    machine = machine_of(given, given.get("machine") or next(iter(machines()), ""))
+    spec, own = read_machine(machine, models.VIBRATION_DRIVE, machines())
     texts = {path: given[path].strip() for path in (*own.base, *_states_of(own)) if given.get(path, "").strip()}
     state = {path: text for path, text in texts.items() if _is_state(path) and given.get("start") != "rest"}
     values = {path: text for path, text in texts.items() if not _is_state(path)}
-    study, faults = _read(spec, own, values | state)
+    # A field with the rounded text of the drive's own number leaves that number as it is.
+    changed = {path: text for path, text in values.items() if not _kind(path) or text != _own_text(own, path)}
+    study, faults, warnings = _read(spec, own, changed | state)
     freed = False
     if faults and any(path.endswith(_OF_CLUTCH) for path in state):
         # A changed clutch may not have the state in which the one before it was.
         kept = {path: text for path, text in state.items() if not path.endswith(_OF_CLUTCH)}
-        study, faults = _read(spec, own, values | kept)
+        study, faults, warnings = _read(spec, own, changed | kept)
         state, freed = kept, not faults
     sliders = [_slider(own, study, path, values.get(path, "")) for path in _in_order(own.base)]
     slid = {slider.path for slider in sliders}
     further = {path: text for path, text in values.items() if path not in slid}
-    changed = overridden(spec, {path: plain(text) for path, text in (values | state).items()})
-    return Setting(name, title_of(name), changed, study, sliders, faults, further, state, freed)
+    title = own.name if machine[0][1] == OWN else title_of(machine[0][1])
+    made = overridden(spec, {path: plain(text) for path, text in (changed | state).items()})
+    return Setting(machine, title, made, study, sliders, faults, warnings, further, state, freed)
 
 
-@lru_cache
-def _own(name: str) -> tuple[dict[str, Any], Study]:
-    """The spec of a built-in drive as one case; what only an axis gives has the value in the middle of the axis."""
-    spec: dict[str, Any] = preset_of(name)["spec"]
-    middle = {path: axis.values[len(axis.values) // 2] for axis in parse_spec(spec).study.axes for path in axis.paths}
-    single = overridden(spec, {path: value for path, value in middle.items() if not _gives(spec["base"], path)})
-    return single, parse_spec(single).study
-
-
-def _gives(base: Any, path: str) -> bool:
-    """Whether the base of a spec has a number at a flat path."""
-    for key in path.split("."):
-        if isinstance(base, dict) and key not in base:
-            return False
-        base = base[int(key)] if isinstance(base, list) else base[key]
-    return True
-
-
-def _read(spec: dict[str, Any], own: Study, values: Mapping[str, str]) -> tuple[Study, dict[str, list[str]]]:
-    """The study with some numbers, or the machine's own and the faults by path."""
+def _read(
+    spec: dict[str, Any], own: Study, values: Mapping[str, str]
+) -> tuple[Study, dict[str, list[str]], tuple[str, ...]]:
+    """The study with some numbers and its warnings, or the machine's own and the faults by path."""
     try:
-        study = parse_spec(overridden(spec, {path: plain(text) for path, text in values.items()})).study
+        parsed = parse_spec(overridden(spec, {path: plain(text) for path, text in values.items()}))
     except SpecError as error:
-        faults: dict[str, list[str]] = {}
-        for item in error.faults:
-            path = (item.where or "").removeprefix("/base/").replace("/", ".")
-            faults.setdefault(path if path in values else "", []).append(message(item))
-        return own, faults
-    return (study if models.is_settled(study.run) else models.settled_study(study)), {}
+        return own, faults_by_field(error, values, values), ()
+    study = parsed.study
+    return (study if models.is_settled(study.run) else models.settled_study(study)), {}, parsed.warnings
 
 
 def _is_state(path: str) -> bool:
@@ -203,7 +198,7 @@ def _slider(own: Study, study: Study, path: str, text: str) -> Slider:
     low, high = _limits(own, path, kind)
     found = _PENDULUM.match(path)
     several = sum(other.endswith(f".{path.rsplit('.', 1)[-1]}") for other in own.base if _PENDULUM.match(other)) > 1
-    given = quantity_text(own.base[path], kind.unit, kind.size)
+    given = _own_text(own, path)
     return Slider(
         path, f"{kind.label} of pendulum {found[1]}" if found and several else kind.label,
         "" if entry is None else "c2" if stiffness else entry.symbol, unit,
@@ -211,6 +206,12 @@ def _slider(own: Study, study: Study, path: str, text: str) -> Slider:
         value_of(text, unit, study.base[path]), text or given, given, low, high, kind.logarithmic and low > 0.0,
         kind.unit, kind.size,
     )  # fmt: skip
+
+
+def _own_text(own: Study, path: str) -> str:
+    """The drive's own number as its field has it."""
+    kind = _RANGES[_kind(path)]
+    return quantity_text(own.base[path], kind.unit, kind.size)
 
 
 def written(slider: Slider, value: float) -> str | float:
@@ -225,4 +226,5 @@ def _limits(own: Study, path: str, kind: Range) -> tuple[float, float]:
     value = own.base[path]
     if path.startswith("excitation.amplitude_"):
         value = max(own.base.get(f"excitation.amplitude_{way}", 0.0) for way in "xy")
-    return kind.low * value, max(kind.high * value, kind.least)
+    low, high = sorted((kind.low * value, kind.high * value))
+    return low, max(high, kind.least)

@@ -14,12 +14,11 @@ from sprag.service.http.problems import ApiError
 from sprag.service.http.respond import json_response
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.figures.shaft import SAMPLES, irregularities, machine_case
-from sprag.service.http.web.form.page import form_page, look_over
-from sprag.service.http.web.form.spec import values_of
+from sprag.service.http.web.form.page import spec_in_form
 from sprag.service.http.web.laboratory.questions import QUESTIONS, estimates, question_spec
 from sprag.service.http.web.laboratory.setting import MOST_HELD, held_settings, machines, setting
 from sprag.service.http.web.laboratory.sliders import position
-from sprag.service.http.web.templates import fragment, page, spec_text
+from sprag.service.http.web.templates import fragment, page
 from sprag.service.http.work import Attended, Work
 from sprag.service.results.pictures.curves import draw_motion
 from sprag.service.results.trajectories import trajectory_csv
@@ -60,7 +59,6 @@ async def laboratory(work: Attended) -> Response:
         position=position,
         drawings=chosen.sketch,
         picture=f"/laboratory/picture.svg?{_query(chosen, held)}",
-        figure=f"/laboratory/figure?{_query(chosen, held)}",
         **_parts(work, chosen, held, case),
     )
 
@@ -140,7 +138,8 @@ async def laboratory_picture(work: Attended, form: Literal["svg", "png", "csv"])
         return table(await run_in_threadpool(trajectory_csv, motions[0]), "csv", "laboratory")
     beside = [(_NAMES[index], motion) for index, motion in enumerate(motions[1:]) if motion.times.size]
     shown = models.presentation_of(chosen.study)
-    return await picture(draw_motion, form, motions[0], shown, chosen.study.name, beside).response(work)
+    at = chosen.angle % chosen.degrees
+    return await picture(draw_motion, form, motions[0], shown, chosen.study.name, beside, at).response(work)
 
 
 def _motion(study: Study) -> Trajectory:
@@ -169,7 +168,7 @@ async def laboratory_questions(work: Attended) -> Response:
 async def laboratory_form(work: Attended) -> Response:
     """The current machine in the form for a new study."""
     chosen = await work.check(setting, dict(work.request.query_params))
-    return await _in_form(work, {**chosen.spec, "axes": []})
+    return await spec_in_form(work, {**chosen.spec, "axes": []})
 
 
 @router.get("/laboratory/study")
@@ -178,13 +177,4 @@ async def laboratory_study(work: Attended, question: str = "inertia") -> Respons
     chosen = await work.check(setting, dict(work.request.query_params))
     if question not in QUESTIONS:
         raise ApiError("not-found", f"Unknown question; known questions: {', '.join(QUESTIONS)}.")
-    return await _in_form(work, question_spec(chosen, question))
-
-
-async def _in_form(work: Work, spec: dict[str, Any]) -> Response:
-    """A study in the form, or as text where the form cannot show it."""
-    try:
-        values = values_of(spec)
-    except ValueError:
-        values = {"/text": spec_text(spec), "format": "json"}
-    return await run_in_threadpool(form_page, work.request, values, await look_over(work.context, work, values))
+    return await spec_in_form(work, question_spec(chosen, question))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
 from functools import lru_cache
@@ -14,10 +13,10 @@ from sprag.service.http.problems import ApiError
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.figures.linkage import Drawing, drawings
 from sprag.service.http.web.figures.shaft import overridden
-from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.entries import plain
+from sprag.service.http.web.form.own_machine import case_page, machine_of, read_machine
 from sprag.service.http.web.form.shaft import group_of
-from sprag.service.http.web.laboratory.sliders import Slider, in_order, slider_of
+from sprag.service.http.web.laboratory.sliders import Slider, faults_by_field, in_order, own_text, slider_of
 from sprag.service.presets import preset_names
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.report import SpecError
@@ -30,10 +29,6 @@ if TYPE_CHECKING:
     from sprag.worker.study import Study
 
 _QUESTION: Final = "question_"
-#: Name of a machine that the address itself describes, by its ``base``.
-OWN: Final = "own"
-#: Characters of a base in an address, at most.
-MOST_BASE: Final = 12_000
 #: Settings that can be held beside the current one.
 MOST_HELD: Final = 3
 
@@ -42,11 +37,11 @@ MOST_HELD: Final = 3
 class Setting:
     """A machine with the numbers of a URL; ``faults``, by path, of invalid ones.
 
-    ``spec`` contains every number as given, valid or not; ``angle`` is that of the sketch, in degrees.
+    ``machine`` is the machine as parameters of a URL, without what was changed; ``spec`` contains every number as
+    given, valid or not; ``angle`` is that of the sketch, in degrees.
     """
 
-    name: str
-    base: str
+    machine: tuple[tuple[str, str], ...]
     spec: dict[str, Any]
     study: Study
     sliders: list[Slider]
@@ -74,9 +69,14 @@ class Setting:
         return 360 * int((self.study.structure or {}).get("cycle", 1))
 
     @property
-    def machine(self) -> list[tuple[str, str]]:
-        """The machine as parameters of a URL, without what was changed."""
-        return [("machine", self.name), *([("base", self.base)] if self.base else [])]
+    def name(self) -> str:
+        """Name of the machine."""
+        return self.machine[0][1]
+
+    @property
+    def case(self) -> str:
+        """Page of the case that the machine comes from; "" where it comes from none."""
+        return case_page(dict(self.machine).get("case", ""))
 
     @property
     def changed(self) -> list[Slider]:
@@ -87,7 +87,7 @@ class Setting:
     def query(self) -> str:
         """The setting as parameters of a URL."""
         numbers = [(s.path, s.text) for s in self.sliders if s.first or s.text != s.own]
-        return urlencode([*self.machine, *numbers])
+        return urlencode([*self.machine, *numbers, *([("angle", f"{self.angle:g}")] if self.angle else [])])
 
 
 @lru_cache(maxsize=1)
@@ -99,26 +99,20 @@ def machines() -> tuple[str, ...]:
 
 def setting(given: Mapping[str, str]) -> Setting:
     """The setting of a URL; ApiError for an unknown machine."""
-    name = given.get("machine") or next(iter(machines()), "")
-    base = given.get("base", "") if name == OWN else ""
-    spec = _own_spec(base) if name == OWN else _preset_spec(name)
-    try:
-        own = parse_spec(overridden(spec, {})).study
-    except SpecError as error:
-        texts = (f"{item.where or 'the spec'}: {message(item)}" for item in error.faults)
-        raise ApiError("invalid-spec", "; ".join(texts)) from error
-    values = {path: plain(given[path]) for path in own.base if given.get(path, "").strip()}
+    machine = machine_of(given, given.get("machine") or next(iter(machines()), ""))
+    spec, own = read_machine(machine, models.MACHINE_SHAFT, machines())
+    # A field with the rounded text of the machine's own number leaves that number as it is.
+    texts = {path: given[path] for path in own.base if given.get(path, "").strip()}
+    values = {path: plain(text) for path, text in texts.items() if text.strip() != own_text(own, path)}
     faults: dict[str, list[str]] = {}
     try:
         study = parse_spec(overridden(spec, values)).study
     except SpecError as error:
-        study = own
-        for item in error.faults:
-            path = (item.where or "").removeprefix("/base/").replace("/", ".")
-            faults.setdefault(path if path in own.base else "", []).append(message(item))
+        study, faults = own, faults_by_field(error, own.base, values)
     angle = _angle(given.get("angle", ""), faults)
     sliders = in_order([slider_of(own, study, path, given.get(path, "")) for path in own.base])
-    return Setting(name, base, overridden(spec, values), study, sliders, faults, angle, drawings(study, angle))
+    made = overridden(spec, values)
+    return Setting(machine, made, study, sliders, faults, angle, drawings(study, angle))
 
 
 def held_settings(queries: list[str]) -> list[Setting]:
@@ -130,26 +124,6 @@ def held_settings(queries: list[str]) -> list[Setting]:
         texts = [f"{path}: {text}" for held in found for path, texts in held.faults.items() for text in texts]
         raise ApiError("invalid-spec", f"A held machine is invalid: {'; '.join(texts)}.")
     return found
-
-
-def _preset_spec(name: str) -> dict[str, Any]:
-    if name not in machines():
-        raise ApiError("not-found", f"Unknown machine; known machines: {', '.join(machines()) or 'none'}.")
-    found: dict[str, Any] = preset_of(name)["spec"]
-    return found
-
-
-def _own_spec(text: str) -> dict[str, Any]:
-    """The spec of a machine that the address describes."""
-    if len(text) > MOST_BASE:
-        raise ApiError("invalid-parameter", f"base must have at most {MOST_BASE} characters; got {len(text)}.")
-    try:
-        base = json.loads(text)
-    except ValueError as error:
-        raise ApiError("invalid-parameter", f"base must be the JSON object of a machine: {error}.") from error
-    if not isinstance(base, dict):
-        raise ApiError("invalid-parameter", "base must be the JSON object of a machine.")
-    return {"sprag": 1, "model": models.MACHINE_SHAFT, "name": "Own machine", "base": base}
 
 
 def _angle(text: str, faults: dict[str, list[str]]) -> float:

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.shaft import part_of
 from sprag.service.results.wording import words
 from sprag.service.spec.numbers import parse_number
@@ -13,6 +14,9 @@ from sprag.service.spec.units import QuantityError, parse_quantity, split_quanti
 from sprag.worker.models.parameters import parameter_of
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from sprag.service.spec.report import SpecError
     from sprag.worker.study import Study
 
 #: Numbers that every machine shows first, and the range of their sliders: (lower, upper) factor on the machine's own.
@@ -52,6 +56,11 @@ class Slider:
     factor: float = 1.0
     first: bool = True
 
+    @property
+    def has_unit(self) -> bool:
+        """Whether its text has a unit of its own."""
+        return bool(split_quantity(self.text)[1])
+
 
 def slider_of(own: Study, study: Study, path: str, text: str) -> Slider:
     """The slider of a number: of the machine as it comes (``own``) and as it is set (``study``, ``text``)."""
@@ -69,12 +78,18 @@ def slider_of(own: Study, study: Study, path: str, text: str) -> Slider:
     if name.startswith(("operation.steps.", "drive.stages.")):
         place = name.split(".")
         label = f"{place[1][:-1].capitalize()} {int(place[2]) + 1}: {label.lower()}"
-    given = quantity_text(first, shown, factor)
+    given = own_text(own, path)
     return Slider(
         path, f"Part {part}: {label}" if part else label, "" if entry is None else entry.symbol, unit,
         "" if entry is None else entry.help, value_of(text, unit, study.base[path]), text.strip() or given, given,
         low, high, low > 0.0, shown, factor, is_first,
     )  # fmt: skip
+
+
+def own_text(own: Study, path: str) -> str:
+    """The machine's own number as its field has it."""
+    entry = parameter_of(own, path)
+    return quantity_text(own.base[path], *_SHOWN.get("" if entry is None else entry.unit, ("", 1.0)))
 
 
 def _factors(study: Study, path: str) -> tuple[tuple[float, float], bool]:
@@ -122,3 +137,18 @@ def in_order(sliders: list[Slider]) -> list[Slider]:
         return not slider.first, part, own not in order, own
 
     return sorted(sliders, key=place)
+
+
+def faults_by_field(error: SpecError, fields: Iterable[str], changed: Iterable[str]) -> dict[str, list[str]]:
+    """The faults of a machine by the path of the field beside which they are shown, "" for none.
+
+    A fault of a whole part of the machine, such as links that do not reach each other, is shown beside every number
+    of that part that was changed.
+    """
+    known, found = set(fields), dict[str, list[str]]()
+    for item in error.faults:
+        path = (item.where or "").removeprefix("/base/").replace("/", ".")
+        inside = [own for own in changed if own in known and own.startswith(f"{path}.")]
+        for place in [path] if path in known else inside or [""]:
+            found.setdefault(place, []).append(message(item))
+    return found

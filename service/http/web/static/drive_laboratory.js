@@ -44,19 +44,7 @@ const ask = async (queryOf = written) => {
   }
 };
 
-for (const slider of lab.querySelectorAll("input[type=range]")) {
-  const field = document.getElementById(slider.dataset.for);
-  slider.addEventListener("input", () => {
-    field.value = sprag.slider.textOf(slider);
-    slider.setAttribute("aria-valuetext", field.value);
-    ask();
-  });
-  field.addEventListener("input", () => {
-    slider.value = sprag.slider.positionOf(slider, field.value) ?? slider.value;
-    ask();
-  });
-}
-for (const field of lab.querySelectorAll("[data-further]")) field.addEventListener("input", () => ask());
+sprag.slider.wire(lab, () => ask());
 lab.addEventListener("submit", (event) => {
   event.preventDefault();
   if (event.submitter?.id === "rest") state.replaceChildren();

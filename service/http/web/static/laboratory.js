@@ -45,19 +45,7 @@ const ask = async () => {
   }
 };
 
-for (const slider of lab.querySelectorAll("input[type=range]")) {
-  const field = document.getElementById(slider.dataset.for);
-  slider.addEventListener("input", () => {
-    field.value = sprag.slider.textOf(slider);
-    slider.setAttribute("aria-valuetext", field.value);
-    ask();
-  });
-  field.addEventListener("input", () => {
-    const place = sprag.slider.positionOf(slider, field.value);
-    if (place !== null) slider.value = place;
-  });
-}
-for (const field of lab.querySelectorAll(".slider .entry input")) field.addEventListener("input", ask);
+sprag.slider.wire(lab, ask);
 
 // The sketch: frames a few degrees apart, and straight lines between them.
 const degrees = () => Number.parseFloat(angle.value) || 0;

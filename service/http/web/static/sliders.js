@@ -20,5 +20,29 @@ sprag.slider = (() => {
     const share = "log" in slider.dataset ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
     return Math.min(Math.max(1000 * share, 0), 1000);
   };
-  return { textOf, positionOf };
+
+  // The unit beside a field is that of plain numbers; a text with a unit of its own needs none.
+  const unitOf = (field) => {
+    const unit = field.parentElement.querySelector(".unit");
+    if (unit) unit.hidden = /[^-+\d.eE\s]/.test(field.value);
+  };
+
+  // Let each slider of a form write into its field, and each field place its slider; `changed` hears of both.
+  const wire = (form, changed) => {
+    for (const field of form.querySelectorAll(".entry input")) {
+      const slider = form.querySelector(`[data-for="${CSS.escape(field.id)}"]`);
+      field.addEventListener("input", () => {
+        if (slider) slider.value = positionOf(slider, field.value) ?? slider.value;
+        unitOf(field);
+        changed();
+      });
+      slider?.addEventListener("input", () => {
+        field.value = textOf(slider);
+        slider.setAttribute("aria-valuetext", field.value);
+        unitOf(field);
+        changed();
+      });
+    }
+  };
+  return { wire };
 })();

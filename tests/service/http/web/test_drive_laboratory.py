@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import pytest
@@ -110,3 +111,54 @@ def test_a_setting_becomes_a_study_over_the_range_of_its_slider(office: Office) 
     assert "&#34;amplitude_x&#34;: &#34;2.5 mm&#34;" in page.text
     assert "characteristic against the frequency" in page.text
     assert 'data-cases="41"' in page.text
+
+
+def test_a_case_of_a_study_goes_to_the_laboratory_and_back(visitor: Visitor, office: Office) -> None:
+    page = visitor.page
+    loads = {"path": "shaft.load", "values": [0.1, 0.2]}
+    example = office.submit(office.get("/presets/one_pendulum")["spec"], axes=[loads])
+    page.goto(f"/studies/{example}/cases/1")
+    page.get_by_role("link", name="This machine in the laboratory").click()
+    page.wait_for_url("**/laboratory/drive?machine=own&**")
+    drawn(page, "#lab-plot")
+    results = office.get(f"/studies/{example}/cases/1")["results"]
+    told = page.locator(SPEED)
+    assert float(str(told.get_attribute("data-value"))) == pytest.approx(results["shaft.speed.mean"], rel=1e-7)
+    expect(page.locator("[data-start]")).to_have_attribute("data-start", "state")
+    # Moved, it is still this drive.
+    fill(page, {"pendulums.0.mass": "0.4"})
+    page.wait_for_url("**pendulums.0.mass=0.4**")
+    page.reload()
+    drawn(page, "#lab-plot")
+    expect(named(page, "pendulums.0.mass")).to_have_value("0.4")
+    page.get_by_role("link", name="Change this drive in the form").click()
+    expect(named(page, "/base/pendulums/0/mass")).to_have_value("0.4")
+    page.go_back()
+    page.get_by_role("link", name="Back to the case of this drive").click()
+    page.wait_for_url(f"**/studies/{example}/cases/1")
+
+
+def test_the_motion_is_saved_as_a_picture_and_as_numbers(office: Office) -> None:
+    given = {"shaft.load": "0.1"}
+    png = office.http.get(f"{OWN}/picture.png", params=given)
+    assert png.content.startswith(b"\x89PNG")
+    rows = office.http.get(f"{OWN}/picture.csv", params=given).text.splitlines()
+    columns = rows[0].split(",")
+    speed, time = (columns.index(name) for name in ("shaft.speed", "time"))
+    values = [[float(cells[time]), float(cells[speed])] for cells in (row.split(",") for row in rows[1:])]
+    # The mean over the turn, by the trapezoidal rule.
+    mean = sum((after[0] - before[0]) * (after[1] + before[1]) / 2 for before, after in pairwise(values)) / (
+        values[-1][0] - values[0][0]
+    )
+    assert mean == pytest.approx(_speed(office.http.get(OWN, params=given)), rel=1e-4)
+
+
+def test_a_unit_is_shown_beside_plain_numbers_only(visitor: Visitor) -> None:
+    page = visitor.page
+    page.goto(OWN)
+    unit = page.locator('.entry:has([name="shaft.load"]) .unit')
+    expect(unit).to_have_text("N·m")
+    fill(page, {"shaft.load": "100 N*mm"})
+    expect(unit).to_be_hidden()
+    fill(page, {"shaft.load": "1e-1"})
+    expect(unit).to_be_visible()

@@ -39,7 +39,20 @@ def test_every_machine_has_a_sketch_for_each_of_its_parts(name: str) -> None:
 def test_a_machine_of_its_own_is_in_the_address() -> None:
     chosen = setting({"machine": "own", "base": BASE, "drive.inertia": "-1"})
     assert "out of range" in chosen.faults["drive.inertia"][0]
-    assert setting(dict(parse_qsl(chosen.query))).base == BASE
+    assert ("base", BASE) in setting(dict(parse_qsl(chosen.query))).machine
+
+
+def test_a_refusal_of_links_is_beside_what_was_changed() -> None:
+    faults = setting({"machine": "press", "mechanism.slider_crank.rod": "50 mm", "drive.inertia": "30"}).faults
+    assert list(faults) == ["mechanism.slider_crank.rod"]
+    assert "do not reach" in faults["mechanism.slider_crank.rod"][0]
+
+
+def test_a_field_with_the_rounded_text_of_a_number_leaves_it_as_it_is() -> None:
+    base = json.loads(BASE) | {"mean_speed": 12.3456789012}
+    chosen = setting({"machine": "own", "base": json.dumps(base)})
+    assert next(slider.text for slider in chosen.sliders if slider.path == "mean_speed") == "117.892 rpm"
+    assert setting(dict(parse_qsl(chosen.query))).study.base["mean_speed"] == 12.3456789012
 
 
 @pytest.mark.parametrize(
@@ -49,6 +62,7 @@ def test_a_machine_of_its_own_is_in_the_address() -> None:
         ({"machine": "own", "base": "{"}, "JSON"),
         ({"machine": "own", "base": "[]"}, "JSON object"),
         ({"machine": "own", "base": " " * 12_001}, "at most 12000 characters; got 12001"),
+        ({"machine": "own", "base": BASE, "run": "1"}, "run must be the JSON object"),
         ({"machine": "own", "base": '{"drive": {"inertia": 1}}'}, "mean_speed"),
     ],
 )
