@@ -7,6 +7,7 @@ With T the kinetic energy, A_d and A_r the works of drive and resistance since a
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +75,11 @@ class Decomposition:
         level = np.where(even, np.inf, self.mean_work)
         self.crossings = panels.crossings(self.total.torque, self.total.nodes, self.total.ends, level)
 
+    @cached_property
+    def square_extremes(self) -> Extremes:
+        """Those of omega^2."""
+        return self.panels.extremes(self.squares)
+
     def reference(self, chosen: int | None) -> tuple[Points, Floats]:
         """phi_c of every case and the number of candidates; by default the first at which T rises.
 
@@ -111,7 +117,7 @@ def characteristics(d: Decomposition, phi_c: int | None) -> dict[str, Floats]:
     """Results that follow from the motion alone, by name, each (cases,)."""
     panels, out = d.panels, {}
     with np.errstate(invalid="ignore", divide="ignore"):
-        speed = panels.extremes(d.squares)
+        speed = d.square_extremes
         out["omega.max"], out["omega.min"] = np.sqrt(speed.highest), np.sqrt(np.maximum(speed.lowest, 0.0))
         out["omega.angle_at_max"] = _wrapped(speed.at_highest.angle, d.cycle)
         out["omega.angle_at_min"] = _wrapped(speed.at_lowest.angle, d.cycle)

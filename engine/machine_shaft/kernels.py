@@ -88,97 +88,112 @@ def series_roots(coefficients: Floats, low: Floats, high: Floats, f_low: Floats,
 
 
 @compiled
-def highest(
+def extremes(
     values: Floats,
-    sign: float,
     half: Floats,
     places: Floats,
-    ends: Floats,
-    slopes: Floats,
+    sampled: Floats,
     to_series: Floats,
     to_slope: Floats,
     value: Floats,
     panel: Integers,
     t: Floats,
 ) -> None:
-    """Largest value of ``sign * values`` over each case's panels: at their ends and at the maxima within them.
+    """Largest and smallest of ``values`` over each case's panels: at their ends and at the extremes within them.
 
     Parameters
     ----------
     values : array, shape (cases, panels, nodes)
-    sign : float
-        1, or -1 for the lowest.
     half : array, shape (cases or 1, panels)
         Half lengths; panels of zero length are skipped.
     places : array, shape (nodes + 2,)
         Ends and nodes within -1 .. 1.
-    ends, slopes, to_series, to_slope : arrays
-        Matrices from the nodes' values to the ends' values, the slopes at ``places``, the Legendre series, and from
-        that to the series of its derivative.
-    value, panel, t : arrays, shape (cases,), written
-        The value (with its own sign), and its position; NaN for a case with a NaN among its values.
+    sampled : array, shape (nodes, nodes + 4)
+        From the nodes' values to the slopes at ``places``, then to the values at both ends. The outputs stand along the
+        last axis, so that their sums, each in the order of the nodes, are computed side by side.
+    to_series, to_slope : arrays, shape (nodes, nodes) and (nodes, nodes - 1)
+        From the nodes' values to the Legendre series, and from that to the series of its derivative, laid out alike.
+    value, panel, t : arrays, shape (2, cases), written
+        The largest and the smallest value, and their positions; NaN for a case with a NaN among its values.
     """
     cases, panels, nodes = values.shape
-    samples = np.empty(nodes + 2)
-    slope = np.empty(nodes + 2)
-    series = np.empty(nodes)
-    derivative = np.empty(nodes - 1)
+    outputs = nodes + 4
+    samples = np.empty((panels, outputs))
     for case in range(cases):
         row = case if len(half) > 1 else 0
-        best, best_panel, best_t = -np.inf, 0, -1.0
         known = True
         for p in range(panels):
             if half[row, p] == 0.0:
                 continue
+            for i in range(outputs):
+                samples[p, i] = 0.0
             for j in range(nodes):
                 known = known and not np.isnan(values[case, p, j])
-                if sign * values[case, p, j] > best:
-                    best, best_panel, best_t = sign * values[case, p, j], p, places[j + 1]
-            for e in range(2):
-                total = 0.0
-                for j in range(nodes):
-                    total += ends[e, j] * values[case, p, j]
-                if sign * total > best:
-                    best, best_panel, best_t = sign * total, p, places[e * (nodes + 1)]
-        if not known:
-            value[case], panel[case], t[case] = np.nan, 0, -1.0
+                for i in range(outputs):
+                    samples[p, i] += sampled[j, i] * values[case, p, j]
+        for side in range(2):
+            if known:
+                found = highest(
+                    values[case], 1.0 - 2.0 * side, half[row], places, samples, to_series, to_slope
+                )  # fmt: skip
+                value[side, case], panel[side, case], t[side, case] = found
+            else:
+                value[side, case], panel[side, case], t[side, case] = np.nan, 0, -1.0
+
+
+@compiled
+def highest(
+    values: Floats,
+    sign: float,
+    half: Floats,
+    places: Floats,
+    samples: Floats,
+    to_series: Floats,
+    to_slope: Floats,
+) -> tuple[float, int, float]:
+    """Largest value of ``sign * values`` of one case, with its own sign, its panel and its position there.
+
+    ``samples`` (panels, nodes + 4) are the slopes at ``places`` and the values at the ends; the others are as for
+    ``extremes``.
+    """
+    panels, nodes = values.shape
+    series = np.empty(nodes)
+    derivative = np.empty(nodes - 1)
+    best, best_panel, best_t = -np.inf, 0, -1.0
+    for p in range(panels):
+        if half[p] == 0.0:
             continue
-        for p in range(panels):
-            if half[row, p] == 0.0:
+        for j in range(nodes):
+            if sign * values[p, j] > best:
+                best, best_panel, best_t = sign * values[p, j], p, places[j + 1]
+        for e in range(2):
+            end = sign * samples[p, nodes + 2 + e]
+            if end > best:
+                best, best_panel, best_t = end, p, places[e * (nodes + 1)]
+    for p in range(panels):
+        if half[p] == 0.0:
+            continue
+        for i in range(nodes + 1):
+            slope, following = sign * samples[p, i], sign * samples[p, i + 1]
+            if not (slope > 0.0 and following < 0.0):
                 continue
-            for i in range(nodes + 2):
-                total = 0.0
-                for j in range(nodes):
-                    total += slopes[i, j] * values[case, p, j]
-                slope[i] = sign * total
-            for i in range(nodes + 1):
-                if not (slope[i] > 0.0 and slope[i + 1] < 0.0):
-                    continue
-                if i == 0:
-                    total = 0.0
-                    for j in range(nodes):
-                        total += ends[0, j] * values[case, p, j]
-                    samples[0] = sign * total
-                else:
-                    samples[i] = sign * values[case, p, i - 1]
-                # A maximum cannot exceed its tangents; those that cannot reach the best value so far are skipped.
-                if not samples[i] + slope[i] * (places[i + 1] - places[i]) > best:
-                    continue
+            start = sign * (samples[p, nodes + 2] if i == 0 else values[p, i - 1])
+            # A maximum cannot exceed its tangents; those that cannot reach the best value so far are skipped.
+            if not start + slope * (places[i + 1] - places[i]) > best:
+                continue
+            series[:] = 0.0
+            derivative[:] = 0.0
+            for j in range(nodes):
                 for k in range(nodes):
-                    total = 0.0
-                    for j in range(nodes):
-                        total += to_series[k, j] * values[case, p, j]
-                    series[k] = sign * total
+                    series[k] += to_series[j, k] * (sign * values[p, j])
+            for j in range(nodes):
                 for k in range(nodes - 1):
-                    total = 0.0
-                    for j in range(nodes):
-                        total += to_slope[k, j] * series[j]
-                    derivative[k] = total
-                x = series_root(derivative, nodes - 1, places[i], places[i + 1], slope[i], slope[i + 1])
-                height = series_value(series, nodes, x)
-                if height > best:
-                    best, best_panel, best_t = height, p, x
-        value[case], panel[case], t[case] = sign * best, best_panel, best_t
+                    derivative[k] += to_slope[j, k] * series[j]
+            x = series_root(derivative, nodes - 1, places[i], places[i + 1], slope, following)
+            height = series_value(series, nodes, x)
+            if height > best:
+                best, best_panel, best_t = height, p, x
+    return sign * best, best_panel, best_t
 
 
 @compiled

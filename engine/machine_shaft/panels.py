@@ -44,6 +44,10 @@ def _matrices() -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
 
 SAMPLES = np.concatenate([[-1.0], POSITIONS, [1.0]])
 COEFFICIENTS, INTEGRAL, _DERIVATIVE, RUNNING, _ENDS, _SLOPES = (np.ascontiguousarray(m) for m in _matrices())
+#: The matrices of ``kernels.extremes``, with their outputs along the last axis.
+_SAMPLED, _TO_SERIES, _TO_SLOPE = (
+    np.ascontiguousarray(m.T) for m in (np.concatenate([_SLOPES, _ENDS]), COEFFICIENTS, _DERIVATIVE)
+)
 TAIL = COEFFICIENTS[-2:].copy()
 _TOTAL = WEIGHTS[None, :].copy()
 
@@ -219,18 +223,14 @@ class Panels:
 
         The ends of a panel count with their values within that panel. A case with a NaN has no extremes.
         """
-        high, at_high = self._highest(values, 1.0)
-        low, at_low = self._highest(values, -1.0)
-        return Extremes(high, at_high, low, at_low)
-
-    def _highest(self, values: Floats, sign: float) -> tuple[Floats, Points]:
-        cases = len(values)
-        value, t, panel = np.empty(cases), np.empty(cases), np.empty(cases, dtype=np.int64)
-        kernels.highest(
-            np.ascontiguousarray(values), sign, self.half, SAMPLES, _ENDS, _SLOPES, COEFFICIENTS, _DERIVATIVE,
-            value, panel, t,
-        )  # fmt: skip
-        return value, Points(panel, t, self._angle(np.arange(cases), panel, t))
+        shape = (2, len(values))
+        value, t, panel = np.empty(shape), np.empty(shape), np.empty(shape, dtype=np.int64)
+        kernels.extremes(
+            np.ascontiguousarray(values), self.half, SAMPLES, _SAMPLED, _TO_SERIES, _TO_SLOPE, value, panel, t
+        )
+        cases = np.arange(len(values))
+        high, low = (Points(panel[k], t[k], self._angle(cases, panel[k], t[k])) for k in range(2))
+        return Extremes(value[0], high, value[1], low)
 
     def crossings(self, values: Floats, running: Floats, ends: Floats, level: Floats) -> "Crossings":
         """Where the running integral of ``values`` passes ``level`` (cases,).

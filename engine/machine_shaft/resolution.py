@@ -31,7 +31,7 @@ def rough_panels(d: Decomposition) -> tuple[Bools, Bools]:
     with np.errstate(invalid="ignore"):
         square = _resolved(panels, d.squares, 1e-10) | still
         speed = _resolved(panels, np.sqrt(d.squares), 1e-6) | still
-        resting = (panels.extremes(d.squares).lowest <= 1e-6 * panels.largest(d.squares))[:, None]
+        resting = (d.square_extremes.lowest <= 1e-6 * panels.largest(d.squares))[:, None]
     fine &= square | resting
     return np.asarray(~fine), np.asarray(~(square & speed))
 

@@ -18,6 +18,8 @@ from scipy.optimize import brentq, minimize_scalar
 Array = NDArray[Any]
 TURN = 2.0 * math.pi
 _STEP = 1e-30
+#: Local maxima among the samples are refined if they are this close to the largest, as a share of the range.
+_NEAR = 1e-2
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
@@ -268,12 +270,15 @@ def solve(machine: MachineData) -> dict[str, float]:
 
     def extreme(sign: float, score: Callable[[Any, Any], Any]) -> float:
         """Largest value of ``sign`` times a function of work and inertia."""
-        flat = int(np.argmax(sign * score(works, inertias)))
-        found = sign * float(score(works.flat[flat], inertias.flat[flat]))
-        middle, step = angles.flat[flat], float(width[flat // len(shares), 0]) / len(shares)
-        for low_end, high_end in ((middle - step, middle), (middle, middle + step)):
-            k = int(np.clip(np.searchsorted(cuts, 0.5 * (low_end + high_end)) - 1, 0, len(cuts) - 2))
-            bounds = max(low_end, 0.0), min(high_end, end)
+        sampled = sign * np.ravel(score(works, inertias))
+        found, last = float(sampled.max()), len(sampled) - 1
+        # Samples beside a maximum are lower by the square of their distance: the largest may be beside another.
+        tops = (sampled >= np.roll(sampled, 1)) & (sampled >= np.roll(sampled, -1))
+        tops &= sampled >= found - _NEAR * np.ptp(sampled)
+        edges = np.concatenate([np.ravel(angles), [end]])
+        for left in {(flat - side) % (last + 1) for flat in np.nonzero(tops)[0] for side in (0, 1)}:
+            bounds = float(edges[left]), float(edges[left + 1])
+            k = int(np.clip(np.searchsorted(cuts, 0.5 * (bounds[0] + bounds[1])) - 1, 0, len(cuts) - 2))
             if bounds[1] > bounds[0]:
                 best = minimize_scalar(lambda p, k=k: -sign * score(*at(k, p)), bounds=bounds, method="bounded",
                                        options={"xatol": 1e-11})  # fmt: skip
