@@ -34,7 +34,7 @@ def estimate_seconds(model: MachineSpec) -> float:
 def _formula_cost(text: str, constants: tuple[str, ...]) -> float:
     expression = Expression(text, dict.fromkeys(("phi", "x", "omega", *constants)))
     cost = _FORMULA + (_SPEED if "omega" in expression.used - set(constants) else 0.0)
-    if expression.names & set(constants):
+    if expression.used & set(constants):
         cost += _OWN
     if expression.switch_count:
         cost += _SWITCHES

@@ -118,6 +118,9 @@ _ARITY: Mapping[str, tuple[int, int]] = {
     "max": (2, 16),
     "if": (3, 3),
 }
+#: A variable that no formula can name: where it is given, ``t`` is ``phi`` over it.
+MEAN_SPEED = "mean speed"
+TIME = "t"
 #: Names that a constant or variable may not have.
 RESERVED = frozenset(_ARITY) | frozenset(CONSTANTS)
 _COMPARE: Mapping[str, Callable[[Value, Value], NDArray[np.bool_]]] = {
@@ -246,7 +249,11 @@ class _Parser:
             return self.node("number", position, number=CONSTANTS[name])
         if name in self.names:
             return self.node(f"name {name}", position)
-        known = ", ".join(sorted(self.names | RESERVED))
+        timed = MEAN_SPEED in self.names
+        if name == TIME and timed:
+            parts = [self.node(f"name {own}", position) for own in ("phi", MEAN_SPEED)]
+            return self.node("/", position, *parts)
+        known = ", ".join(sorted((self.names | RESERVED | ({TIME} if timed else set())) - {MEAN_SPEED}))
         raise ExpressionError(f"{name[:40]!r} is not known; known are {known}", position)
 
 
@@ -283,11 +290,6 @@ class Expression:
     def switch_count(self) -> int:
         """Number of quantities whose change of sign is a jump or a kink of the formula."""
         return len(self._switches)
-
-    @property
-    def names(self) -> set[str]:
-        """Names of variables and constants that the formula uses."""
-        return names_of(self.root)
 
     @property
     def kinds(self) -> set[str]:

@@ -74,7 +74,12 @@ def check_structure(spec: MachineSpec) -> None:
         _check_part(part)
     # The parts are built once with arbitrary valid numbers, so that tables and formulas are read.
     columns = {p.path: p.default if p.default is not None else 1.0 for p in parameters(spec)}
-    Machine(spec, Columns.of(spec, columns, 1))
+    machine = Machine(spec, Columns.of(spec, columns, 1))
+    if spec.balance == "motor" and any(part.uses_time for part in machine.parts):
+        raise StructureError(
+            "The formula of an operation uses t, the time in which the shaft comes to phi at its mean speed; with a "
+            "motor that speed is not known before. Give the operation over phi."
+        )
 
 
 def _check_part(part: PartChoice) -> None:

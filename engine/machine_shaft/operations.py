@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.machine_shaft.expressions import Expression
+from sprag.engine.machine_shaft.expressions import MEAN_SPEED, Expression
 from sprag.engine.machine_shaft.mechanisms import Mechanism, Values
 from sprag.engine.machine_shaft.roots import bracketed_roots, switches
 from sprag.engine.machine_shaft.spec import OperationChoice
@@ -164,7 +164,7 @@ class Operation:
             self._curve = over_stroke(choice.table) if choice.over == "stroke" else periodic(choice.table, self._cycle)
         if choice.formula is not None and choice.form == "formula":
             names = ("phi", "x") if stroke is not None else ("phi",)
-            self._expression = Expression(choice.formula, dict.fromkeys((*names, "omega", *constants)))
+            self._expression = Expression(choice.formula, dict.fromkeys((*names, "omega", MEAN_SPEED, *constants)))
 
     def _environment(self, phi: Floats) -> dict[str, tuple[Floats, Floats | float]]:
         names: dict[str, tuple[Floats, Floats | float]] = {"phi": (phi, 0.0)}
@@ -172,6 +172,8 @@ class Operation:
             names["x"] = (self._stroke.fraction(phi), 0.0)
         if self.follows_speed:
             names["omega"] = (self._pace, 0.0)
+        if self.uses_time:
+            names[MEAN_SPEED] = (self._pace, 0.0)
         return names | {name: (value, 0.0) for name, value in self._constants.items()}
 
     @property
@@ -179,6 +181,12 @@ class Operation:
         """Whether its formula uses the speed of the shaft, ``omega``."""
         own = self.expression
         return own is not None and "omega" in own.used and "omega" not in self._constants
+
+    @property
+    def uses_time(self) -> bool:
+        """Whether its formula uses ``t``, the time in which an even shaft comes to ``phi``."""
+        own = self.expression
+        return own is not None and MEAN_SPEED in own.used
 
     def speed_law(self, phi: Floats, way_slope: Floats | None) -> SpeedLaw:
         """The torque at ``phi`` by the speed, of an operation that follows it; parameters as in ``lossless``."""

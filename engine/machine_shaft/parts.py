@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sprag.engine.machine_shaft.bearings import JointForces, joint_forces
 from sprag.engine.machine_shaft.cams import Cam
 from sprag.engine.machine_shaft.columns import Columns
-from sprag.engine.machine_shaft.expressions import Expression
+from sprag.engine.machine_shaft.expressions import MEAN_SPEED, Expression
 from sprag.engine.machine_shaft.four_bars import FourBar, ParallelCrank
 from sprag.engine.machine_shaft.linkages import CrankShaper, ScotchYoke, SliderCrank, Whitworth
 from sprag.engine.machine_shaft.linked_rams import DragLink, Toggle
@@ -181,7 +181,7 @@ class ShaftPart:
     def formulas(self) -> list[Formula]:
         """The formulas of its inertia and its resistance."""
         own = (("inertia", self.inertia_formula), ("resistance", self._operation.expression))
-        known = {"omega": self._pace} | self._constants
+        known = {"omega": self._pace, MEAN_SPEED: self._pace} | self._constants
         return [
             Formula(
                 "inertia" if field == "inertia" else "resistance", expression,
@@ -199,6 +199,11 @@ class ShaftPart:
     def follows_speed(self) -> bool:
         """Whether the formula of its operation uses the speed of the shaft, ``omega``."""
         return self._operation.follows_speed
+
+    @property
+    def uses_time(self) -> bool:
+        """Whether the formula of its operation uses ``t``."""
+        return self._operation.uses_time
 
     def speed_law(self, phi: Floats) -> SpeedLaw:
         """The torque of an operation that follows the speed, at angles of the shaft (cases or 1, panels, nodes)."""

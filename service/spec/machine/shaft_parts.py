@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from sprag.service.spec.described import Described, Listed, choice, named
-from sprag.service.spec.fields import read_object, read_one
+from sprag.service.spec.fields import read_number, read_object, read_one
 from sprag.service.spec.machine.shaft_tables import read_csv_rows
 from sprag.service.spec.report import Report, join
 from sprag.service.spec.units import QuantityError, parse_quantity
@@ -45,14 +45,14 @@ MECHANISMS: Final = ("table", "csv", "formula", *MECHANISM_CHOICES)
 #: Ways to give an operation.
 FORMS: Final = ("value", "steps", "table", "csv", "formula", "gas", "indicator")
 #: What of an indicator diagram is no number: its rows over the shaft's angle, or along the strokes of the cycle.
-INDICATOR_OVER: Final = choice("over", "against the shaft's angle, or the volume as fraction of the stroke", "angle",
-                               "stroke", default="angle")  # fmt: skip
-_OVER: Final = "against the shaft's angle, or the fraction of the stroke"
+_AGAINST: Final = "against the shaft's angle, or the volume as fraction of the stroke, or recorded over time"
+INDICATOR_OVER: Final = choice("over", _AGAINST, "angle", "stroke", "time", default="angle")
+_OVER: Final = "against the shaft's angle, or the fraction of the stroke, or recorded over time"
 _DURING: Final = "strokes in which a diagram over the stroke holds"
 _SENSE: Final = "a force against the motion, or always against the forward stroke"
 OPERATION_CHOICES: Final = named(
     choice("quantity", "a force on the working part, or a torque on the shaft", "force", "torque"),
-    choice("over", _OVER, "angle", "stroke", default="angle"),
+    choice("over", _OVER, "angle", "stroke", "time", default="angle"),
     choice("during", _DURING, "forward", "return", "both", default="forward"),
     choice("sense", _SENSE, "resisting", "fixed", default="resisting"),
 )
@@ -68,8 +68,14 @@ ROWS: Final = Listed("rows", 2, machine_shaft.MAX_ROWS)
 _NAME = re.compile(r"[A-Za-z_][A-Za-z_0-9]{0,39}")
 _ANY: Final = 1e30
 ANGLE = Parameter("angle", "phi", "rad", -100.0, 100.0, False, None, "angle of the shaft")
+_TIME = Parameter("time", "t", "s", 0.0, 1e6, False, None, "time since the shaft's angle 0")
+#: Turns the times of a diagram into angles.
+RECORDED_AT: Final = Parameter(
+    "recorded_at", "", "rad/s", 0.0, 1e6, True, None, "mean speed of the shaft while the diagram was recorded over time"
+)
 _PRESSURE = Parameter("pressure", "p", "Pa", 0.0, 1e12, False, None, "absolute pressure")
 _FRACTION = Parameter("fraction", "x", "1", 0.0, 1.0, False, None, "fraction of the stroke")
+_PLACES: Final = {"angle": ANGLE, "stroke": _FRACTION, "time": _TIME}
 
 
 def numbers_under(prefix: str) -> dict[str, Parameter]:
@@ -189,7 +195,8 @@ def read_operation(report: Report, data: object, places: dict[str, str], prefix:
     where = places[f"{prefix}operation"] = _place(prefix, "operation")
     if data is None:
         return {"quantity": "none", "over": "angle", "steps": 0}
-    found = read_object(report, where, data, (*FORMS, *OPERATION_CHOICES, "interpolation", "scale", "efficiency"))
+    own = ("interpolation", "scale", "efficiency", "recorded_at")
+    found = read_object(report, where, data, (*FORMS, *OPERATION_CHOICES, *own))
     if found is None:
         return None
     if "gas" in found:
@@ -202,6 +209,9 @@ def read_operation(report: Report, data: object, places: dict[str, str], prefix:
     chosen = {name: field.read(report, where, found) for name, field in OPERATION_CHOICES.items()}
     if None in chosen.values():
         return None
+    speed = read_recorded_at(report, where, found, str(chosen["over"]), form)
+    if speed is None:
+        return None
     operation: dict[str, Any] = {**chosen, "steps": 0}
     places[f"{prefix}operation"] = join(where, form)
     if form == "value":
@@ -209,9 +219,9 @@ def read_operation(report: Report, data: object, places: dict[str, str], prefix:
     if form == "steps":
         count = _read_steps(report, join(where, "steps"), found["steps"])
         return None if count is None else operation | {"form": "steps", "steps": count}
-    place = ANGLE if chosen["over"] == "angle" else _FRACTION
-    diagram = read_diagram(report, where, found, place, value_in("N" if chosen["quantity"] == "force" else "N*m"))
-    return None if diagram is None else operation | diagram
+    value = value_in("N" if chosen["quantity"] == "force" else "N*m")
+    diagram = read_diagram(report, where, found, _PLACES[str(chosen["over"])], value)
+    return None if diagram is None else _over_angle(operation | diagram, speed)
 
 
 def _beside(report: Report, where: str, found: Mapping[str, Any], form: str) -> bool:
@@ -229,7 +239,7 @@ def _read_indicator(
 ) -> dict[str, Any] | None:
     """Read an indicator diagram: pressure over the angle or along the strokes."""
     pointer = join(where, "indicator")
-    names = ("over", "table", "csv", "interpolation", *numbers_under("operation.indicator."))
+    names = ("over", "recorded_at", "table", "csv", "interpolation", *numbers_under("operation.indicator."))
     own = (
         None if _beside(report, where, found, "indicator") else read_object(report, pointer, found["indicator"], names)
     )
@@ -237,11 +247,41 @@ def _read_indicator(
     if own is None or over is None:
         return None
     form = read_one(report, pointer, own, ("table", "csv"))
-    if form is None:
+    speed = None if form is None else read_recorded_at(report, pointer, own, str(over), form)
+    if form is None or speed is None:
         return None
     places[f"{prefix}operation"] = join(pointer, form)
-    diagram = read_diagram(report, pointer, own, ANGLE if over == "angle" else _FRACTION, _PRESSURE)
-    return None if diagram is None else {"quantity": "pressure", "over": over, "steps": 0} | diagram
+    diagram = read_diagram(report, pointer, own, _PLACES[str(over)], _PRESSURE)
+    return None if diagram is None else _over_angle({"quantity": "pressure", "over": over, "steps": 0} | diagram, speed)
+
+
+def read_recorded_at(report: Report, where: str, found: Mapping[str, Any], over: str, form: str) -> float | None:
+    """The speed in rad/s at which a diagram over time was recorded, 1 for any other; None with a fault recorded."""
+    pointer = join(where, "recorded_at")
+    if over != "time":
+        if "recorded_at" in found:
+            told = "belongs to a diagram over time, and this one is not"
+            report.fault(pointer, "not-used", told, found["recorded_at"], allowed='with `over` "time" only')
+            return None
+        return 1.0
+    if form not in {"table", "csv"}:
+        told = f"is possible for what was recorded, a table or csv, and not for {form}; a formula may use the time t"
+        report.fault(join(where, "over"), "conflict", told, over, allowed='"angle" or "stroke"')
+        return None
+    if "recorded_at" not in found:
+        told = "is required by a diagram over time: the angle is this speed times the time"
+        report.fault(pointer, "required", told, allowed=RECORDED_AT.range_text(), unit=RECORDED_AT.unit)
+        return None
+    return read_number(report, pointer, found["recorded_at"], RECORDED_AT)
+
+
+def _over_angle(operation: dict[str, Any], speed: float) -> dict[str, Any]:
+    """An operation whose rows over time have become rows over the angle of a shaft that turns evenly at ``speed``."""
+    if operation["over"] != "time":
+        return operation
+    table = operation["table"]
+    rows = [[speed * time, value] for time, value in table["rows"]]
+    return operation | {"over": "angle", "table": table | {"rows": rows}}
 
 
 def _read_gas(report: Report, where: str, found: Mapping[str, Any]) -> dict[str, Any] | None:

@@ -16,6 +16,7 @@ from sprag.service.spec.machine.shaft_parts import (
     OPERATION_CHOICES,
     PARTS,
     PHI_C,
+    RECORDED_AT,
     ROWS,
     STEPS,
     numbers_under,
@@ -115,21 +116,22 @@ def _mechanism() -> Schema:
 def _operation() -> Schema:
     step, gas = numbers_under("operation.steps.K."), numbers_under("operation.gas.")
     indicator = numbers_under("operation.indicator.")
-    table = "angle (rad) or fraction of the stroke, and force (N) or torque (N*m)"
-    pressure = "angle (rad) or fraction of the stroke, to and fro in every revolution, and absolute pressure (Pa)"
+    recorded = {RECORDED_AT.path: RECORDED_AT}
+    table = "angle (rad), fraction of the stroke or time (s), and force (N) or torque (N*m)"
+    pressure = "angle (rad), fraction of the stroke, to and fro in every revolution, or time (s), and pressure (Pa)"
     schema = object_schema(
         {
             **schemas(OPERATION_CHOICES),
-            **quantities(numbers_under("operation.")),
+            **quantities(numbers_under("operation.") | recorded),
             "steps": STEPS.schema(object_schema(quantities(step), required_of(step))),
             **_diagram(
-                table, "force or torque as a formula of phi (rad), x (fraction of the stroke) and omega (rad/s)"
+                table, "force or torque as a formula of phi (rad), t (s), x (fraction of the stroke) and omega (rad/s)"
             ),
             "indicator": one_of(
                 object_schema(
                     {
                         "over": INDICATOR_OVER.schema(),
-                        **quantities(indicator),
+                        **quantities(indicator | recorded),
                         **_rows(pressure),
                     },
                     required_of(indicator),

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.engine.machine_shaft.spec import During, MachineSpec, MechanismChoice, OperationChoice
+from sprag.engine.machine_shaft.machine import check_structure
+from sprag.engine.machine_shaft.problems import MachineError
+from sprag.engine.machine_shaft.spec import Drive, During, MachineSpec, MechanismChoice, OperationChoice
 from sprag.engine.machine_shaft.tables import Table
 from sprag.engine.machine_shaft.trajectory import trajectory
-from tests.engine.machine_shaft.machines import PRESS, PRESS_NUMBERS, one
+from tests.engine.machine_shaft.machines import PRESS, PRESS_NUMBERS, one, results_of
 
 CRANK, ROD = 0.1, 0.4
 STROKE = 2.0 * CRANK
@@ -158,3 +160,31 @@ def test_a_step_to_the_end_of_the_stroke_acts_where_the_fraction_rounds_to_one(d
         "mechanism.cam.follower_mass": 1.0,
     })  # fmt: skip
     assert row["work.resistance"] == pytest.approx(-100.0 * math.pi, rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    "formula", ["{load}*exp(-(({t} - 0.1)/0.01)^2)", "if({t} < 0.2, {load}, 0)", "{load}*sin(12*{t})^2"]
+)
+def test_a_formula_of_the_time_is_one_of_the_angle_at_the_mean_speed(formula: str) -> None:
+    """t = phi/omega_mean with the mean speed of each case; the engine's formula over the angle has it as a constant."""
+    timed = with_operation(quantity="torque", form="formula", formula=formula.format(t="t", load=900))
+    angular = with_operation(quantity="torque", form="formula", formula=formula.format(t="(phi/w)", load=900))
+    angular = replace(angular, constants=("w",))
+    speeds = np.array([8.0, 12.0, 19.0])
+    found = results_of(timed, BASE | {"mean_speed": speeds}, 3)
+    other = results_of(angular, BASE | {"mean_speed": speeds, "constants.w": speeds}, 3)
+    for name in ("omega.max", "omega.min", "work.resistance", "energy.fluctuation"):
+        assert found[name] == pytest.approx(other[name], rel=1e-12), name
+    assert np.ptp(found["work.resistance"]) > 0.0
+
+
+def test_a_constant_named_t_stays_a_constant() -> None:
+    named = replace(with_operation(quantity="torque", form="formula", formula="t*phi"), constants=("t",))
+    found = one(named, BASE | {"constants.t": 7.0})
+    assert found["work.resistance"] == pytest.approx(-7.0 * 0.5 * (2.0 * math.pi) ** 2, rel=1e-12)
+
+
+def test_a_motor_has_no_speed_for_the_time_of_a_formula() -> None:
+    spec = with_operation(quantity="torque", form="formula", formula="20*step(t - 0.1)")
+    with pytest.raises(MachineError, match="uses t, the time"):
+        check_structure(replace(spec, balance="motor", drive=Drive(motor="linear")))

@@ -22,6 +22,7 @@ from sprag.service.spec.machine.shaft_parts import (
     INTERPOLATION,
     MECHANISM_CHOICES,
     OPERATION_CHOICES,
+    RECORDED_AT,
     numbers_of,
     numbers_under,
 )
@@ -43,7 +44,7 @@ CONSTANTS: Final = "/base/constants"
 _CONSTANTS_HELP: Final = "one a line: name = value"
 _MOTORS: Final = {"kloss": "an induction motor (Kloss)", "linear": "a motor with a linear characteristic",
                   "table": "a motor with a measured characteristic"}  # fmt: skip
-_FORMULA_HELP: Final = "of phi in rad, such as 40*sin(2*phi)^2"
+_FORMULA_HELP: Final = "of phi in rad, such as 40*sin(2*phi)^2; of an operation also of t in s, x and omega"
 _CSV_HELP: Final = "two columns, with units in their headings"
 _STEPS_HELP: Final = "one step a line: from; to; value"
 _NO_CHOICE: Final = (("none", "none"),)
@@ -221,13 +222,18 @@ def _operation(values: Mapping[str, str], owner: str) -> list[Entry]:
     if form == "gas":
         found += _numbers("operation.gas.", f"{pointer}/gas")
     elif form == "indicator":
-        found.append(_described(INDICATOR_OVER, f"{pointer}/indicator"))
-        found += _numbers("operation.indicator.", f"{pointer}/indicator")
-        found += _diagram(f"{pointer}/indicator", "csv", "angle [deg],pressure [bar]")
+        own = f"{pointer}/indicator"
+        found.append(_described(INDICATOR_OVER, own, shape=True))
+        if values.get(f"{own}/over") == "time":
+            found.append(_parameter(RECORDED_AT, own))
+        found += _numbers("operation.indicator.", own)
+        found += _diagram(own, "csv", "angle [deg],pressure [bar]")
     else:
         over = values.get(f"{pointer}/over", "angle")
         found += [_described(entry, pointer, shape=name == "over")
                   for name, entry in OPERATION_CHOICES.items() if name != "during" or over == "stroke"]  # fmt: skip
+        if over == "time":
+            found.append(_parameter(RECORDED_AT, pointer))
         if form == "value":
             found += _numbers("operation.", pointer, only=("value",))
         elif form == "steps":

@@ -13,6 +13,7 @@ from sprag.service.spec.machine.shaft_parts import MECHANISM_CHOICES
 from sprag.service.spec.units import QuantityError, parse_quantity
 
 _STEP: Final = ("from", "to", "value")
+_PLACES: Final = {"angle": ("angle", "rad"), "stroke": ("fraction", "1"), "time": ("time", "s")}
 _TEXTS: Final = ("formula", "csv")
 _FORMS: Final = ("value", "steps", "formula", "csv", "gas", "indicator")
 
@@ -178,14 +179,14 @@ def _operation_values(pointer: str, operation: Mapping[str, Any]) -> Values:
         return {}
     values: Values = {}
     form = next((name for name in (*_FORMS, "table") if name in operation), "")
-    place = ("angle", "rad") if operation.get("over", "angle") == "angle" else ("fraction", "1")
+    place = _PLACES.get(operation.get("over", "angle"), _PLACES["angle"])
     for key, content in operation.items():
         if key in {"table", "csv", "formula", "interpolation"}:
             continue
         if key == "gas":
             values |= {f"{pointer}/gas/{name}": _text(value) for name, value in content.items()}
         elif key == "indicator":
-            over = ("angle", "rad") if content.get("over", "angle") == "angle" else ("fraction", "1")
+            over = _PLACES.get(content.get("over", "angle"), _PLACES["angle"])
             values |= {f"{pointer}/indicator/{name}": _text(value) for name, value in content.items()
                        if name not in {"table", "csv", "interpolation"}}  # fmt: skip
             values |= _diagram_values(f"{pointer}/indicator", content, over, ("pressure", "Pa"))[1]

@@ -50,6 +50,26 @@ def test_a_measured_motor_goes_through_the_form() -> None:
     assert parse_spec(spec_of(values_of(spec))[0]).study == parse_spec(spec).study
 
 
+@pytest.mark.parametrize("indicated", [False, True])
+def test_a_diagram_over_time_goes_through_the_form(indicated: bool) -> None:
+    recorded = {"over": "time", "recorded_at": "120 rpm", "interpolation": "linear"}
+    diagram = recorded | {"table": [["0 ms", 1e3], ["100 ms", 3e3], ["500 ms", 1e3]]}
+    operation = {"indicator": diagram | {"piston_area": 1e-4}} if indicated else diagram | {"quantity": "force"}
+    spec = {
+        "sprag": 1,
+        "model": "machine-shaft",
+        "name": "t",
+        "base": PRESS["base"] | {"operation": operation},
+        "axes": [],
+    }
+    values = values_of(spec)
+    again, faults = spec_of(values)
+    assert faults == {}
+    assert parse_spec(again).study == parse_spec(spec).study
+    own = "/base/operation/indicator" if indicated else "/base/operation"
+    assert field_of(f"{own}/recorded_at", values) == f"{own}/recorded_at"
+
+
 def test_what_the_form_has_no_field_for_is_given_as_text() -> None:
     with pytest.raises(ValueError, match="no fields"):
         values_of({**PRESS, "base": {**PRESS["base"], "operation": {"quantity": "force", "value": {"odd": 1}}}})

@@ -159,3 +159,41 @@ def test_a_motor_from_a_table() -> None:
             parse_spec(spec)
         faults = {fault.where: fault.message for fault in caught.value.faults}
         assert faults["/base/drive/motor" + place].startswith(sentence)
+
+
+def test_a_diagram_recorded_over_time_is_one_over_the_angle() -> None:
+    """0.125 s at 120 rpm is a quarter of a turn."""
+    recorded = {"quantity": "torque", "over": "time", "recorded_at": "120 rpm"}
+    timed = changed(
+        {"/base/operation": recorded | {"csv": "time [ms],torque [N*m]\n0,0\n125,90\n500,0\n"}, "/axes": []}
+    )
+    rows = [["0 deg", 0], ["90 deg", 90], ["360 deg", 0]]
+    angular = changed({"/base/operation": {"quantity": "torque", "table": rows}, "/axes": []})
+    own, other = (parse_spec(spec).study.structure for spec in (timed, angular))
+    assert own is not None
+    assert other is not None
+    assert own["operation"]["over"] == "angle"
+    for row, wanted in zip(own["operation"]["table"]["rows"], other["operation"]["table"]["rows"], strict=True):
+        assert row == pytest.approx(wanted, rel=1e-15)
+    jsonschema.Draft202012Validator(spec_schema()).validate(timed)
+    pressure = {"over": "time", "recorded_at": "300 rpm", "piston_area": "60 cm^2", "table": [[0, 1e5], ["0.1 s", 5e5]]}
+    indicated = parse_spec(changed({"/base/operation": {"indicator": pressure}, "/axes": []})).study.structure
+    assert indicated is not None
+    assert indicated["operation"]["table"]["rows"] == [[0.0, 1e5], [pytest.approx(math.pi), 5e5]]
+
+
+@pytest.mark.parametrize(
+    ("operation", "field", "code"),
+    [
+        ({"over": "time", "table": [[0, 1], [0.1, 2]]}, "recorded_at", "required"),
+        ({"over": "time", "recorded_at": 0, "table": [[0, 1], [0.1, 2]]}, "recorded_at", "out-of-range"),
+        ({"over": "time", "recorded_at": "2 m", "table": [[0, 1], [0.1, 2]]}, "recorded_at", "wrong-unit"),
+        ({"over": "time", "recorded_at": 9, "value": 3}, "over", "conflict"),
+        ({"over": "time", "recorded_at": 9, "formula": "t"}, "over", "conflict"),
+        ({"recorded_at": 9, "value": 3}, "recorded_at", "not-used"),
+        ({"over": "time", "recorded_at": "100 rpm", "table": [[0, 1], ["0.9 s", 1]]}, "table", "invalid-table"),
+    ],
+)
+def test_what_is_wrong_about_a_diagram_over_time(operation: dict[str, Any], field: str, code: str) -> None:
+    found = problems({"/base/operation": {"quantity": "torque"} | operation, "/axes": []})
+    assert {where: fault.code for where, fault in found.items()} == {f"/base/operation/{field}": code}
