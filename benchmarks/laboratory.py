@@ -1,9 +1,10 @@
 """Processor time of one move in the laboratory of vibration drives, against one settled case in the same run.
 
-python -m benchmarks.laboratory [--moves 60] [--seed 1]
+python -m benchmarks.laboratory [--moves 200] [--seed 1] [--worst 5]
 
-A move reads the setting, runs the settled case from the state before it, and makes figure, frames and answer. It is
-measured in this process; the service adds two hops between processes.
+For each built-in drive one slider at a time goes to a random place of its range, each move from the motion before it. A
+move reads the setting, runs the settled case, and makes figure, frames and answer. It is measured in this process; the
+service adds two hops between processes.
 """
 
 from __future__ import annotations
@@ -11,23 +12,37 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from sprag.service.http.web.figures.drive import drive_case
-from sprag.service.http.web.laboratory.drive_setting import setting
+from sprag.service.http.web.laboratory.drive_setting import machines, setting
 from sprag.service.json_text import to_bytes
 from sprag.worker import models
 
-#: Values of the sliders at random, by path: lower and upper end, SI.
-_ENDS = {
-    "excitation.frequency": (15.0, 45.0),
-    "excitation.amplitude_x": (0.5e-3, 4e-3),
-    "excitation.amplitude_y": (0.5e-3, 4e-3),
-    "shaft.load": (0.0, 1.0),
-    "pendulums.0.backlash": (0.0, 0.02),
-}
+if TYPE_CHECKING:
+    from sprag.service.http.web.laboratory.sliders import Slider
+
+#: Milliseconds that a move may take.
+BOUND = 100.0
+
+
+class Move(NamedTuple):
+    """One move: processor times (ms), the motion that it comes to, and what was set last."""
+
+    reading: float
+    drawing: float
+    alone: float
+    regime: str
+    settled_after: float
+    path: str
+    given: dict[str, str]
+
+    @property
+    def whole(self) -> float:
+        """Time of the move."""
+        return self.reading + self.drawing
 
 
 def _timed(function: Callable[..., Any], *args: Any) -> tuple[float, Any]:
@@ -42,36 +57,64 @@ def _bytes_of(study: Any) -> tuple[bytes, dict[str, Any]]:
     return to_bytes(found), found
 
 
+def _place(slider: Slider, share: float) -> str:
+    """The text of a slider at a share of its range."""
+    low, high = slider.low, slider.high
+    value = low * (high / low) ** share if slider.logarithmic else low + (high - low) * share
+    return repr(value)
+
+
+def moves_of(name: str, count: int, random: np.random.Generator) -> list[Move]:
+    """Random moves of one drive."""
+    given = {"machine": name}
+    chosen = setting(given)
+    models.warm_up(chosen.study)
+    drive_case(chosen.study, None)
+    sliders = [slider for slider in chosen.sliders if slider.high > slider.low]
+    found = []
+    for _ in range(count):
+        slider = sliders[int(random.integers(len(sliders)))]
+        given[slider.path] = _place(slider, float(random.random()))
+        reading, chosen = _timed(setting, given)
+        drawing, (_, case) = _timed(_bytes_of, chosen.study)
+        alone, _ = _timed(models.run_chunk, chosen.study, 0, 1)
+        after = case["results"].get("regime.settled_after") or float("nan")
+        regime = case["regime"] or case["ending"]
+        found.append(Move(reading, drawing, alone, regime, after, slider.path, dict(given)))
+        given |= {path: repr(value) for path, value in (case["state"] or {}).items()}
+    return found
+
+
+def _told(name: str, found: list[Move], worst: int) -> None:
+    kinds = {regime: sum(move.regime == regime for move in found) for regime in sorted({m.regime for m in found})}
+    print(f"{name}, {len(found)} moves: " + ", ".join(f"{count} {kind}" for kind, count in kinds.items()))
+    print("processor time, ms              median   90 %    most")
+    rows = np.array([[move.reading, move.drawing, move.whole, move.alone] for move in found])
+    titles = ("reading the setting", "case, figure, frames", "move", "settled case")
+    for title, column in zip(titles, rows.T, strict=True):
+        print(f"{title:30}" + "".join(f"{value:8.1f}" for value in np.quantile(column, [0.5, 0.9, 1.0])))
+    above = sum(move.whole > BOUND for move in found)
+    print(f"{above} of {len(found)} moves take more than {BOUND:g} ms; a move takes ", end="")
+    print(f"{np.median(rows[:, 2] / rows[:, 3]):.1f} times its settled case (median)")
+    for move in sorted(found, key=lambda move: -move.whole)[:worst]:
+        print(
+            f"  {move.whole:6.0f} ms, case {move.alone:.0f} ms: {move.regime}, settled after {move.settled_after:.0f}"
+        )
+        print(
+            f"    {move.path} moved; " + ", ".join(f"{p} {v:.8}" for p, v in move.given.items() if "initial" not in p)
+        )
+
+
 def main() -> None:
     """Measure random moves of one slider at a time, each from the motion before it."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--moves", type=int, default=60)
+    parser.add_argument("--moves", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--worst", type=int, default=5)
     asked = parser.parse_args()
     random = np.random.default_rng(asked.seed)
-    given: dict[str, str] = {}
-    first = setting(given).study
-    models.warm_up(first)
-    drive_case(first, None)
-    rows: list[tuple[float, float, float, float]] = []
-    kinds: dict[str, int] = {}
-    for _ in range(asked.moves):
-        path = str(random.choice(list(_ENDS)))
-        given[path] = repr(float(random.uniform(*_ENDS[path])))
-        read, chosen = _timed(setting, given)
-        case, (_, found) = _timed(_bytes_of, chosen.study)
-        alone, _ = _timed(models.run_chunk, chosen.study, 0, 1)
-        rows.append((read, case, read + case, alone))
-        kinds[found["regime"]] = kinds.get(found["regime"], 0) + 1
-        given |= {name: repr(value) for name, value in (found["state"] or {}).items()}
-    times = np.array(rows)
-    print(f"{asked.moves} moves: " + ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items())))
-    print("processor time, ms              median   90 %    most")
-    for name, column in zip(
-        ("reading the setting", "case, figure, frames", "move", "settled case"), times.T, strict=True
-    ):
-        print(f"{name:30}" + "".join(f"{value:8.1f}" for value in np.quantile(column, [0.5, 0.9, 1.0])))
-    print(f"a move takes {np.median(times[:, 2] / times[:, 3]):.1f} times its settled case (median)")
+    for name in machines():
+        _told(name, moves_of(name, asked.moves, random), asked.worst)
 
 
 if __name__ == "__main__":

@@ -11,8 +11,9 @@ from sprag.service.faults import Fault
 from sprag.service.http.web.figures.fit import FitChart, fit_chart
 from sprag.service.http.web.figures.linkage import Drawing, drawings
 from sprag.service.http.web.form.entries import Faults
+from sprag.service.http.web.form.shaft import is_shaft
 from sprag.service.http.web.form.shaft_spec import step_of
-from sprag.service.http.web.form.spec import clutch_pointers, field_of, is_shaft, pendulums_of, spec_of
+from sprag.service.http.web.form.spec import clutch_pointers, field_of, pendulums_of, spec_of
 from sprag.service.jobs.preview import preview_json
 from sprag.service.results.fits import fit_json
 from sprag.service.results.wording import unit_text
@@ -110,7 +111,7 @@ def check_form(
         found.parsed = parse_spec(spec)
     except SpecError as error:
         for item in error.faults:
-            name = field_of(item.where or "", values)
+            name = _beside(field_of(item.where or "", values), values.get("edited", ""))
             # Faults of unreadable data were reported already, line by line.
             if not (name in faults and name.endswith("/data")):
                 texts = found.faults.setdefault(name, [])
@@ -128,6 +129,11 @@ def check_form(
             found.notes += _assumed(values.get(f"{pointer}/data", ""))
             _fit(found, pointer, values)
     return found
+
+
+def _beside(name: str, edited: str) -> str:
+    """The field for a fault at ``name``: that of its part which was changed last, where the fault is about a part."""
+    return edited if name and edited.startswith(f"{name}/") else name
 
 
 def _assumed(text: str) -> list[str]:

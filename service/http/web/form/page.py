@@ -36,14 +36,13 @@ from sprag.service.http.web.form.fields import (
 from sprag.service.http.web.form.goal import GOAL_DEFAULTS, LIMITS
 from sprag.service.http.web.form.own_machine import laboratory_address
 from sprag.service.http.web.form.parts import PARTS, add_part, add_row, copy, count_of, drop, drop_row
-from sprag.service.http.web.form.shaft import blocks, shaft_paths
+from sprag.service.http.web.form.shaft import blocks, is_shaft, shaft_paths
 from sprag.service.http.web.form.shaft_spec import base_of
 from sprag.service.http.web.form.spec import (
     FORMULA,
     REFINE_DEFAULTS,
     clutch_pointers,
     is_search,
-    is_shaft,
     pendulums_of,
     spec_of,
     values_of,

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from sprag.service.http.web.form.entries import Values, count_in
+from sprag.service.http.web.form.tolerances import OWN
 from sprag.service.spec.plan import goal
 from sprag.worker.limits import MAX_AXES
 from sprag.worker.models import machine_shaft
@@ -71,20 +72,35 @@ def add_part(values: Values) -> None:
     count = count_of(values, "parts")
     if not count:
         for name in ("mechanism", "operation"):
-            copy(values, f"/base/{name}", f"/base/parts/0/{name}")
-            drop(values, f"/base/{name}")
+            for old in _with_tolerances(f"/base/{name}"):
+                copy(values, old, old.replace(name, f"parts/0/{name}", 1))
+                drop(values, old)
             _rename(values, f"{name}.", f"parts.0.{name}.")
         count = 1
     if count < PARTS["parts"].most:
-        copy(values, f"/base/parts/{count - 1}/", f"/base/parts/{count}/")
+        for pointer in _with_tolerances("/base/parts"):
+            _copy_row(values, pointer, count - 1, count)
         values["parts"] = str(count + 1)
 
 
 def _rename(values: Values, old: str, new: str) -> None:
     """Replace the beginning of paths that vary or are in formulas."""
     for name, text in values.items():
-        if name.endswith(("/path", "/tied")) or text.startswith("="):
+        if name.endswith(("/path", "/tied", "/with")) or text.startswith("="):
             values[name] = re.sub(rf"(?<![\w.]){re.escape(old)}", new, text)
+
+
+def _copy_row(values: Values, pointer: str, source: int, target: int) -> None:
+    """Copy the fields of a row; what shares the draw of a tolerance in it is in the same row."""
+    copy(values, f"{pointer}/{source}/", f"{pointer}/{target}/")
+    paths = pointer.removeprefix(OWN).replace("/", ".")
+    for name in [name for name in values if name.startswith(f"{pointer}/{target}/") and name.endswith("/with")]:
+        values[name] = values[name].replace(f"{paths}.{source}.", f"{paths}.{target}.")
+
+
+def _with_tolerances(pointer: str) -> tuple[str, ...]:
+    """The beginning of names of fields, and that of the fields of their tolerances."""
+    return (pointer, pointer.replace("/base/", OWN, 1)) if pointer.startswith("/base/") else (pointer,)
 
 
 def drop_row(values: Values, name: str, index: int) -> None:
@@ -92,9 +108,10 @@ def drop_row(values: Values, name: str, index: int) -> None:
     part, count = PARTS[name], count_of(values, name)
     if index >= count:
         return
-    for row in range(index, count):
-        drop(values, f"{part.pointer}/{row}/")
-        copy(values, f"{part.pointer}/{row + 1}/", f"{part.pointer}/{row}/")
+    for pointer in _with_tolerances(part.pointer):
+        for row in range(index, count):
+            drop(values, f"{pointer}/{row}/")
+            _copy_row(values, pointer, row + 1, row)
     values[name] = str(count - 1)
 
 

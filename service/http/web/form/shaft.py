@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from sprag.service.http.web.form.entries import count_in
-from sprag.service.http.web.form.fields import Choice, Field, Groups, field_for
+from sprag.service.http.web.form.fields import Choice, Field, Groups, described, field_for
 from sprag.service.results.wording import words
 from sprag.service.spec.described import Described
 from sprag.service.spec.machine.shaft import MEAN_SPEED_IS, read_shaft
@@ -22,11 +22,13 @@ from sprag.service.spec.machine.shaft_parts import (
     INTERPOLATION,
     MECHANISM_CHOICES,
     OPERATION_CHOICES,
+    PHI_C,
     RECORDED_AT,
     numbers_of,
     numbers_under,
 )
 from sprag.service.spec.report import Report
+from sprag.worker import models
 from sprag.worker.models import Parameter, machine_shaft
 
 _PART: Final = re.compile(r"parts\.(\d+)\.")
@@ -73,6 +75,11 @@ class Entry:
         """The field's name."""
         return self.field.name
 
+    @property
+    def is_parameter(self) -> bool:
+        """Whether it is a number of the machine."""
+        return bool(self.field.mark)
+
 
 @dataclass(frozen=True, slots=True)
 class Block:
@@ -81,6 +88,11 @@ class Block:
     title: str
     entries: tuple[Entry, ...]
     drop: tuple[str, int] | None = None
+
+
+def is_shaft(values: Mapping[str, str]) -> bool:
+    """Whether the form describes a machine shaft, not a vibration drive."""
+    return values.get("model") == models.MACHINE_SHAFT
 
 
 def several(values: Mapping[str, str]) -> bool:
@@ -156,6 +168,7 @@ def _machine(values: Mapping[str, str]) -> list[Entry]:
         _described(MEAN_SPEED_IS, "/base"),
         Entry(cycle),
         *(_parameter(top[name], "/base") for name in names if name != "mean_speed"),
+        Entry(replace(described(PHI_C, "/base"), label="Reference angle", symbol="phi_c", default="by default")),
         Entry(Field(CONSTANTS, "Constants of formulas", "", "", "", _CONSTANTS_HELP, "", False, "", "k = 40"), lines=2),
     ]
 

@@ -21,6 +21,7 @@ from sprag.service.http.web.form.entries import (
 from sprag.service.http.web.form.fields import FORM_MODEL, pendulum, sections
 from sprag.service.http.web.form.goal import GOAL_DEFAULTS, field_of_goal, goal_of, goal_values
 from sprag.service.http.web.form.parts import count_of
+from sprag.service.http.web.form.shaft import is_shaft
 from sprag.service.http.web.form.shaft_spec import base_of, field_of_base, values_of_base
 from sprag.service.http.web.form.tolerances import FIELDS as TOLERANT
 from sprag.service.http.web.form.tolerances import field_of_tolerance, tolerance_values, tolerances_of
@@ -51,7 +52,7 @@ _FIELDS: Final = frozenset(
     {"sprag", "model", "name", "base", "run", "axes", "combine", "derive", "refine", "goal", *TOLERANT}
 )
 #: Fields of the spec of a machine shaft that the form has.
-_SHAFT_FIELDS: Final = _FIELDS - {"run", *TOLERANT}
+_SHAFT_FIELDS: Final = _FIELDS - {"run"}
 #: Beginning of a field with the formula of a derived parameter.
 FORMULA: Final = "="
 
@@ -59,11 +60,6 @@ FORMULA: Final = "="
 def pendulums_of(values: Mapping[str, str]) -> int:
     """How many pendulums the form has."""
     return count_in(values, "pendulums", 1, 1, MAX_PENDULUMS)
-
-
-def is_shaft(values: Mapping[str, str]) -> bool:
-    """Whether the form describes a machine shaft, not a vibration drive."""
-    return values.get("model") == MACHINE_SHAFT
 
 
 def is_search(values: Mapping[str, str]) -> bool:
@@ -94,7 +90,7 @@ def spec_of(values: Mapping[str, str]) -> tuple[dict[str, Any], Faults]:
         spec["derive"] = derive
     if not shaft:
         spec["run"] = _run(values)
-        spec |= tolerances_of(values)
+    spec |= tolerances_of(values)
     if is_search(values):
         return spec | {"goal": goal_of(values, faults)}, faults
     axes = [_axis(values, index) for index in range(count_of(values, "axes"))]
@@ -279,8 +275,7 @@ def values_of(spec: Mapping[str, Any]) -> Values:
     values |= goal_values(spec["goal"]) if "goal" in spec else GOAL_DEFAULTS
     for key, content in spec.get("refine", {}).items():
         values[f"/refine/{key}"] = "; ".join(content) if key == "results" else text_of(content)
-    if not shaft:
-        values |= tolerance_values(spec, int(values["pendulums"]))
+    values |= tolerance_values(spec, values)
     values["axes"] = str(len(spec.get("axes", ())))
     for index, axis in enumerate(spec.get("axes", ())):
         values |= _axis_values(f"/axes/{index}", axis)

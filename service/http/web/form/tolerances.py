@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
 from sprag.service.http.web.form.entries import Values, count_in, names_of, plain, text_of
 from sprag.service.http.web.form.fields import Field, described, pendulum, sections
+from sprag.service.http.web.form.shaft import blocks, is_shaft
 from sprag.service.results.wording import words
 from sprag.service.spec.draws.described import DISTRIBUTION, DRAWS
 from sprag.worker.models import MAX_PENDULUMS
@@ -62,14 +63,21 @@ def tolerances_of(values: Mapping[str, str]) -> dict[str, Any]:
 
 def _filled(values: Mapping[str, str]) -> Iterator[tuple[str, str]]:
     """The parameters with a tolerance, in their order: name of the part, and the text of the field."""
-    pendulums = count_in(values, "pendulums", 1, 1, MAX_PENDULUMS)
-    parts = (*sections(), *(pendulum(index) for index in range(pendulums)))
-    names = [own_name(field.name) for section in parts for field in section.fields]
+    names = [own_name(field) for field in _tolerant(values)]
     first = {name: place for place, name in enumerate(names_of(values.get(ORDER, "")))}
     for name in sorted(names, key=lambda name: first.get(name, len(first))):
         text = values.get(f"{name}/plus_minus", "").strip()
         if text:
             yield name, text
+
+
+def _tolerant(values: Mapping[str, str]) -> list[str]:
+    """Names of the fields of the machine that can have a tolerance."""
+    if is_shaft(values):
+        return [entry.name for block in blocks(values) for entry in block.entries if entry.is_parameter]
+    pendulums = count_in(values, "pendulums", 1, 1, MAX_PENDULUMS)
+    parts = (*sections(), *(pendulum(index) for index in range(pendulums)))
+    return [field.name for section in parts for field in section.fields]
 
 
 def own_name(field: str) -> str:
@@ -84,28 +92,34 @@ def field_of_tolerance(pointer: str, values: Mapping[str, str]) -> str:
     return f"{names[int(found[1])]}/plus_minus" if found and int(found[1]) < len(names) else BATCH
 
 
-def tolerance_values(spec: Mapping[str, Any], pendulums: int) -> Values:
-    """The form's values for the drives of a spec; raises ValueError where the form cannot show them."""
+def tolerance_values(spec: Mapping[str, Any], values: Mapping[str, str]) -> Values:
+    """The form's values for the tolerances of a spec, whose machine has these ``values``; raises ValueError where the
+    form cannot show them.
+    """
     if "tolerances" not in spec:
         return {}
     found: Values = {BATCH: "on"} | {f"/{name}": text_of(spec[name]) for name in FIELDS[1:] if name in spec}
-    shown = {field.name for section in sections() for field in section.fields}
-    shown |= {field.name for index in range(pendulums) for field in pendulum(index).fields}
+    shown = {field.removeprefix("/base/").replace("/", "."): field for field in _tolerant(values)}
     order: list[str] = []
     for item in spec["tolerances"]:
         if "plus_minus" not in item:
             raise ValueError("the form has no field for measured values")
         given = item["path"] if isinstance(item["path"], list) else [item["path"]]
-        paths = [path.replace("*", str(index)) for path in given for index in range(pendulums if "*" in path else 1)]
+        paths = [own for path in given for own in (_matching(path, shown) if "*" in path else [path])]
         groups = [paths] if item.get("shared") else [[path] for path in paths]
         for first, *others in groups:
-            pointer = "/base/" + first.replace(".", "/")
-            if pointer not in shown:
+            if first not in shown:
                 raise ValueError(f"the form has no field for the tolerance of {first}")
-            name = own_name(pointer)
+            name = own_name(shown[first])
             order.append(name)
             found[f"{name}/plus_minus"] = text_of(item["plus_minus"])
             found[f"{name}/distribution"] = item.get("distribution", _NORMAL)
             if others:
                 found[f"{name}/with"] = ", ".join(others)
     return found | {ORDER: " ".join(order)}
+
+
+def _matching(path: str, shown: Iterable[str]) -> list[str]:
+    """The paths for which ``path`` stands, whose ``*`` is any number."""
+    pattern = re.compile(re.escape(path).replace(r"\*", "[0-9]+"))
+    return [own for own in shown if pattern.fullmatch(own)]

@@ -7,7 +7,9 @@ const touched = new Set();
 let old = false; // the panel is out of date; it is requested again once the connection is restored
 let whole = false; // after a full check, empty required fields are reported too
 
-const encoded = (extra = []) => new URLSearchParams([...new FormData(form), ...extra]);
+let edited = ""; // name of the field that was changed last: what is wrong with a whole part is shown beside it
+
+const encoded = (extra = []) => new URLSearchParams([...new FormData(form), ["edited", edited], ...extra]);
 
 // The input is sent with the button to the login, and comes back from there.
 const ended = () => {
@@ -109,7 +111,7 @@ const mark = (event) => {
 };
 
 function listen() {
-  form.addEventListener("input", soon);
+  form.addEventListener("input", (event) => { edited = event.target.name; soon(); });
   form.addEventListener("focusin", mark);
   form.addEventListener("focusout", (event) => { if (event.target.name) { touched.add(event.target.name); soon(); } });
   form.addEventListener("change", (event) => { if (event.target.matches("[data-shape]")) reshape([]); });

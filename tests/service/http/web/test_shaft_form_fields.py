@@ -74,7 +74,47 @@ def test_what_the_form_has_no_field_for_is_given_as_text() -> None:
     with pytest.raises(ValueError, match="no fields"):
         values_of({**PRESS, "base": {**PRESS["base"], "operation": {"quantity": "force", "value": {"odd": 1}}}})
     with pytest.raises(ValueError, match="no fields"):
-        values_of({**PRESS, "tolerances": {}})
+        values_of({**PRESS, "correlations": []})
+    with pytest.raises(ValueError, match="no field for the tolerance"):
+        values_of({**PRESS, "tolerances": [{"path": "operation.steps.0.value", "plus_minus": "5 %"}]})
+
+
+def test_tolerances_and_the_reference_angle_go_through_the_form() -> None:
+    ram, rod = (f"mechanism.slider_crank.{name}" for name in ("ram_mass", "rod_mass"))
+    tolerances = [
+        {"path": "operation.scale", "plus_minus": "10 %", "distribution": "uniform"},
+        {"path": [ram, rod], "plus_minus": "2 %", "shared": True},
+    ]
+    base = PRESS["base"] | {"phi_c": 1}
+    spec = {**PRESS, "base": base, "tolerances": tolerances, "drives": 8, "seed": 3}
+    values = values_of(spec)
+    assert values["/base/phi_c"] == "1"
+    assert values["/tolerances/operation/scale/plus_minus"] == "10 %"
+    again, faults = spec_of(values)
+    assert faults == {}
+    assert parse_spec(again).study == parse_spec(spec).study
+
+
+def test_a_part_is_copied_and_removed_with_its_tolerances() -> None:
+    ram, rod = (f"mechanism.slider_crank.{name}" for name in ("ram_mass", "rod_mass"))
+    values = values_of({**PRESS, "tolerances": [{"path": [ram, rod], "plus_minus": "2 %", "shared": True}]})
+    reshape(values, "add-parts")
+    spec, _ = spec_of(values)
+    assert [item["path"] for item in spec["tolerances"]] == [
+        [f"parts.{part}.{ram}", f"parts.{part}.{rod}"] for part in (0, 1)
+    ]
+    values["/tolerances/parts/1/mechanism/slider_crank/ram_mass/plus_minus"] = "3 %"
+    reshape(values, "drop-parts 0")
+    (item,) = spec_of(values)[0]["tolerances"]
+    assert item["plus_minus"] == "3 %"
+    assert item["path"][0] == f"parts.0.{ram}"
+
+
+def test_a_refusal_of_links_is_beside_the_number_changed_last() -> None:
+    values = values_of(PRESS) | {"/base/mechanism/slider_crank/rod": "50 mm"}
+    assert list(check_form(values, Chunking()).faults) == ["/base/mechanism"]
+    rod = "/base/mechanism/slider_crank/rod"
+    assert list(check_form({**values, "edited": rod}, Chunking()).faults) == [rod]
 
 
 def test_a_second_part_is_a_copy_of_the_first_and_paths_follow() -> None:
