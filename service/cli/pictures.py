@@ -24,6 +24,11 @@ PictureFile = Annotated[
     str | None, typer.Option("-o", "--output", metavar="FILE", help="Picture to write: .svg, .png or .pdf.")
 ]
 
+ChosenOf = Annotated[
+    list[str] | None,
+    typer.Option("--of", metavar="PATH=VALUE", help="Value of an axis of --by that has a curve; default: all."),
+]
+
 _PICTURES = ("svg", "png", "pdf")
 #: Indices and the headings of their columns.
 _SHARES = {"first_order": "first order", "first_order_error": "+-", "total": "total", "total_error": "+-"}
@@ -79,6 +84,7 @@ def curve(
         list[str] | None, typer.Option("--by", metavar="PATH", help="Axis with one curve for each value.")
     ] = None,
     at: HeldAt = None,
+    of: ChosenOf = None,
     file: PictureFile = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
@@ -87,7 +93,7 @@ def curve(
     """Show results against an axis as a table, and write them as a picture."""
     query = [*([] if x is None else [("x", x)]), *(("y", name) for name in y or ())]
     query += [("by", path) for path in by or ()]
-    query += [("at", item) for item in at or ()]
+    query += [*(("at", item) for item in at or ()), *(("of", item) for item in of or ())]
     with connection(server, token) as client:
         answer(client, study_id, "curves", query, file, show_curves, as_json)
 

@@ -19,6 +19,7 @@ from sprag.service.client.frames import Curves, grid_of, table_of
 from sprag.service.client.queries import (
     Progressing,
     Value,
+    answers_query,
     case_query,
     curve_query,
     extension,
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
 
     from sprag.service.answers.calibration import CalibrationReport
     from sprag.service.answers.goals import FrontReport
+    from sprag.service.answers.key import AnswerReport
     from sprag.service.answers.results import Case
     from sprag.service.answers.studies import Preview, StudyDetail, StudySummary
     from sprag.service.client.queries import Spec
@@ -220,9 +222,22 @@ class AsyncStudy(AsyncCaseAnswers):
         by: str | Sequence[str] = (),
         at: Mapping[str, Value] | None = None,
         number: int | None = None,
+        of: Mapping[str, Sequence[Value]] | None = None,
     ) -> Curves:
         """Results against one axis, as `Study.curves` gives them."""
-        return Curves(cast("Any", await self._get("/curves", curve_query(x, y, by, at, number))))
+        return Curves(cast("Any", await self._get("/curves", curve_query(x, y, by, at, number, of))))
+
+    async def answers(
+        self,
+        point: Value | None = None,
+        x: str | None = None,
+        *,
+        by: str | Sequence[str] = (),
+        at: Mapping[str, Value] | None = None,
+        of: Mapping[str, Sequence[Value]] | None = None,
+    ) -> AnswerReport:
+        """What one asks of a study first, as `Study.answers` gives it."""
+        return cast("AnswerReport", await self._get("/answers", answers_query(point, x, by, at, of)))
 
     async def map(
         self, x: str, y: str, z: str, *, at: Mapping[str, Value] | None = None, number: int | None = None

@@ -17,6 +17,7 @@ from sprag.service.client.wire import (
     FILE_TIMEOUT,
     Drawn,
     Query,
+    answers_path,
     calibration_path,
     case_path,
     connection_options,
@@ -122,6 +123,14 @@ class ServiceClient:
     def calibration_file(self, study_id: str, form: str) -> Iterator[bytes]:
         """The same as "csv", a row for each measured value, or as a picture: "svg", "png" or "pdf"."""
         return self.download(calibration_path(study_id), [("format", form)])
+
+    def answers(self, study_id: str, query: Query = ()) -> dict[str, Any]:
+        """What people ask of a study first."""
+        return self._json("GET", answers_path(study_id), params=list(query))
+
+    def answers_file(self, study_id: str, query: Query) -> Iterator[bytes]:
+        """The same as a file, by the query's ``format``."""
+        return self.download(answers_path(study_id), query)
 
     def front(self, study_id: str, query: Query = ()) -> dict[str, Any]:
         """The designs of a study with a goal."""

@@ -55,15 +55,28 @@ def curve_query(
     by: str | Sequence[str],
     at: Mapping[str, Value] | None,
     number: int | None = None,
+    of: Mapping[str, Sequence[Value]] | None = None,
 ) -> list[tuple[str, str]]:
-    """Query of curves: ``at`` maps paths to values, SI numbers or texts with a unit."""
+    """Query of curves: ``at`` maps paths to values, SI numbers or texts with a unit, ``of`` to several."""
     query = [
         *([] if x is None else [("x", x)]),
         *(("y", name) for name in _listed(y)),
         *(("by", path) for path in _listed(by)),
     ]
     query += [("at", f"{path}={value}") for path, value in (at or {}).items()]
+    query += [("of", f"{path}={value}") for path, values in (of or {}).items() for value in values]
     return query + given({"number": number})
+
+
+def answers_query(
+    point: Value | None,
+    x: str | None,
+    by: str | Sequence[str],
+    at: Mapping[str, Value] | None,
+    of: Mapping[str, Sequence[Value]] | None,
+) -> list[tuple[str, str]]:
+    """Query of the answers of a study: as of curves, and a working point; None leaves that to the service."""
+    return [*curve_query(x, (), by, at, of=of), *given({"point": point})]
 
 
 def ribbon_query(

@@ -14,6 +14,7 @@ from sprag.service.client.plain import ServiceClient
 from sprag.service.client.queries import (
     Progressing,
     Value,
+    answers_query,
     case_query,
     curve_query,
     extension,
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 
     from sprag.service.answers.calibration import CalibrationReport
     from sprag.service.answers.goals import FrontReport
+    from sprag.service.answers.key import AnswerReport
     from sprag.service.answers.results import Case
     from sprag.service.answers.studies import Preview, StudyDetail, StudySummary
     from sprag.service.client.queries import Spec
@@ -148,13 +150,35 @@ class Study(CaseAnswers):
         by: str | Sequence[str] = (),
         at: Mapping[str, Value] | None = None,
         number: int | None = None,
+        of: Mapping[str, Sequence[Value]] | None = None,
     ) -> Curves:
         """Results ``y`` against axis ``x``, a curve for each value of the axes ``by``, others held ``at`` values.
 
+        ``of`` gives, by path, those values of the axes ``by`` that have a curve; by default all of them.
         ``number`` is that of the regime in cases with many starts, by default 0, the most frequent one. Without ``x``
         or ``y``, the curves that the page of the study shows first.
         """
-        return Curves(cast("Any", self._client.plain.drawn(self.id, "curves", curve_query(x, y, by, at, number))))
+        return Curves(cast("Any", self._client.plain.drawn(self.id, "curves", curve_query(x, y, by, at, number, of))))
+
+    def answers(
+        self,
+        point: Value | None = None,
+        x: str | None = None,
+        *,
+        by: str | Sequence[str] = (),
+        at: Mapping[str, Value] | None = None,
+        of: Mapping[str, Sequence[Value]] | None = None,
+    ) -> AnswerReport:
+        """What one asks of a study first, such as no-load speed, largest power, best efficiency and stall torque.
+
+        Parameters
+        ----------
+        point : float or str, optional
+            Working point on the axis along the curves, such as "0.3 N*m".
+        x, by, at, of : optional
+            Other curves than those that the page of the study shows first, as for `curves`.
+        """
+        return cast("AnswerReport", self._client.plain.answers(self.id, answers_query(point, x, by, at, of)))
 
     def map(
         self, x: str, y: str, z: str, *, at: Mapping[str, Value] | None = None, number: int | None = None

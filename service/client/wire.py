@@ -96,6 +96,11 @@ def front_path(study_id: str) -> str:
     return f"{study_path(study_id)}/front"
 
 
+def answers_path(study_id: str) -> str:
+    """Address of what people ask of a study first."""
+    return f"{study_path(study_id)}/answers"
+
+
 def case_path(study_id: str, case: int, part: str) -> str:
     """Address of a case under the API, or of a part of it, such as "/branch"."""
     return f"{study_path(study_id)}/cases/{case:d}{part}"

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from sprag.service.results.selection import (
     held_texts,
     listed,
     locate_axes,
+    locate_values,
     numeric_results,
     refused,
     require_axis,
@@ -44,6 +46,9 @@ if TYPE_CHECKING:
     from sprag.worker.planning.refine import Curve as Refined
     from sprag.worker.study import Study
 
+#: No chosen values of axes: curves for all of them.
+NOTHING: Final[Mapping[int, Sequence[int]]] = MappingProxyType({})
+
 
 def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Selection:
     """Select the cases of the curves of ``query``.
@@ -61,6 +66,9 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
     fixed = locate_axes(study, query.at)
     plan = plan_along(study, query.x)
     by_axes = {path: require_axis(study, "by", path) for path in dict.fromkeys(query.by)}
+    only = locate_values(study, query.of)
+    # What some values are chosen of distinguishes curves.
+    by_axes |= {study.axes[axis].paths[0]: axis for axis in only if axis not in by_axes.values()}
     # Every combination of the fixed axes is a curve of its own.
     for path in () if plan is None else families(plan):
         axis = require_axis(study, "by", path)
@@ -71,7 +79,7 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
     _no_axis_twice({query.x: x_axis}, "by", by_axes, fixed)
     fixed = with_nominal(study, fixed, {x_axis, *by_axes.values()})
     chooser = _zip_lines if study.combine == "zip" else _grid_lines
-    x_values, lines = chooser(study, x_axis, by_axes, fixed, len(results))
+    x_values, lines = chooser(study, x_axis, by_axes, fixed, len(results), only=only)
     made = tuple(lines)
     units = {path: unit_of(study, path) for path in (query.x, *made[0].by, *made[0].at)}
     names = {path: axis_name(study, path) for path in (query.x, *made[0].by)}
@@ -99,7 +107,8 @@ def draw(selection: Selection, fetch: Fetch) -> Curves:
         jumps = None
         if selection.swept and regimes and orders:
             jumps = jumps_of_line(line, columns.flags[part], regimes[part], orders[part])
-        curves.append(Curve(line, y, endings[part], regimes and regimes[part], orders and orders[part], own, jumps))
+        kinds = regimes and regimes[part], orders and orders[part]
+        curves.append(Curve(line, y, endings[part], *kinds, own, jumps, columns.flags[part] or None))
         start = part.stop
     return Curves(selection, tuple(curves))
 
@@ -169,7 +178,14 @@ def _check_size(points: int, results: int) -> None:
 
 
 def _grid_lines(
-    study: Study, x_axis: int, by: dict[str, int], fixed: Fixed, results: int, way_out: str = "name it in by=, or give"
+    study: Study,
+    x_axis: int,
+    by: dict[str, int],
+    fixed: Fixed,
+    results: int,
+    way_out: str = "name it in by=, or give",
+    *,
+    only: Mapping[int, Sequence[int]] = NOTHING,
 ) -> tuple[tuple[float, ...], Iterator[Line]]:
     axes = study.axes
     named = {x_axis, *by.values(), *fixed}
@@ -186,7 +202,8 @@ def _grid_lines(
     ]
     if faults:
         raise SelectionError(faults)
-    _check_size(math.prod([len(axes[i]) for i in (x_axis, *by.values())]), results)
+    orders = [only.get(i) or np.argsort(axes[i].array, kind="stable").tolist() for i in by.values()]
+    _check_size(len(axes[x_axis]) * math.prod(map(len, orders)), results)
 
     strides = [math.prod(study.shape[i + 1 :]) for i in range(len(axes))]
     at = {path: axes[i].value(index) for i, (path, index) in fixed.items()}
@@ -196,7 +213,6 @@ def _grid_lines(
     x_values = tuple(axes[x_axis].array[x_order].tolist())
 
     def lines() -> Iterator[Line]:
-        orders = [np.argsort(axes[i].array, kind="stable").tolist() for i in by.values()]
         for indices in itertools.product(*orders):
             chosen = list(zip(by.items(), indices, strict=True))
             first = origin + sum(index * strides[i] for (_, i), index in chosen)
@@ -207,12 +223,20 @@ def _grid_lines(
 
 
 def _zip_lines(
-    study: Study, x_axis: int, by: dict[str, int], fixed: Fixed, results: int
+    study: Study,
+    x_axis: int,
+    by: dict[str, int],
+    fixed: Fixed,
+    results: int,
+    *,
+    only: Mapping[int, Sequence[int]] = NOTHING,
 ) -> tuple[tuple[float, ...], Iterator[Line]]:
     axes = study.axes
     chosen = np.ones(study.cases, dtype=np.bool_)
     for i, (_, index) in fixed.items():
         chosen &= axes[i].array == axes[i].value(index)
+    for i, indices in only.items():
+        chosen &= np.isin(axes[i].array, [axes[i].value(index) for index in indices])
     cases = np.flatnonzero(chosen).astype(np.int64)
     if cases.size == 0:
         message = "no case has all these values together"

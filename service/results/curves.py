@@ -33,7 +33,9 @@ Fetch = Callable[[NDArray[np.int64], Sequence[str]], "CaseColumns"]
 class CurveQuery:
     """What to draw: paths and result names as in docs/reference.md; values of ``at`` as text with or without a unit.
 
-    Of cases with several rows, one for each regime, that with the ``number``.
+    Of cases with several rows, one for each regime, that with the ``number``. ``of`` are the values of axes of ``by``
+    that have a curve, pairs as those of ``at``; an axis that it does not name has one for each of its values. An axis
+    that only ``of`` names is one of ``by``.
     """
 
     x: str
@@ -41,6 +43,7 @@ class CurveQuery:
     by: tuple[str, ...] = ()
     at: tuple[tuple[str, str], ...] = ()
     number: int = 0
+    of: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +82,8 @@ class Curve:
     """One curve: a line of cases with their results (NaN where there is none) and endings.
 
     Of a settled study also with their regimes, and the excitation periods after which their motions repeat;
-    of a refined curve what its planner says of it, of a sweep its jumps.
+    of a refined curve what its planner says of it, of a sweep its jumps. ``flags`` are those of each case, joined by
+    commas, where they are known.
     """
 
     line: Line
@@ -89,6 +93,7 @@ class Curve:
     orders: list[int | None] | None = None
     refined: Refined | None = None
     jumps: list[Jump] | None = None
+    flags: list[str] | None = None
 
     def run(self) -> NDArray[np.intp]:
         """Indices of the cases that were run, ascending, which a picture joins; of a coarser study, its own points."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
@@ -21,8 +22,11 @@ if TYPE_CHECKING:
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Axis, Study
 
-#: Curves that can be distinguished by colour.
+#: Curves that can be distinguished by colour; of an axis with more values, so many of these are drawn first.
 _MOST_CURVES: Final = 8
+_CHOSEN_CURVES: Final = 6
+#: Values of an axis that a page lists; of more, one is typed.
+MOST_CHOICES: Final = 200
 #: Number of results shown first for a model that names no main ones.
 _MOST_MAIN: Final = 10
 
@@ -31,8 +35,9 @@ def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
     """What to draw for ``study``; None when nothing varies.
 
     Axes that are not drawn are held at the base's value where they contain it, otherwise at their middle value, and the
-    drives at the nominal one. Sweeps are drawn along their axis, in both directions. Refined curves are drawn with
-    every result whose error was asked for, all of them.
+    drives at the nominal one. There is a curve for each value of one axis; where all axes have many values, for some.
+    Sweeps are drawn along their axis, in both directions. Refined curves are drawn with every result whose error was
+    asked for, all of them.
     """
     plan = curve_plan(study)
     if plan is not None:
@@ -50,11 +55,33 @@ def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
         return CurveQuery(x, y)
     others = [axis for axis in varying if x not in axis.paths]
     few = [axis for axis in others if len(axis) <= _MOST_CURVES]
-    by = next((path for path in shown.apart for axis in few if path in axis.paths), few[0].paths[0] if few else None)
+    apart = few or others
+    by = next(
+        (path for path in shown.apart for axis in apart if path in axis.paths), apart[0].paths[0] if apart else None
+    )
     held = [axis for axis in others if by not in axis.paths]
     at = tuple((axis.paths[0], repr(usual_value(study, axis))) for axis in held)
     both = (SWEEP,) if study.sweep is not None and len(study.axes[-1]) > 1 else ()
-    return CurveQuery(x, y if by is None and not both else y[:1], (*(() if by is None else (by,)), *both), at)
+    of = () if by is None else many_values(study, by)
+    return CurveQuery(x, y if by is None and not both else y[:1], (*(() if by is None else (by,)), *both), at, of=of)
+
+
+def many_values(study: Study, path: str, most: int = _CHOSEN_CURVES) -> tuple[tuple[str, str], ...]:
+    """At most ``most`` values of an axis with many of them, for a family of curves: pairs as those of `CurveQuery.of`.
+
+    Its first, its last, that at which it is held otherwise, and others evenly between; () for an axis with few values,
+    which are all drawn.
+    """
+    axis = study.axes[next(place for place, one in enumerate(study.axes) if path in one.paths)]
+    values = np.unique(axis.array)
+    if values.size <= _MOST_CURVES:
+        return ()
+    if values.size <= most:
+        return tuple((path, repr(value)) for value in values.tolist())
+    places = np.linspace(0, values.size - 1, most).round().astype(int)
+    usual = int(np.searchsorted(values, usual_value(study, axis)))
+    places[np.argmin(np.abs(places[1:-1] - usual)) + 1] = usual
+    return tuple((path, repr(value)) for value in values[np.unique(places)].tolist())
 
 
 def completed(
@@ -64,24 +91,27 @@ def completed(
     y: tuple[str, ...],
     by: tuple[str, ...],
     at: tuple[tuple[str, str], ...],
+    of: tuple[tuple[str, str], ...] = (),
 ) -> CurveQuery:
     """The curves of these choices; without ``x`` or ``y`` as they are drawn first.
 
     Raises SelectionError where nothing varies that could be drawn.
     """
     if x and y:
-        return CurveQuery(x, y, by, at)
+        return CurveQuery(x, y, by, at, of=of)
     main = main_query(study, infos)
     if main is None:
         raise refused("x", "not-an-axis", "nothing varies in this study, so there are no curves")
     if x:
-        return CurveQuery(x, main.y, by, at)
-    taken = {study.axis_of(path) for path in (*by, *(path for path, _ in at))}
+        return CurveQuery(x, main.y, by, at, of=of)
+    taken = {study.axis_of(path) for path in (*by, *(path for path, _ in (*at, *of)))}
+    families = by or tuple(path for path in main.by if study.axis_of(path) not in taken)
     return CurveQuery(
         main.x,
         y or main.y,
-        by or tuple(path for path in main.by if study.axis_of(path) not in taken),
+        families,
         (*at, *(pair for pair in main.at if study.axis_of(pair[0]) not in taken)),
+        of=of or tuple(pair for pair in main.of if not by and pair[0] in families),
     )
 
 
@@ -120,8 +150,9 @@ def drawn_numbers(study: Study, query: CurveQuery) -> int:
     mapped = map_plan(study)
     if study.combine == "zip":
         return study.cases * len(query.y) + (0 if mapped is None else squares(mapped) ** 2)
-    axes = [axis for path in (query.x, *query.by) for axis in study.axes if path in axis.paths]
-    return math.prod(map(len, axes)) * len(query.y)
+    of = Counter(path for path, _ in query.of)
+    axes = [(path, axis) for path in (query.x, *query.by) for axis in study.axes if path in axis.paths]
+    return math.prod(of[path] or len(axis) for path, axis in axes) * len(query.y)
 
 
 def caption(study: Study, query: CurveQuery) -> str:

@@ -144,8 +144,8 @@ def held_texts(study: Study, at: Mapping[str, float]) -> tuple[str, ...]:
     return tuple(held_text(study, path, value) for path, value in fixed)
 
 
-def locate_axes(study: Study, at: Sequence[tuple[str, str]]) -> Fixed:
-    """The axes and the positions on them given by pairs of path and value (as text).
+def locate_axes(study: Study, at: Sequence[tuple[str, str]], parameter: str = "at") -> Fixed:
+    """The axes and the positions on them given by pairs of path and value (as text), the content of ``parameter``.
 
     A path that is not an axis is accepted where its only value is the given one. Raises SelectionError otherwise.
     """
@@ -153,25 +153,35 @@ def locate_axes(study: Study, at: Sequence[tuple[str, str]]) -> Fixed:
     for path, text in at:
         position = study.axis_of(path)
         if position is None and (path in study.derive or path not in study.base):
-            require_axis(study, "at", path)
+            require_axis(study, parameter, path)
         unit = unit_of(study, path)
-        value = _value(path, text, unit)
+        value = value_of(path, text, unit, parameter)
         if position is None:
             if not math.isclose(study.base[path], value, rel_tol=SAME_VALUE):
-                require_axis(study, "at", path)
+                require_axis(study, parameter, path)
             continue
         index = study.axes[position].index_of(value)
         if index is None:
             values = np.sort(study.axes[position].array).tolist()
             known = listed(map(direction, values) if path == SWEEP else values)
             message = "the axis has no such value"
-            raise refused("at", "unknown-value", message, f"{path}={text}", allowed=known, unit=unit)
+            raise refused(parameter, "unknown-value", message, f"{path}={text}", allowed=known, unit=unit)
         if fixed.setdefault(position, (path, index))[1] != index:
-            raise refused("at", "repeated", "the axis is given two values", f"{path}={text}")
+            raise refused(parameter, "repeated", "the axis is given two values", f"{path}={text}")
     return fixed
 
 
-def _value(path: str, text: str, unit: str) -> float:
+def locate_values(study: Study, of: Sequence[tuple[str, str]], parameter: str = "of") -> dict[int, list[int]]:
+    """Positions of several values on axes, by axis, in the order of the values; pairs are those of `locate_axes`."""
+    found: dict[int, dict[int, float]] = {}
+    for pair in of:
+        for axis, (_, index) in locate_axes(study, [pair], parameter).items():
+            found.setdefault(axis, {})[index] = study.axes[axis].value(index)
+    return {axis: sorted(places, key=places.__getitem__) for axis, places in found.items()}
+
+
+def value_of(path: str, text: str, unit: str, parameter: str = "at") -> float:
+    """The value (SI) of a path in a text with or without a unit; SelectionError about ``parameter`` otherwise."""
     if path == SWEEP and text in DIRECTIONS:
         return float(DIRECTIONS.index(text))
     try:
@@ -180,5 +190,5 @@ def _value(path: str, text: str, unit: str) -> float:
     except QuantityError as error:
         if path == SWEEP:
             message, allowed = "is not a direction", ", ".join(DIRECTIONS)
-            raise refused("at", "unknown-value", message, f"{path}={text}", allowed=allowed) from error
-        raise refused("at", error.code, f"{path} {error}", f"{path}={text}", unit=unit) from error
+            raise refused(parameter, "unknown-value", message, f"{path}={text}", allowed=allowed) from error
+        raise refused(parameter, error.code, f"{path} {error}", f"{path}={text}", unit=unit) from error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from sprag.worker.models.presentation import Panel, Presentation
+from sprag.worker.models.presentation import Answer, Panel, Presentation
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -52,6 +52,13 @@ PRESENTATION: Final = Presentation(
     drawn=("shaft.speed.mean", "shaft.speed.max"),
     main=("shaft.speed.mean", "torque.mean", "power.useful.mean", "efficiency"),
     heading="Mechanical characteristic",
+    answers=(
+        Answer("no_load_speed", "No-load speed", "shaft.speed.mean", "at_zero", along="shaft.load"),
+        Answer("largest_power", "Largest useful power", "power.useful.mean", "largest"),
+        Answer("best_efficiency", "Best efficiency", "efficiency", "largest"),
+        Answer("stall_torque", "Stall torque", "shaft.speed.mean", "until_zero", along="shaft.load"),
+    ),
+    doubtful=("not_settled", "unsettled"),
     columns=("regime", "shaft.speed.mean", "shaft.irregularity", "torque.mean", "power.useful.mean", "efficiency"),
     operating_point=_POINT,
     checks=("balance", "run", "reset", "regime"),

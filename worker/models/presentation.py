@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     import numpy as np
@@ -36,6 +36,31 @@ class Reference:
     wide: bool = False
 
 
+#: How an answer is read off a curve of a result: its value where x is 0, its largest or smallest value with the x of
+#: it, the x from which on it is 0, or its value at the working point.
+AnswerKind = Literal["at_zero", "largest", "smallest", "until_zero", "here"]
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A number that people ask of a study first, such as the largest useful power and the load of it.
+
+    Attributes
+    ----------
+    name : in the API
+    title : for people
+    result : the result that it is read from
+    kind : how it is read
+    along : path of the axis along which it has a meaning; "" for any
+    """
+
+    name: str
+    title: str
+    result: str
+    kind: AnswerKind
+    along: str = ""
+
+
 def panels_by_unit(names: Sequence[str], units: Sequence[str]) -> tuple[Panel, ...]:
     """A panel for each unit, with all variables that have it."""
     pairs = tuple(zip(names, units, strict=True))
@@ -60,6 +85,8 @@ class Presentation:
     along, apart : paths of the axes to draw along, and of those distinguished by colour, in order of preference
     drawn : results of the main curve
     main : the main results of a machine; ``heading`` is their common title
+    answers : what a page says first; where there are none, the largest and smallest values of the drawn results
+    doubtful : flags of cases whose results are not those of steady running: other cases are preferred as answers
     columns : results that the table of cases shows first
     operating_point : paths of parameters that every picture must state
     checks : first parts of the names of results that describe the computation rather than the machine
@@ -78,6 +105,8 @@ class Presentation:
     drawn: tuple[str, ...] = ()
     main: tuple[str, ...] = ()
     heading: str = "Main results"
+    answers: tuple[Answer, ...] = ()
+    doubtful: tuple[str, ...] = ()
     columns: tuple[str, ...] = ()
     operating_point: tuple[str, ...] = ()
     checks: tuple[str, ...] = ()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.worker.models.presentation import Panel, Presentation, Reference
+from sprag.worker.models.presentation import Answer, Panel, Presentation, Reference
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -59,6 +59,13 @@ PRESENTATION: Final = Presentation(
     apart=("mean_speed",),
     drawn=("irregularity",),
     main=("irregularity", "omega.max", "omega.min", "energy.fluctuation", "drive_torque.mean", "required_inertia"),
+    answers=(
+        Answer("irregularity", "Irregularity", "irregularity", "here"),
+        Answer("required_inertia", "Required inertia", "required_inertia", "here"),
+        Answer("energy_fluctuation", "Energy fluctuation", "energy.fluctuation", "here"),
+        Answer("mean_energy", "Mean kinetic energy", "energy.mean", "here"),
+        Answer("least_irregularity", "Least irregularity", "irregularity", "smallest"),
+    ),
     operating_point=("mean_speed", "drive.inertia"),
     checks=("balance",),
     panels=_panels,

@@ -53,6 +53,13 @@ Fixed = Annotated[
         examples=[["excitation.frequency=16 Hz"]],
     ),
 ]
+Chosen = Annotated[
+    list[str] | None,
+    Query(
+        description="`path=value`, such as excitation.frequency=16 Hz: a value of an axis of `by` that has a curve; "
+        "may be repeated; default: all of them",
+    ),
+]
 Number = Annotated[
     int,
     Query(
@@ -93,6 +100,7 @@ async def get_curves(
         ),
     ] = None,
     at: Fixed = None,
+    of: Chosen = None,
     number: Number = 0,
     form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
@@ -103,7 +111,8 @@ async def get_curves(
     """
 
     def chosen(study: Study) -> CurveQuery:
-        query = completed(study, models.study_results(study), x, tuple(y or ()), tuple(by or ()), pairs(at))
+        infos = models.study_results(study)
+        query = completed(study, infos, x, tuple(y or ()), tuple(by or ()), pairs(at), pairs(of, "of"))
         return _numbered(study, query, number)
 
     return await _drawn(work, study_id, form, "curves", chosen)
@@ -213,12 +222,14 @@ async def get_report(
     return await conditional(work, study_id, chosen, make)
 
 
-def pairs(at: list[str] | None) -> tuple[tuple[str, str], ...]:
-    """The fixed values of the parameter ``at``; raises a fault for a text without a path or a value."""
+def pairs(at: list[str] | None, parameter: str = "at") -> tuple[tuple[str, str], ...]:
+    """Paths and values of a parameter such as ``at``; raises a fault for a text without a path or a value."""
     pairs = []
     for item in at or ():
         path, separator, value = item.partition("=")
         if not separator or not path.strip() or not value.strip():
-            raise parameter_error("at", "invalid-text", "must be path=value", item, "for instance shaft.load=0.1 N*m")
+            raise parameter_error(
+                parameter, "invalid-text", "must be path=value", item, "for instance shaft.load=0.1 N*m"
+            )
         pairs.append((path.strip(), value.strip()))
     return tuple(pairs)

@@ -4,13 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from sprag.service.results.curves import CurveQuery
-from sprag.service.results.defaults import main_query, main_results, usual_value, varying_axes
+from sprag.service.results.defaults import (
+    MOST_CHOICES,
+    main_query,
+    main_results,
+    many_values,
+    usual_value,
+    varying_axes,
+)
 from sprag.service.results.refined import curve_plan, families, plan_along
 from sprag.service.results.refined_maps import map_plan
-from sprag.service.results.selection import refused
+from sprag.service.results.selection import refused, value_of
+from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 from sprag.worker.sweeps import SWEEP
 
@@ -36,7 +46,7 @@ def characteristic(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | No
     main = main_query(study, infos)
     if main is None or curve_plan(study) is not None:
         return main  # refined curves are right for the results that were asked for
-    return CurveQuery(main.x, main_results(study, infos), main.by, main.at)
+    return CurveQuery(main.x, main_results(study, infos), main.by, main.at, of=main.of)
 
 
 def curve_query(study: Study, infos: Sequence[ResultInfo], given: QueryParams) -> CurveQuery | None:
@@ -51,7 +61,42 @@ def curve_query(study: Study, infos: Sequence[ResultInfo], given: QueryParams) -
     y = tuple(name for name in given.getlist("y") if name) or main.y
     by = tuple(path for path in given.getlist("by") if path) if given.get("x") else main.by
     by = tuple(path for path in by if not _same_axis(study, path, x))
-    return CurveQuery(x, y, by, held(study, given.getlist("at"), (x, *by)))
+    of = _family(study, given, main, by)
+    return CurveQuery(x, y, by, held(study, given.getlist("at"), (x, *by)), of=of)
+
+
+def _family(study: Study, given: QueryParams, main: CurveQuery, by: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+    """The values that have a curve: as given, those of the main curves, some of an axis with many; () for all."""
+    chosen = tuple((path, value) for path, _, value in (item.partition("=") for item in given.getlist("of") if item))
+    chosen = tuple(pair for pair in chosen if any(_same_axis(study, pair[0], path) for path in by))
+    if curve_plan(study) is not None:
+        return chosen
+    if given.get("every"):
+        return tuple(pair for path in by for pair in many_values(study, path, MOST_CHOICES))
+    if by == main.by:
+        return chosen or main.of
+    return chosen or tuple(pair for path in by for pair in many_values(study, path))
+
+
+def value_choices(study: Study, query: CurveQuery) -> list[dict[str, Any]]:
+    """For each axis of by of which some values are drawn: its values, and which of them are."""
+    found = []
+    for path in dict.fromkeys(path for path, _ in query.of):
+        axis = study.axes[next(place for place, one in enumerate(study.axes) if path in one.paths)]
+        unit, texts = unit_of(study, path), [text for own, text in query.of if own == path]
+        places = {axis.index_of(value_of(path, text, unit, "of")) for text in texts}
+        drawn = {axis.value(place) for place in places if place is not None}
+        values = np.unique(axis.array).tolist()
+        listed = values if len(values) <= MOST_CHOICES else sorted(drawn)
+        found.append(
+            {
+                "path": path,
+                "unit": unit,
+                "of": len(values),
+                "values": [(value, value in drawn) for value in listed],
+            }
+        )
+    return found
 
 
 def map_query(study: Study, infos: Sequence[ResultInfo], given: QueryParams) -> MapQuery | None:
@@ -109,7 +154,8 @@ def pairs_of(query: CurveQuery | MapQuery) -> list[tuple[str, str]]:
     at = [("at", f"{path}={value}") for path, value in query.at]
     if isinstance(query, MapQuery):
         return [("x", query.x), ("y", query.y), ("z", query.z), *at]
-    return [("x", query.x), *(("y", name) for name in query.y), *(("by", path) for path in query.by), *at]
+    of = [("of", f"{path}={value}") for path, value in query.of]
+    return [("x", query.x), *(("y", name) for name in query.y), *(("by", path) for path in query.by), *at, *of]
 
 
 def _same_axis(study: Study, first: str, second: str) -> bool:

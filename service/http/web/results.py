@@ -12,11 +12,13 @@ from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.drawing import Drawing, conditional, placed
 from sprag.service.http.respond import JSON, json_response
-from sprag.service.http.web.choice import MapQuery, curve_query, map_query, pairs_of
+from sprag.service.http.web.choice import MapQuery, characteristic, curve_query, map_query, pairs_of, value_choices
 from sprag.service.http.web.figures import answers
 from sprag.service.http.web.study import fixed_choices, orders_address, regime_maps, study_frame
+from sprag.service.http.web.study_answers import answers_choice
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
+from sprag.service.jobs.answers import FEW
 from sprag.service.results.curve_cases import select
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import varying_axes
@@ -73,6 +75,7 @@ def curves_page(context: Ctx, request: Request, study_id: StudyId) -> Response:
         axes=axis_choices(study),
         results=[info for info in infos if info.kind != "category"],
         fixed=fixed_choices(study, (shown.x, *shown.by), shown.at),
+        choices=[] if faults else value_choices(study, shown),
         figure=f"/studies/{study_id}/figures/curves?{urlencode(pairs)}",
         files=f"{views.study_address(study_id)}/curves?{urlencode(pairs)}",
         pictured=values <= pictures.MAX_PICTURE_POINTS,
@@ -148,6 +151,21 @@ async def curves_of(work: Attended, study_id: StudyId, columns: Annotated[int, Q
         if query is None:
             return json_response(_NOTHING)
         return placed(context, Drawing(answers.curves_json, (context.library, study_id, query, columns), JSON))
+
+    return await conditional(work, study_id, "figure", make)
+
+
+@router.get("/studies/{study_id:study}/figures/answers")
+async def answers_of(work: Attended, study_id: StudyId, columns: Annotated[int, Query(ge=1, le=2)] = 1) -> Response:
+    """The figure of the main results with the answers of the study marked."""
+
+    def make(_record: StudyRecord) -> Response | Drawing:
+        context, given = work.context, work.request.query_params
+        study = context.store.study(study_id)
+        query = answers_choice(study, given, characteristic(study, models.study_results(study)))
+        shown = (context.library, study_id, query, given.get("point") or None, given.get("curve") or "", columns)
+        drawing = Drawing(answers.answers_json, shown, JSON)
+        return drawing if study.cases > FEW // 2 else drawing.here()
 
     return await conditional(work, study_id, "figure", make)
 

@@ -19,13 +19,14 @@ from sprag.service.http.context import Context, Ctx, StudyId
 from sprag.service.http.problems import ApiError
 from sprag.service.http.web.choice import characteristic, map_query, pairs_of
 from sprag.service.http.web.form.check import fits_of, has_measured_clutch
+from sprag.service.http.web.study_answers import AnswersView, answers_view
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
-from sprag.service.jobs import checks
+from sprag.service.jobs import answers, checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.json_text import timestamp
 from sprag.service.results.curve_cases import select
-from sprag.service.results.defaults import caption, drawn_numbers, varying_axes
+from sprag.service.results.defaults import MOST_CHOICES, caption, drawn_numbers, varying_axes
 from sprag.service.results.exports.inputs import inputs as every_input
 from sprag.service.results.exports.inputs import run_inputs
 from sprag.service.results.pictures import curves as pictures
@@ -98,24 +99,44 @@ def _verbs(state: StudyState, some_failed: bool) -> list[str]:
 
 @router.get("/studies/{study_id:study}")
 async def study_page(context: Ctx, work: Attended, study_id: StudyId) -> Response:
-    """One study: its progress, mechanical characteristic and inputs."""
+    """One study: its progress, answers, mechanical characteristic and inputs."""
     spec = await run_in_threadpool(context.store.spec, study_id)
     fits = await work.check(fits_of, spec) if has_measured_clutch(spec) else {}
-    return await run_in_threadpool(_study_page, context, study_id, fits)
+    usual, many = await run_in_threadpool(_usual_curves, context, study_id)
+    asked = (context.library, study_id, work.request.query_params.multi_items(), usual)
+    view = await (work.check(answers_view, *asked) if many else run_in_threadpool(answers_view, *asked))
+    return await run_in_threadpool(_study_page, context, study_id, fits, view, usual)
 
 
-def _study_page(context: Context, study_id: str, fits: Mapping[str, tuple[ClutchFitReport, FitChart]]) -> Response:
+def _usual_curves(context: Context, study_id: str) -> tuple[CurveQuery | None, bool]:
+    """The curves that are shown first, and whether reading the answers of the study takes long."""
+    study = context.store.study(study_id)
+    usual = characteristic(study, models.study_results(study))
+    return _with_rows(context, study, study_id, usual), study.cases > answers.FEW // 2
+
+
+def _study_page(
+    context: Context,
+    study_id: str,
+    fits: Mapping[str, tuple[ClutchFitReport, FitChart]],
+    view: AnswersView,
+    usual: CurveQuery | None,
+) -> Response:
     study = context.store.study(study_id)
     frame = study_frame(context, study_id)
-    query = _with_rows(context, study, study_id, characteristic(study, models.study_results(study)))
+    query = view.query or usual
     first = context.store.case_row(study_id, 0) if query is None else None
     kinds = context.store.kinds(study_id)
     return page(
         "study.html",
+        status=422 if view.faults else 200,
         **frame,
         tab="",
         shown=models.presentation_of(study),
-        **_main_figure(study, study_id, query),
+        answers=view,
+        faults=view.faults,
+        fixed=[] if view.query is None else fixed_choices(study, (view.query.x, *view.query.by), view.query.at),
+        **_main_figure(study, study_id, query, view),
         orders=orders_address(study, study_id),
         regime_maps=regime_maps(study, study_id),
         only_row=None if first is None else first.results.items(),
@@ -146,7 +167,7 @@ def _drawable(points: int) -> bool:
     return points <= pictures.MAX_PICTURE_POINTS
 
 
-def _main_figure(study: Study, study_id: str, query: CurveQuery | None) -> dict[str, Any]:
+def _main_figure(study: Study, study_id: str, query: CurveQuery | None, view: AnswersView) -> dict[str, Any]:
     """The addresses of the figure on the page, of its picture and of the page where others are chosen; its caption."""
     if _has_goal(study):
         return {
@@ -188,9 +209,12 @@ def _main_figure(study: Study, study_id: str, query: CurveQuery | None) -> dict[
         text = caption(study, query)
         drawable = _drawable(drawn_numbers(study, query))
     picture = f"{views.study_address(study_id)}/{kind}?{urlencode([*pairs, ('format', 'svg')])}"
+    figure = f"/studies/{study_id}/figures/{kind}?{urlencode([*pairs, more])}"
+    if view.figure is not None:  # with the answers on the curves
+        figure, picture = view.figure, view.picture or picture
     return {
         "heading": models.presentation_of(study).heading,
-        "figure": f"/studies/{study_id}/figures/{kind}?{urlencode([*pairs, more])}",
+        "figure": figure,
         "picture": picture if drawable else None,
         "others": f"/studies/{study_id}/{kind}?{urlencode(pairs)}",
         "kind": kind.capitalize(),
@@ -296,17 +320,13 @@ def fixed_choices(study: Study, drawn: tuple[str, ...], at: tuple[tuple[str, str
                 "path": axis.paths[0],
                 "paths": axis.paths,
                 "unit": unit,
-                "values": [] if len(axis) > _MOST_CHOICES else sorted(set(axis.values)),
+                "values": [] if len(axis) > MOST_CHOICES else sorted(set(axis.values)),
                 "chosen": text,
                 "number": _direction(text) if axis.paths == (SWEEP,) else _plain(text),
                 "names": dict(enumerate(DIRECTIONS)) if axis.paths == (SWEEP,) else {},
             }
         )
     return found
-
-
-#: Most values of an axis in a selection list; beyond this the value is typed.
-_MOST_CHOICES: Final = 200
 
 
 def _direction(text: str | None) -> float | None:

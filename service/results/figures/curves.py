@@ -9,18 +9,16 @@ import numpy as np
 
 from sprag.service.results.figures.figure import Band, Figure, Line, Marks, Panel, Quantity, line_colours
 from sprag.service.results.figures.orders import TITLE, order_map, strip_of
+from sprag.service.results.joined import joined_points
 from sprag.service.results.refined import jumps_of, sentence
-from sprag.service.results.refined import stretches as refined_stretches
-from sprag.service.results.regimes import DOUBTFUL, MARKED, regimes_of, stretches
-from sprag.service.results.sweeps import broken_at, hysteresis, value_text, without_direction
+from sprag.service.results.regimes import DOUBTFUL, MARKED, regimes_of
+from sprag.service.results.sweeps import hysteresis, value_text, without_direction
 from sprag.service.results.wording import number, unit_text
 from sprag.worker.codes import PENDING
 from sprag.worker.models import WorkerEnding
 from sprag.worker.sweeps import DIRECTIONS, SWEEP
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from sprag.service.results.curves import Curve, Curves, Map
     from sprag.worker.models import ResultInfo
 
@@ -122,7 +120,6 @@ def _lines(
         down = int({**curve.line.at, **curve.line.by}.get(SWEEP, 0.0))
         run = curve.run()
         x = np.asarray(curve.line.x)[run]
-        regimes = None if curve.regimes is None else [curve.regimes[place] for place in run.tolist()]
         values = ", ".join(value_text(path, value) for path, value in curve.line.by.items())
         for place, info in enumerate(infos):
             yield Line(
@@ -135,7 +132,7 @@ def _lines(
                 heading=labels[study] if values else "",
                 listed=listed and place == 0,
                 cases=curve.line.cases[run],
-                stretches=_stretches(curve, info, regimes, x),
+                stretches=joined_points(curve, info.name),
                 # A line needs y as a function of x; the points of a zip may go back and forth.
                 joined=bool(np.all(np.diff(x) > 0.0)),
             )
@@ -163,17 +160,6 @@ def _further(drawn: Sequence[tuple[str, Curves]], infos: Sequence[ResultInfo], *
                 cases=curve.line.cases[kept],
                 joined=False,
             )
-
-
-def _stretches(
-    curve: Curve, info: ResultInfo, regimes: Sequence[str | None] | None, x: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], ...] | None:
-    """The points that lines join; None for all of them."""
-    if curve.refined is not None and x.size:
-        return refined_stretches(curve.refined, info.name, stretches(regimes, x.size))
-    if curve.jumps is not None:
-        return broken_at(stretches(regimes, x.size), x, curve.jumps)
-    return None if regimes is None else tuple(stretches(regimes, x.size))
 
 
 def _marks(lines: Sequence[tuple[int, Curve]], infos: Sequence[ResultInfo], regimes: Sequence[str]) -> Iterator[Marks]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,12 +97,34 @@ class Fill:
     listed: bool = True
 
 
+#: What a note marks: an extreme of a line, or the working point on it.
+NoteKind = Literal["largest", "smallest", "point"]
+#: What notes are, for the legend.
+NOTES: Final[dict[NoteKind, str]] = {
+    "largest": "largest of its curve",
+    "smallest": "smallest of its curve",
+    "point": "working point",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """A point on the line of that ``key`` and ``colour`` that is read off it, with a text beside it ("" for none)."""
+
+    x: float
+    y: float
+    colour: str
+    kind: NoteKind
+    text: str = ""
+    key: str = ""
+
+
 @dataclass(frozen=True, slots=True)
 class Panel:
     """One plot. ``styles`` explains the dashes where they distinguish results.
 
     ``x`` is the quantity of its own x axis; without one, the panel has the x axis of the figure.
-    ``bands`` are the jumps of its curves, ``fills`` areas between two lines.
+    ``bands`` are the jumps of its curves, ``fills`` areas between two lines, ``notes`` points read off its lines.
     """
 
     y: Quantity
@@ -112,6 +134,7 @@ class Panel:
     x: Quantity | None = None
     bands: tuple[Band, ...] = ()
     fills: tuple[Fill, ...] = ()
+    notes: tuple[Note, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +154,7 @@ class Figure:
     most : most points of a drawn line, where there are more than can be distinguished
     note : a sentence, where there is nothing to draw
     below : a sentence below the panels
-    at : x of a line across all panels of a picture; pages draw theirs where their own slider stands
+    at : x of a line across all panels, such as the working point; pages of motions draw theirs at their slider
     """
 
     x: Quantity
@@ -173,6 +196,12 @@ class Figure:
     def banded(self) -> bool:
         """Whether any panel has bands."""
         return any(panel.bands for panel in self.panels)
+
+    @property
+    def noted(self) -> tuple[NoteKind, ...]:
+        """The kinds of notes that occur."""
+        occurring = {note.kind for panel in self.panels for note in panel.notes}
+        return tuple(kind for kind in NOTES if kind in occurring)
 
     @property
     def listed(self) -> list[Line]:

@@ -13,7 +13,15 @@ from sprag.service.results.figures.basin import basin_figure
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.motion import motion_figure
 from sprag.service.results.figures.portrait import portrait_figure
-from sprag.service.results.pictures.legends import COLUMNS, STYLES, explain, explain_regimes, explain_studies, handle
+from sprag.service.results.pictures.legends import (
+    COLUMNS,
+    NOTE_MARKERS,
+    STYLES,
+    explain,
+    explain_regimes,
+    explain_studies,
+    handle,
+)
 from sprag.service.results.pictures.text import load_matplotlib, quantity_label, writable
 from sprag.service.results.regimes import MARKS
 from sprag.service.results.selection import refused
@@ -25,7 +33,7 @@ if TYPE_CHECKING:
 
     from sprag.service.results.curves import Curves
     from sprag.service.results.figures.figure import Figure as Described
-    from sprag.service.results.figures.figure import Line, Marks, Panel
+    from sprag.service.results.figures.figure import Line, Marks, Note, Panel
     from sprag.worker.models import Basin, Portrait, Presentation, Trajectory
 
 Picture = Literal["svg", "png", "pdf"]
@@ -132,7 +140,7 @@ def paint_figure(figure: Figure, drawn: Described, title: str) -> None:
     if not drawn.motion:
         (explain if drawn.studies == 1 else explain_studies)(figure, plots, drawn)
         edge: Literal["upper", "lower"] = "lower" if drawn.studies == 1 else "upper"
-        explain_regimes(figure, drawn.regimes, edge, jumps=drawn.banded, below=drawn.below)
+        explain_regimes(figure, drawn.regimes, edge, jumps=drawn.banded, below=drawn.below, notes=drawn.noted)
     held = drawn.held if drawn.studies == 1 else ()
     head(figure, title, (drawn.heading, *held) if drawn.heading else held)
 
@@ -185,6 +193,7 @@ def _paint_panel(figure: Figure, axes: Axes, panel: Panel, drawn: Described) -> 
     if shaded is not None:
         figure.colorbar(shaded, ax=axes, label=drawn.scale)
     paint_marks(axes, panel.marks)
+    paint_notes(axes, panel.notes)
     axes.set_ylabel(quantity_label(panel.y))
     if panel.x is not None:
         axes.set_xlabel(quantity_label(panel.x))
@@ -241,6 +250,20 @@ def paint_marks(axes: Axes, every: Sequence[Marks], *, clipped: bool = True) -> 
             axes.plot(
                 marks.x, marks.y, color=look.colour, linestyle="none", marker=look.marker, markersize=5.0,
                 clip_on=clipped,
+            )  # fmt: skip
+
+
+def paint_notes(axes: Axes, notes: Sequence[Note]) -> None:
+    """Points that are read off the lines, with their texts."""
+    for note in notes:
+        ring = note.kind == "point"
+        axes.plot(
+            note.x, note.y, color=note.colour, linestyle="none", marker=NOTE_MARKERS[note.kind],
+            markersize=9.0 if ring else 7.0, markerfacecolor="none" if ring else note.colour, zorder=3.0,
+        )  # fmt: skip
+        if note.text:
+            axes.annotate(
+                note.text, (note.x, note.y), xytext=(7, 7), textcoords="offset points", fontsize=8, color=note.colour,
             )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, Literal
 
-from sprag.service.results.figures.figure import BANDS, PALETTE, shortened
+from sprag.service.results.figures.figure import BANDS, NOTES, PALETTE, shortened
 from sprag.service.results.pictures.text import quantity_label, writable
 from sprag.service.results.regimes import MARKS
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from sprag.service.results.figures.figure import Figure as Described
-    from sprag.service.results.figures.figure import Line
+    from sprag.service.results.figures.figure import Line, NoteKind
 
 #: Style of the line, and marker where there is none.
 STYLES: Final[tuple[tuple[Literal["-", "--", ":", "-."], str], ...]] = (
@@ -26,6 +26,8 @@ STYLES: Final[tuple[tuple[Literal["-", "--", ":", "-."], str], ...]] = (
     (":", "^"),
     ("-.", "D"),
 )
+#: Markers of the points that are read off lines.
+NOTE_MARKERS: Final[dict[NoteKind, str]] = {"largest": "v", "smallest": "^", "point": "o"}
 #: Labels of a colour bar, which distinguishes more curves than a legend.
 _BAR_LABELS: Final = 24
 #: Columns of the legend of several studies, and the characters that fit in each.
@@ -107,10 +109,11 @@ def explain_regimes(
     *,
     jumps: bool = False,
     below: str = "",
+    notes: Sequence[NoteKind] = (),
 ) -> None:
-    """Explain the marks of points, and jumps, at an edge of the picture, after the sentence ``below``.
+    """Explain the marks of points, jumps and notes, at an edge of the picture, after the sentence ``below``.
 
-    Nothing where all motions are periodic and there is neither.
+    Nothing where all motions are periodic and there is none of these.
     """
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -122,6 +125,13 @@ def explain_regimes(
     ]
     if jumps:
         handles.append(Patch(facecolor="#777777", alpha=0.4, label=BANDS))
+    handles += [
+        Line2D(
+            [], [], color="#555555", marker=NOTE_MARKERS[kind], markersize=6.0, linestyle="none", label=NOTES[kind],
+            markerfacecolor="none" if kind == "point" else None,
+        )
+        for kind in notes
+    ]  # fmt: skip
     if handles or below:
         figure.legend(
             handles=handles,

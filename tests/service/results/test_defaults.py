@@ -49,7 +49,22 @@ def test_further_axes_are_held_in_their_middle(spec: dict[str, Any]) -> None:
     assert 0.28 < float(value) < 0.32
     many = query_of(spec, axes=[axis("shaft.load", 5), axis("excitation.frequency", 30)])
     assert many is not None
-    assert many.by == ()
+    assert (many.by, {path for path, _ in many.of}) == (("excitation.frequency",), {"excitation.frequency"})
+    drawn = [float(value) for _, value in many.of]
+    assert (len(drawn), drawn[0], drawn[-1]) == (6, 0.1, 0.5)
+    assert drawn == sorted(set(drawn))
+    assert max(abs(value - (0.1 + 0.08 * place)) for place, value in enumerate(drawn)) < 0.04
+
+
+def test_some_of_many_values_always_include_that_of_the_base(spec: dict[str, Any]) -> None:
+    axes = [{"path": "excitation.frequency", "linspace": ["20 Hz", "35 Hz", 61]}, axis("shaft.load", 5)]
+    query = query_of(spec, axes=axes)
+    assert query is not None
+    assert ("excitation.frequency", "25.0") in query.of
+    study = parse_spec({**spec, "axes": axes}).study
+    lines = select(study, models.study_results(study), query).lines
+    assert [repr(line.by["excitation.frequency"]) for line in lines] == [value for _, value in query.of]
+    assert drawn_numbers(study, query) == 6 * 5
 
 
 def test_a_further_axis_is_held_at_the_value_of_the_base(spec: dict[str, Any]) -> None:

@@ -8,8 +8,10 @@ from sprag.service.http.web.figures.maps import map_figure
 from sprag.service.http.web.figures.plotly import Data, plotly_figure
 from sprag.service.jobs.answers import curves_drawn, map_of
 from sprag.service.jobs.batch_answers import ribbon_of, yield_of
+from sprag.service.jobs.key_answers import answers_of
 from sprag.service.json_text import to_bytes
 from sprag.service.results.basins import basin_of, units_of
+from sprag.service.results.figures.answers import answers_figure
 from sprag.service.results.figures.basin import basin_figure
 from sprag.service.results.figures.calibration import calibration_figure
 from sprag.service.results.figures.curves import curves_figure
@@ -17,6 +19,7 @@ from sprag.service.results.figures.front import front_figure, history_figure
 from sprag.service.results.figures.motion import motion_figure, phase_figure
 from sprag.service.results.figures.portrait import portrait_figure
 from sprag.service.results.figures.ribbons import ribbon_figure, yield_figure
+from sprag.service.results.key_answer_words import curve_name
 from sprag.service.results.wording import number
 from sprag.worker import models
 
@@ -34,6 +37,18 @@ SAMPLES: Final = 6000
 def curves_json(library: Library, study_id: str, query: CurveQuery, columns: int) -> bytes:
     """The figure of curves, as JSON text."""
     return to_bytes(plotly_figure(curves_figure([("", curves_drawn(library, study_id, query))], columns)))
+
+
+def answers_json(
+    library: Library, study_id: str, query: CurveQuery | None, point: str | None, curve: str, columns: int
+) -> bytes:
+    """The figure of the main results with the answers of the study marked, as JSON text."""
+    found = answers_of(library, study_id, query, point)
+    if found.drawn is None:
+        return to_bytes({"data": [], "layout": {}})
+    names = [curve_name(one, library.store.study(study_id)) for one in found.curves]
+    chosen = names.index(curve) if curve in names else None
+    return to_bytes(plotly_figure(answers_figure(found, columns, chosen=chosen)))
 
 
 def map_json(library: Library, study_id: str, query: CurveQuery, contours: bool) -> bytes:

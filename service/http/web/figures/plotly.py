@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Final
 
@@ -10,19 +10,24 @@ import numpy as np
 
 from sprag.service.http.web.figures.thinning import thin
 from sprag.service.json_text import numbers
-from sprag.service.results.figures.figure import BANDS, PALETTE, shortened
+from sprag.service.results.figures.figure import BANDS, NEUTRAL, NOTES, PALETTE, shortened
 from sprag.service.results.regimes import MARKS
 from sprag.service.results.wording import unit_text, words
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.results.figures.figure import Band, Figure, Fill, Line, Marks, Panel, Quantity
+    from sprag.service.results.figures.figure import Band, Figure, Fill, Line, Marks, NoteKind, Panel, Quantity
 
 Data = dict[str, Any]
 
 #: Markers and dashes repeat the distinction by colour, for prints in grey.
 SYMBOLS: Final = ("circle", "square", "diamond", "triangle-up", "x", "triangle-down", "star", "cross")
+_NOTE_SYMBOLS: Final[dict[NoteKind, str]] = {
+    "largest": "triangle-down",
+    "smallest": "triangle-up",
+    "point": "circle-open",
+}
 _DASHES: Final = ("solid", "dash", "dot", "dashdot")
 #: Lines with more points are drawn without markers.
 _MARKED: Final = 60
@@ -68,7 +73,7 @@ def plotly_figure(figure: Figure) -> Data:
         "height": inner + margin["t"] + margin["b"],
         "margin": margin,
         "hovermode": "x" if figure.motion else "closest",
-        "showlegend": named or bool(figure.regimes or strip or figure.banded),
+        "showlegend": named or bool(figure.regimes or strip or figure.banded or figure.noted),
         "legend": _legend(figure, beside=beside),
         MOTIONS: {**BELOW, "title": {"text": _motion_title(figure), "side": "top"}},
         "uirevision": "keep",
@@ -98,7 +103,10 @@ def plotly_figure(figure: Figure) -> Data:
                 trace["marker"]["colorbar"] |= {"x": right, "y": (low + high) / 2.0, "len": high - low}
             traces.append(trace | {"showlegend": line.listed and named})
         traces += [marks_trace(marks, panel.y, listed=index == 0) | axes for marks in panel.marks]
-        shapes += [_band(band) | {"xref": axes["xaxis"], "yref": f"{axes['yaxis']} domain"} for band in panel.bands]
+        traces += [trace | axes for trace in note_traces(panel, figure.noted, listed=index == 0)]
+        over = {"xref": axes["xaxis"], "yref": f"{axes['yaxis']} domain"}
+        shapes += [_band(band) | over for band in panel.bands]
+        shapes += [] if figure.at is None else [_at(figure.at) | over]
     for column in range(first):
         suffix = _suffix(column)
         axes = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
@@ -116,6 +124,7 @@ def plotly_figure(figure: Figure) -> Data:
         layout |= {"barmode": "overlay", "bargap": 0.25}
     if shapes:
         layout["shapes"] = shapes
+    if figure.banded:
         traces.append(_band_entry())
     over_time = figure.motion and figure.x.unit == "s"
     cases = any(line.cases is not None for panel in figure.panels for line in panel.lines)
@@ -126,7 +135,7 @@ def plotly_figure(figure: Figure) -> Data:
 def _motion_title(figure: Figure) -> str:
     """What the legend of marks and strips is about."""
     if not figure.regimes:
-        return figure.states if figure.spans or not figure.banded else ""
+        return figure.states if figure.spans or not (figure.banded or figure.noted) else ""
     return f"Regime; {figure.states.lower()}" if figure.spans else "Regime"
 
 
@@ -270,6 +279,40 @@ def marks_trace(marks: Marks, y: Quantity, *, listed: bool) -> Data:
         "marker": {"color": MARKS[marks.regime].colour, "symbol": MARKS[marks.regime].symbol, "size": 8},
         "hovertemplate": _hover(y, marks.regime),
     }
+
+
+def note_traces(panel: Panel, kinds: Sequence[NoteKind], *, listed: bool) -> Iterator[Data]:
+    """The points of each kind that are read off lines; a kind without points appears in the legend only."""
+    for kind in kinds:
+        notes = [note for note in panel.notes if note.kind == kind]
+        ring = kind == "point"
+        yield {
+            "type": "scatter",
+            "mode": "markers+text",
+            "name": NOTES[kind],
+            "legend": MOTIONS,
+            "legendgroup": f"note {kind}",
+            "showlegend": listed,
+            "x": [note.x for note in notes] or [None],
+            "y": [note.y for note in notes] or [None],
+            "text": [escaped(note.text) for note in notes],
+            "textposition": "top right",
+            "textfont": {"size": 12},
+            "cliponaxis": False,
+            "marker": {
+                "color": [note.colour for note in notes],
+                "symbol": _NOTE_SYMBOLS[kind],
+                "size": 13 if ring else 10,
+                "line": {"width": 2 if ring else 0},
+            },
+            "hovertemplate": f"%{{x:.5g}}, %{{y:.5g}} {unit_text(panel.y.unit)}<extra>{NOTES[kind]}</extra>",
+        }
+
+
+def _at(x: float | None) -> Data:
+    """The line across a panel at the working point."""
+    line = {"color": NEUTRAL, "width": 1, "dash": "dot"}
+    return {"type": "line", "x0": x, "x1": x, "y0": 0, "y1": 1, "layer": "below", "line": line}
 
 
 def _fill(fill: Fill, *, named: bool) -> tuple[Data, Data]:

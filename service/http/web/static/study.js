@@ -47,7 +47,7 @@ if (running) {
     const last = ended, here = location.href;
     const page = await sprag.page(here).catch(() => null);
     if (!page || here !== location.href) return;
-    for (const part of ["#head", "#progress", "#endings", "#particulars"]) sprag.take(page, part);
+    for (const part of ["#head", "#progress", "#tiles", "#family", "#endings", "#particulars"]) sprag.take(page, part);
     if (!last && Date.now() - lastDrawn < 3000) return;
     lastDrawn = Date.now();
     if (!document.querySelector(".stale")) sprag.take(page, "#cases");

@@ -1,0 +1,181 @@
+"""The answers on the page of a study: what is chosen in its address, and what is shown of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import urlencode
+
+from starlette.datastructures import QueryParams
+
+from sprag.service.http import views
+from sprag.service.http.web.choice import curve_query, pairs_of, value_choices
+from sprag.service.jobs.key_answers import answers_of
+from sprag.service.results.key_answer_words import curve_name, note_of, place_text
+from sprag.service.results.key_answers import answers_query
+from sprag.service.results.pictures.curves import MAX_PICTURE_POINTS
+from sprag.service.results.selection import SelectionError
+from sprag.worker import models
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sprag.service.faults import Fault
+    from sprag.service.jobs.checks import Library
+    from sprag.service.results.curves import CurveQuery
+    from sprag.service.results.key_answers import CurveAnswers, Found, StudyAnswers
+    from sprag.worker.study import Study
+
+#: Parameters of the page's address that choose curves.
+_CURVES: Final = ("x", "by", "at", "of", "every")
+
+
+@dataclass(frozen=True, slots=True)
+class Tile:
+    """One answer as the page shows it."""
+
+    title: str
+    value: float | None
+    unit: str
+    where: float | None = None
+    above: bool = False
+    note: str = ""
+    cases: tuple[int, ...] = ()
+    place: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class FamilyRow:
+    """The answers of one curve of a family, aligned with the titles of the table."""
+
+    name: str
+    tiles: list[Tile]
+
+
+@dataclass(frozen=True, slots=True)
+class AnswersView:
+    """What the page shows of the answers of a study.
+
+    Attributes
+    ----------
+    faults : why they are not those that were asked for
+    query : the curves; None where the cases lie on none
+    point : the working point as typed, otherwise its SI number; ``unit`` is its unit
+    chosen : place of the curve whose answers are shown, of the ``names`` of all curves
+    tiles, here : its answers, and its main results at the working point
+    family : the answers of all curves, where there are several
+    overall : extremes among all cases
+    choices : values of the axes that tell curves apart, where some are chosen
+    figure, picture : addresses of the figure and of its picture
+    """
+
+    faults: tuple[Fault, ...] = ()
+    query: CurveQuery | None = None
+    point: str = ""
+    unit: str = "1"
+    chosen: int = 0
+    names: list[str] = field(default_factory=list)
+    tiles: list[Tile] = field(default_factory=list)
+    here: list[Tile] = field(default_factory=list)
+    family: list[FamilyRow] = field(default_factory=list)
+    overall: list[Tile] = field(default_factory=list)
+    choices: list[dict[str, Any]] = field(default_factory=list)
+    figure: str | None = None
+    picture: str | None = None
+
+    @property
+    def known(self) -> bool:
+        """Whether there is any answer."""
+        return any(tile.value is not None for tile in (*self.tiles, *self.here))
+
+
+def answers_choice(study: Study, given: QueryParams, usual: CurveQuery | None) -> CurveQuery | None:
+    """The curves that the address of the page asks for, otherwise the ``usual`` ones; raises SelectionError."""
+    infos = models.study_results(study)
+    if answers_query(study, infos) is None:
+        return None
+    if not any(given.getlist(name) for name in _CURVES):
+        return usual
+    return curve_query(study, infos, given)
+
+
+def answers_view(
+    library: Library, study_id: str, given: Sequence[tuple[str, str]], usual: CurveQuery | None
+) -> AnswersView:
+    """The answers of a study as the page shows them; those of the ``usual`` curves where others cannot be shown."""
+    study, params = library.store.study(study_id), QueryParams(list(given))
+    faults: tuple[Fault, ...] = ()
+    point = (params.get("point") or "").strip() or None
+    query = usual
+    try:
+        query = answers_choice(study, params, usual)
+        found = answers_of(library, study_id, query, point)
+    except SelectionError as error:
+        faults, query, typed = error.faults, usual, point
+        found = answers_of(library, study_id, usual, None)
+        return _view(study, study_id, found, faults, typed or "", "")
+    return _view(study, study_id, found, faults, point or "", params.get("curve") or "")
+
+
+def _view(
+    study: Study, study_id: str, found: StudyAnswers, faults: tuple[Fault, ...], point: str, curve: str
+) -> AnswersView:
+    names = [curve_name(one, study) for one in found.curves]
+    chosen = names.index(curve) if curve in names else _usual_curve(study, found)
+    one = found.curves[chosen] if found.curves else None
+    overall = [_tile(item, found.unit, study) for item in found.overall if item.value is not None]
+    if one is None:
+        return AnswersView(faults, overall=overall)
+    tiles, here = ([_tile(item, found.unit) for item in part] for part in (one.answers, one.working_point))
+    if found.query is None:
+        return AnswersView(faults, tiles=tiles or here, here=here if tiles else [])
+    pairs = pairs_of(found.query)
+    asked = [pair for pair in pairs if pair[0] != "y"]
+    shown = [("point", point)] if point and not faults else []
+    drawn = sum(line.cases.size for line in (part.line for part in found.curves)) * len(found.query.y)
+    address = views.study_address(study_id)
+    named = [("curve", names[chosen]), ("columns", "2")]
+    return AnswersView(
+        faults,
+        found.query,
+        point or (f"{found.point:.10g}" if found.point is not None else ""),
+        found.unit,
+        chosen,
+        names,
+        tiles,
+        here,
+        [FamilyRow(name, _row(part, found)) for name, part in zip(names, found.curves, strict=True) if len(names) > 1],
+        overall,
+        value_choices(study, found.query),
+        f"/studies/{study_id}/figures/answers?{urlencode([*asked, *shown, *named])}",
+        f"{address}/answers?{urlencode([*asked, *shown, ('format', 'svg')])}" if drawn <= MAX_PICTURE_POINTS else None,
+    )
+
+
+def _usual_curve(study: Study, found: StudyAnswers) -> int:
+    """The curve nearest to the machine of the base; the first of several."""
+
+    def distance(one: CurveAnswers) -> float:
+        return sum(
+            abs(value - study.base.get(path, value)) / (abs(value) or 1.0) for path, value in one.line.by.items()
+        )
+
+    return min(range(len(found.curves)), key=lambda place: distance(found.curves[place]), default=0)
+
+
+def _row(one: CurveAnswers, found: StudyAnswers) -> list[Tile]:
+    return [_tile(item, found.unit) for item in (one.answers or one.working_point)]
+
+
+def _tile(item: Found, x_unit: str, study: Study | None = None) -> Tile:
+    where = None if item.answer.kind in ("at_zero", "until_zero", "here") else item.x
+    return Tile(
+        item.answer.title if item.answer.title != item.answer.result else item.info.name,
+        item.value,
+        item.unit,
+        where,
+        item.above,
+        note_of(item, x_unit),
+        tuple(case for case in (item.case, item.other) if case is not None),
+        place_text(study, item.case) if study is not None and item.case is not None else "",
+    )

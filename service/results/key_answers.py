@@ -1,0 +1,375 @@
+"""The answers of a study: what is read off its curves first, such as the largest useful power and the load of it.
+
+The model says which answers there are (`Presentation.answers`); here they are read from the cases of curves, exactly
+where a case stands, and otherwise from the straight line between two neighbours that a picture joins.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+
+from sprag.service.results.curve_cases import draw, select
+from sprag.service.results.curves import Curve, Line
+from sprag.service.results.defaults import drawn_results, main_query, main_results, usual_value
+from sprag.service.results.joined import joined_points
+from sprag.service.results.refined import curve_plan
+from sprag.service.results.selection import refused, value_of
+from sprag.service.spec.catalogue import unit_of
+from sprag.worker import models
+from sprag.worker.codes import PENDING
+from sprag.worker.models.presentation import Answer
+from sprag.worker.planning.refine_plan import REFINE
+from sprag.worker.study import SAME_VALUE
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from sprag.service.results.curves import CurveQuery, Curves, Fetch
+    from sprag.worker.models import Presentation, ResultInfo
+    from sprag.worker.study import Study
+
+#: Why there is no value: no case there, beyond the ends of the axis, between points that no line joins, no result.
+Why = Literal["no-case", "outside", "not-joined", "no-result"]
+#: Ending of the names of half widths of the intervals of means of irregular motion.
+_HALF: Final = ".half_width"
+#: Cases of a study whose overall extremes are looked for with every answer.
+MOST_OVERALL: Final = 200_000
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """An answer of one curve, or of all cases of a study. Numbers are SI.
+
+    Attributes
+    ----------
+    answer, info : what it is, and the result that it is read from; ``unit`` is that of the value
+    value : None where there is none; ``why`` says why
+    x : value of the axis of the curve at which it holds; None where there is no such axis
+    low, high : neighbouring values of the axis: between them lies an extreme of the curve, or the x of the answer
+    above : whether no case shows its upper end; ``there`` is the result at x then
+    case, other : the case it was read from, and the second one where it is between two
+    cases : cases that were compared for it
+    edge : whether an extreme is at the end of the axis, so that it may go on beyond it
+    regime, flags : of the cases it was read from
+    half_width : of the interval of a mean of irregular motion
+    error : of a refined curve, relative to its range
+    """
+
+    answer: Answer
+    info: ResultInfo
+    unit: str
+    value: float | None = None
+    why: Why | None = None
+    x: float | None = None
+    low: float | None = None
+    high: float | None = None
+    above: bool = False
+    there: float | None = None
+    case: int | None = None
+    other: int | None = None
+    cases: int = 0
+    edge: bool = False
+    regime: str | None = None
+    flags: tuple[str, ...] = ()
+    half_width: float | None = None
+    error: float | None = None
+
+    @property
+    def interpolated(self) -> bool:
+        """Whether the value was computed from two cases."""
+        return self.other is not None and self.answer.kind != "until_zero"
+
+
+@dataclass(frozen=True, slots=True)
+class CurveAnswers:
+    """The answers of one curve, and its main results at the working point."""
+
+    line: Line
+    answers: tuple[Found, ...]
+    working_point: tuple[Found, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class StudyAnswers:
+    """The answers of a study.
+
+    Attributes
+    ----------
+    query : the curves that they are read from; None for a study of one machine, which has one case
+    point : value of x (SI) of the working point; None where there is no curve, or none can be read there
+    unit : of x
+    curves : one or several; empty for a study whose cases lie on no curves
+    overall : extremes among all cases of the study, with the parameters of their cases
+    drawn : the curves of the main results, for a picture
+    """
+
+    query: CurveQuery | None
+    point: float | None
+    unit: str
+    curves: tuple[CurveAnswers, ...]
+    overall: tuple[Found, ...]
+    drawn: Curves | None
+
+
+def answers_of_model(study: Study, infos: Sequence[ResultInfo]) -> tuple[Answer, ...]:
+    """The answers that the model names and the study has; extremes of the drawn results of a model that names none."""
+    names = {info.name for info in infos}
+    named = tuple(one for one in models.presentation_of(study).answers if one.result in names)
+    if named:
+        return named
+    kinds: tuple[Literal["largest", "smallest"], ...] = ("largest", "smallest")
+    drawn = [name for name in drawn_results(study, infos) if name in names][:2]
+    return tuple(
+        Answer(f"{kind}_{name}", f"{kind.capitalize()} {name}", name, kind) for name in drawn for kind in kinds
+    )
+
+
+def answers_query(study: Study, infos: Sequence[ResultInfo], chosen: CurveQuery | None = None) -> CurveQuery | None:
+    """The curves of the main results that answers are read from: those of the page, or of the ``chosen`` ones.
+
+    None where the cases of the study lie on no curves: nothing varies, or it chooses its own cases.
+    """
+    if study.plan is not None and (study.plan["kind"] != REFINE or curve_plan(study) is None):
+        return None
+    query = chosen or main_query(study, infos)
+    if query is None:
+        return None
+    y = query.y if curve_plan(study) is not None else main_results(study, infos)
+    return replace(query, y=y)
+
+
+def read_point(study: Study, query: CurveQuery, text: str | None) -> float | None:
+    """The working point: the text with or without a unit, otherwise the base's value, or the middle one of the axis.
+
+    Raises SelectionError about ``point`` for a text that is no quantity of the axis.
+    """
+    if text is not None and text.strip():
+        return value_of(query.x, text.strip(), unit_of(study, query.x), "point")
+    axis = study.axes[next(place for place, one in enumerate(study.axes) if query.x in one.paths)]
+    base = study.base.get(query.x)
+    between = base is not None and axis.array.min() <= base <= axis.array.max()
+    return base if between else usual_value(study, axis)
+
+
+def find_answers(
+    study: Study, infos: Sequence[ResultInfo], query: CurveQuery | None, point: str | None, fetch: Fetch
+) -> StudyAnswers:
+    """The answers of the curves of ``query``, as `answers_query` gives it.
+
+    Raises
+    ------
+    SelectionError
+        As `select` does; and where ``point`` is given although there is no axis for it.
+    """
+    shown, answers, by_name = models.presentation_of(study), answers_of_model(study, infos), {i.name: i for i in infos}
+    overall = tuple(_overall(study, shown, answers, by_name, fetch))
+    if query is None:
+        if point:
+            raise refused("point", "not-used", "the cases of this study lie on no curves", point, allowed="no point")
+        curves = (_single(study, infos, answers, by_name, fetch),) if study.cases == 1 else ()
+        return StudyAnswers(None, None, "1", curves, () if study.cases == 1 else overall, None)
+    x = read_point(study, query, point)
+    names = dict.fromkeys([*query.y, *(one.result for one in answers)])
+    names |= dict.fromkeys(name + _HALF for name in tuple(names) if name + _HALF in by_name)
+    drawn = draw(select(study, infos, replace(query, y=tuple(names))), fetch)
+    found = []
+    for curve in drawn.curves:
+        reader = _Reader(curve, shown, query.x, x)
+        main = (Answer(name, name, name, "here") for name in query.y)
+        found.append(
+            CurveAnswers(
+                curve.line,
+                tuple(reader.read(one, by_name[one.result], drawn) for one in answers if _fits(study, one, query.x)),
+                tuple(reader.read(one, by_name[one.result], drawn) for one in main),
+            )
+        )
+    shown_only = replace(drawn.selection, results=tuple(by_name[name] for name in query.y))
+    return StudyAnswers(query, x, unit_of(study, query.x), tuple(found), overall, replace(drawn, selection=shown_only))
+
+
+def _fits(study: Study, answer: Answer, x: str) -> bool:
+    """Whether an answer has a meaning along the axis of ``x``."""
+    return not answer.along or study.axis_of(answer.along) == study.axis_of(x)
+
+
+def _single(
+    study: Study,
+    infos: Sequence[ResultInfo],
+    answers: Sequence[Answer],
+    by_name: dict[str, ResultInfo],
+    fetch: Fetch,
+) -> CurveAnswers:
+    """The main results of the only case."""
+    main = [Answer(name, name, name, "here") for name in main_results(study, infos)]
+    here = [one for one in answers if one.kind == "here"]
+    names = dict.fromkeys(one.result for one in (*main, *here))
+    columns = fetch(np.zeros(1, dtype=np.int64), list(names))
+    line = Line({}, {}, (0.0,), np.zeros(1, dtype=np.int64))
+    flags = columns.flags[0].split(",") if columns.flags and columns.flags[0] else []
+
+    def one(answer: Answer) -> Found:
+        info, value = by_name[answer.result], float(columns.values[answer.result][0])
+        known = math.isfinite(value)
+        why: Why | None = None if known else "no-result"
+        return Found(answer, info, info.unit, value if known else None, why, case=0, cases=1, flags=tuple(flags))
+
+    return CurveAnswers(line, tuple(map(one, here)), tuple(map(one, main)))
+
+
+def _overall(
+    study: Study, shown: Presentation, answers: Sequence[Answer], by_name: dict[str, ResultInfo], fetch: Fetch
+) -> Iterator[Found]:
+    """The extremes among all cases of a study; none of one that chooses its own cases, or has one or very many."""
+    extremes = [one for one in answers if one.kind in ("largest", "smallest")]
+    if not extremes or not 1 < study.cases <= MOST_OVERALL or study.plan is not None:
+        return
+    columns = fetch(np.arange(study.cases, dtype=np.int64), [one.result for one in extremes])
+    for answer in extremes:
+        info, values = by_name[answer.result], columns.values[answer.result]
+        kept = _preferred(values, columns.flags, shown)
+        if not kept.size:
+            yield Found(answer, info, info.unit, why="no-result")
+            continue
+        case = int(kept[_best(values[kept], answer)])
+        flags = _split(columns.flags, [case])
+        yield Found(answer, info, info.unit, float(values[case]), case=case, cases=kept.size, flags=flags)
+
+
+def _preferred(values: NDArray[np.float64], flags: Sequence[str], shown: Presentation) -> NDArray[np.int64]:
+    """Places with a value, without those whose flags make them doubtful unless there are no others."""
+    known = np.isfinite(values)
+    doubtful = set(shown.doubtful)
+    if doubtful and flags:
+        kinds = {text: bool(doubtful & set(text.split(","))) for text in set(flags)}
+        sound = known & ~np.array([kinds[text] for text in flags], dtype=np.bool_)
+        known = sound if sound.any() else known
+    return np.flatnonzero(known).astype(np.int64)
+
+
+def _best(values: NDArray[np.float64], answer: Answer) -> int:
+    return int(np.argmax(values) if answer.kind == "largest" else np.argmin(values))
+
+
+def _split(flags: Sequence[str], places: Sequence[int]) -> tuple[str, ...]:
+    """The flags of some cases, each once."""
+    return tuple(dict.fromkeys(name for place in places if flags for name in flags[place].split(",") if name))
+
+
+class _Reader:
+    """Reads answers off one curve."""
+
+    def __init__(self, curve: Curve, shown: Presentation, path: str, point: float | None) -> None:
+        self._curve, self._shown, self._path, self._point = curve, shown, path, point
+        self._x = np.asarray(curve.line.x, dtype=np.float64)
+        self._flags = curve.flags or []
+
+    def read(self, answer: Answer, info: ResultInfo, drawn: Curves) -> Found:
+        """One answer."""
+        way: dict[str, Callable[[Answer, ResultInfo], Found]] = {
+            "at_zero": self._at_zero,
+            "until_zero": self._until_zero,
+            "here": lambda one, own: self._at(one, own, self._point),
+        }
+        found = way.get(answer.kind, self._extreme)(answer, info)
+        if answer.kind == "until_zero":
+            found = replace(found, unit=drawn.selection.units[self._path])
+        refined = self._curve.refined
+        exact = found.answer.kind in ("here", "at_zero", "until_zero") and not found.interpolated
+        return found if refined is None or exact else replace(found, error=refined.errors.get(info.name))
+
+    def _of(self, answer: Answer, info: ResultInfo, places: Sequence[int], value: float, **more: object) -> Found:
+        """A value that was read from the cases at these places of the curve."""
+        curve, x = self._curve, self._x
+        regimes = {curve.regimes[place] for place in places} if curve.regimes is not None else {None}
+        cases = curve.line.cases[list(places)].tolist()
+        found = Found(
+            answer, info, info.unit, value,
+            x=float(x[places[0]]),
+            case=cases[0],
+            other=cases[1] if len(cases) > 1 else None,
+            regime=regimes.pop() if len(regimes) == 1 else None,
+            flags=_split(self._flags, places),
+            half_width=self._half_width(info, places),
+        )  # fmt: skip
+        return replace(found, **more)  # type: ignore[arg-type]
+
+    def _half_width(self, info: ResultInfo, places: Sequence[int]) -> float | None:
+        widths = self._curve.y.get(info.name + _HALF)
+        known = [] if widths is None else [float(widths[place]) for place in places if np.isfinite(widths[place])]
+        return max(known, default=None)
+
+    def _at_zero(self, answer: Answer, info: ResultInfo) -> Found:
+        places = np.flatnonzero(self._x == 0.0)
+        if not places.size:
+            return Found(answer, info, info.unit, why="no-case", x=0.0)
+        return self._at(answer, info, 0.0)
+
+    def _extreme(self, answer: Answer, info: ResultInfo) -> Found:
+        values = self._curve.y[info.name]
+        kept = _preferred(values, self._flags, self._shown)
+        if not kept.size:
+            return Found(answer, info, info.unit, why="no-result")
+        place = int(kept[_best(values[kept], answer)])
+        around = np.unique(self._x[np.isfinite(values)]) if np.all(np.diff(self._x) > 0.0) else self._x[[place]]
+        own = int(np.searchsorted(around, self._x[place]))
+        low = float(around[own - 1]) if own > 0 else None
+        high = float(around[own + 1]) if own + 1 < around.size else None
+        edge = around.size > 1 and (low is None or high is None)
+        return self._of(answer, info, [place], float(values[place]), low=low, high=high, cases=kept.size, edge=edge)
+
+    def _until_zero(self, answer: Answer, info: ResultInfo) -> Found:
+        """The last x with a value above 0, and the next one with a case at 0."""
+        values = self._curve.y[info.name]
+        moving = np.flatnonzero(np.nan_to_num(values) > 0.0)
+        at_rest = np.flatnonzero(values == 0.0)
+        count = int(np.isfinite(values).sum())
+        if not moving.size:
+            why: Why = "outside" if at_rest.size else "no-result"
+            return Found(answer, info, info.unit, why=why, cases=count)
+        last = int(moving[np.argmax(self._x[moving])])
+        after = at_rest[self._x[at_rest] > self._x[last]]
+        at = float(self._x[last])
+        found = self._of(answer, info, [last], at, low=at, cases=count, half_width=None)
+        if not after.size:
+            return replace(found, above=True, there=float(values[last]))
+        first = int(after[np.argmin(self._x[after])])
+        other = int(self._curve.line.cases[first])
+        return replace(found, high=float(self._x[first]), other=other)
+
+    def _at(self, answer: Answer, info: ResultInfo, point: float | None) -> Found:
+        """The value at a point of the axis."""
+        nothing = Found(answer, info, info.unit, x=point)
+        if point is None or not self._x.size:
+            return replace(nothing, why="no-case")
+        run, values = self._curve.run(), self._curve.y[info.name]
+        scale = max(float(np.max(np.abs(self._x))), abs(point))
+        exact = [place for place in run.tolist() if abs(self._x[place] - point) <= SAME_VALUE * scale]
+        if exact:
+            place = exact[0]
+            if not np.isfinite(values[place]):
+                return replace(nothing, why="no-result", case=int(self._curve.line.cases[place]))
+            return self._of(answer, info, [place], float(values[place]), cases=1)
+        x = self._x[run]
+        known = x[np.isfinite(values[run])]
+        if not known.size or not known.min() <= point <= known.max():
+            pending = any(ending == PENDING for ending in self._curve.endings)
+            return replace(nothing, why="no-case" if pending else "outside")
+        low, high = float(known[known < point].max()), float(known[known > point].min())
+        for stretch in joined_points(self._curve, info.name) or (np.arange(run.size),):
+            own = x[stretch]
+            if own.size < 2 or not np.all(np.diff(own) > 0.0) or not own[0] < point < own[-1]:
+                continue
+            after = int(np.searchsorted(own, point))
+            places = [int(run[stretch[after - 1]]), int(run[stretch[after]])]
+            first, last = float(values[places[0]]), float(values[places[1]])
+            if not np.isfinite(first + last):
+                continue
+            share = (point - self._x[places[0]]) / (self._x[places[1]] - self._x[places[0]])
+            ends = {"low": float(self._x[places[0]]), "high": float(self._x[places[1]])}
+            return self._of(answer, info, places, first + share * (last - first), cases=2, **ends, x=point)
+        return replace(nothing, why="not-joined", low=low, high=high)
