@@ -25,7 +25,6 @@ from distributed import Client, LocalCluster
 from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
-from sprag.worker.executors.dask_tasks import introduce
 from sprag.worker.models import ChunkResult
 from sprag.worker.study import Axis, Study
 
@@ -84,9 +83,9 @@ def schedule_seconds(tasks: int = 2000) -> float:
         LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0", memory_limit=0) as cluster,
         Client(cluster) as client,
     ):
-        client.submit(introduce, key="warm").result()
+        client.submit(int, key="warm").result()
         begin = time.perf_counter()
-        client.gather([client.submit(introduce, key=f"task-{index}") for index in range(tasks)])
+        client.gather([client.submit(int, key=f"task-{index}") for index in range(tasks)])
         return (time.perf_counter() - begin) / tasks
 
 

@@ -45,7 +45,8 @@ def check(db: Database = None, as_json: JsonFlag = False) -> None:
     if as_json:
         write_json({**asdict(report), "sound": not report.problems})
     else:
-        print(f"{report.location}: {report.backend} {report.backend_version}, revision {report.revision or 'none'}")
+        backend = f"{report.backend} {report.backend_version}".rstrip()
+        print(f"{report.location}: {backend}, revision {report.revision or 'none'}")
         print("\n".join(f"  {problem}" for problem in report.problems) or "  sound")
     if report.problems:
         raise typer.Exit(ExitCode.TROUBLE)

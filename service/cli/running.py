@@ -36,18 +36,21 @@ def run_parsed(
     """
     from sprag.service.jobs.local import pool_size, run_here
 
+    local = settings.executor == "pool"
+    most = settings.pool_processes
     with (
         progress_bar(parsed.study.name or title) as update,
         run_here(
             parsed.spec,
             parsed.study,
-            processes=pool_size(parsed.study, settings.pool_processes, asked=processes is not None),
+            processes=pool_size(parsed.study, most, asked=processes is not None) if local else most,
             database_url=settings.database_url if db is not None else None,
             chunk_cases=settings.chunk_cases,
             chunk_timeout=settings.chunk_timeout,
             warnings=parsed.warnings,
             fresh=fresh,
             finish_by=finish_by,
+            setting=settings.executor,
             on_progress=lambda now: update(now.done, now.total, remark(now)),
         ) as done,
     ):

@@ -78,13 +78,15 @@ def run_here(
     fresh: bool = False,
     finish_by: datetime | None = None,
     on_progress: Callable[[Progress], None] | None = None,
+    setting: str = "pool",
     executor: Executor | None = None,
 ) -> Iterator[LocalRun]:
     """Run ``study`` to its end on ``processes`` processes and return its rows.
 
     Without ``database_url`` the database is temporary and is deleted with the context. When another dispatcher is
     active on the given database, it runs the study while this process waits. ``processes`` 0 runs the cases in this
-    process, which suits small studies; 1 or more start a pool. At ``finish_by`` it ends with what is done. Raises
+    process, which suits small studies; 1 or more start a pool, or use the cluster that ``setting`` names
+    (`Settings.executor`). At ``finish_by`` it ends with what is done. Raises
     StoreError and ExecutorError, each with one sentence, and RunInterruptedError on Ctrl-C; the study is then
     cancelled, so that no later worker continues it.
     """
@@ -93,7 +95,7 @@ def run_here(
         url = database_url or f"sqlite:///{Path(folder) / 'run.sqlite3'}"
         with Store.open(url, chunking=Chunking(chunk_cases, max(processes, 1), chunk_timeout)) as store:
             record = store.create_study(spec, study, warnings=warnings, fresh=fresh, finish_by=finish_by)
-            settings = WorkerSettings(url, processes, chunk_timeout)
+            settings = WorkerSettings(url, processes, chunk_timeout, executor=setting)
             watch = _Watch(store, record.id, on_progress, interrupted)
             lock = lock_of(store.session, owner_name())
             owner = run_owner(owner_name(), record.id)

@@ -136,7 +136,7 @@ class DaskExecutor:
     def shortage(self) -> str | None:
         """Why nothing can be run at present, as a sentence; None where chunks can run."""
         if self._gone_since is not None:
-            return f"The scheduler {self._link.address} cannot be reached; retrying."
+            return f"The scheduler {self._link.address} cannot be reached; retrying: {self._link.trouble}"
         with self._lock:
             if any(worker.usable for worker in self._workers.values()):
                 return None

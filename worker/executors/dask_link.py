@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import logging
+import socket
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from threading import Condition
 from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import urlsplit
 
 from distributed import Client
 from distributed.client import AllExit
@@ -43,6 +45,8 @@ class Link:
 
     def __init__(self, address: str, security: Security | None, name: str, lock: RLock) -> None:
         self.address = address
+        #: Why the scheduler did not answer the last time that it did not.
+        self.trouble = ""
         self._security = security
         self._name = name
         self._client: Client | None = None
@@ -52,9 +56,19 @@ class Link:
 
     def present(self) -> dict[str, dict[str, Any]]:
         """The workers that the scheduler knows, by address. Raises OSError, TimeoutError or ValueError without a
-        scheduler.
+        scheduler; `trouble` then says why.
         """
+        try:
+            return self._present()
+        except (OSError, TimeoutError, ValueError) as error:
+            self.trouble = str(error) or type(error).__name__
+            raise
+
+    def _present(self) -> dict[str, dict[str, Any]]:
         if self._client is None:
+            place = urlsplit(self.address)
+            # Dask's client takes five seconds for this, and leaves a half-made object behind.
+            socket.create_connection((str(place.hostname), int(place.port or 0)), ANSWER_SECONDS).close()
             self._client = Client(
                 self.address, security=self._security, timeout=ANSWER_SECONDS, set_as_default=False, name=self._name
             )

@@ -10,6 +10,7 @@ from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
+import dask
 from distributed import Security
 
 from sprag.worker import fingerprint, models
@@ -88,16 +89,17 @@ def _within(seconds: float, function: Callable[[], _T]) -> _T:
 def scheduler_address(url: str) -> tuple[str, Security | None]:
     """Dask's address of the scheduler at ``dask://host:port``, with TLS unless it is on this machine.
 
-    Raises ExecutorError when certificates are needed and Dask's own configuration names none.
+    It has TLS there, too, where Dask's own configuration requires it. Raises ExecutorError when certificates are needed
+    and that configuration names none.
     """
     place = url.removeprefix("dask://")
     host = place.rpartition(":")[0].strip("[]")
-    if _is_loopback(host):
+    if _is_loopback(host) and not dask.config.get("distributed.comm.require-encryption", None):
         return f"tcp://{place}", None
     security = Security(require_encryption=True)
     if not all(getattr(security, name) for name in ("tls_ca_file", "tls_client_cert", "tls_client_key")):
         raise ExecutorError(
-            f"the scheduler {place} is on another machine, so TLS is required: set "
+            f"the scheduler {place} is spoken to by TLS, which needs certificates: set "
             "DASK_DISTRIBUTED__COMM__TLS__CA_FILE, DASK_DISTRIBUTED__COMM__TLS__CLIENT__CERT and "
             "DASK_DISTRIBUTED__COMM__TLS__CLIENT__KEY"
         )

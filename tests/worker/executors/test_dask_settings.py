@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 
+import dask
 import pytest
 from pydantic import ValidationError
 
@@ -14,10 +15,15 @@ from sprag.worker.ports import ExecutorError
 
 
 def test_other_machines_need_certificates() -> None:
-    with pytest.raises(ExecutorError, match="TLS is required: set DASK_DISTRIBUTED__COMM__TLS__CA_FILE"):
+    with pytest.raises(ExecutorError, match="needs certificates: set DASK_DISTRIBUTED__COMM__TLS__CA_FILE"):
         scheduler_address("dask://cluster.example:8786")
     assert scheduler_address("dask://localhost:8786") == ("tcp://localhost:8786", None)
     assert scheduler_address("dask://[::1]:8786") == ("tcp://[::1]:8786", None)
+
+
+def test_the_loopback_address_has_tls_where_dask_requires_it() -> None:
+    with dask.config.set({"distributed.comm.require-encryption": True}), pytest.raises(ExecutorError, match="TLS"):
+        scheduler_address("dask://127.0.0.1:8786")
 
 
 def test_the_setting_is_checked() -> None:

@@ -1,0 +1,68 @@
+"""The commands of docs/deployment.md for a cluster, run as they stand there with other names of hosts and folders."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from benchmarks.faults.harness import kill_family
+from tests.conftest import ROOT
+
+_SECTION = (ROOT / "docs" / "deployment.md").read_text(encoding="utf-8").split("## A Dask cluster")[1]
+_CERTIFICATES, _SETTINGS, _COMMANDS = re.findall(r"```sh\n(.*?)```", _SECTION, re.DOTALL)[:3]
+_SPEC = ROOT / "examples" / "one_pendulum.json"
+
+
+def shell(command: str, folder: Path) -> subprocess.Popen[bytes]:
+    """A command of the shell with the programs of this environment, in a folder of its own."""
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    return subprocess.Popen(
+        ["bash", "-ec", command], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        env={**os.environ, "PATH": path, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+
+
+def run(command: str, folder: Path) -> bytes:
+    """Standard output of a command that succeeds."""
+    process = shell(command, folder)
+    out, said = process.communicate()
+    assert process.returncode == 0, said.decode()
+    return out
+
+
+def test_the_commands_for_a_cluster_give_the_rows_of_the_pool(tmp_path: Path) -> None:
+    if shutil.which("openssl") is None:
+        pytest.skip("there is no command openssl to make certificates with")
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        place = f"127.0.0.1:{free.getsockname()[1]}"
+
+    def here(text: str) -> str:
+        host, port = place.split(":")
+        return text.replace("/etc/sprag", str(tmp_path)).replace("head.example", host).replace("8786", port)
+
+    scheduler, worker, service = here(_COMMANDS).splitlines()
+    assert (scheduler.split()[:2], worker.split()[:2]) == (["dask", "scheduler"], ["dask", "worker"])
+    setting, _ = service.split(" ", 1)
+    run(here(_CERTIFICATES), tmp_path)
+    settings = here(_SETTINGS)
+    started = [shell(f"{settings}\nexec {command} >parts.log 2>&1", tmp_path) for command in (scheduler, worker)]
+    try:
+        by_cluster = run(f"{settings}\n{setting} sprag run {_SPEC}", tmp_path)
+    finally:
+        for process in started:
+            kill_family(process)
+    assert by_cluster == run(f"sprag run {_SPEC}", tmp_path)
+
+
+def test_a_run_on_a_cluster_without_certificates_is_refused(tmp_path: Path) -> None:
+    process = shell(f"SPRAG_EXECUTOR=dask://head.example:8786 sprag run {_SPEC}", tmp_path)
+    _, said = process.communicate()
+    assert process.returncode == 1
+    assert b"the scheduler head.example:8786 is spoken to by TLS, which needs certificates" in said
