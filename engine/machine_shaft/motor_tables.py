@@ -76,12 +76,16 @@ def motor_table(table: Table) -> MotorTable:
     curve = over_speed(table)
     x, y = np.array(table.rows, dtype=np.float64).T
     if x[0] < 0.0:
-        raise TableError(f"The characteristic of a motor begins at the speed 0 or above, not at {x[0]:g} rad/s.")
+        message = f"The characteristic of a motor begins at the speed 0 or above, not at {x[0]:g} rad/s."
+        raise TableError(message, f"{x[0]:g} rad/s", "0 rad/s or more in row 1")
     if not (y[-1] <= 0.0 < y[-2]) and not (y[-1] < y[-2] <= 0.0):
         raise TableError(
             f"The characteristic of a motor ends beyond its speed without load, with a falling torque that is not "
-            f"positive: this one ends with {y[-2]:g} and {y[-1]:g} N*m."
+            f"positive: this one ends with {y[-2]:g} and {y[-1]:g} N*m.",
+            f"{y[-1]:g} N*m",
+            f"at most 0 N*m and less than {y[-2]:g} N*m in the last row",
         )
     if y.max() <= 0.0:
-        raise TableError("The characteristic of a motor has a positive torque at some speed.")
+        message = "The characteristic of a motor has a positive torque at some speed."
+        raise TableError(message, f"{y.max():g} N*m at most", "a torque > 0 N*m")
     return MotorTable(curve)

@@ -59,7 +59,9 @@ def _inertia_curve(choice: MechanismChoice, revolutions: int) -> Curve | None:
         if row[0] == following[0]:
             raise TableError(
                 f"Rows {number} and {number + 1} of the inertia both have {row[0]:g} rad, with {row[1]:g} and "
-                f"{following[1]:g} kg*m^2: only a torque may jump, not an inertia."
+                f"{following[1]:g} kg*m^2: only a torque may jump, not an inertia.",
+                f"{row[0]:g} rad",
+                f"more than {row[0]:g} rad in row {number + 1}",
             )
     within_one = len(table.rows) > 0 and table.rows[-1][0] - table.rows[0][0] <= _TURN * (1.0 + 1e-9)
     return periodic(table, _TURN if within_one else _TURN * revolutions)

@@ -12,9 +12,13 @@ class MachineError(ValueError):
     ----------
     ending : Ending or None
         Ending of a case of a grid with the same fault; None for faults that no numeric parameter can remove.
+    found, allowed : str or None
+        What the machine has and what it must have, with units where they are known.
     """
 
     ending: Ending | None = None
+    found: str | None = None
+    allowed: str | None = None
 
 
 class StructureError(MachineError):
@@ -23,6 +27,11 @@ class StructureError(MachineError):
 
 class TableError(MachineError):
     """A table is not ascending, not finite, too short, or does not close on itself."""
+
+    def __init__(self, message: str, found: float | str, allowed: str) -> None:
+        super().__init__(message)
+        self.found = found if isinstance(found, str) else f"{found:g}"
+        self.allowed = allowed
 
 
 class ExpressionError(MachineError):
@@ -88,6 +97,7 @@ class NegativeInertiaError(MachineError):
             "Give the drive more inertia, or correct the table or formula of the mechanism."
         )
         self.inertia = inertia
+        self.found, self.allowed = f"{inertia:.6g} kg*m^2", "> 0 kg*m^2 at every angle"
 
 
 class UnbalancedWorkError(MachineError):
@@ -133,18 +143,24 @@ class InsufficientInertiaError(MachineError):
     ending = Ending.INERTIA_INSUFFICIENT
 
     def __init__(self, asked: float, least_mean_speed: float) -> None:
-        stops = f"The inertia is insufficient for a mean speed of {asked:.6g} rad/s: the shaft would "
+        stops = f"The inertia is insufficient for a mean speed of {_in_rpm(asked)}: the shaft would "
         if math.isnan(least_mean_speed):
             more = "stop within the cycle. Choose a higher mean speed, or give the drive more inertia."
         elif asked > least_mean_speed:
             more = "nearly stop within the cycle. Choose a higher mean speed, or give the drive more inertia."
         else:
             more = (
-                f"stop within the cycle. The least feasible mean speed is {least_mean_speed:.6g} rad/s "
-                f"({least_mean_speed * 30.0 / math.pi:.6g} rpm); or give the drive more inertia."
+                f"stop within the cycle. The least feasible mean speed is {_in_rpm(least_mean_speed)}; "
+                "or give the drive more inertia."
             )
         super().__init__(stops + more)
         self.asked, self.least_mean_speed = asked, least_mean_speed
+        self.allowed = "a higher speed" if math.isnan(least_mean_speed) else f"> {_in_rpm(least_mean_speed)}"
+
+
+def _in_rpm(speed: float) -> str:
+    """A speed in rad/s with its revolutions a minute."""
+    return f"{speed:.6g} rad/s ({speed * 30.0 / math.pi:.6g} rpm)"
 
 
 class MotorStalledError(MachineError):

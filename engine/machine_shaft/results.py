@@ -8,8 +8,8 @@ def _squares() -> tuple[ResultInfo, ...]:
     meaning = {
         1: "S1 = 2 T_min/I, the share of the least energy",
         2: "S2 = 2 (T_mean - T_min)/I, the share of the mean energy above the least",
-        3: "S3 = 2 A_d/I, the share of the drive's work since phi_c",
-        4: "S4 = 2 A_r/I, the share of the resistance's work since phi_c",
+        3: "S3 = 2 A_d/I, the share of the drive's work since the angle phi_c",
+        4: "S4 = 2 A_r/I, the share of the resistance's work since the angle phi_c",
     }
     return tuple(
         ResultInfo(f"s{k}.{end}", "rad^2/s^2", f"{word} value of {meaning[k]}")
@@ -27,12 +27,12 @@ def _harmonics(name: str, unit: str, what: str) -> tuple[ResultInfo, ...]:
 
 _R = ResultInfo
 MACHINE_RESULTS: tuple[ResultInfo, ...] = (
-    _R("omega.mean", "rad/s", "mean speed of the shaft, by the definition of mean_speed_is"),
+    _R("omega.mean", "rad/s", "mean speed of the shaft: the middle of its range, or its mean over angle or time"),
     _R("omega.max", "rad/s", "largest speed of the shaft"),
     _R("omega.min", "rad/s", "smallest speed of the shaft"),
     _R("omega.angle_at_max", "rad", "angle at which the speed is largest"),
     _R("omega.angle_at_min", "rad", "angle at which the speed is smallest"),
-    _R("irregularity", "1", "(largest - smallest)/mean speed, by the definition of mean_speed_is"),
+    _R("irregularity", "1", "coefficient of irregularity: (largest - smallest)/mean speed"),
     _R("energy.fluctuation", "J", "largest less smallest kinetic energy"),
     _R("energy.mean", "J", "mean kinetic energy over the angle"),
     _R("energy.min", "J", "smallest kinetic energy"),
@@ -71,10 +71,10 @@ MACHINE_RESULTS: tuple[ResultInfo, ...] = (
     _R("motor.torque.max", "N*m", "largest torque of the motor, at its own shaft"),
     _R("motor.power.mean", "W", "mean torque of the motor times its mean speed"),
     _R("energy.coefficient", "1", "coefficient of fluctuation of energy: fluctuation / work of the drive over a cycle"),
-    _R("work.drive.max", "J", "largest work of the drive since phi_c (A_d)"),
-    _R("work.drive.min", "J", "smallest (most negative) work of the drive since phi_c"),
-    _R("work.resistance.max", "J", "largest work of the resistance since phi_c (A_r)"),
-    _R("work.resistance.min", "J", "smallest (most negative) work of the resistance since phi_c"),
+    _R("work.drive.max", "J", "largest work of the drive since the angle phi_c (A_d)"),
+    _R("work.drive.min", "J", "smallest (most negative) work of the drive since the angle phi_c"),
+    _R("work.resistance.max", "J", "largest work of the resistance since the angle phi_c (A_r)"),
+    _R("work.resistance.min", "J", "smallest (most negative) work of the resistance since the angle phi_c"),
     _R("omega_squared.amplitude", "rad^2/s^2", "half the range of the square of the speed"),
     *(_R(f"s{k}.share", "1", f"amplitude of S{k} / sum of the amplitudes of S1 to S4") for k in range(1, 5)),
     *_harmonics("omega", "rad/s", "speed's oscillation"),

@@ -66,16 +66,20 @@ class Curve:
 
 def _checked(rows: Sequence[tuple[float, float]]) -> tuple[Floats, Floats]:
     if not 2 <= len(rows) <= MAX_ROWS:
-        raise TableError(f"A table needs 2 to {MAX_ROWS} rows, not {len(rows)}.")
+        message = f"A table needs 2 to {MAX_ROWS} rows, not {len(rows)}."
+        raise TableError(message, len(rows), f"2 to {MAX_ROWS} rows")
     x, y = np.array(rows, dtype=np.float64).T
     if not (np.isfinite(x).all() and np.isfinite(y).all()):
-        raise TableError("A table must contain finite numbers only.")
+        raise TableError("A table must contain finite numbers only.", "a number that is not finite", "finite numbers")
     steps = np.diff(x)
     if np.any(steps < 0.0):
         row = int(np.argmax(steps < 0.0)) + 1
-        raise TableError(f"The rows of a table must ascend: row {row + 1} has {x[row]:g} after {x[row - 1]:g}.")
+        message = f"The rows of a table must ascend: row {row + 1} has {x[row]:g} after {x[row - 1]:g}."
+        raise TableError(message, float(x[row]), f"at least {x[row - 1]:g} in row {row + 1}")
     if np.any((steps[1:] == 0.0) & (steps[:-1] == 0.0)):
-        raise TableError("A table has at most two rows with the same x (a jump).")
+        row = int(np.argmax((steps[1:] == 0.0) & (steps[:-1] == 0.0)))
+        message = f"A table has at most two rows with the same x (a jump): rows {row + 1} to {row + 3} have {x[row]:g}."
+        raise TableError(message, float(x[row]), "at most two rows with the same x")
     return x, y
 
 
@@ -124,15 +128,13 @@ def periodic(table: Table, period: float) -> Curve:
     x, y = _checked(table.rows)
     excess = x[-1] - x[0] - period
     if excess > 1e-9 * period:
-        raise TableError(
-            f"The table covers {math.degrees(x[-1] - x[0]):g} deg, more than its cycle of {math.degrees(period):g} deg."
-        )
+        covered, most = (f"{math.degrees(angle):g} deg" for angle in (x[-1] - x[0], period))
+        raise TableError(f"The table covers {covered}, more than its cycle of {most}.", covered, f"at most {most}")
     if abs(excess) <= 1e-9 * period:
         gap = abs(y[-1] - y[0])
         if gap > CLOSING * max(np.ptp(y), np.abs(y).max(), 1e-300):
-            raise TableError(
-                f"The table does not close on itself: it begins with {y[0]:g} and ends, a cycle later, with {y[-1]:g}."
-            )
+            message = f"it begins with {y[0]:g} and ends, a cycle later, with {y[-1]:g}."
+            raise TableError(f"The table does not close on itself: {message}", float(y[-1]), f"{y[0]:g} at the end")
         x[-1], y[-1] = x[0] + period, y[0]
     else:
         x, y = np.append(x, x[0] + period), np.append(y, y[0])
@@ -164,19 +166,24 @@ def along_strokes(table: Table, strokes: int) -> tuple[Curve, ...]:
     ends, first = (1.0, 0.0), 0
     curves: list[Curve] = []
     if not table.rows or abs(table.rows[0][0]) > 1e-9:
-        raise TableError("An indicator diagram over the stroke begins at 0, where the forward stroke does.")
+        first_x = table.rows[0][0] if table.rows else "no row"
+        message = "An indicator diagram over the stroke begins at 0, where the forward stroke does."
+        raise TableError(message, first_x, "0 in the first row")
     while first < len(table.rows) - 1:
         end = ends[len(curves) % 2]
         last = next((k for k in range(first + 1, len(table.rows)) if abs(table.rows[k][0] - end) <= 1e-9), None)
         if last is None:
-            raise TableError(f"Stroke {len(curves) + 1} of the indicator diagram does not come to {end:g}.")
+            number = len(curves) + 1
+            message = f"Stroke {number} of the indicator diagram does not come to {end:g}."
+            raise TableError(message, table.rows[-1][0], f"{end:g} at the end of stroke {number}")
         rows = table.rows[first : last + 1]
         curves.append(over_stroke(Table(rows if end == 1.0 else rows[::-1], table.interpolation)))
         # Two rows at a dead centre are a jump there.
         first = last + 1 if last + 1 < len(table.rows) and abs(table.rows[last + 1][0] - end) <= 1e-9 else last
     if len(curves) != strokes:
         count = f"{len(curves)} stroke{'' if len(curves) == 1 else 's'}"
-        raise TableError(f"The indicator diagram has {count}, but the cycle has {strokes}.")
+        message = f"The indicator diagram has {count}, but the cycle has {strokes}."
+        raise TableError(message, len(curves), f"{strokes} strokes")
     return tuple(curves)
 
 
@@ -190,7 +197,8 @@ def over_stroke(table: Table) -> Curve:
     """
     x, y = _checked(table.rows)
     if abs(x[0]) > 1e-9 or abs(x[-1] - 1.0) > 1e-9:
-        raise TableError(f"A table over the stroke runs from 0 to 1 of it, not from {x[0]:g} to {x[-1]:g}.")
+        found = f"from {x[0]:g} to {x[-1]:g}"
+        raise TableError(f"A table over the stroke runs from 0 to 1 of it, not {found}.", found, "from 0 to 1")
     x[0], x[-1] = 0.0, 1.0
     return Curve(_pieces(x, y, table.interpolation), None)
 
@@ -206,5 +214,6 @@ def over_speed(table: Table) -> Curve:
     x, y = _checked(table.rows)
     if np.any(np.diff(x) == 0.0):
         row = int(np.argmax(np.diff(x) == 0.0))
-        raise TableError(f"A characteristic does not jump: rows {row + 1} and {row + 2} both have {x[row]:g} rad/s.")
+        message = f"A characteristic does not jump: rows {row + 1} and {row + 2} both have {x[row]:g} rad/s."
+        raise TableError(message, f"{x[row]:g} rad/s", f"more than {x[row]:g} rad/s in row {row + 2}")
     return Curve(_pieces(x, y, table.interpolation), None)

@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 from sprag.service.cli.console import WrongInputError, wrong_option
 
+#: What has a table, and what else in it stays when a file takes the place of its table, its formula or its links. The
+#: names are not imported: a command for a running service does without the models.
+_KEPT: Final[Mapping[str, frozenset[str]]] = {
+    "mechanism": frozenset({"interpolation"}),
+    "operation": frozenset(
+        {"quantity", "over", "during", "sense", "interpolation", "scale", "efficiency", "recorded_at"}
+    ),
+    "indicator": frozenset({"over", "interpolation", "piston_area", "back_pressure", "recorded_at"}),
+    "torque": frozenset({"interpolation"}),
+    "motor": frozenset({"interpolation", "inertia", "scale"}),
+}
 _ALLOWED = "PLACE=FILE, such as operation=torque.csv, drive.motor=motor.csv or parts.0.operation.indicator=p.csv"
 
 
@@ -29,16 +40,15 @@ def with_tables(spec: Mapping[str, Any], texts: Sequence[tuple[str, str]]) -> di
     """
     made = {**spec, "base": _copied(spec.get("base"))}
     for place, text in texts:
-        found: Any = made["base"]
-        for name in place.removesuffix(".csv").split("."):
-            found = _within(found, name)
-            if found is None:
-                raise _missing(place)
-        if not isinstance(found, dict):
+        *owners, name = place.removesuffix(".csv").split(".")
+        owner: Any = made["base"]
+        for key in owners:
+            owner = _within(owner, key)
+        found = _within(owner, name)
+        if not isinstance(owner, dict) or found is None or name not in _KEPT:
             raise _missing(place)
-        for form in ("table", "formula", "value", "steps"):
-            found.pop(form, None)
-        found["csv"] = text
+        kept = {key: value for key, value in found.items() if key in _KEPT[name]} if isinstance(found, dict) else {}
+        owner[name] = {**kept, **({"kind": "table"} if name == "motor" else {}), "csv": text}
     return made
 
 

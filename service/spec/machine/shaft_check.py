@@ -91,14 +91,16 @@ def check_machine(
         formula = _at(structure, error.part).get("formula") if error.part in places else None
         report.fault(places.get(error.part, "/base"), "invalid-formula", str(error), formula)
     except InsufficientInertiaError as error:
-        allowed = f"> {error.least_mean_speed:.6g} rad/s"
-        report.fault("/base/mean_speed", "inertia-insufficient", str(error), error.asked, allowed=allowed, unit="rad/s")
+        report.fault(
+            "/base/mean_speed", "inertia-insufficient", str(error), error.asked, allowed=error.allowed, unit="rad/s"
+        )
     except machine_shaft.RelationError as error:
         report.fault(
             "/base/" + error.path.replace(".", "/"), "conflict", str(error), error.value, allowed=error.allowed
         )
     except MachineError as error:
-        report.fault(_pointer(error, structure, places), code_of(error), str(error))
+        where = _pointer(error, structure, places)
+        report.fault(where, code_of(error), str(error), error.found, allowed=error.allowed)
 
 
 def _alone(structure: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any], Any]]:
@@ -149,4 +151,5 @@ def _note(report: Report, pointer: str, check: Callable[[], None], value: object
     try:
         check()
     except MachineError as error:
-        report.fault(pointer, code_of(error), str(error), value)
+        found = value if error.found is None else error.found
+        report.fault(pointer, code_of(error), str(error), found, allowed=error.allowed)

@@ -197,3 +197,22 @@ def test_a_diagram_recorded_over_time_is_one_over_the_angle() -> None:
 def test_what_is_wrong_about_a_diagram_over_time(operation: dict[str, Any], field: str, code: str) -> None:
     found = problems({"/base/operation": {"quantity": "torque"} | operation, "/axes": []})
     assert {where: fault.code for where, fault in found.items()} == {f"/base/operation/{field}": code}
+
+
+@pytest.mark.parametrize(
+    ("drive", "found", "allowed"),
+    [
+        ({"csv": "speed [rpm],torque [N*m]\n0,60\n"}, "1", "2 to 5000 rows"),
+        ({"csv": "speed,torque\n0,60\n9,40\n"}, "40 N*m", "at most 0 N*m and less than 60 N*m in the last row"),
+        ({"table": [[0, 60], [9, 40], [9, 0]]}, "9 rad/s", "more than 9 rad/s in row 3"),
+        ({"table": [[9, 60], [5, 40], [9, 0]]}, "5", "at least 9 in row 2"),
+    ],
+)
+def test_a_wrong_table_says_what_it_has_and_what_is_allowed(drive: dict[str, Any], found: str, allowed: str) -> None:
+    spec = changed({"/base/drive": {"inertia": 30, "motor": {"kind": "table"} | drive}, "/base/balance": "motor",
+                    "/axes": []})  # fmt: skip
+    del spec["base"]["mean_speed"]
+    with pytest.raises(SpecError) as caught:
+        parse_spec(spec)
+    (fault,) = caught.value.faults
+    assert (fault.code, fault.value, fault.allowed) == ("invalid-table", found, allowed)
