@@ -77,6 +77,10 @@ MAX_WAITING_STUDIES: Final = 1_000
 MAX_STREAMS: Final = 200
 #: Simultaneous connections; a further one is answered with 503.
 MAX_CONNECTIONS: Final = 800
+#: Size of the head of a request, which the parser of HTTP would limit to 16 KiB, and of the address in it: the address
+#: of a laboratory describes a machine, and those that it is compared with.
+MAX_HEAD_BYTES: Final = 64 * 1024
+MAX_ADDRESS_BYTES: Final = 56 * 1024
 #: Seconds within which the head of a request, and then its body, must arrive.
 HEAD_SECONDS: Final = 20.0
 BODY_SECONDS: Final = 60.0

@@ -19,7 +19,7 @@ import uvicorn
 
 from sprag.service import logs
 from sprag.service.http.app import create_app
-from sprag.service.http.timeouts import TimeoutProtocol
+from sprag.service.http.timeouts import READING
 from sprag.service.jobs.dispatching import start_dispatcher_process, worker_settings
 from sprag.service.settings import Settings
 from sprag.worker.limits import MAX_CONNECTIONS
@@ -211,7 +211,7 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
         log_config=None,
         log_level=logging.WARNING,
         access_log=False,
-        http=TimeoutProtocol,
+        **READING,
         ws="none",
         limit_concurrency=MAX_CONNECTIONS,
         server_header=False,

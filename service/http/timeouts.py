@@ -6,11 +6,11 @@ The server itself waits indefinitely for the head of a request, and for clients 
 from __future__ import annotations
 
 import asyncio
-from typing import Any
+from typing import Any, Final
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from sprag.worker.limits import HEAD_SECONDS, WRITE_SECONDS
+from sprag.worker.limits import HEAD_SECONDS, MAX_HEAD_BYTES, WRITE_SECONDS
 
 
 class TimeoutProtocol(H11Protocol):
@@ -85,3 +85,7 @@ def _stopped(timer: asyncio.TimerHandle | None) -> asyncio.TimerHandle | None:
     if timer is not None:
         timer.cancel()
     return None
+
+
+#: How uvicorn reads requests.
+READING: Final[dict[str, Any]] = {"http": TimeoutProtocol, "h11_max_incomplete_event_size": MAX_HEAD_BYTES}

@@ -17,7 +17,7 @@ from uvicorn.server import ServerState
 
 from sprag.service.http import guard
 from sprag.service.http.api import events
-from sprag.service.http.timeouts import TimeoutProtocol
+from sprag.service.http.timeouts import READING, TimeoutProtocol
 from sprag.service.jobs.submission import accept
 from sprag.service.spec.document import parse_spec
 from sprag.worker import limits
@@ -80,6 +80,22 @@ def test_the_head_of_a_second_request_is_not_waited_for_either(service: Service)
         assert connection.recv(65536).startswith(b"HTTP/1.1 200")
         connection.sendall(HEAD)
         assert until_closed(connection).count(b"HTTP/1.1 200") == 0
+
+
+def test_a_long_address_may_come_in_pieces(service: Service) -> None:
+    """The parser would refuse a head that is not complete after 16 KiB."""
+    long = b"GET /" + b"x" * limits.MAX_ADDRESS_BYTES
+    with serving(service.app, **READING) as address, socket.create_connection(address) as connection:
+        connection.sendall(long)
+        connection.settimeout(SHORT)
+        with pytest.raises(TimeoutError):
+            connection.recv(1)
+        connection.settimeout(60)
+        connection.sendall(b" HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        assert connection.recv(65536).startswith(b"HTTP/1.1 404")
+    with serving(service.app, **READING) as address, socket.create_connection(address) as connection:
+        connection.sendall(long + b"x" * limits.MAX_HEAD_BYTES)
+        assert until_closed(connection).startswith(b"HTTP/1.1 400")
 
 
 def test_a_body_that_does_not_come_is_told_and_left(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:

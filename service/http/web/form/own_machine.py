@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
+from sprag.service.faults import Fault
 from sprag.service.http.problems import ApiError
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form.check import message
@@ -17,6 +18,7 @@ from sprag.service.spec.document import parse_spec
 from sprag.service.spec.fields import WHICH_CASES
 from sprag.service.spec.report import SpecError
 from sprag.worker import models
+from sprag.worker.limits import MAX_ADDRESS_BYTES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,8 +27,6 @@ if TYPE_CHECKING:
 
 #: Name of a machine that the address itself describes.
 OWN: Final = "own"
-#: Characters of each parameter that describes one, at most.
-MOST_TEXT: Final = 12_000
 #: Parameters of an own machine besides its name: base and run of its spec as JSON, title, and the case it comes from.
 FIELDS: Final = ("base", "run", "title", "case")
 _CASE: Final = re.compile(r"([A-Za-z0-9_-]{1,64})/([0-9]{1,12})(?:/([0-9]{1,9}))?")
@@ -89,7 +89,17 @@ def laboratory_address(spec: Mapping[str, Any], **further: str) -> str:
     run = made.get("run")
     texts = {"base": _json(made["base"]), "run": _json(run) if run else "", "title": made.get("name", "")}
     given = {"machine": OWN, **{name: text for name, text in texts.items() if text}, **further}
-    return f"{_PAGES[made['model']]}?{urlencode(given)}"
+    address = f"{_PAGES[made['model']]}?{urlencode(given)}"
+    if not fits(address):
+        told = "is too long for the address of the laboratory: give its tables fewer rows"
+        allowed = f"an address of at most {MAX_ADDRESS_BYTES:,} characters"
+        raise SpecError([Fault("/base", "out-of-range", told, f"{len(address):,} characters", allowed)])
+    return address
+
+
+def fits(address: str) -> bool:
+    """Whether a server reads so long an address."""
+    return len(address) <= MAX_ADDRESS_BYTES
 
 
 def case_address(spec: Mapping[str, Any], study: Study, case: int, mark: str, state: Mapping[str, float]) -> str:
@@ -107,10 +117,10 @@ def _json(value: object) -> str:
 
 def own_spec(given: Mapping[str, str], model: str) -> dict[str, Any]:
     """The spec of a machine that an address describes; ApiError where it does not."""
-    for name in FIELDS:
-        if len(given.get(name, "")) > MOST_TEXT:
-            told = f"{name} must have at most {MOST_TEXT} characters; got {len(given[name])}."
-            raise ApiError("invalid-parameter", told)
+    long = len(urlencode({name: given.get(name, "") for name in FIELDS}))
+    if long > MAX_ADDRESS_BYTES:
+        told = f"base and run must have at most {MAX_ADDRESS_BYTES} characters in an address; got {long}."
+        raise ApiError("invalid-parameter", told)
     title = given.get("title", "").strip() or "Own machine"
     spec = {"sprag": 1, "model": model, "name": title, "base": _object(given, "base")}
     return spec | ({"run": _object(given, "run")} if given.get("run") else {})

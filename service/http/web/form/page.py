@@ -156,7 +156,7 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
             address = await work.check(laboratory_address, checked.spec)
         except SpecError as error:
             told = "; ".join(f"{item.where or 'the spec'}: {message(item)}" for item in error.faults)
-            checked.faults.setdefault("", []).append(f"The laboratory shows one machine, which this is not: {told}")
+            checked.faults.setdefault("", []).append(f"The laboratory cannot show this machine: {told}")
         else:
             return RedirectResponse(address, status_code=303)
     return await run_in_threadpool(form_page, request, values, checked)

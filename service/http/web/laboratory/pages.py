@@ -14,6 +14,7 @@ from sprag.service.http.problems import ApiError
 from sprag.service.http.respond import json_response
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.figures.shaft import SAMPLES, irregularities, machine_case
+from sprag.service.http.web.form.own_machine import fits
 from sprag.service.http.web.form.page import spec_in_form
 from sprag.service.http.web.laboratory.questions import QUESTIONS, estimates, question_spec
 from sprag.service.http.web.laboratory.setting import MOST_HELD, held_settings, machines, setting
@@ -84,6 +85,7 @@ def _parts(work: Work, chosen: Setting, held: list[Setting], case: dict[str, Any
     """What the page and its answers say about a setting: the answer that is always in sight, and all results."""
     infos = {info.name: info for info in models.study_results(chosen.study)}
     cases = [] if case is None else [case, *case["held"]]
+    hold = _query(chosen, [*held, chosen])
     values = {
         "chosen": chosen,
         "case": case,
@@ -97,7 +99,7 @@ def _parts(work: Work, chosen: Setting, held: list[Setting], case: dict[str, Any
             }
             for index, each in enumerate(held)
         ],
-        "hold": _query(chosen, [*held, chosen]) if len(held) < MOST_HELD else "",
+        "hold": hold if len(held) < MOST_HELD and fits(hold) else "",
         "query": _query(chosen, held),
         "sentence": "" if case is None else models.ENDING_SENTENCES.get(case["ending"], ""),
         "questions": QUESTIONS,

@@ -10,7 +10,6 @@ import pytest
 from sprag.service.http.problems import ApiError
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form.own_machine import (
-    MOST_TEXT,
     case_address,
     case_page,
     laboratory_address,
@@ -20,6 +19,8 @@ from sprag.service.http.web.form.own_machine import (
 from sprag.service.http.web.laboratory.drive_setting import setting as drive_setting
 from sprag.service.http.web.laboratory.setting import setting as shaft_setting
 from sprag.service.spec.document import parse_spec
+from sprag.service.spec.report import SpecError
+from sprag.worker.limits import MAX_ADDRESS_BYTES
 
 DRIVE = preset_of("one_pendulum")["spec"]
 INERTIA = "pendulums.0.inertia"
@@ -78,8 +79,22 @@ def test_a_machine_shaft_goes_to_its_own_page() -> None:
 
 
 def test_a_text_that_is_too_long_is_refused() -> None:
-    with pytest.raises(ApiError, match=f"title must have at most {MOST_TEXT} characters; got {MOST_TEXT + 1}"):
-        own_spec({"base": "{}", "title": "x" * (MOST_TEXT + 1)}, "vibration-drive")
+    with pytest.raises(ApiError, match=f"at most {MAX_ADDRESS_BYTES} characters in an address; got "):
+        own_spec({"base": "{}", "title": "x" * MAX_ADDRESS_BYTES}, "vibration-drive")
+
+
+@pytest.mark.parametrize(("rows", "allowed"), [(2000, True), (4900, False)])
+def test_a_table_of_a_machine_fits_the_address_or_is_refused(rows: int, allowed: bool) -> None:
+    spec = copy.deepcopy(preset_of("press")["spec"])
+    text = "angle [deg],force [kN]\n" + "\n".join(f"{360 * k / rows:.8g},{k % 20}" for k in range(rows))
+    spec["base"]["operation"] = {"quantity": "force", "csv": text, "interpolation": "linear"}
+    if allowed:
+        address = laboratory_address(spec)
+        assert 12_000 < len(address) <= MAX_ADDRESS_BYTES
+        assert own_spec(_given(address), "machine-shaft")["base"]["operation"]["csv"] == text
+    else:
+        with pytest.raises(SpecError, match="too long for the address"):
+            laboratory_address(spec)
 
 
 @pytest.mark.parametrize("mark", ["", "//evil.example/5", "st_1", "st_1/x", "st_1/5/", "https:st/1"])
