@@ -1,13 +1,14 @@
-"""``sprag transient``: the run-up, a load step or the coasting of one case of machine shafts."""
+"""``sprag transient``: the run-up, a load step or the coasting of one case of machine shafts, or of every case."""
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sprag.service.cli.console import ExitCode, say, write_json
+from sprag.service.cli.console import ExitCode, say, write_json, wrong_option
 from sprag.service.cli.files import is_json, output, read_study, require_cases, to_file
 from sprag.service.cli.motions import naming_options
 from sprag.service.cli.options import (
@@ -23,13 +24,17 @@ from sprag.service.json_text import to_bytes
 from sprag.worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 
 if TYPE_CHECKING:
-    from sprag.worker.models.transients import Transient
+    from sprag.worker.models.transients import Course, Transient
+    from sprag.worker.study import Study
 
 
 def transient(
     spec: SpecFile,
     kind: Annotated[str, typer.Option("--kind", metavar="KIND", help="run-up, load-step or coasting.")],
     case: CaseOption = 0,
+    every: Annotated[
+        bool, typer.Option("--all", help="A row for each case instead: its axes, the outcome and the results.")
+    ] = False,
     load: Annotated[
         str | None, typer.Option("--load", metavar="FACTOR", help="Factor on all operations during it; default: 1.")
     ] = None,
@@ -64,9 +69,14 @@ def transient(
 
     study = read_study(spec, files=tables).study
     require_cases(study, [case])
+    if every and case:
+        raise wrong_option("--case", "conflict", "cannot be given with --all", case, allowed="--case or --all")
     given = {"load": load, "angle": angle, "torque": torque, "within": within, "revolutions": revolutions}
     with naming_options(study, "has no transients"):
         course = course_of(study, case, kind, given)
+    if every:
+        _write_all(study, course, file, as_json=is_json(file, as_json) if form is None else form is ValueFormat.JSON)
+        return
     with output(file) as write:
         made = run_transient(study, case, course, points)
         written = is_json(file, as_json) if form is None else form is ValueFormat.JSON
@@ -77,8 +87,31 @@ def transient(
     _report(made, case)
     if as_json and to_file(file):
         write_json({"file": file, "case": case, "outcome": made.outcome, "cause": made.cause})
-    if made.outcome != ("stopped" if course.kind == "coasting" else "reached"):
+    if made.outcome != completed(course):
         raise typer.Exit(ExitCode.NOT_ALL_OK)
+
+
+def _write_all(study: Study, course: Course, file: str | None, *, as_json: bool) -> None:
+    """Write a row for each case; a line of JSON each, or CSV with a line of headings."""
+    from sprag.service.results.exports.text import csv_lines
+    from sprag.service.results.transients import case_rows, row_headings
+
+    ends: Counter[str] = Counter()
+    with output(file) as write:
+        if not as_json:
+            write(csv_lines([row_headings(study)]))
+        for row in case_rows(study, course):
+            ends[str(row["outcome"])] += 1
+            cells = ["" if value is None else value for value in row.values()]
+            write(to_bytes(row) + b"\n" if as_json else csv_lines([cells]))
+    say(f"{study.cases} cases: " + ", ".join(f"{count} {outcome}" for outcome, count in ends.most_common()))
+    if set(ends) - {completed(course)}:
+        raise typer.Exit(ExitCode.NOT_ALL_OK)
+
+
+def completed(course: Course) -> str:
+    """The outcome of a transient that comes to its end."""
+    return "stopped" if course.kind == "coasting" else "reached"
 
 
 def _report(made: Transient, case: int) -> None:

@@ -1,4 +1,4 @@
-"""Transients of one case: what is asked for, the document, and the table as CSV."""
+"""Transients of one case: what is asked for, the document, the table as CSV; a row of results for each of many."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from sprag.service.json_text import to_bytes
 from sprag.service.results.trajectories import timed_values, trajectory_csv
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
+from sprag.worker.limits import MIN_TRAJECTORY_POINTS
 from sprag.worker.models.transients import KINDS, RESULTS, Course, has_motor, has_transients, run_transient
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from sprag.service.answers.transients import Transient as TransientData
     from sprag.service.formats import Format
@@ -95,6 +96,19 @@ def transient_file(study: Study, case: int, course: Course, points: int, form: F
     """Compute the transient and write the file. For the computing process."""
     made = run_transient(study, case, course, points)
     return trajectory_csv(made.motion) if form == "csv" else to_bytes(transient_json(made, study, case, course))
+
+
+def row_headings(study: Study) -> list[str]:
+    """The names of the values of ``case_rows``."""
+    return ["case", *study.columns([0]), "outcome", *(name for name, *_ in RESULTS)]
+
+
+def case_rows(study: Study, course: Course) -> Iterator[dict[str, str | float | None]]:
+    """For each case its number, the values of the axes, the outcome of the transient, and its results, in SI units."""
+    for case in range(study.cases):
+        made = run_transient(study, case, course, MIN_TRAJECTORY_POINTS)
+        results = {name: value if math.isfinite(value) else None for name, value in made.results.items()}
+        yield {"case": case, **study.case_parameters(case), "outcome": made.outcome, **results}
 
 
 def transient_json(made: Transient, study: Study, case: int, course: Course) -> TransientData:

@@ -78,7 +78,7 @@ def csv_pieces(source: Source) -> Iterator[bytes]:
     """Header ``case, axis paths, derived paths, ending, flags, result names``; empty cells for missing values."""
     study = source.study
     paths = study.column_paths
-    yield _csv_lines([["case", *paths, "ending", "flags", *(info.name for info in source.infos)]])
+    yield csv_lines([["case", *paths, "ending", "flags", *(info.name for info in source.infos)]])
     for block in source.blocks:
         columns = value_columns(study, block.cases).values()
         parameters = zip(*columns, strict=True) if paths else iter(lambda: (), None)
@@ -86,13 +86,13 @@ def csv_pieces(source: Source) -> Iterator[bytes]:
             [row.case, *map(_cell, values), row.ending, ";".join(row.flags), *map(_cell, row.results.values())]
             for row, values in zip(block.rows(), parameters, strict=False)
         )
-        yield _csv_lines(lines)
+        yield csv_lines(lines)
 
 
 def table_csv(header: Iterable[str], columns: Iterable[Iterable[object]]) -> bytes:
     """A small table given by its columns, as CSV with the same cells as `csv_pieces`."""
     rows = ([_cell(value) for value in row] for row in zip(*columns, strict=True))
-    return _csv_lines(_with_header(list(header), rows))
+    return csv_lines(_with_header(list(header), rows))
 
 
 def _with_header(header: list[str], rows: Iterable[list[Any]]) -> Iterator[list[Any]]:
@@ -111,7 +111,8 @@ def escape(text: str) -> str:
     return "'" + text if text.startswith(_FORMULA_STARTS) else text
 
 
-def _csv_lines(rows: Iterable[Iterable[object]]) -> bytes:
+def csv_lines(rows: Iterable[Iterable[object]]) -> bytes:
+    """The rows as lines of CSV."""
     buffer = io.StringIO()
     csv.writer(buffer, lineterminator="\n").writerows(rows)
     return buffer.getvalue().encode("utf-8")

@@ -61,3 +61,27 @@ def test_points_and_tables_of_files(sprag: Sprag, examples: Path, tmp_path: Path
     wrong = sprag(*words, "--file", f"nowhere={tmp_path / 'cut.csv'}")
     assert wrong.code == 2
     assert "nowhere" in wrong.err
+
+
+def test_a_row_for_each_case_of_a_study(sprag: Sprag, tmp_path: Path) -> None:
+    """A constant torque runs up an unloaded inertia: t = I omega/M, and a smaller motor torque than the load stalls."""
+    base = {"mean_speed": "10 rad/s", "drive": {"inertia": 1}, "operation": {"quantity": "torque", "value": "5 N*m"}}
+    axes = [{"path": "drive.inertia", "values": [2, 4, 8]}]
+    spec = tmp_path / "spec.json"
+    spec.write_text(json.dumps({"sprag": 1, "model": "machine-shaft", "base": base, "axes": axes}), encoding="utf-8")
+    words = ("transient", spec, "--kind", "run-up", "--load", 0, "--torque", "20 N*m", "--all")
+    done = sprag(*words)
+    assert done.code == 0
+    assert done.err.splitlines()[-1] == "3 cases: 3 reached"
+    rows = list(csv.DictReader(done.out.splitlines()))
+    assert [float(row["drive.inertia"]) for row in rows] == [2.0, 4.0, 8.0]
+    assert [float(row["time"]) for row in rows] == pytest.approx([1.0, 2.0, 4.0], rel=1e-12)
+    lines = [json.loads(line) for line in sprag(*words, "--format", "json").out.splitlines()]
+    assert [line["time"] for line in lines] == [float(row["time"]) for row in rows]
+    stalled = sprag("transient", spec, "--kind", "run-up", "--torque", "2 N*m", "--all")
+    assert stalled.code == 1
+    assert stalled.err.splitlines()[-1] == "3 cases: 3 not_started"
+    assert {row["time"] for row in csv.DictReader(stalled.out.splitlines())} == {""}
+    both = sprag(*words, "--case", 1)
+    assert both.code == 2
+    assert "--all" in both.err
