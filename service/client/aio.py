@@ -22,6 +22,7 @@ from sprag.service.client.queries import (
     answers_query,
     case_query,
     curve_query,
+    explore_query,
     extension,
     finish_text,
     form_of,
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from sprag.service.answers.calibration import CalibrationReport
+    from sprag.service.answers.explore import Exploration
     from sprag.service.answers.goals import FrontReport
     from sprag.service.answers.key import AnswerReport
     from sprag.service.answers.results import Case
@@ -238,6 +240,21 @@ class AsyncStudy(AsyncCaseAnswers):
     ) -> AnswerReport:
         """What one asks of a study first, as `Study.answers` gives it."""
         return cast("AnswerReport", await self._get("/answers", answers_query(point, x, by, at, of)))
+
+    async def explore(
+        self,
+        where: str | Sequence[str] = (),
+        *,
+        sort: str | None = None,
+        limit: int | None = None,
+        show: str | Sequence[str] = (),
+        ending: str | None = None,
+        regime: str | None = None,
+        flag: str | None = None,
+    ) -> Exploration:
+        """A selection of cases by ranges and kinds, as `Study.explore` gives it."""
+        query = explore_query(where, sort, limit, show, ending, regime, flag)
+        return cast("Exploration", await self._get("/explore", query))
 
     async def map(
         self, x: str, y: str, z: str, *, at: Mapping[str, Value] | None = None, number: int | None = None

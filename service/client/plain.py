@@ -22,6 +22,7 @@ from sprag.service.client.wire import (
     case_path,
     connection_options,
     document,
+    explore_path,
     front_path,
     is_event,
     reason,
@@ -131,6 +132,14 @@ class ServiceClient:
     def answers_file(self, study_id: str, query: Query) -> Iterator[bytes]:
         """The same as a file, by the query's ``format``."""
         return self.download(answers_path(study_id), query)
+
+    def explore(self, study_id: str, query: Query = ()) -> dict[str, Any]:
+        """A selection of cases by ranges and kinds, with histograms."""
+        return self._json("GET", explore_path(study_id), params=list(query))
+
+    def explore_file(self, study_id: str, query: Query) -> Iterator[bytes]:
+        """The same as a file, by the query's ``format``."""
+        return self.download(explore_path(study_id), query)
 
     def front(self, study_id: str, query: Query = ()) -> dict[str, Any]:
         """The designs of a study with a goal."""

@@ -79,6 +79,20 @@ def answers_query(
     return [*curve_query(x, (), by, at, of=of), *given({"point": point})]
 
 
+def explore_query(
+    where: str | Sequence[str],
+    sort: str | None,
+    limit: int | None,
+    show: str | Sequence[str],
+    ending: str | None,
+    regime: str | None,
+    flag: str | None,
+) -> list[tuple[str, str]]:
+    """Query of a selection of cases; None leaves a parameter to the service."""
+    query = [*(("where", text) for text in _listed(where)), *(("show", name) for name in _listed(show))]
+    return [*query, *case_query(ending, regime, flag), *given({"sort": sort, "limit": limit})]
+
+
 def ribbon_query(
     x: str | None,
     y: str | Sequence[str],

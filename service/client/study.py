@@ -17,6 +17,7 @@ from sprag.service.client.queries import (
     answers_query,
     case_query,
     curve_query,
+    explore_query,
     extension,
     finish_text,
     form_of,
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from sprag.service.answers.calibration import CalibrationReport
+    from sprag.service.answers.explore import Exploration
     from sprag.service.answers.goals import FrontReport
     from sprag.service.answers.key import AnswerReport
     from sprag.service.answers.results import Case
@@ -179,6 +181,34 @@ class Study(CaseAnswers):
             Other curves than those that the page of the study shows first, as for `curves`.
         """
         return cast("AnswerReport", self._client.plain.answers(self.id, answers_query(point, x, by, at, of)))
+
+    def explore(
+        self,
+        where: str | Sequence[str] = (),
+        *,
+        sort: str | None = None,
+        limit: int | None = None,
+        show: str | Sequence[str] = (),
+        ending: str | None = None,
+        regime: str | None = None,
+        flag: str | None = None,
+    ) -> Exploration:
+        """The cases of which all ranges ``where`` hold, such as "shaft.load <= 2 N*m", the first ``limit`` in order.
+
+        Parameters
+        ----------
+        where : str or sequence of str
+        sort : str, optional
+            A parameter or a result, with "-" before it from the largest down.
+        limit : int, optional
+            Most cases, by default 50.
+        show : str or sequence of str
+            Quantities of histograms and rows, by default the parameters that vary and the model's own results.
+        ending, regime, flag : str, optional
+            Only cases of one kind.
+        """
+        query = explore_query(where, sort, limit, show, ending, regime, flag)
+        return cast("Exploration", self._client.plain.explore(self.id, query))
 
     def map(
         self, x: str, y: str, z: str, *, at: Mapping[str, Value] | None = None, number: int | None = None

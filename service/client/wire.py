@@ -101,6 +101,11 @@ def answers_path(study_id: str) -> str:
     return f"{study_path(study_id)}/answers"
 
 
+def explore_path(study_id: str) -> str:
+    """Address of the selection of cases of a study."""
+    return f"{study_path(study_id)}/explore"
+
+
 def case_path(study_id: str, case: int, part: str) -> str:
     """Address of a case under the API, or of a part of it, such as "/branch"."""
     return f"{study_path(study_id)}/cases/{case:d}{part}"

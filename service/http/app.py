@@ -29,6 +29,7 @@ from sprag.service.http.api import (
     clutch_fits,
     curves,
     events,
+    explore,
     fronts,
     health,
     key_answers,
@@ -63,6 +64,7 @@ from sprag.service.http.web import (
 )
 from sprag.service.http.web import diagram as diagram_pages
 from sprag.service.http.web import engagements as engagement_pages
+from sprag.service.http.web import explore as explore_pages
 from sprag.service.http.web import schedules as schedule_pages
 from sprag.service.http.web import transient as transient_pages
 from sprag.service.http.web.form import page as form
@@ -227,6 +229,7 @@ def _routes() -> APIRouter:
         batches,
         calibrations,
         fronts,
+        explore,
         key_answers,
         cases,
         case_branches,
@@ -245,6 +248,7 @@ def _routes() -> APIRouter:
         form,
         study,
         front,
+        explore_pages,
         calibration,
         calibrate,
         drives,

@@ -11,6 +11,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from sprag.service.jobs.calibrations import Calibrations
+from sprag.service.jobs.explore import Columns
 from sprag.service.jobs.fronts import Fronts
 from sprag.service.jobs.preview import preview_json
 from sprag.service.jobs.start_from import with_start
@@ -57,6 +58,7 @@ class Library:
     def __init__(self, store: Store) -> None:
         self.store = store
         self.fronts = Fronts(store)
+        self.columns = Columns(store)
         self.calibrations = Calibrations(store)
 
     def __reduce__(self) -> tuple[Callable[[str, Chunking], Library], tuple[str, Chunking]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Self
 
 from sprag.service.storage import maintenance
+from sprag.service.storage.columns import WholeColumns
 from sprag.service.storage.figures import Totals
 from sprag.service.storage.part import SystemClock
 from sprag.service.storage.purging import Purging
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from sprag.worker.ports import Clock
 
 
-class Store(Rounds, Purging, Retries, Room, Schedules, Sessions, Tokens, Totals):
+class Store(Rounds, WholeColumns, Purging, Retries, Room, Schedules, Sessions, Tokens, Totals):
     """One database. Safe to use from several threads; close it at the end (it is a context manager)."""
 
     @classmethod

@@ -85,7 +85,7 @@ def study_frame(context: Context, study_id: str) -> dict[str, Any]:
         "study": shown,
         "live": not StudyState(shown["state"]).terminal,
         "verbs": {verb: VERBS[verb] for verb in _verbs(StudyState(shown["state"]), record.ok < record.done)},
-        "tabs": [*tabs, ("/cases", "Cases")],
+        "tabs": [*tabs, ("/explore", "Explore"), ("/cases", "Cases")],
         "endings": models.ENDING_SENTENCES,
         "formats": list(formats.MEDIA_TYPES),
         "now": timestamp(datetime.now(UTC)),

@@ -8,6 +8,7 @@ from sprag.service.http.web.figures.maps import map_figure
 from sprag.service.http.web.figures.plotly import Data, plotly_figure
 from sprag.service.jobs.answers import curves_drawn, map_of
 from sprag.service.jobs.batch_answers import ribbon_of, yield_of
+from sprag.service.jobs.explore import explored
 from sprag.service.jobs.key_answers import answers_of
 from sprag.service.json_text import to_bytes
 from sprag.service.results.basins import basin_of, units_of
@@ -15,6 +16,7 @@ from sprag.service.results.figures.answers import answers_figure
 from sprag.service.results.figures.basin import basin_figure
 from sprag.service.results.figures.calibration import calibration_figure
 from sprag.service.results.figures.curves import curves_figure
+from sprag.service.results.figures.explore import explore_figure
 from sprag.service.results.figures.front import front_figure, history_figure
 from sprag.service.results.figures.motion import motion_figure, phase_figure
 from sprag.service.results.figures.portrait import portrait_figure
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from sprag.service.jobs.checks import Library
     from sprag.service.results.basins import BasinQuery
     from sprag.service.results.curves import CurveQuery
+    from sprag.service.results.explore import ExploreQuery
     from sprag.worker.study import Study
 
 #: Times at which a motion is sampled for a picture.
@@ -49,6 +52,11 @@ def answers_json(
     names = [curve_name(one, library.store.study(study_id)) for one in found.curves]
     chosen = names.index(curve) if curve in names else None
     return to_bytes(plotly_figure(answers_figure(found, columns, chosen=chosen)))
+
+
+def explore_json(library: Library, study_id: str, query: ExploreQuery, x: str, y: str) -> bytes:
+    """The figure of two quantities of all cases, as JSON text."""
+    return to_bytes(plotly_figure(explore_figure(explored(library, study_id, query), x, y)))
 
 
 def map_json(library: Library, study_id: str, query: CurveQuery, contours: bool) -> bytes:

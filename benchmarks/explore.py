@@ -1,0 +1,66 @@
+"""Time of a question about all cases of a large study: the first, which reads the columns, and the next ones.
+
+python -m benchmarks.explore [--cases 1000000]
+
+Rows are random numbers in a database of its own. Times are also given relative to sorting one column with numpy.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from benchmarks.reading import build, grid
+from sprag.service.jobs.explore import Columns
+from sprag.service.json_text import to_bytes
+from sprag.service.results.explore import ExploreQuery, explore, explored_json, plan_of
+from sprag.service.results.figures.explore import explore_figure
+from sprag.service.storage.store import Store
+
+
+def timed(what: str, work: Callable[[], object], unit: float | None = None) -> float:
+    """Print and give the time of some work."""
+    began = perf_counter()
+    work()
+    seconds = perf_counter() - began
+    print(f"{what:<48} {seconds:8.3f} s" + ("" if unit is None else f"  {seconds / unit:8.1f} x"))
+    return seconds
+
+
+def main() -> None:
+    """Fill a database, ask, and print the times."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", type=int, default=1_000_000)
+    cases: int = parser.parse_args().cases
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "explore.sqlite3"
+        study_id, _ = build(path, grid(cases))
+        with Store.open(f"sqlite:///{path}") as store:
+            study, columns = store.study(study_id), Columns(store)
+            where = ("shaft.load <= 0.3 N*m", "efficiency >= 0.2", "shaft.speed.mean >= 0")
+            queries = {
+                "the first question (reads its columns)": ExploreQuery(where, sort="-efficiency", limit=50),
+                "the same again": ExploreQuery(where, sort="-efficiency", limit=50),
+                "other ranges, other order": ExploreQuery(where[:1], sort="torque.mean", limit=500),
+                "all rows, one more column": ExploreQuery(sort="-shaft.irregularity", limit=50),
+                "all rows by a column that is there": ExploreQuery(sort="-torque.mean", limit=50),
+            }
+            unit = timed("numpy sorts one column", lambda: np.sort(np.random.default_rng(1).normal(size=cases)))
+
+            def ask(query: ExploreQuery) -> None:
+                plan = plan_of(study, query)
+                found = explore(study, plan, columns.of(study_id, plan.results))
+                to_bytes(explored_json(study_id, found))
+                explore_figure(found)
+
+            for what, query in queries.items():
+                timed(what, lambda query=query: ask(query), unit)  # type: ignore[misc]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,160 @@
+"""All cases of a study on one page: ranges and kinds, histograms, two quantities as points, the first rows in order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+from urllib.parse import urlencode
+
+from fastapi import APIRouter
+from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import QueryParams
+from starlette.responses import Response
+
+from sprag.service.http import views
+from sprag.service.http.context import Context, StudyId
+from sprag.service.http.drawing import Drawing, conditional
+from sprag.service.http.respond import JSON
+from sprag.service.http.web.figures import answers as figures
+from sprag.service.http.web.study import study_frame
+from sprag.service.http.web.templates import page
+from sprag.service.http.work import Attended
+from sprag.service.jobs.answers import FEW
+from sprag.service.jobs.explore import explored
+from sprag.service.results.explore import MOST_ROWS, ROWS, ExploreQuery, explored_json, quantities
+from sprag.service.results.figures.explore import chosen_pair
+from sprag.service.results.selection import SelectionError, refused
+from sprag.service.spec.numbers import parse_number
+from sprag.worker import models
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sprag.service.answers.explore import Exploration, Histogram
+    from sprag.service.faults import Fault
+    from sprag.service.jobs.checks import Library
+    from sprag.service.storage.records import StudyRecord
+
+router = APIRouter(include_in_schema=False)
+
+_SIGNS: Final = {"min:": ">=", "max:": "<="}
+#: Most rows on a page; files have more.
+_MOST_ON_PAGE: Final = 500
+#: Size of a drawn histogram.
+WIDTH: Final = 192
+HEIGHT: Final = 48
+
+
+@dataclass(frozen=True, slots=True)
+class ExploreView:
+    """What the page shows: the answer of the API for the choices of the address, and these."""
+
+    query: ExploreQuery
+    found: Exploration
+    axes: tuple[str, str]
+    faults: tuple[Fault, ...] = ()
+    typed: dict[str, str] = field(default_factory=dict)
+
+
+def read_choice(given: QueryParams) -> ExploreQuery:
+    """The question in the address of the page; raises SelectionError about ``limit``."""
+    where = [text for text in given.getlist("where") if text.strip()]
+    where += [f"{key[4:]} {_SIGNS[key[:4]]} {value.strip()}" for key, value in _ranges(given)]
+    text = given.get("limit", "").strip() or str(ROWS)
+    limit = parse_number(text)
+    if limit is None or limit != int(limit) or not 1 <= limit <= _MOST_ON_PAGE:
+        raise refused("limit", "out-of-range", "is not a number of rows", text, allowed=f"1 to {_MOST_ON_PAGE}")
+    ending, regime, flag = (given.get(name, "") for name in ("ending", "regime", "flag"))
+    show = tuple(name for name in given.getlist("show") if name)
+    return ExploreQuery(tuple(where), ending, regime, flag, given.get("sort") or "case", int(limit), show)
+
+
+def _ranges(given: QueryParams) -> list[tuple[str, str]]:
+    return [(key, value) for key, value in given.multi_items() if key[:4] in _SIGNS and value.strip()]
+
+
+def explore_view(library: Library, study_id: str, given: Sequence[tuple[str, str]]) -> ExploreView:
+    """The page of a study; where its address asks for what there is not, all cases, with what is wrong."""
+    params = QueryParams(list(given))
+    faults: tuple[Fault, ...] = ()
+    try:
+        query = read_choice(params)
+        found = explored(library, study_id, query)
+        axes = chosen_pair(found, params.get("x", ""), params.get("y", ""))
+    except SelectionError as error:
+        faults, query = error.faults, ExploreQuery()
+        found = explored(library, study_id, query)
+        axes = chosen_pair(found, "", "")
+    typed = dict(_ranges(params))
+    return ExploreView(query, explored_json(study_id, found), axes, faults, typed)
+
+
+@router.get("/studies/{study_id:study}/explore")
+async def explore_page(work: Attended, study_id: StudyId) -> Response:
+    """Cases within ranges; every choice is in the address."""
+    context, given = work.context, work.request.query_params.multi_items()
+    many = await run_in_threadpool(_many, context, study_id)
+    asked = (context.library, study_id, given)
+    view = await (work.check(explore_view, *asked) if many else run_in_threadpool(explore_view, *asked))
+    return await run_in_threadpool(_page, context, study_id, view, given)
+
+
+def _many(context: Context, study_id: str) -> bool:
+    """Whether reading all rows takes so long that another process does it."""
+    return context.store.study(study_id).cases > FEW
+
+
+def _page(context: Context, study_id: str, view: ExploreView, given: Sequence[tuple[str, str]]) -> Response:
+    study = context.store.study(study_id)
+    infos, query = models.study_results(study), view.query
+    kept = [(key, value) for key, value in given if value.strip() and key not in {"sort", "x", "y"}]
+    asked: list[tuple[str, str]] = [("where", text) for text in query.where]
+    asked += [("show", item["name"]) for item in view.found["quantities"]]
+    kinds = {"ending": query.ending, "regime": query.regime, "flag": query.flag}
+    asked += [(key, value) for key, value in kinds.items() if value]
+    asked.append(("sort", query.sort))
+    drawn = urlencode([*asked, ("limit", str(query.limit)), ("x", view.axes[0]), ("y", view.axes[1])])
+    return page(
+        "explore.html",
+        status=422 if view.faults else 200,
+        **study_frame(context, study_id),
+        tab="/explore",
+        view=view,
+        query=query,
+        faults=view.faults,
+        found=view.found,
+        bars={item["name"]: bars(item["histogram"]) for item in view.found["quantities"] if item["histogram"]},
+        width=WIDTH,
+        height=HEIGHT,
+        units=quantities(study),
+        paths=set(study.column_paths),
+        regimes=[] if (regime := models.regime_info(infos)) is None else regime.categories,
+        flags=models.flags_of(study.model),
+        most=_MOST_ON_PAGE,
+        figure=f"/studies/{study_id}/figures/explore?{drawn}",
+        picture=f"{views.study_address(study_id)}/explore?{drawn}&format=svg",
+        files=f"{views.study_address(study_id)}/explore?{urlencode([*asked, ('limit', str(MOST_ROWS))])}",
+        address=lambda sort: f"/studies/{study_id}/explore?{urlencode([*kept, ('sort', sort)])}",
+    )
+
+
+def bars(histogram: Histogram) -> list[tuple[float, float, float]]:
+    """Of each interval its left end, and the heights (px) of all cases and of the selected ones."""
+    most, wide = max(histogram["all"]) or 1, WIDTH / len(histogram["all"])
+    return [
+        (wide * place, HEIGHT * every / most, HEIGHT * own / most)
+        for place, (every, own) in enumerate(zip(histogram["all"], histogram["selected"], strict=True))
+    ]
+
+
+@router.get("/studies/{study_id:study}/figures/explore")
+async def explore_figure(work: Attended, study_id: StudyId) -> Response:
+    """The figure of two quantities."""
+    given = work.request.query_params
+
+    def make(_record: StudyRecord) -> Response | Drawing:
+        query, pair = read_choice(given), (given.get("x", ""), given.get("y", ""))
+        drawing = Drawing(figures.explore_json, (work.context.library, study_id, query, *pair), JSON)
+        return drawing if _many(work.context, study_id) else drawing.here()
+
+    return await conditional(work, study_id, "figure", make)

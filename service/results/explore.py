@@ -1,0 +1,272 @@
+"""All cases of a study at once: chosen by ranges of inputs and results and by kind, sorted, counted in histograms."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sprag.service.answers.explore import Exploration, ExploredCase, Histogram
+from sprag.service.results import exports
+from sprag.service.results.directions import case_values
+from sprag.service.results.selection import listed, own_paths, refused, value_of
+from sprag.service.spec.catalogue import result_of, unit_of
+from sprag.service.spec.report import did_you_mean
+from sprag.service.spec.units import plain_signs
+from sprag.worker import models
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from sprag.service.storage.columns import RowColumns
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.study import Study
+
+#: What a range may look like.
+EXAMPLES: Final = "for instance shaft.load <= 2 N*m or efficiency >= 0.5"
+#: Most ranges, quantities and rows of one question.
+MOST_RANGES, MOST_SHOWN, MOST_ROWS = 40, 12, 100_000
+ROWS: Final = 50
+BINS: Final = 24
+
+_FORM: Final = re.compile(r"\s*([A-Za-z][\w.]*)\s*(>=|<=|≥|≤)\s*(.+?)\s*")
+
+
+@dataclass(frozen=True, slots=True)
+class ExploreQuery:
+    """Which cases: ``where`` are texts such as ``shaft.load <= 2 N*m``, all of which must hold.
+
+    ``ending``, ``regime`` and ``flag`` keep one kind, "" any. Rows are ordered by ``sort``, a parameter, a result or
+    "case", with "-" before it from the largest down; cases without the number come last. ``show`` are the quantities of
+    histograms and rows, by default the axes and the model's own columns.
+    """
+
+    where: tuple[str, ...] = ()
+    ending: str = ""
+    regime: str = ""
+    flag: str = ""
+    sort: str = "case"
+    limit: int = ROWS
+    show: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """One condition: a limit (SI) from below or above."""
+
+    name: str
+    at_least: bool
+    limit: float
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A question whose names and values have been checked; ``results`` are those that it needs."""
+
+    query: ExploreQuery
+    ranges: tuple[Range, ...]
+    shown: tuple[str, ...]
+    sort: str
+    descending: bool
+    regime: ResultInfo | None
+    results: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Explored:
+    """The cases that a question selects.
+
+    Attributes
+    ----------
+    known : number of finished cases
+    selected : bool array, shape (known,)
+    order : int64 array
+        Places of the first rows in their order, at most as many as asked for.
+    values : columns of the shown quantities over all finished cases
+    """
+
+    study: Study
+    plan: Plan
+    rows: RowColumns
+    known: int
+    selected: NDArray[np.bool_]
+    order: NDArray[np.int64]
+    values: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+
+    @property
+    def count(self) -> int:
+        """Number of selected cases."""
+        return int(np.count_nonzero(self.selected))
+
+
+def plan_of(study: Study, query: ExploreQuery) -> Plan:
+    """Check a question; raises SelectionError for unknown names, categories and values that cannot be read."""
+    infos = models.study_results(study)
+    regime = models.regime_info(infos)
+    if len(query.where) > MOST_RANGES:
+        raise refused("where", "too-many", f"{len(query.where)} ranges are given", allowed=f"at most {MOST_RANGES}")
+    if len(query.show) > MOST_SHOWN:
+        raise refused("show", "too-many", f"{len(query.show)} quantities are given", allowed=f"at most {MOST_SHOWN}")
+    ranges = tuple(_range(study, infos, text) for text in query.where)
+    if query.regime and (regime is None or query.regime not in regime.categories):
+        allowed = "no regime: this study has none" if regime is None else listed(regime.categories)
+        raise refused("regime", "invalid-choice", "is not a regime", query.regime, allowed=allowed)
+    _kind("ending", query.ending, models.endings_of(study.model))
+    _kind("flag", query.flag, models.flags_of(study.model))
+    descending, sort = query.sort.startswith("-"), query.sort.removeprefix("-") or "case"
+    if sort != "case":
+        _require(study, infos, "sort", sort)
+    shown = tuple(dict.fromkeys(query.show)) or usual_quantities(study, infos)
+    for name in shown:
+        _require(study, infos, "show", name)
+    named = dict.fromkeys([*shown, *(one.name for one in ranges), sort])
+    needed = [name for name in named if result_of(infos, name)]
+    needed += [regime.name] if regime is not None and regime.name not in needed else []
+    return Plan(query, ranges, shown, sort, descending, regime, tuple(needed))
+
+
+def usual_quantities(study: Study, infos: Sequence[ResultInfo]) -> tuple[str, ...]:
+    """The quantities that are shown first: the parameters that vary, and numeric results of the model's table."""
+    columns = [name for name in models.presentation_of(study).columns if _numeric(infos, name)]
+    results = columns or [info.name for info in infos if info.kind != "category"][:5]
+    return (*own_paths(study), *results)[:MOST_SHOWN]
+
+
+def quantities(study: Study) -> dict[str, str]:
+    """Units of everything that ranges, order and histograms can be about, by name."""
+    infos = models.study_results(study)
+    units = {path: unit_of(study, path) for path in own_paths(study)}
+    return units | {info.name: info.unit for info in infos if info.kind != "category"}
+
+
+def explore(study: Study, plan: Plan, rows: RowColumns) -> Explored:
+    """The cases that a checked question selects, of a study whose finished cases have these ``rows``."""
+    known = len(rows.cases)
+    parameters = study.columns(rows.cases) if known else {}
+    every = {**rows.values, **parameters}
+    empty = np.empty(0)
+    selected = np.ones(known, dtype=np.bool_)
+    for one in plan.ranges:
+        values = every.get(one.name, empty)
+        selected &= values >= one.limit if one.at_least else values <= one.limit
+    query = plan.query
+    kept = [
+        (not query.ending or ending == query.ending) and (not query.flag or query.flag in flags.split(","))
+        for ending, flags in rows.kinds
+    ]
+    if not all(kept):
+        selected &= np.array(kept, dtype=np.bool_)[rows.kind]
+    if query.regime and plan.regime is not None:
+        selected &= rows.values[plan.regime.name] == plan.regime.categories.index(query.regime)
+    places = np.flatnonzero(selected).astype(np.int64)
+    keys = rows.cases.astype(np.float64) if plan.sort == "case" else every.get(plan.sort, empty)
+    order = _first(places, keys, plan.query.limit, descending=plan.descending)
+    return Explored(study, plan, rows, known, selected, order, {name: every.get(name, empty) for name in plan.shown})
+
+
+def _first(places: NDArray[np.int64], keys: NDArray[np.float64], count: int, *, descending: bool) -> NDArray[np.int64]:
+    """The first ``count`` of ``places`` in the order of their keys; NaN last, equal keys in their own order."""
+    own = keys[places] if places.size else keys[:0]
+    own = np.where(np.isnan(own), np.inf, -own if descending else own)
+    if count < places.size:
+        limit = np.partition(own, count - 1)[count - 1]
+        below = np.flatnonzero(own < limit)
+        near = np.concatenate([below, np.flatnonzero(own == limit)[: count - below.size]])
+    else:
+        near = np.arange(places.size)
+    chosen: NDArray[np.int64] = places[near[np.lexsort((near, own[near]))]]
+    return chosen
+
+
+def _numeric(infos: Sequence[ResultInfo], name: str) -> bool:
+    info = result_of(infos, name)
+    return info is not None and info.kind != "category"
+
+
+def _require(study: Study, infos: Sequence[ResultInfo], parameter: str, name: str) -> None:
+    if name not in study.column_paths and not _numeric(infos, name):
+        names = [*study.column_paths, *(info.name for info in infos if info.kind != "category")]
+        message = "is neither a parameter that varies nor a numeric result" + did_you_mean(name, names)
+        raise refused(parameter, "unknown-name", message, name, allowed=listed(names))
+
+
+def _kind(parameter: str, name: str, known: dict[str, str]) -> None:
+    if name and name not in known:
+        raise refused(parameter, "invalid-choice", f"is not {'an' if parameter == 'ending' else 'a'} {parameter}",
+                      name, allowed=listed(known) or "none")  # fmt: skip
+
+
+def _range(study: Study, infos: Sequence[ResultInfo], text: str) -> Range:
+    parts = _FORM.fullmatch(plain_signs(text))
+    if parts is None:
+        raise refused("where", "invalid-text", "is not a range", text, allowed=f"NAME >= VALUE, {EXAMPLES}")
+    name, sign, value = parts.groups()
+    _require(study, infos, "where", name)
+    info = result_of(infos, name)
+    unit = info.unit if info is not None else unit_of(study, name)
+    return Range(name, sign in (">=", "≥"), value_of(name, value, unit, "where"))
+
+
+def histogram(values: NDArray[np.float64], selected: NDArray[np.bool_], bins: int = BINS) -> Histogram | None:
+    """Numbers of cases in equal intervals of their range; None where no case has a number."""
+    known = np.isfinite(values)
+    if not known.any():
+        return None
+    low, high = float(values[known].min()), float(values[known].max())
+    every, edges = np.histogram(values[known], bins=bins, range=(low, high) if high > low else None)
+    own, _ = np.histogram(values[known & selected], bins=edges)
+    return {"edges": edges.tolist(), "all": every.tolist(), "selected": own.tolist()}
+
+
+def explored_json(study_id: str, found: Explored) -> Exploration:
+    """The answer of the API."""
+    study, units = found.study, quantities(found.study)
+    return {
+        "study": study_id,
+        "known": found.known,
+        "selected": found.count,
+        "quantities": [
+            {"name": name, "unit": units.get(name, "1"), "histogram": histogram(found.values[name], found.selected)}
+            for name in found.plan.shown
+        ],
+        "cases": list(explored_rows(study, found)),
+    }
+
+
+def explored_rows(study: Study, found: Explored) -> Iterator[ExploredCase]:
+    """The first rows in their order."""
+    paths = set(study.column_paths)
+    results = [name for name in found.plan.shown if name not in paths]
+    regime = found.plan.regime
+    for place in found.order.tolist():
+        case = int(found.rows.cases[place])
+        ending, flags = found.rows.kinds[found.rows.kind[place]]
+        own = None if regime is None else regime.cell(float(found.rows.values[regime.name][place]))
+        values = {name: float(found.values[name][place]) for name in results}
+        yield {
+            "case": case,
+            "ending": ending,
+            "flags": [name for name in flags.split(",") if name],
+            "regime": None if own is None else str(own),
+            "parameters": case_values(study, case),
+            "results": {name: value if np.isfinite(value) else None for name, value in values.items()},
+        }
+
+
+def explored_csv(study: Study, found: Explored) -> bytes:
+    """The first rows in their order as a table, SI."""
+    rows = list(explored_rows(study, found))
+    names = ("case", "ending", "regime") if found.plan.regime is not None else ("case", "ending")
+    columns = {name: [row[name] for row in rows] for name in names}  # type: ignore[literal-required]
+    columns["flags"] = [" ".join(row["flags"]) for row in rows]
+    for path in own_paths(study):
+        columns[path] = [row["parameters"][path] for row in rows]
+    for name in found.plan.shown:
+        if name not in study.column_paths:
+            columns[name] = [row["results"][name] for row in rows]
+    return exports.table_csv(list(columns), list(columns.values()))

@@ -1,0 +1,152 @@
+"""Selections, order and histograms of all cases, against what pandas finds in the same rows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sprag.service.results.explore import ExploreQuery, explore, histogram, plan_of
+from sprag.service.results.figures.explore import explore_figure
+from sprag.service.results.selection import SelectionError
+from sprag.service.spec.document import parse_spec
+from sprag.service.storage.columns import RowColumns
+from sprag.worker import models
+
+if TYPE_CHECKING:
+    from sprag.service.results.explore import Explored
+    from sprag.worker.study import Study
+
+AXES = [
+    {"path": "shaft.load", "linspace": [0.0, 1.0, 11]},
+    {"path": "excitation.frequency", "linspace": ["20 Hz", "30 Hz", 21]},
+]
+KINDS = (("ok", ""), ("ok", "windup_out_of_data"), ("chatter", ""))
+
+
+@pytest.fixture
+def study(spec: dict[str, Any]) -> Study:
+    """Eleven loads at 21 frequencies."""
+    return parse_spec({**spec, "axes": AXES, "run": {"until": "settled"}}).study
+
+
+@pytest.fixture
+def rows(study: Study) -> RowColumns:
+    """Rows with equal values, gaps and every kind."""
+    random = np.random.default_rng(3)
+    cases = np.flatnonzero(random.random(study.cases) < 0.9).astype(np.int64)
+    kind = random.integers(0, 3, cases.size).astype(np.int32)
+    efficiency = np.round(random.random(cases.size), 2)
+    efficiency[kind == 2] = np.nan
+    regime = np.where(kind == 2, np.nan, random.integers(0, 2, cases.size))
+    return RowColumns(cases, KINDS, kind, {"efficiency": efficiency, "regime": regime})
+
+
+def frame(study: Study, rows: RowColumns) -> pd.DataFrame:
+    kinds = [KINDS[kind] for kind in rows.kind]
+    table = pd.DataFrame({"case": rows.cases, **study.columns(rows.cases), **rows.values})
+    return table.assign(ending=[ending for ending, _ in kinds], flags=[flags for _, flags in kinds])
+
+
+def found(study: Study, rows: RowColumns, *where: str, **query: Any) -> Explored:
+    show = query.pop("show", ("efficiency", "shaft.load"))
+    return explore(study, plan_of(study, ExploreQuery(where, show=show, **query)), rows)
+
+
+def first(explored: Explored) -> list[int]:
+    return explored.rows.cases[explored.order].tolist()
+
+
+@pytest.mark.parametrize("sort", ["efficiency", "-efficiency", "case", "-case", "-excitation.frequency"])
+@pytest.mark.parametrize("limit", [1, 7, 150, 1000])
+def test_the_first_rows_are_those_of_pandas(study: Study, rows: RowColumns, sort: str, limit: int) -> None:
+    shown = found(study, rows, "shaft.load <= 500 N*mm", "efficiency >= 0.25", sort=sort, limit=limit)
+    table = frame(study, rows)
+    chosen = table[(table["shaft.load"] <= 0.5) & (table["efficiency"] >= 0.25)]
+    name, descending = sort.removeprefix("-"), sort.startswith("-")
+    expected = chosen.sort_values(name, ascending=not descending, kind="stable")["case"].tolist()
+    assert (shown.count, first(shown)) == (len(chosen), expected[:limit])
+
+
+def test_cases_without_the_number_come_last(study: Study, rows: RowColumns) -> None:
+    for sort in ("efficiency", "-efficiency"):
+        shown = found(study, rows, sort=sort, limit=1000)
+        own = shown.values["efficiency"][shown.order]
+        missing = int(np.isnan(own).sum())
+        assert missing > 5
+        assert np.isnan(own[-missing:]).all()
+        assert not np.isnan(own[:-missing]).any()
+
+
+def test_kinds_are_kept(study: Study, rows: RowColumns) -> None:
+    table = frame(study, rows)
+    info = models.regime_info(models.study_results(study))
+    assert info is not None
+    for query, kept in (
+        ({"ending": "chatter"}, table["ending"] == "chatter"),
+        ({"flag": "windup_out_of_data"}, table["flags"] == "windup_out_of_data"),
+        ({"regime": info.categories[1]}, table["regime"] == 1.0),
+    ):
+        shown = found(study, rows, limit=1000, **query)
+        assert first(shown) == table["case"][kept].tolist()
+        assert shown.count > 3
+
+
+def test_histograms_count_every_case_once(study: Study, rows: RowColumns) -> None:
+    shown = found(study, rows, "shaft.load >= 0.35")
+    drawn = histogram(shown.values["efficiency"], shown.selected, 10)
+    assert drawn is not None
+    known = rows.values["efficiency"][np.isfinite(rows.values["efficiency"])]
+    counts = pd.cut(known, drawn["edges"], include_lowest=True, right=False).value_counts()
+    assert sum(drawn["all"]) == known.size
+    assert drawn["all"][:-1] == counts.tolist()[:-1]
+    assert sum(drawn["selected"]) == int((shown.selected & np.isfinite(shown.values["efficiency"])).sum())
+    assert histogram(np.full(3, np.nan), np.ones(3, dtype=bool)) is None
+    alone = histogram(np.full(3, 2.0), np.array([True, False, True]))
+    assert alone is not None
+    assert (sum(alone["all"]), sum(alone["selected"])) == (3, 2)
+
+
+def test_points_of_the_picture_are_the_cases(study: Study, rows: RowColumns) -> None:
+    shown = found(study, rows, "efficiency >= 0.5", sort="-efficiency", limit=5)
+    figure = explore_figure(shown, "shaft.load", "efficiency")
+    lines = {line.name: line for line in figure.panels[0].lines}
+    top = lines["first in the table"]
+    assert top.cases is not None
+    assert sorted(top.cases.tolist()) == sorted(first(shown))
+    assert sum(line.x.size for line in lines.values()) == int(np.isfinite(rows.values["efficiency"]).sum())
+    with pytest.raises(SelectionError):
+        explore_figure(shown, "torque.mean", "")
+
+
+@pytest.mark.parametrize(
+    ("query", "parameter", "code"),
+    [
+        (ExploreQuery(where=("shaft.load",)), "where", "invalid-text"),
+        (ExploreQuery(where=("shaft.lod <= 1",)), "where", "unknown-name"),
+        (ExploreQuery(where=("shaft.load <= 1 mm",)), "where", "wrong-unit"),
+        (ExploreQuery(where=("pendulums.0.mass <= 1",)), "where", "unknown-name"),
+        (ExploreQuery(where=("shaft.load <= 1",) * 41), "where", "too-many"),
+        (ExploreQuery(ending="fine"), "ending", "invalid-choice"),
+        (ExploreQuery(regime="calm"), "regime", "invalid-choice"),
+        (ExploreQuery(flag="red"), "flag", "invalid-choice"),
+        (ExploreQuery(sort="-regime"), "sort", "unknown-name"),
+        (ExploreQuery(show=("regime",)), "show", "unknown-name"),
+    ],
+)
+def test_what_is_wrong_is_named(study: Study, query: ExploreQuery, parameter: str, code: str) -> None:
+    with pytest.raises(SelectionError) as caught:
+        plan_of(study, query)
+    (fault,) = caught.value.faults
+    assert (fault.where, fault.code) == (parameter, code)
+    assert fault.allowed or fault.unit
+
+
+def test_a_study_without_rows_has_no_cases(study: Study) -> None:
+    nothing = {"efficiency": np.empty(0), "regime": np.empty(0)}
+    empty = RowColumns(np.empty(0, np.int64), (), np.empty(0, np.int32), nothing)
+    shown = found(study, empty, "efficiency >= 0.5", sort="-efficiency")
+    assert (shown.known, shown.count, first(shown)) == (0, 0, [])
+    assert explore_figure(shown).note
