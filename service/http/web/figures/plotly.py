@@ -51,6 +51,8 @@ BELOW: Final[Data] = {
 }  # fmt: skip
 #: Share of the width between two panels side by side.
 _GAP: Final = 0.1
+#: The same of a motion, whose numbers have more digits and whose legend leaves less room.
+_MOTION_GAP: Final = 0.15
 #: Shares for a scale, and between it and its panel.
 _SCALE: Final = 0.09
 _BAR_GAP: Final = 0.005
@@ -175,7 +177,8 @@ def _x_axis(figure: Figure, index: int, anchor: str) -> Data:
 def _across(figure: Figure, index: int) -> list[float]:
     """Left and right end of a panel; beside panels with a scale there is room for it."""
     scaled = any(line.shades is not None for panel in figure.panels for line in panel.lines)
-    gap, edge = (_GAP + _SCALE, 0.0 if figure.columns > 1 else _SCALE) if scaled else (_GAP, 0.0)
+    plain = _MOTION_GAP if figure.motion else _GAP
+    gap, edge = (plain + _SCALE, 0.0 if figure.columns > 1 else _SCALE) if scaled else (plain, 0.0)
     width = (1.0 - edge - gap * (figure.columns - 1)) / figure.columns
     left = (index % figure.columns) * (width + gap)
     return [left, left + width]

@@ -16,8 +16,10 @@ from sprag.service.http.web.form.page import spec_in_form
 from sprag.service.http.web.laboratory.drive_setting import Setting, machines, setting, title_of, written
 from sprag.service.http.web.laboratory.sliders import position
 from sprag.service.http.web.templates import fragment, page
-from sprag.service.http.work import Attended
+from sprag.service.http.work import Attended, Work
 from sprag.service.results.pictures.curves import draw_figure
+from sprag.service.results.wording import number
+from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -80,7 +82,7 @@ async def drive_laboratory(work: Attended) -> Response:
         held="" if held is None else held.query,
         machines=[(name, title_of(name)) for name in machines()],
         answer=_answer(chosen, held, case),
-        details=_details(chosen, held, case),
+        details=_details(work, chosen, held, case),
         state=_next_state(chosen, case),
         frames=None if case is None else case["frames"],
         looks=models.presentation_of(chosen.study).states,
@@ -108,10 +110,25 @@ def _answer(chosen: Setting, held: Setting | None, case: dict[str, Any] | None) 
     return fragment("_drive_laboratory_answer.html", labels=_MAIN, **_shown(chosen, held, case, (*_MAIN,)))
 
 
-def _details(chosen: Setting, held: Setting | None, case: dict[str, Any] | None) -> str:
-    """The further results, and the studies that can be made of the setting."""
+def _details(work: Work, chosen: Setting, held: Setting | None, case: dict[str, Any] | None) -> str:
+    """The further results, all numbers of the drive, and what can be made of the setting."""
     shown = _shown(chosen, held, case, (*_MAIN, *_FURTHER))
-    return fragment("_drive_laboratory_details.html", **shown, studies=STUDIES, query=_query(chosen, held))
+    return fragment(
+        "_drive_laboratory_details.html",
+        **shown,
+        studies=STUDIES,
+        query=_query(chosen, held),
+        held=held,
+        others=_others(chosen),
+        now=work.context.store.clock.now().isoformat(),
+    )
+
+
+def _others(chosen: Setting) -> list[tuple[str, str, str]]:
+    """Path, text and unit of each number of a drive that has no slider, with those in which it starts."""
+    slid = {slider.path for slider in chosen.sliders}
+    numbers = [(path, value) for path, value in chosen.study.base.items() if path not in slid]
+    return [(path, number(value, 8), unit_of(chosen.study, path)) for path, value in numbers]
 
 
 def _shown(
@@ -159,7 +176,7 @@ async def drive_figure(work: Attended) -> Response:
             "figure": None if case is None else case["figure"],
             "frames": None if case is None else case["frames"],
             "answer": _answer(chosen, held, case),
-            "details": _details(chosen, held, case),
+            "details": _details(work, chosen, held, case),
             "state": _next_state(chosen, case),
             "faults": chosen.faults,
             "query": _query(chosen, held),

@@ -12,8 +12,8 @@ sprag.figures = new Map();
 
 sprag.colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-// Widths of a picture (px) below which its panels stand one under the other, and its legend under them.
-const NARROW = 600, ENTRIES = { legend: 110, legend2: 130 }, LINE = 20, SCALE = 80, LETTER = 7;
+// Widths of a picture (px) below which its panels stand one under the other, and its legend under them, as on paper.
+const NARROW = 600, BESIDE = 700, ENTRIES = { legend: 110, legend2: 130 }, LINE = 20, SCALE = 80, LETTER = 7;
 
 // The title of a legend in lines that fit a width (px), as far as its words allow.
 const titleLines = (figure, name, width) => (figure.layout[name]?.title?.text ?? "").split(" ").reduce((lines, word) => {
@@ -34,7 +34,7 @@ const legendHeight = (figure, name, width) => {
 sprag.fitted = (figure, width) => {
   const layout = figure.layout;
   if (!layout.showlegend && !hasScale(figure)) return layout;
-  const narrow = width < NARROW, second = legendHeight(figure, "legend2", width), first = narrow ? legendHeight(figure, "legend", width) : 0;
+  const narrow = width < BESIDE, second = legendHeight(figure, "legend2", width), first = narrow ? legendHeight(figure, "legend", width) : 0;
   const { t, b } = layout.margin, scale = narrow && hasScale(figure) ? SCALE : 0;
   const bottom = b + scale + (first + second ? first + second + 10 : 0);
   const margin = { ...layout.margin, b: bottom, ...(narrow ? { t: layout.title ? 60 : 20, l: 60 } : {}) };
@@ -47,7 +47,7 @@ sprag.fitted = (figure, width) => {
 };
 
 // The scale of a map stands below a narrow one, above its legend.
-sprag.traces = (figure, width, layout) => width >= NARROW ? figure.data : figure.data.map((trace) => {
+sprag.traces = (figure, width, layout) => width >= BESIDE ? figure.data : figure.data.map((trace) => {
   if (!trace.colorbar) return trace;
   const y = legendHeight(figure, "legend2", width) / layout.height, title = { ...trace.colorbar.title, side: "bottom" };
   return { ...trace, colorbar: { ...trace.colorbar, title, orientation: "h", x: 0.5, y, yref: "container", yanchor: "bottom" } };
@@ -96,7 +96,10 @@ sprag.show = async (element, figure) => {
     below.hidden = !figure.below;
   }
   const first = !sprag.figures.has(element);
-  if (first) element.replaceChildren();
+  if (first) {
+    element.replaceChildren();
+    element.setAttribute("role", "group"); // no longer an image: it has buttons
+  }
   sprag.figures.set(element, figure);
   const width = element.clientWidth, layout = sprag.themed(figure, width);
   await Plotly.react(element, sprag.traces(figure, width, layout), layout, sprag.config);
@@ -128,18 +131,18 @@ sprag.draw = async (element) => {
 
 sprag.drawAll = (root) => Promise.all([...root.querySelectorAll("[data-figure]")].map(sprag.draw));
 
-// Paper is narrower than the window, and white.
-const PAPER = 690;
+// Paper is narrower than the window, and white; on its first page a picture is at most a quarter lower, to fit.
+const PAPER = 690, LOW = 580, LOWER = 0.75;
 const redraw = (width) => {
   for (const [element, figure] of sprag.figures) {
     const shown = width || element.clientWidth, layout = sprag.themed(figure, shown);
-    Plotly.react(element, sprag.traces(figure, shown, layout), width ? { ...layout, width } : layout, sprag.config);
+    Plotly.react(element, sprag.traces(figure, shown, layout), width ? { ...layout, width, height: Math.max(LOWER * layout.height, Math.min(layout.height, LOW)) } : layout, sprag.config);
   }
 };
 window.addEventListener("beforeprint", () => redraw(PAPER));
 window.addEventListener("afterprint", () => redraw());
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => redraw());
-matchMedia(`(max-width: ${NARROW}px)`).addEventListener("change", () => redraw());
+for (const width of [NARROW, BESIDE]) matchMedia(`(max-width: ${width}px)`).addEventListener("change", () => redraw());
 
 document.addEventListener("DOMContentLoaded", () => sprag.drawAll(document));
 document.addEventListener("sprag:found", () => { for (const plot of document.querySelectorAll(".stale[data-figure]")) sprag.draw(plot); });

@@ -162,3 +162,26 @@ def test_a_unit_is_shown_beside_plain_numbers_only(visitor: Visitor) -> None:
     expect(unit).to_be_hidden()
     fill(page, {"shaft.load": "1e-1"})
     expect(unit).to_be_visible()
+
+
+def test_the_sheet_has_every_number_with_its_unit_and_nothing_to_press(visitor: Visitor) -> None:
+    page = visitor.page
+    page.goto(f"{OWN}?held=shaft.load%3D0.4")
+    drawn(page, "#lab-plot")
+    # A drawn picture has buttons, which no image may have.
+    expect(page.locator("#lab-plot")).to_have_attribute("role", "group")
+    expect(page.locator("section.paper")).to_be_hidden()
+    page.emulate_media(media="print")
+    sheet = page.locator("section.paper")
+    expect(sheet.locator("tr", has_text="Spring rate")).to_contain_text("9000N/m")
+    expect(sheet.locator("tr", has_text="Horizontal amplitude")).to_contain_text("2 mm")
+    expect(sheet.locator("tr", has_text="spring arm")).to_contain_text("0.05m")
+    expect(sheet).to_contain_text("Held: One pendulum, load torque 0.4 N·m.")
+    expect(sheet).to_contain_text("Printed 2")
+    for selector in ("#lab", "#hold", "#play", "#reading"):
+        expect(page.locator(selector)).to_be_hidden()
+    first = page.locator("#sketch").bounding_box()
+    answer = page.locator("#answer").bounding_box()
+    assert first is not None
+    assert answer is not None
+    assert first["x"] >= answer["x"] + answer["width"]

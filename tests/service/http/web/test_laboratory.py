@@ -86,6 +86,17 @@ def test_panels_stand_below_each_other_in_a_narrow_place(office: Office) -> None
     assert len(left(2)) == 2
 
 
+@pytest.mark.parametrize("visitor", [{"viewport": {"width": 390, "height": 800}}], indirect=True)
+def test_on_a_phone_the_answer_stays_in_sight_while_sliders_move(visitor: Visitor) -> None:
+    page = visitor.page
+    page.goto("/laboratory?machine=press")
+    drawn(page, "#lab-plot")
+    page.locator(f'input[type="range"][data-for="{RAM}"]').scroll_into_view_if_needed()
+    page.mouse.wheel(0, 300)
+    expect(page.locator("[data-irregularity]")).to_be_in_viewport()
+    assert page.evaluate("() => document.documentElement.scrollWidth") == 390
+
+
 def _numbers(points: str | None) -> list[float]:
     return [float(text) for text in re.split("[ ,]", points or "")]
 
