@@ -5,15 +5,21 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from sprag.service.jobs.answers import FEW
 from sprag.service.json_text import to_bytes
 from sprag.service.results.figures.answers import answers_figure
 from sprag.service.results.key_answer_words import answers_csv, report
 from sprag.service.results.key_answers import answers_query, find_answers
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.selection import refused
+from sprag.service.storage.records import CaseColumns
 from sprag.worker import models
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from sprag.service.jobs.checks import Library
     from sprag.service.results.curves import CurveQuery
     from sprag.service.results.key_answers import StudyAnswers
@@ -28,7 +34,17 @@ def answers_of(library: Library, study_id: str, chosen: CurveQuery | None, point
         raise refused(
             "x", "not-used", "the cases of this study lie on no curves", chosen.x, allowed="no choice of curves"
         )
-    return find_answers(study, infos, query, point, partial(library.store.rows_for_cases, study_id))
+    # While a large study runs, all its rows would be read again for each of its chunks.
+    over = library.store.get_study(study_id).over or study.cases <= FEW
+    whole = partial(_whole, library, study_id) if over else None
+    return find_answers(study, infos, query, point, partial(library.store.rows_for_cases, study_id), whole)
+
+
+def _whole(library: Library, study_id: str, names: Sequence[str]) -> CaseColumns:
+    """Results of all finished cases."""
+    rows = library.columns.of(study_id, names)
+    flags = np.array([flags for _, flags in rows.kinds], dtype=object)[rows.kind].tolist() if len(rows.cases) else []
+    return CaseColumns(rows.cases, [None] * len(rows.cases), rows.values, flags)
 
 
 def answers_as_json(library: Library, study_id: str, chosen: CurveQuery | None, point: str | None) -> bytes:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag.service.results.curves import CurveQuery, Curves, Fetch
+    from sprag.service.storage.records import CaseColumns
     from sprag.worker.models import Presentation, ResultInfo
     from sprag.worker.study import Study
 
@@ -37,8 +38,8 @@ if TYPE_CHECKING:
 Why = Literal["no-case", "outside", "not-joined", "no-result"]
 #: Ending of the names of half widths of the intervals of means of irregular motion.
 _HALF: Final = ".half_width"
-#: Cases of a study whose overall extremes are looked for with every answer.
-MOST_OVERALL: Final = 200_000
+#: Results of all cases by their names, in order of the cases.
+Whole = Callable[[Sequence[str]], "CaseColumns"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,9 +158,16 @@ def read_point(study: Study, query: CurveQuery, text: str | None) -> float | Non
 
 
 def find_answers(
-    study: Study, infos: Sequence[ResultInfo], query: CurveQuery | None, point: str | None, fetch: Fetch
+    study: Study,
+    infos: Sequence[ResultInfo],
+    query: CurveQuery | None,
+    point: str | None,
+    fetch: Fetch,
+    whole: Whole | None = None,
 ) -> StudyAnswers:
     """The answers of the curves of ``query``, as `answers_query` gives it.
+
+    ``whole`` gives results of all cases for the extremes among them; without it there are none.
 
     Raises
     ------
@@ -167,7 +175,7 @@ def find_answers(
         As `select` does; and where ``point`` is given although there is no axis for it.
     """
     shown, answers, by_name = models.presentation_of(study), answers_of_model(study, infos), {i.name: i for i in infos}
-    overall = tuple(_overall(study, shown, answers, by_name, fetch))
+    overall = () if whole is None else tuple(_overall(study, shown, answers, by_name, whole))
     if query is None:
         if point:
             raise refused("point", "not-used", "the cases of this study lie on no curves", point, allowed="no point")
@@ -222,22 +230,22 @@ def _single(
 
 
 def _overall(
-    study: Study, shown: Presentation, answers: Sequence[Answer], by_name: dict[str, ResultInfo], fetch: Fetch
+    study: Study, shown: Presentation, answers: Sequence[Answer], by_name: dict[str, ResultInfo], whole: Whole
 ) -> Iterator[Found]:
-    """The extremes among all cases of a study; none of one that chooses its own cases, or has one or very many."""
+    """The extremes among all cases of a study; none of one that chooses its own cases, or has one."""
     extremes = [one for one in answers if one.kind in ("largest", "smallest")]
-    if not extremes or not 1 < study.cases <= MOST_OVERALL or study.plan is not None:
+    if not extremes or study.cases == 1 or study.plan is not None:
         return
-    columns = fetch(np.arange(study.cases, dtype=np.int64), [one.result for one in extremes])
+    columns = whole(list(dict.fromkeys(one.result for one in extremes)))
     for answer in extremes:
         info, values = by_name[answer.result], columns.values[answer.result]
         kept = _preferred(values, columns.flags, shown)
         if not kept.size:
             yield Found(answer, info, info.unit, why="no-result")
             continue
-        case = int(kept[_best(values[kept], answer)])
-        flags = _split(columns.flags, [case])
-        yield Found(answer, info, info.unit, float(values[case]), case=case, cases=kept.size, flags=flags)
+        place = int(kept[_best(values[kept], answer)])
+        flags, case = _split(columns.flags, [place]), int(columns.cases[place])
+        yield Found(answer, info, info.unit, float(values[place]), case=case, cases=kept.size, flags=flags)
 
 
 def _preferred(values: NDArray[np.float64], flags: Sequence[str], shown: Presentation) -> NDArray[np.int64]:

@@ -54,6 +54,10 @@ class Rows:
             names = ["held" if value == 0.0 else "periodic" for value in own]
             self.values["regime"] = np.array([info.categories.index(name) for name in names], dtype=float)
 
+    def whole(self, names: Sequence[str]) -> CaseColumns:
+        """Results of all cases."""
+        return self(np.arange(self.study.cases, dtype=np.int64), names)
+
     def __call__(self, cases: NDArray[np.int64], names: Sequence[str]) -> CaseColumns:
         endings: list[str | None] = ["ok"] * len(cases)
         empty = np.full(self.study.cases, np.nan)
@@ -68,7 +72,7 @@ def study_of(spec: dict[str, Any], **changes: Any) -> Study:
 
 def found_in(study: Study, rows: Rows, point: str | None = None) -> StudyAnswers:
     infos = models.study_results(study)
-    return find_answers(study, infos, answers_query(study, infos), point, rows)
+    return find_answers(study, infos, answers_query(study, infos), point, rows, rows.whole)
 
 
 def only(found: StudyAnswers) -> dict[str, Found]:
