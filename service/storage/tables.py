@@ -1,5 +1,6 @@
 """The tables. Times are microseconds since 1970-01-01 UTC; JSON is text, stored exactly as it was given."""
 
+import threading
 from functools import cache
 
 import sqlalchemy as sa
@@ -153,6 +154,9 @@ DISPATCHER = sa.Table(
     sa.Column("clock_at", sa.BigInteger),
 )
 
+#: Held while a table of results is defined: the first requests of a service ask for the same one at the same time.
+_DEFINING = threading.Lock()
+
 #: Columns of a table of results before the results themselves.
 KEY_COLUMNS = ("study", "case_number", "ending", "flags")
 
@@ -188,23 +192,24 @@ def _table_of_rows(
     name: str, infos: tuple[models.ResultInfo, ...], *indexes: sa.Index, number: str | None = None
 ) -> sa.Table:
     """A table of rows; the result ``number`` belongs to its key."""
-    if name in METADATA.tables:
-        return METADATA.tables[name]
-    results = (
-        sa.Column(info.column, sa.Double if info.kind == "real" else sa.Integer, primary_key=info.name == number)
-        for info in infos
-    )
-    return sa.Table(
-        name,
-        METADATA,
-        sa.Column("study", sa.Integer, sa.ForeignKey("studies.number"), primary_key=True),
-        sa.Column("case_number", sa.Integer, primary_key=True),
-        sa.Column("ending", sa.String(40), nullable=False),
-        sa.Column("flags", sa.Text, nullable=False),
-        *results,
-        *indexes,
-        sqlite_with_rowid=False,
-    )
+    with _DEFINING:
+        if name in METADATA.tables:
+            return METADATA.tables[name]
+        results = (
+            sa.Column(info.column, sa.Double if info.kind == "real" else sa.Integer, primary_key=info.name == number)
+            for info in infos
+        )
+        return sa.Table(
+            name,
+            METADATA,
+            sa.Column("study", sa.Integer, sa.ForeignKey("studies.number"), primary_key=True),
+            sa.Column("case_number", sa.Integer, primary_key=True),
+            sa.Column("ending", sa.String(40), nullable=False),
+            sa.Column("flags", sa.Text, nullable=False),
+            *results,
+            *indexes,
+            sqlite_with_rowid=False,
+        )
 
 
 def all_tables() -> sa.MetaData:

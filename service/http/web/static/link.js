@@ -21,7 +21,9 @@ sprag.LostError = class extends Error {
     else plan();
   };
 
+  // Several probes may be under way: the first answer ends the wait, and later ones find no bar.
   const plan = () => {
+    if (!bar || timer) return;
     const seconds = DELAYS[Math.min(tries, DELAYS.length - 1)];
     tries += 1;
     bar.querySelector("span").textContent = `next try in ${seconds} s.`;
@@ -30,6 +32,9 @@ sprag.LostError = class extends Error {
 
   // The service answers again: parts that may be out of date are requested again.
   const found = () => {
+    if (!bar) return;
+    clearTimeout(timer);
+    timer = null;
     bar.remove();
     bar = null;
     document.body.classList.remove("lost");

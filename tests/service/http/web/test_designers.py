@@ -45,7 +45,7 @@ def test_from_an_empty_form_to_a_curve_and_a_file(visitor: Visitor, office: Offi
     expect(page.locator(".wrong:not(:empty)")).to_have_count(0)
     page.get_by_role("button", name="Submit the study").click()
     page.wait_for_url("**/studies/st_*")
-    expect(page.locator("#progress .state")).to_have_text("finished", timeout=60_000)
+    expect(page.locator("#progress .state")).to_have_text("finished")
     study_id = page.url.rsplit("/", 1)[-1]
     page.wait_for_function("() => document.querySelector('.plot').data?.[0]?.y?.every(value => value !== null)")
     lines = [line for line in drawn(page) if line["name"] not in MARKS]

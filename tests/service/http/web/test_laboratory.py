@@ -144,7 +144,7 @@ def test_the_laboratory_answers_a_moved_slider(visitor: Visitor, office: Office)
     expect(page.locator("[data-cases]")).to_have_text("25")
     page.get_by_role("button", name="Submit the study").click()
     page.wait_for_url("**/studies/st_*")
-    expect(page.locator("#progress .state")).to_have_text("finished", timeout=60_000)
+    expect(page.locator("#progress .state")).to_have_text("finished")
     drawn(page)
 
 
