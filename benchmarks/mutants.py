@@ -130,7 +130,7 @@ MUTANTS = (
         "worker/pool/processes.py",
         "    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, int(number), 0, 0, 0)\n",
         "    ctypes.CDLL(None, use_errno=True)\n",
-        ("tests/acceptance/test_serve.py::test_a_killed_worker_is_replaced_and_nothing_outlives_a_killed_service",),
+        (f"{_KILLS}test_killed_processes_lose_nothing",),
     ),
     Mutant(
         "no reserve for a full disk",

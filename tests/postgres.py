@@ -94,7 +94,7 @@ class Server:
         done = subprocess.run(
             [found, *arguments], cwd=self.folder, user=self._user, stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE if name == "initdb" else subprocess.DEVNULL,
-            stderr=subprocess.STDOUT if name == "initdb" else subprocess.DEVNULL, timeout=60, check=False,
+            stderr=subprocess.STDOUT if name == "initdb" else subprocess.DEVNULL, timeout=600, check=False,
         )  # fmt: skip
         if done.returncode:
             log = self.folder / "log"

@@ -28,11 +28,12 @@ def badcases(
     chunk: int = 0,
     timeout: float = 600.0,
     timed: bool = True,
+    processes: int = 2,
 ) -> dict[str, Any]:
     """Run a study with bad cases, and without them when it is ``timed``; gives the figures."""
     draw = random.Random(seed)
     made = harness.spec(cases, periods)
-    options = ["--processes", 2, *(["--chunk", chunk] if chunk else [])]
+    options = ["--processes", processes, *(["--chunk", chunk] if chunk else [])]
     drawn = draw.sample(range(cases), crashing + hanging)
     odd = {case: "crashed" if place < crashing else "timed_out" for place, case in enumerate(drawn)}
     limit = {"SPRAG_CHUNK_TIMEOUT": f"{timeout:g}"}

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import psutil
 
 from benchmarks.faults import harness
 from sprag.service.storage.sqlite_files import sqlite_driver
@@ -93,8 +94,10 @@ def kill(service: harness.Service, draw: random.Random) -> str:
     elif target == "dispatcher":
         harness.until(service.dispatcher, "there is a dispatcher")
         if (dispatcher := service.dispatcher()) is not None:
+            pool = dispatcher.children(recursive=True)
             dispatcher.kill()
             dispatcher.wait(harness.PATIENCE)
+            assert psutil.wait_procs(pool, timeout=harness.PATIENCE)[1] == [], "a process outlived the dispatcher"
     else:
         harness.until(service.pool, "there is a pool")
         if pool := service.pool():

@@ -8,9 +8,12 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import cache
 from typing import Annotated, cast
 
 import typer
+from typer.core import TyperGroup
+from typer.main import get_group
 
 from sprag.service.cli import (
     batches,
@@ -126,6 +129,12 @@ app.add_typer(token.app, name="token", rich_help_panel="Run a service")
 app.add_typer(database.app, name="db", rich_help_panel="Run a service")
 
 
+@cache
+def _command_line() -> TyperGroup:
+    """All commands with their options, which typer reads from the signatures of the functions."""
+    return get_group(app)
+
+
 def execute(arguments: Sequence[str]) -> int:
     """Run one command; returns the exit code. Every failure is reported on standard error."""
     for stream in (sys.stdout, sys.stderr):
@@ -156,7 +165,7 @@ def _invoke(arguments: Sequence[str]) -> int:
 
     as_json = "--json" in arguments
     try:
-        code = app(list(arguments), prog_name="sprag", standalone_mode=False) or ExitCode.DONE
+        code = _command_line()(list(arguments), prog_name="sprag", standalone_mode=False) or ExitCode.DONE
         if code == ExitCode.INTERRUPTED:  # as typer returns Ctrl-C
             say("interrupted")
         return int(code)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,11 +14,29 @@ from typing import Any
 
 from benchmarks.faults.harness import COMMAND, ROOT, environment
 
-__all__ = ["COMMAND", "EXAMPLES", "ROOT", "SECONDS", "Ended", "Service", "environment", "service", "sprag"]
+__all__ = [
+    "COMMAND",
+    "EXAMPLES",
+    "INTERRUPTIBLE",
+    "ROOT",
+    "SECONDS",
+    "Ended",
+    "Service",
+    "environment",
+    "service",
+    "sprag",
+]
 
 EXAMPLES = ROOT / "examples"
 #: Generous: the machine may be busy with other tests.
 SECONDS = 600
+#: A process that was started in the background may have been told to ignore interrupts; this one is not.
+INTERRUPTIBLE = (
+    sys.executable,
+    "-c",
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    "from sprag.service.cli import main; main()",
+)
 
 
 @dataclass(frozen=True)
@@ -75,5 +94,6 @@ def service(folder: Path, *options: object, **more: str) -> Iterator[Service]:
     finally:
         process.send_signal(signal.SIGTERM)
         code = process.wait(SECONDS)
-    assert code == 0, log.read_text()
-    assert "Traceback" not in log.read_text()
+    said = log.read_text()
+    assert code == 0, said
+    assert "Traceback" not in said, said

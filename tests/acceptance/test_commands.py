@@ -7,27 +7,19 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.acceptance import processes
-from tests.acceptance.processes import COMMAND, EXAMPLES, SECONDS, Service, environment, service
+from tests.acceptance.processes import COMMAND, EXAMPLES, INTERRUPTIBLE, SECONDS, Service, environment, service
 from tests.conftest import Finished
 
 Sprag = Callable[..., Finished]
 
 SPEC = EXAMPLES / "one_pendulum.json"
 SMALL = EXAMPLES / "measured_clutch.json"
-#: A process that was started in the background may have been told to ignore interrupts; this one is not.
-INTERRUPTIBLE = [
-    sys.executable,
-    "-c",
-    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
-    "from sprag.service.cli import main; main()",
-]
 
 
 def test_a_study_from_submission_to_picture(running: Service, tmp_path: Path, sprag: Sprag) -> None:

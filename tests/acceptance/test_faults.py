@@ -6,6 +6,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -18,7 +19,8 @@ from tests.conftest import Finished
 
 
 def test_bad_cases_are_named_and_the_others_ok_until_a_retry_mends_them(tmp_path: Path) -> None:
-    badcases(tmp_path, cases=8, crashing=1, hanging=1, seed=1, periods=4.0, chunk=1, timeout=2.0, timed=False)
+    few: dict[str, Any] = {"cases": 8, "crashing": 1, "hanging": 1, "periods": 4.0, "chunk": 1, "processes": 1}
+    badcases(tmp_path, **few, seed=1, timeout=2.0, timed=False)
 
 
 def test_files_that_may_not_grow_hold_the_studies_until_they_may(tmp_path: Path) -> None:

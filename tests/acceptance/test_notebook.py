@@ -38,7 +38,7 @@ def test_the_example_notebook_runs(running: Service, tmp_path: Path, monkeypatch
     monkeypatch.delenv("SPRAG_TOKEN", raising=False)
     NotebookClient(
         notebook,
-        timeout=240,
+        timeout=600,
         kernel_manager_class=ThisPython,
         resources={"metadata": {"path": str(EXAMPLES)}},
     ).execute()

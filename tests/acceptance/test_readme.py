@@ -5,14 +5,19 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import httpx
 import pytest
 
-from tests.acceptance.processes import EXAMPLES, ROOT, SECONDS, Ended, environment, service, sprag
+from benchmarks.faults.harness import kill_family
+from tests.acceptance.processes import EXAMPLES, INTERRUPTIBLE, ROOT, SECONDS, environment
 
 README = (ROOT / "README.md").read_text()
 PRINTED = "http://127.0.0.1:8000"
@@ -38,44 +43,56 @@ def tools(folder: Path) -> str:
     return f"{binaries}{os.pathsep}{os.environ['PATH']}"
 
 
+@dataclass
+class Demonstration:
+    """A demonstration that goes on serving, in ``folder``; what it says is in two files there."""
+
+    folder: Path
+    process: subprocess.Popen[bytes]
+
+    @property
+    def said(self) -> str:
+        """Its messages."""
+        return (self.folder / "said").read_text(encoding="utf-8")
+
+    @property
+    def address(self) -> str:
+        """Where it serves, once it has shown its study."""
+        limit = time.monotonic() + SECONDS
+        while not (found := re.search(r"^Open (http://127\.0\.0\.1:\d+)/studies/", self.said, re.MULTILINE)):
+            assert self.process.poll() is None, self.said
+            assert time.monotonic() < limit, self.said
+            time.sleep(0.1)
+        return found[1]
+
+
 @pytest.fixture(scope="module")
-def demonstration(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended]:
-    """What the demonstration left, and what it said."""
+def demonstration(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Demonstration]:
+    """One demonstration, whose service the commands ask."""
     folder = tmp_path_factory.mktemp("demonstration")
-    return folder / "demo", sprag("demo", "--exit", cwd=folder)
+    with (folder / "shown").open("wb") as output, (folder / "said").open("wb") as errors:
+        process = subprocess.Popen(
+            [*INTERRUPTIBLE, "demo"], cwd=folder, stdout=output, stderr=errors, env=environment()
+        )
+    yield Demonstration(folder, process)
+    kill_family(process)
 
 
-def test_the_demonstration(demonstration: tuple[Path, Ended]) -> None:
-    folder, done = demonstration
-    assert done.code == 0, done.err
-    text = done.out.decode()
-    assert "Mechanical characteristic at excitation.frequency 25 Hz" in text
-    assert "mean speed" in text
-    assert max(map(len, text.splitlines())) <= 80
-    assert "512 cases" in done.err
-    assert (folder / "curve.png").read_bytes().startswith(b"\x89PNG")
-    address = re.search(r"http://127\.0\.0\.1:\d+", done.err)
-    assert address is not None
-    with pytest.raises(httpx.ConnectError):
-        httpx.get(address[0], timeout=SECONDS)
-
-
-def test_every_command_of_the_readme_does_what_it_says(tmp_path: Path, demonstration: tuple[Path, Ended]) -> None:
+def test_every_command_of_the_readme_does_what_it_says(tmp_path: Path, demonstration: Demonstration) -> None:
     """The demonstration has run the example study already, and its rows are taken from its database."""
     shutil.copytree(EXAMPLES, tmp_path / "examples")
     path = tools(tmp_path)
     script = "".join(blocks())
     assert PRINTED in script
     assert "$ .venv/bin/sprag serve\n" in README
-    with service(demonstration[0]) as running:
-        done = subprocess.run(
-            ["/bin/sh", "-eu", "-c", script.replace(PRINTED, running.address)],
-            cwd=tmp_path,
-            env=environment(PATH=path, no_proxy="127.0.0.1"),
-            capture_output=True,
-            timeout=SECONDS,
-            check=False,
-        )
+    done = subprocess.run(
+        ["/bin/sh", "-eu", "-c", script.replace(PRINTED, demonstration.address)],
+        cwd=tmp_path,
+        env=environment(PATH=path, no_proxy="127.0.0.1"),
+        capture_output=True,
+        timeout=SECONDS,
+        check=False,
+    )
     out, err = done.stdout.decode(), done.stderr.decode()
     assert done.returncode == 0, err
     assert "Traceback" not in err
@@ -96,3 +113,19 @@ def test_every_command_of_the_readme_does_what_it_says(tmp_path: Path, demonstra
     assert len((tmp_path / "results.csv").read_text().splitlines()) == 1 + 512
     assert (tmp_path / "rows.csv").read_text() == (tmp_path / "results.csv").read_text()
     assert (tmp_path / "motion.csv").read_text().startswith("time,")
+
+
+def test_the_demonstration_shows_its_curve_and_serves_until_it_is_interrupted(demonstration: Demonstration) -> None:
+    address, folder = demonstration.address, demonstration.folder
+    assert httpx.get(f"{address}/livez", timeout=SECONDS).status_code == 200
+    demonstration.process.send_signal(signal.SIGINT)
+    assert demonstration.process.wait(SECONDS) == 0, demonstration.said
+    text = (folder / "shown").read_text(encoding="utf-8")
+    assert "Mechanical characteristic at excitation.frequency 25 Hz" in text
+    assert "mean speed" in text
+    assert max(map(len, text.splitlines())) <= 80
+    assert "512 cases" in demonstration.said
+    assert "Traceback" not in demonstration.said
+    assert (folder / "demo" / "curve.png").read_bytes().startswith(b"\x89PNG")
+    with pytest.raises(httpx.ConnectError):
+        httpx.get(address, timeout=SECONDS)

@@ -8,26 +8,33 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import httpx
+import pytest
 
 from benchmarks.same_rows import SETTLED_AXES, TIMED, example, same_rows
-from tests.acceptance.processes import service
+from tests.acceptance.processes import SECONDS, service
 from tests.conftest import Finished
 
 RESULTS = ("shaft.speed.mean", "shaft.speed.max", "torque.max", "power.useful.mean", "efficiency", "run.events")
-FEW = example(run=TIMED, axes=SETTLED_AXES)
 #: As the example has them, with fewer values.
 AXES = [
     {"path": "excitation.frequency", "linspace": ["20 Hz", "35 Hz", 4]},
     {"path": ["excitation.amplitude_x", "excitation.amplitude_y"], "values": ["1 mm", "3 mm"]},
     {"path": "shaft.load", "values": [0, 0.1, 0.4, 1.6]},
 ]
+FEW = example(run=TIMED, axes=AXES)
 
 
-def test_run_gives_the_same_rows_in_any_cut(tmp_path: Path) -> None:
-    rows = same_rows(tmp_path, FEW, [(1, 20, ()), (2, 1, ("--finish-by", "1 h"))])
-    assert len(rows) == 20
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
+    """The rows of `FEW`, the same in two cuts."""
+    return same_rows(tmp_path_factory.mktemp("runs"), FEW, [(1, 32, ()), (2, 1, ("--finish-by", "1 h"))])
+
+
+def test_run_gives_the_same_rows_in_any_cut(reference: list[dict[str, Any]]) -> None:
+    assert len(reference) == 32
 
 
 def test_settled_cases_have_the_same_rows_in_any_cut(tmp_path: Path) -> None:
@@ -35,15 +42,12 @@ def test_settled_cases_have_the_same_rows_in_any_cut(tmp_path: Path) -> None:
     assert {row["results"]["regime"] for row in rows} >= {"periodic", "coasting"}
 
 
-def test_http_gives_the_same_rows_and_curves(tmp_path: Path) -> None:
-    spec = example(run=TIMED, axes=AXES)
-    reference = same_rows(tmp_path, spec, [(1, 32, ())])
-    assert len(reference) == 32
+def test_http_gives_the_same_rows_and_curves(tmp_path: Path, reference: list[dict[str, Any]]) -> None:
     with (
         service(tmp_path, "--processes", 2, "--chunk", 7) as running,
-        httpx.Client(base_url=f"{running.address}/api/v1", timeout=240) as client,
+        httpx.Client(base_url=f"{running.address}/api/v1", timeout=SECONDS) as client,
     ):
-        study = f"/studies/{client.post('/studies', json=spec).json()['id']}"
+        study = f"/studies/{client.post('/studies', json=FEW).json()['id']}"
         with client.stream("GET", f"{study}/events") as events:
             assert "event: end" in events.iter_lines()
         assert client.get(study).json()["progress"]["endings"] == {"ok": 32}
@@ -68,7 +72,7 @@ def test_csv_has_the_same_numbers(tmp_path: Path, sprag: Callable[..., Finished]
     rows = sprag("run", spec, "--json").data["rows"]
     assert sprag("run", spec, "-o", file).code == 0
     header, *lines = [line.split(",") for line in file.read_text().splitlines()]
-    assert len(lines) == len(rows) == 20
+    assert len(lines) == len(rows) == 32
     for line, row in zip(lines, rows, strict=True):
         cells = dict(zip(header, line, strict=True))
         for name, value in {**row["parameters"], **row["results"]}.items():

@@ -167,12 +167,12 @@ def broken() -> None:
 def pool(
     processes: int = 2,
     *,
-    chunk_timeout: float = 60.0,
+    chunk_timeout: float = 600.0,
     run: Callable[[ChunkTask], ChunkResult] = run,
     load: Callable[[KernelShape], None] = load,
     compiled: Callable[[KernelShape], bool] = nothing_compiled,
     prepare: Callable[[], None] = prepare,
-    load_timeout: float = 60.0,
+    load_timeout: float = 600.0,
 ) -> ProcessPoolExecutor:
     """A process pool without the engine."""
     return ProcessPoolExecutor(

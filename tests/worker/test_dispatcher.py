@@ -62,7 +62,7 @@ def test_two_studies_take_turns(store: Store) -> None:
 
 def test_a_crash_and_a_hang_are_found_among_their_neighbours(store: Store) -> None:
     record = submit(store, 24)
-    work(store, fakes.pool(2, run=fakes.faulty(crash=frozenset({6}), hang=frozenset({17})), chunk_timeout=0.3))
+    work(store, fakes.pool(2, run=fakes.faulty(crash=frozenset({6}), hang=frozenset({17})), chunk_timeout=2.0))
     found = endings(store, record)
     assert found == {case: {6: "crashed", 17: "timed_out"}.get(case, "ok") for case in range(24)}
     ended = store.get_study(record.id)

@@ -19,7 +19,7 @@ def collected(**environment: str) -> str:
     command = [sys.executable, "-c", "from sprag.worker import fingerprint; print(fingerprint.digest())"]
     return subprocess.run(
         command, cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT), **environment}, capture_output=True, text=True,
-        check=True, timeout=240,
+        check=True, timeout=600,
     ).stdout.strip()  # fmt: skip
 
 

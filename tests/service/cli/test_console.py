@@ -134,7 +134,7 @@ def test_a_bar_on_a_terminal_and_nothing_elsewhere() -> None:
         stderr=theirs,
         env={**os.environ, "TERM": "xterm", "PYTHONPATH": str(Path(__file__).resolve().parents[3])},
         check=False,
-        timeout=60,
+        timeout=600,
     )
     os.close(theirs)
     with os.fdopen(ours, "rb") as terminal:

@@ -65,7 +65,7 @@ def test_a_kernel_takes_longer_than_a_computation_may_and_outlives_its_request(
         left.cancel()
         again = portal.start_task_soon(computer.load, SHAPE)
         told.write_text("now")
-        assert again.result(timeout=60) is None
+        assert again.result(timeout=600) is None
         portal.call(computer.load, SHAPE)  # compiling again would wait for ever
     finally:
         computer.close()
@@ -106,7 +106,7 @@ def test_it_is_ready_when_its_processes_are(tmp_path: Path, portal: BlockingPort
         begun.read_text()  # waits until the process is being made ready
         assert not ready.done()
         told.write_text("now")
-        assert ready.result(timeout=300) is None
+        assert ready.result(timeout=600) is None
     finally:
         computer.close()
 

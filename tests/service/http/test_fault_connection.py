@@ -27,7 +27,7 @@ def test_the_next_request_of_the_same_client_is_answered(
     path = f"{API}/studies/{service.submit(spec)}/sensitivity?y=torque.max"
     with (
         serving(service.app, http=TimeoutProtocol) as address,
-        httpx.Client(base_url=f"http://localhost:{address[1]}", timeout=60) as client,
+        httpx.Client(base_url=f"http://localhost:{address[1]}", timeout=600) as client,
     ):
         answers: Sequence[httpx.Response] = [client.get(place) for _ in range(5) for place in (path, "/livez")]
     assert [answer.status_code for answer in answers] == [500, 200] * 5

@@ -67,9 +67,9 @@ def test_a_dead_child_is_replaced_and_the_last_one_ended() -> None:
     supervisor = Supervisor(nursery, delays=(0.0, 0.0))
     supervisor.start()
     for number in range(3):
-        assert nursery.born.acquire(timeout=10)
+        assert nursery.born.acquire(timeout=600)
         nursery.children[number].die(1)
-    assert nursery.born.acquire(timeout=10)
+    assert nursery.born.acquire(timeout=600)
     supervisor.stop()
     assert [child.exitcode for child in nursery.children] == [1, 1, 1, 0]
     assert nursery.children[-1].asked == ["terminate"]
@@ -80,10 +80,10 @@ def test_a_child_that_ends_with_everything_else_is_not_replaced(caplog: pytest.L
     nursery, leaving = Nursery(), threading.Event()
     supervisor = Supervisor(nursery, delays=(60.0, 60.0), leaving=leaving)
     supervisor.start()
-    assert nursery.born.acquire(timeout=10)
+    assert nursery.born.acquire(timeout=600)
     nursery.children[0].die(0)
     leaving.set()
-    supervisor.join(10)
+    supervisor.join(600)
     assert not supervisor.is_alive()
     supervisor.stop()
     assert len(nursery.children) == 1
@@ -95,9 +95,9 @@ def test_a_child_is_ended_as_soon_as_everything_is_about_to_end() -> None:
     nursery, leaving = Nursery(), threading.Event()
     supervisor = Supervisor(nursery, leaving=leaving)
     supervisor.start()
-    assert nursery.born.acquire(timeout=10)
+    assert nursery.born.acquire(timeout=600)
     leaving.set()
-    supervisor.join(10)
+    supervisor.join(600)
     assert not supervisor.is_alive()
     assert nursery.children[0].asked == ["terminate"]
 
@@ -106,7 +106,7 @@ def test_a_child_that_does_not_end_is_killed() -> None:
     nursery = Nursery(obedient=False)
     supervisor = Supervisor(nursery)
     supervisor.start()
-    assert nursery.born.acquire(timeout=10)
+    assert nursery.born.acquire(timeout=600)
     supervisor.stop()
     assert nursery.children[0].asked == ["terminate", "kill"]
 
@@ -137,7 +137,7 @@ def test_the_address_is_told_while_the_processes_that_check_still_start(
         return workers[-1]
 
     def ask(address: str) -> None:
-        with httpx.Client(base_url=address, trust_env=False, timeout=60.0) as http:
+        with httpx.Client(base_url=address, trust_env=False, timeout=600.0) as http:
             answers.extend(http.get(path).status_code for path in ("/livez", "/readyz"))
         os.kill(os.getpid(), signal.SIGTERM)
 

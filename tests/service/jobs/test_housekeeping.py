@@ -17,7 +17,7 @@ from sprag.service.storage.store import Store
 from sprag.worker.chunking import Chunking
 from tests.worker import fakes
 
-SECONDS = 120.0
+SECONDS = 600.0
 
 
 @pytest.fixture

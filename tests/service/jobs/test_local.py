@@ -31,7 +31,7 @@ from sprag.worker.states import StudyState
 from tests.conftest import Finished
 from tests.worker import fakes
 
-DEADLINE = 120.0
+DEADLINE = 600.0
 
 
 def eventually(condition: Callable[[], bool]) -> None:

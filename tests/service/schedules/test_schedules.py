@@ -287,7 +287,7 @@ def test_the_thread_looks_again_after_trouble(
     scheduler = Troubled(service.store)
     scheduler.start()
     for _ in range(3):
-        assert looked.acquire(timeout=20)
+        assert looked.acquire(timeout=600)
     scheduler.stop()
     assert not scheduler.is_alive()
     assert caplog.messages == ["The schedules cannot be updated: the database is busy"]

@@ -89,9 +89,9 @@ def test_what_is_refused(text: str | bytes, kind: str, at: list[str]) -> None:
     ids=lambda value: repr(value)[:15],
 )
 def test_depth_is_refused_at_once(text: str, kind: str) -> None:
-    begin = time.perf_counter()
+    begin = time.thread_time()
     assert pointers(text, kind) == [""]
-    assert time.perf_counter() - begin < 2.0
+    assert time.thread_time() - begin < 2.0
 
 
 def test_the_deepest_that_is_taken() -> None:

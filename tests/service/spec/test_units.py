@@ -190,10 +190,10 @@ def test_a_unit_that_is_nearly_right_is_named(text: str, near: str) -> None:
     ids=lambda value: type(value).__name__,
 )
 def test_tricks_neither_hang_nor_evaluate(value: object) -> None:
-    begin = time.perf_counter()
+    begin = time.thread_time()
     with pytest.raises(QuantityError):
         parse_quantity(value, "m")
-    assert time.perf_counter() - begin < 1.0
+    assert time.thread_time() - begin < 1.0
 
 
 @given(st.one_of(st.text(max_size=90), st.from_regex(r"[0-9.eE+\-]{1,6} [a-zA-Z*/^() 0-9°µ²]{0,20}", fullmatch=True)))

@@ -83,7 +83,7 @@ def start(cluster: Cluster) -> Iterator[Callable[..., DaskExecutor]]:
     made: list[DaskExecutor] = []
 
     def begin(**options: object) -> DaskExecutor:
-        given = {"chunk_timeout": 60.0, "run": fakes.run, "load": fakes.load} | options
+        given = {"chunk_timeout": DEADLINE, "run": fakes.run, "load": fakes.load} | options
         made.append(DaskExecutor(cluster.url, 0, **given))  # type: ignore[arg-type]
         return made[-1]
 
@@ -95,7 +95,7 @@ def start(cluster: Cluster) -> Iterator[Callable[..., DaskExecutor]]:
 def test_inline_pool_and_dask_give_the_same_bits(start: Callable[..., DaskExecutor]) -> None:
     study = fakes.study(30)
     dask = start(run=models.run_task, load=models.load)
-    processes = ProcessPoolExecutor(2, chunk_timeout=60.0)
+    processes = ProcessPoolExecutor(2, chunk_timeout=DEADLINE)
     cuts = ((InlineExecutor(), 30), (processes, 4), (dask, 7))
     try:
         found = [run_all(executor, study, size) for executor, size in cuts]
@@ -270,7 +270,7 @@ def test_workers_that_would_give_other_values_run_nothing_and_the_study_says_so(
             folder = tmp_path / other.__name__
             folder.mkdir()
             made.start_worker(folder=folder, **other(folder))
-        executor = DaskExecutor(made.url, 0, chunk_timeout=60.0, run=fakes.run, load=fakes.load)
+        executor = DaskExecutor(made.url, 0, chunk_timeout=DEADLINE, run=fakes.run, load=fakes.load)
 
         def told() -> bool:
             reason = store.get_study(record.id).reason or ""
@@ -295,7 +295,7 @@ def test_damaged_kernels_are_compiled_anew(tmp_path: Path, caplog: pytest.LogCap
         made.start_scheduler()
         made.start_worker(2, SPRAG_KERNEL_CACHE=str(tmp_path))
         # One after the other dies while it loads; the next one finds the damaged file gone.
-        executor = DaskExecutor(made.url, 0, chunk_timeout=60.0, run=fakes.run, load=fakes.load_or_die)
+        executor = DaskExecutor(made.url, 0, chunk_timeout=DEADLINE, run=fakes.run, load=fakes.load_or_die)
         eventually(lambda: executor.wait(0.05) or executor.capacity == 2 + SPARE_CHUNKS)
         damaged = tmp_path / "kernels" / models.cache_folder().name / fakes.DAMAGED
         damaged.parent.mkdir(parents=True, exist_ok=True)
@@ -306,7 +306,7 @@ def test_damaged_kernels_are_compiled_anew(tmp_path: Path, caplog: pytest.LogCap
         executor.close()
         # Every chunk crashes, of workers that have the damaged kernel in hand; nobody is quarantined.
         damaged.touch()
-        given = {"chunk_timeout": 60.0, "run": fakes.run_or_die, "load": fakes.load_damaged}
+        given = {"chunk_timeout": DEADLINE, "run": fakes.run_or_die, "load": fakes.load_damaged}
         first = DaskExecutor(made.url, 0, **given)  # type: ignore[arg-type]
         record = store.create_study({}, study)
         dispatcher = Dispatcher(
@@ -332,7 +332,7 @@ def test_a_scheduler_that_stays_away_ends_the_executor_with_a_sentence() -> None
 
 
 def test_a_cluster_of_its_own_runs_chunks() -> None:
-    executor = pool(WorkerSettings("", 1, 60.0, executor="dask"))
+    executor = pool(WorkerSettings("", 1, DEADLINE, executor="dask"))
     try:
         study = fakes.study(3)
         result = run_all(executor, study, 3)[0].result
@@ -368,7 +368,7 @@ def test_a_study_survives_what_happens_to_a_cluster(tmp_path: Path, capfd: pytes
         made.start_scheduler()
         made.start_worker()
         record = store.create_study({}, toy.study(5, size))
-        executor = DaskExecutor(made.url, 0, chunk_timeout=60.0, run=fakes.run, load=fakes.load)
+        executor = DaskExecutor(made.url, 0, chunk_timeout=DEADLINE, run=fakes.run, load=fakes.load)
         marks = sorted(chosen.sample(range(cases // 20, cases - cases // 10), 2 + cases // 1500))
 
         def stopping() -> bool:

@@ -28,7 +28,7 @@ def generated(service: Service, tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     command = ["generate", "--path", "openapi.json", "--config", "config.yml", "--meta", "none"]
     done = subprocess.run(
         [sys.executable, "-m", "openapi_python_client", *command, "--output-path", PACKAGE],
-        cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False,
+        cwd=tmp_path, capture_output=True, text=True, timeout=600, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     # The generator knows no TOML and says so; nothing else may be missing.
