@@ -34,8 +34,14 @@ class SliderCrank(RodMechanism):
         slider = Slider(values["crank"], values["rod"], values["offset"], phi)
         bodies, x1 = slider_bodies(slider, values, 1.0, 0.0)
         inertia, slope = reduced(bodies)
-        reach = np.sqrt((values["rod"] + values["crank"]) ** 2 - values["offset"] ** 2)
-        return Motion(inertia, slope, reach - slider.x(), -x1)
+        return Motion(inertia, slope, self._from_outside(values, slider), -x1)
+
+    def way(self, values: Values, phi: Floats) -> Floats:
+        """See Mechanism."""
+        return self._from_outside(values, Slider(values["crank"], values["rod"], values["offset"], phi))
+
+    def _from_outside(self, values: Values, slider: Slider) -> Floats:
+        return np.sqrt((values["rod"] + values["crank"]) ** 2 - values["offset"] ** 2) - slider.x()
 
     def lift(self, values: Values, phi: Floats) -> Floats:
         """See Mechanism; the crank's pin is above the level through the shaft first."""
@@ -88,6 +94,11 @@ class _QuickReturn(RodMechanism):
 
     ram_mass = "ram_mass"
 
+    def _direction(self, values: Values, phi: Floats) -> Floats:
+        """Angle of the link from the direction of the ram's far side."""
+        r, d = values["crank"], values["pivot_distance"]
+        return np.asarray(np.arctan2(d + r * np.sin(phi), r * np.cos(phi)))
+
     def _link(self, values: Values, phi: Floats) -> tuple[Floats, Floats, Floats]:
         """Angle of the link from the direction of the ram's far side, and its two derivatives."""
         r, d = values["crank"], values["pivot_distance"]
@@ -105,8 +116,16 @@ class _QuickReturn(RodMechanism):
         zero = np.zeros((1, 1, 1))
         bodies.append(Body(zero, values["link_inertia"], zero, zero, turn1, zero, zero, turn2))
         inertia, slope = reduced(bodies)
-        start = self._slider(values, self._link(values, self.dead_centres(values)[0])[0])
-        return Motion(inertia + values["block_mass"] * values["crank"] ** 2, slope, start.x() - slider.x(), -x1)
+        way = self._from_outside(values, slider)
+        return Motion(inertia + values["block_mass"] * values["crank"] ** 2, slope, way, -x1)
+
+    def way(self, values: Values, phi: Floats) -> Floats:
+        """See Mechanism."""
+        return self._from_outside(values, self._slider(values, self._direction(values, phi)))
+
+    def _from_outside(self, values: Values, slider: Slider) -> Floats:
+        start = self._direction(values, self.dead_centres(values)[0])
+        return np.asarray(self._slider(values, start).x() - slider.x())
 
     def lift(self, values: Values, phi: Floats) -> Floats:
         """See Mechanism; the link itself is taken to be balanced."""

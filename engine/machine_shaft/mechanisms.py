@@ -101,6 +101,10 @@ class Mechanism(ABC):
     def motion(self, values: Values, phi: Floats) -> Motion:
         """Inertia and travel at ``phi`` (rad)."""
 
+    def way(self, values: Values, phi: Floats) -> Floats:
+        """Travel of the working part alone, the same as that of ``motion``."""
+        return self.motion(values, phi).way
+
     @abstractmethod
     def dead_centres(self, values: Values) -> tuple[Floats, Floats]:
         """Angles, of the parameters' shape, at which the forward stroke starts and ends (rad, any revolution)."""

@@ -45,7 +45,7 @@ class Stroke:
         with np.errstate(all="ignore"):
             start, end = mechanism.dead_centres(values)
             end = start + np.mod(end - start, _TURN)
-            return cls(mechanism, values, start, end, mechanism.motion(values, end).way)
+            return cls(mechanism, values, start, end, mechanism.way(values, end))
 
     def take(self, rows: NDArray[np.int64]) -> "Stroke":
         """The strokes of some of the cases."""
@@ -55,7 +55,7 @@ class Stroke:
 
     def fraction(self, phi: Floats) -> Floats:
         """Fraction of the stroke at ``phi``, 0 where the forward stroke starts, 1 where it ends."""
-        return np.clip(self.mechanism.motion(self.values, phi).way / self.length, 0.0, 1.0)
+        return np.clip(self.mechanism.way(self.values, phi) / self.length, 0.0, 1.0)
 
     def forward(self, phi: Floats) -> NDArray[np.bool_]:
         """Whether the forward stroke is under way."""

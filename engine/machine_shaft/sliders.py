@@ -1,5 +1,7 @@
 """Rod and ram driven by a pin on a circle, which most mechanisms end in: kinematics and bodies."""
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,10 +24,18 @@ class Slider:
         self.sin_b = (radius * self.sin - offset) / rod
         with np.errstate(invalid="ignore"):
             self.cos_b = np.sqrt(1.0 - self.sin_b**2)
-        q = radius / rod
+
+    @cached_property
+    def b1(self) -> Floats:
+        """First derivative of the rod's angle B by theta."""
         with np.errstate(invalid="ignore", divide="ignore"):
-            self.b1 = q * self.cos / self.cos_b
-            self.b2 = (self.sin_b * self.b1**2 - q * self.sin) / self.cos_b
+            return np.asarray(self.radius / self.rod * self.cos / self.cos_b)
+
+    @cached_property
+    def b2(self) -> Floats:
+        """Its second derivative."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray((self.sin_b * self.b1**2 - self.radius / self.rod * self.sin) / self.cos_b)
 
     def along_rod(self, s: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """First and second derivatives, by theta, of the x and y of the rod's point at ``s`` from the pin."""

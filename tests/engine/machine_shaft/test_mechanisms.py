@@ -54,6 +54,7 @@ def compare(
     values = arrays(v)
     assert np.isnan(mechanism.unassembled(values)[0])
     motion = mechanism.motion(values, ANGLES[None, None, :])
+    assert (mechanism.way(values, ANGLES[None, None, :]) == motion.way).all()
     got = np.broadcast_to(motion.inertia, (1, 1, len(ANGLES)))[0, 0]
     wanted = inertia(bodies, ANGLES)
     assert np.max(np.abs(got - wanted)) <= 1e-8 * np.max(np.abs(wanted))
