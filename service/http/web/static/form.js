@@ -110,7 +110,18 @@ const mark = (event) => {
   }
 };
 
+// A pasted column or row of a spreadsheet becomes a list of values.
+const paste = (event) => {
+  const text = event.clipboardData.getData("text");
+  if (!event.target.name?.endsWith("/values") || !/[\t\n]/.test(text.trim())) return;
+  event.preventDefault();
+  const field = event.target, list = text.split(/[\t\r\n]+/).map((part) => part.trim()).filter(Boolean).join("; ");
+  field.setRangeText(list, field.selectionStart, field.selectionEnd, "end");
+  field.dispatchEvent(new Event("input", { bubbles: true }));
+};
+
 function listen() {
+  form.addEventListener("paste", paste);
   form.addEventListener("input", (event) => { edited = event.target.name; soon(); });
   form.addEventListener("focusin", mark);
   form.addEventListener("focusout", (event) => { if (event.target.name) { touched.add(event.target.name); soon(); } });

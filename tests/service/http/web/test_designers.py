@@ -190,3 +190,20 @@ def test_everything_works_without_javascript(visitor: Visitor, example: str) -> 
         assert kinds[urlsplit(str(picture.get_attribute("src"))).path] == "image/svg+xml", address
     page.goto(f"/studies/{study_id}/cases?sort=-shaft.load")
     assert [cell.inner_text() for cell in page.locator("tbody td:nth-child(2)").all()] == ["0.2", "0.1", "0"]
+
+
+def test_a_pasted_column_becomes_the_values_of_an_axis(visitor: Visitor) -> None:
+    page = visitor.page
+    page.goto("/new?preset=one_pendulum")
+    field = named(page, "/axes/2/values")
+    field.fill("")
+    field.evaluate(
+        """(field, text) => {
+          const clipboardData = new DataTransfer();
+          clipboardData.setData("text", text);
+          field.dispatchEvent(new ClipboardEvent("paste", { clipboardData, bubbles: true, cancelable: true }));
+        }""",
+        "0\r\n0.1\r\n200 N*mm\r\n",
+    )
+    expect(field).to_have_value("0; 0.1; 200 N*mm")
+    expect(page.locator("[data-cases]")).to_have_attribute("data-cases", str(16 * 4 * 3))
