@@ -157,7 +157,10 @@ def drawn_numbers(study: Study, query: CurveQuery) -> int:
 
 def caption(study: Study, query: CurveQuery) -> str:
     """A caption of the curves of ``query``: a sentence without its full stop."""
-    by = ", ".join(_with_unit(study, path) for path in query.by)
+    some = Counter(path for path, _ in query.of)
+    by = ", ".join(
+        (f"of {some[path]} values of " if path in some else "") + _with_unit(study, path) for path in query.by
+    )
     held = [held_text(study, path, float(value)) for path, value in query.at]
     first = f"{', '.join(query.y)} against {_with_unit(study, query.x)}" + (f", a curve for each {by}" if by else "")
     return "; ".join([first, *held])
