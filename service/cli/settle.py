@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag.service.storage.records import RowBlock
+    from sprag.worker.models import ChunkResult, ResultInfo
     from sprag.worker.study import Study
 
 #: Cases that are settled together: enough to fill the engine, few enough to show progress.
@@ -43,9 +44,10 @@ def settle(
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Find the settled motion of cases: its regime, order, stability and characteristics."""
+    """Find the settled motions of cases, with many starts all: regime, order, stability and characteristics."""
     from sprag.service.results.exports import Source, csv_pieces, rows_json
     from sprag.worker.models import OK, study_results
+    from sprag.worker.models.starts import count_of
 
     study = _settled(read_study(spec, points).study, at_most)
     cases = _chosen(study, case)
@@ -54,11 +56,11 @@ def settle(
         if as_json or (file or "").lower().endswith(".json"):
             write(to_bytes([row for block in blocks for row in rows_json(study, block)]) + b"\n")
         elif len(cases) == 1 and not to_file(file):
-            _show(blocks[0])
+            _show(blocks[0], count_of(study.run))
         else:
             for piece in csv_pieces(Source(study, study_results(study), blocks, {})):
                 write(piece)
-    endings = Counter(ending for block in blocks for ending in block.endings)
+    endings = Counter(ending for block in blocks for ending in block.first_rows().endings)
     regimes = Counter(row.results["regime"] for block in blocks for row in block.rows() if row.ending == OK)
     say(", ".join(f"{count} {regime}" for regime, count in regimes.most_common()) or "no case ended ok")
     if as_json and to_file(file):
@@ -86,10 +88,9 @@ def _chosen(study: Study, asked: list[int] | None) -> list[int]:
 
 
 def _blocks(study: Study, cases: list[int]) -> list[RowBlock]:
-    """The rows of the cases, run here."""
+    """The rows of the cases, run here; those of a case with many starts side by side."""
     import numpy as np
 
-    from sprag.service.storage.records import RowBlock
     from sprag.worker.models import run_chunk, study_results
     from sprag.worker.reuse import taken
 
@@ -100,9 +101,26 @@ def _blocks(study: Study, cases: list[int]) -> list[RowBlock]:
         for first in range(0, len(cases), _BATCH):
             part = np.array(cases[first : first + _BATCH], dtype=np.int64)
             done = run_chunk(taken(study, part) if study.axes else study, 0, part.size)
-            blocks.append(RowBlock(study_results(study), part, done.endings, done.flags, done.values))
+            blocks.append(_block(study_results(study), part, done))
             update(first + part.size, len(cases), "")
     return blocks
+
+
+def _block(infos: tuple[ResultInfo, ...], cases: NDArray[np.int64], done: ChunkResult) -> RowBlock:
+    """The rows of a run of these cases, in their order: those of a case one after the other."""
+    import numpy as np
+
+    from sprag.service.storage.records import RowBlock
+    from sprag.worker.models import OK
+
+    if done.further is None:
+        return RowBlock(infos, cases, done.endings, done.flags, done.values)
+    places = np.concatenate([np.arange(cases.size), done.further.of])
+    order = np.argsort(places, kind="stable")
+    endings = [*done.endings, *[OK] * len(done.further.of)]
+    flags = [*done.flags, *done.further.flags]
+    values = np.concatenate([done.values, done.further.values])
+    return RowBlock(infos, cases[places[order]], [endings[k] for k in order], [flags[k] for k in order], values[order])
 
 
 def _of_lines(study: Study, cases: NDArray[np.int64]) -> RowBlock:
@@ -122,15 +140,23 @@ def _of_lines(study: Study, cases: NDArray[np.int64]) -> RowBlock:
     return RowBlock(study_results(study), cases, endings, flags, done.values[rows])
 
 
-def _show(block: RowBlock) -> None:
-    """One case as a table, without missing values."""
+def _show(block: RowBlock, starts: int) -> None:
+    """One case as a table, without missing values; a column for each of its regimes."""
     from sprag.service.results.regimes import ORDER
     from sprag.worker.models import ENDING_SENTENCES, OK, motion_sentence
 
-    (row,) = block.rows()
-    regime, order = (row.results[name] for name in ("regime", ORDER))
-    found = motion_sentence(str(regime), order if isinstance(order, int) else None) if row.ending == OK else ""
-    meaning = found or ENDING_SENTENCES[row.ending]
-    values = zip(block.infos, block.values[0].tolist(), strict=True)
-    rows = [(info.name, info.cell(value), info.unit) for info, value in values if math.isfinite(value)]
-    show_table(f"Case {row.case}: {meaning}", [("result", False, True), ("value", True), ("unit", False)], rows)
+    first, *others = block.rows()
+    regime, order = (first.results[name] for name in ("regime", ORDER))
+    found = motion_sentence(str(regime), order if isinstance(order, int) else None) if first.ending == OK else ""
+    meaning = found or ENDING_SENTENCES[first.ending]
+    if others:
+        meaning = f"{len(block)} regimes, to which its {starts} starts come"
+    values = zip(block.infos, block.values.T.tolist(), strict=True)
+    rows = [
+        (info.name, *("" if math.isnan(value) else info.cell(value) for value in own), info.unit)
+        for info, own in values
+        if any(map(math.isfinite, own))
+    ]
+    heads = [f"regime {number}" for number in range(len(block))] if others else ["value"]
+    shown = [(head, True) for head in heads]
+    show_table(f"Case {first.case}: {meaning}", [("result", False, True), *shown, ("unit", False)], rows)

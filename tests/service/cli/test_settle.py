@@ -48,6 +48,24 @@ def test_json_is_null_where_there_is_no_value(sprag: Sprag, examples: Path) -> N
     assert row["results"]["regime.exponent"] is None
 
 
+def test_every_regime_of_a_case_with_many_starts_is_shown(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+    spec = examples / "coexisting_motions.json"
+    done = sprag("settle", spec, "--case", 2)
+    assert "2 regimes, to which its 32 starts come" in done.out
+    assert "2 periodic" in done.err
+    share = next(line for line in done.out.splitlines() if "regime.share " in line)
+    assert ("0.625" in share, "0.375" in share) == (True, True)
+    file = tmp_path / "settled.csv"
+    sprag("settle", spec, "--case", 2, "--case", 0, "-o", file)
+    rows = list(csv.DictReader(io.StringIO(file.read_text(encoding="utf-8"))))
+    assert [(row["case"], row["regime.number"]) for row in rows] == [("2", "0"), ("2", "1"), ("0", "0")]
+    assert [float(row["shaft.speed.mean"]) for row in rows[:2]] == pytest.approx([0.392266, 0.558988], abs=1e-6)
+    listed = sprag("settle", spec, "--case", 2, "--json").data
+    assert [row["results"]["regime.start"] for row in listed] == [0, 1]
+    told = sprag("settle", spec, "--case", 2, "--case", 0, "-o", tmp_path / "settled.json", "--json").data
+    assert (told["cases"], told["regimes"], told["endings"]) == (2, {"periodic": 3}, {"ok": 2})
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
