@@ -13,8 +13,10 @@ from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.run import SettledRun
 from sprag.engine.vibration_drive import starts as module
 from sprag.engine.vibration_drive.regimes import Regime
+from sprag.engine.vibration_drive.same_motions import Motions
 from sprag.engine.vibration_drive.start_results import started_infos
 from sprag.engine.vibration_drive.starts import StartedBatch, basin, settle_starts, started_columns, wilson
+from sprag.engine.vibration_drive.strobes import SHAFT_SPEED
 
 NAMES = [info.name for info in started_infos(1)]
 ANGLE = "pendulums.0.initial_angle"
@@ -70,7 +72,7 @@ def test_copies_of_an_orbit_a_period_apart_are_one_regime() -> None:
     spread = started_columns(PERIOD_TWO, starts, 8, 1)
     points = module.settle(spread, SettledRun(), cases=8).points
     # Some of them are at the other strobe of the orbit.
-    assert np.ptp(points[:, module.SHAFT_SPEED]) > 0.1
+    assert np.ptp(points[:, SHAFT_SPEED]) > 0.1
 
 
 def test_starts_without_an_orbit_are_run_longer_before_they_count_as_another_motion(
@@ -100,7 +102,7 @@ def test_irregular_motions_are_distinguished_by_their_means() -> None:
 
 
 def test_orbits_that_repeat_for_ever_alike_are_one_whatever_their_orders() -> None:
-    motions = module._Motions.__new__(module._Motions)
+    motions = Motions.__new__(Motions)
     a, b = [1.0, 0.1, 2.0], [1.5, 0.2, -2.0]
     sequences = ([a, b], [a], [b, a, b, a], [a, a], [a, b, b, a])
     motions.orders = np.array([len(sequence) for sequence in sequences])
