@@ -4,6 +4,7 @@
 
 Lines are random drives of the range of W1 (amplitude, load), swept over the excitation frequency from 16 to 35 Hz, up
 and down. A jump agrees if a sweep with 16 times smaller steps has one in the same step or the next one to either side.
+Then the jumps of each drive are narrowed, and agree where the finer sweep has one within what the narrowed sweep tells.
 """
 
 from __future__ import annotations
@@ -19,9 +20,11 @@ from sprag.engine.run import SettledRun
 from sprag.engine.vibration_drive.regimes import settled_infos
 from sprag.engine.vibration_drive.settle import settle
 from sprag.engine.vibration_drive.sweep import Begun, Sweep, sweep
+from sprag.service.spec.narrow import narrowed_values
 
 FINER = 16
 LOW, HIGH = 16.0, 35.0
+SWEPT = "excitation.frequency"
 #: Differences of the mean speeds up and down, relative to the larger one, that count as hysteresis.
 HYSTERESIS = 0.05
 SPEED = [info.name for info in settled_infos(1)].index("shaft.speed.mean")
@@ -49,12 +52,33 @@ def lines_of(drives: int, steps: int) -> NDArray[np.int64]:
 
 
 def jumps(found: Sweep, lines: NDArray[np.int64], frequencies: Floats) -> list[Floats]:
-    """The middles of the steps of each line in which the motion jumps."""
+    """The steps of each line in which the motion jumps: their lower and upper ends, shape (jumps, 2)."""
     steps = frequencies.size
-    return [
-        np.array([frequencies[line[[k - 1, k]] % steps].mean() for k in range(1, steps) if found.jumped[line[k]]])
-        for line in lines
-    ]
+    every = []
+    for line in lines:
+        at = np.flatnonzero(found.jumped[line])
+        every.append(np.sort(frequencies[line[np.column_stack([at - 1, at])] % steps], axis=1))
+    return every
+
+
+def narrowed(drives: Floats, frequencies: Floats, coarse: list[Floats], fine: list[Floats]) -> None:
+    """Print whether the jumps of narrowed sweeps are those of the finer one."""
+    told = within = cases = whole = 0
+    for number in range(len(drives)):
+        own = np.unique(np.concatenate(coarse[2 * number : 2 * number + 2]), axis=0)
+        values = narrowed_values(frequencies, own, FINER)
+        lines = lines_of(1, values.size)
+        found = sweep(columns_of(drives[number : number + 1], values), SettledRun(), lines, SWEPT)
+        cases += 2 * values.size
+        for steps, finer in zip(jumps(found, lines, values), fine[2 * number : 2 * number + 2], strict=True):
+            told += len(steps)
+            whole += int((np.diff(steps) > 1.5 * np.diff(frequencies)[0] / FINER).sum())
+            middles = finer.mean(axis=1)
+            within += sum(bool(((middles > low) & (middles < high)).any()) for low, high in steps)
+    print(
+        f"narrowed: {told} jumps, {within} of them where the finer sweep jumps, {whole} in steps not narrowed yet; "
+        f"{cases} cases, the finer sweep {2 * len(drives) * (FINER * (frequencies.size - 1) + 1)}"
+    )
 
 
 def main() -> None:
@@ -64,7 +88,7 @@ def main() -> None:
     drives = np.column_stack([random.uniform(1e-3, 3e-3, count), random.uniform(0.02, 0.4, count)])
     frequencies = np.linspace(LOW, HIGH, steps)
     columns, lines = columns_of(drives, frequencies), lines_of(count, steps)
-    coarse = sweep(columns, SettledRun(), lines)
+    coarse = sweep(columns, SettledRun(), lines, SWEPT)
     rest = settle(columns, SettledRun(), cases=lines.size)
     continued = coarse.begun != Begun.FIRST
     ratio = coarse.batch.spent[continued].mean() / rest.spent[continued].mean()
@@ -80,13 +104,16 @@ def main() -> None:
     print(f"drives with hysteresis above {100 * HYSTERESIS:g} %: {wide} of {count}")
     fine_frequencies = np.linspace(LOW, HIGH, FINER * (steps - 1) + 1)
     fine_lines = lines_of(count, fine_frequencies.size)
-    fine = sweep(columns_of(drives, fine_frequencies), SettledRun(), fine_lines)
+    fine = sweep(columns_of(drives, fine_frequencies), SettledRun(), fine_lines, SWEPT)
     step = (HIGH - LOW) / (steps - 1)
     agree = total = 0
-    for own, finer in zip(jumps(coarse, lines, frequencies), jumps(fine, fine_lines, fine_frequencies), strict=True):
-        total += own.size
-        agree += int(sum(bool(finer.size) and np.abs(finer - at).min() <= 1.5 * step for at in own))
+    jumped, finer_jumps = jumps(coarse, lines, frequencies), jumps(fine, fine_lines, fine_frequencies)
+    for own, finer in zip(jumped, finer_jumps, strict=True):
+        total += len(own)
+        middles = finer.mean(axis=1)
+        agree += int(sum(bool(len(finer)) and np.abs(middles - at).min() <= 1.5 * step for at in own.mean(axis=1)))
     print(f"jumps within a step of a {FINER} times finer sweep: {agree} of {total}")
+    narrowed(drives, frequencies, jumped, finer_jumps)
 
 
 if __name__ == "__main__":

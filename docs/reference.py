@@ -89,6 +89,8 @@ def limits() -> Iterator[Row]:
     yield "excitation periods of a search for the settled motion (`at_most`)", searched
     yield "largest order of a periodic motion (`max_period`)", f"1 to {limit.MAX_ORBIT_PERIODS}"
     yield "scaled distance that counts as settled (`settled`)", f"{limit.MIN_SETTLED:g} to {limit.MAX_SETTLED:g}"
+    smaller = f"{limit.MIN_NARROW_STEPS:,} to {limit.MAX_NARROW_STEPS:,}"
+    yield "smaller steps into which a step of a sweep is split (`narrow`)", smaller
     yield "tolerance", f"{limit.MIN_TOLERANCE:g} to {limit.MAX_TOLERANCE:g}"
     yield "times of a trajectory", f"{limit.MAX_TRAJECTORY_POINTS:,}"
     told = "excitation periods in the tables of a case's engagements: the last of its run"

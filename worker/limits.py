@@ -49,6 +49,10 @@ MAX_ORBIT_PERIODS: Final = 64
 #: Range of the scaled distance from its orbit below which a run counts as settled.
 MIN_SETTLED: Final = 1e-10
 MAX_SETTLED: Final = 1e-3
+#: Smaller steps into which a step of a sweep is split where the motion jumps: by default, at least, at most.
+NARROW_STEPS: Final = 16
+MIN_NARROW_STEPS: Final = 2
+MAX_NARROW_STEPS: Final = 1024
 #: Range of the integrator's local relative error.
 MIN_TOLERANCE: Final = 1e-14
 MAX_TOLERANCE: Final = 1e-4

@@ -1,7 +1,8 @@
 """kill -9 of pool processes, dispatcher and service in the middle of the lines of a sweep.
 
 A case of a sweep starts from the one before it, and only whole lines are stored. Each kill comes when the study has got
-to a case that was drawn, while further lines run. In the end every row and flag is that of an undisturbed run.
+to a case that was drawn, while further lines run, and when the lines that lost their process before have been run
+again: a line that loses it twice is given up. In the end every row and flag is that of an undisturbed run.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ from sprag.service.presets import preset_text
 from sprag.service.storage.store import Store
 from sprag.worker import models
 
+#: How many lines have lost their process and have not been run again.
+_LOST = "SELECT count(*) FROM chunks WHERE failures > 0 AND state <> 'done'"
+
 
 def sweeps(folder: Path, *, count: int, seed: int, lines: int, processes: int = 2) -> dict[str, Any]:
     """Run a sweep of that many loads, up and down, under ``count`` kills; gives the figures."""
@@ -30,6 +34,7 @@ def sweeps(folder: Path, *, count: int, seed: int, lines: int, processes: int = 
         swept = service.submit(made)
         for mark in sorted(draw.randrange(study.cases) for _ in range(count)):
             harness.until(lambda mark=mark: harness.done(service.database, swept) >= mark, "the study goes on")
+            harness.until(lambda: not harness.asked(service.database, _LOST), "lost lines are run again")
             killed[kill(service, draw)] += 1
         service.finish(swept)
     harness.compare(service.database, swept, made)

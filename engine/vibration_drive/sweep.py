@@ -34,7 +34,8 @@ Flags = NDArray[np.bool_]
 
 _OK = ENDINGS.index(Ending.OK)
 #: Orbits are apart where they are so many times as far from each other as those around them in the line (the median of
-#: so many pairs to either side), and at least this far (scaled); without any others around, the last number.
+#: so many pairs to either side), as they are and in proportion to the steps, and at least this far (scaled); without
+#: any others around, the last number.
 _TIMES, _AROUND, _LEAST, _ALONE = 4.0, 3, 0.02, 0.2
 
 
@@ -74,7 +75,7 @@ class Sweep:
     jumped: Flags
 
 
-def sweep(columns: Mapping[str, ArrayLike], settings: SettledRun, lines: Ints) -> Sweep:
+def sweep(columns: Mapping[str, ArrayLike], settings: SettledRun, lines: Ints, along: str | None = None) -> Sweep:
     """Find the settled motions along lines: the first case of each from its own start, the others each from the
     settled motion of the case before it.
 
@@ -90,6 +91,8 @@ def sweep(columns: Mapping[str, ArrayLike], settings: SettledRun, lines: Ints) -
     settings : SettledRun
     lines : int array, shape (lines, steps)
         The cases of each line in the order of the sweep; every case of the batch exactly once.
+    along : str, optional
+        The column that is swept. Without it the steps count as equal where jumps are told from steep parts.
 
     Returns
     -------
@@ -120,7 +123,10 @@ def sweep(columns: Mapping[str, ArrayLike], settings: SettledRun, lines: Ints) -
         batch.values[cases], batch.endings[cases], batch.regimes[cases] = found.values, found.endings, found.regimes
         batch.points[cases], batch.spent[cases] = found.points, found.spent
         before = cases
-    return Sweep(batch, begun, starts, _jumped(columns, settings, batch, starts, begun, lines))
+    at = np.arange(lines.shape[1])[None, :] if along is None else np.asarray(columns[along], dtype=np.float64)[lines]
+    steps = np.ones(count)
+    steps[lines[:, 1:]] = np.abs(np.diff(at))
+    return Sweep(batch, begun, starts, _jumped(columns, settings, batch, starts, begun, lines, steps))
 
 
 def _after(
@@ -175,8 +181,9 @@ def _jumped(
     starts: Floats,
     begun: NDArray[np.int8],
     lines: Ints,
+    steps: Floats,
 ) -> Flags:
-    """Which cases do not continue the motion of the case before them."""
+    """Which cases do not continue the motion of the case before them, so many ``steps`` away."""
     order = batch.orders
     # Without a load a drive coasts, as the limit of a vanishing load.
     kind = np.where(batch.regimes == Regime.COASTING, Regime.PERIODIC, batch.regimes)
@@ -193,11 +200,17 @@ def _jumped(
     for line in lines:
         for place, case in enumerate(line.tolist()):
             if not math.isnan(apart[case]):
-                around = apart[np.delete(line[max(0, place - _AROUND) : place + _AROUND + 1], min(place, _AROUND))]
-                around = around[~np.isnan(around)]
-                usual = max(_LEAST, _TIMES * float(np.median(around))) if around.size else _ALONE
-                found[case] = apart[case] > usual
+                near = np.delete(line[max(0, place - _AROUND) : place + _AROUND + 1], min(place, _AROUND))
+                found[case] = apart[case] > _usual(apart, steps, case, near[~np.isnan(apart[near])])
     return found
+
+
+def _usual(apart: Floats, steps: Floats, case: int, near: Ints) -> float:
+    """How far apart the orbits of a case and the one before it may be, from the cases ``near`` it in the line."""
+    if not near.size:
+        return _ALONE
+    around = max(np.median(apart[near]), np.median(apart[near] / steps[near]) * steps[case])
+    return max(_LEAST, _TIMES * float(around))
 
 
 def _apart(

@@ -101,6 +101,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "submit": remote.submit,
         "extend": extend.extend,
         "longer": extend.longer,
+        "narrow": extend.narrow,
         "watch": remote.watch,
         "list": remote.list_studies,
         "pause": remote.pause,

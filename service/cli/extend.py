@@ -1,4 +1,4 @@
-"""``sprag extend`` and ``sprag longer``: further cases, and more time for cases, of a study of a running service."""
+"""``sprag extend``, ``longer`` and ``narrow``: further cases, more time and smaller steps for a study of a service."""
 
 from __future__ import annotations
 
@@ -12,7 +12,14 @@ from sprag.service.cli.files import decode, read_bytes
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token, Wait, WaitTimeout
 from sprag.service.cli.remote import connection, submitted
 from sprag.service.spec.numbers import parse_number
-from sprag.worker.limits import MAX_BODY_BYTES, MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
+from sprag.worker.limits import (
+    MAX_BODY_BYTES,
+    MAX_NARROW_STEPS,
+    MAX_SETTLED_PERIODS,
+    MIN_NARROW_STEPS,
+    MIN_SETTLED_PERIODS,
+    NARROW_STEPS,
+)
 
 
 def extend(
@@ -66,6 +73,30 @@ def longer(
     """Submit a study of the unsettled cases of another, with more time for each."""
     with connection(server, token) as client:
         submitted(client, client.run_longer(study_id, regime, at_most), wait, timeout, as_json)
+
+
+def narrow(
+    study_id: StudyId,
+    steps: Annotated[
+        int,
+        typer.Option(
+            min=MIN_NARROW_STEPS, max=MAX_NARROW_STEPS, help="Smaller steps into which each of these steps is split."
+        ),
+    ] = NARROW_STEPS,
+    at: Annotated[
+        list[str] | None,
+        typer.Option("--at", metavar="PATH=VALUE", help="Only value of another axis; may be repeated. Default: all."),
+    ] = None,
+    wait: Wait = False,
+    timeout: WaitTimeout = None,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Submit the sweep of a study once more, with smaller steps where its motion jumps."""
+    query = [("steps", str(steps)), *(("at", text) for text in at or [])]
+    with connection(server, token) as client:
+        submitted(client, client.narrow(study_id, query), wait, timeout, as_json)
 
 
 def _what_is_new(old: Mapping[str, Any], study: Mapping[str, Any]) -> str:

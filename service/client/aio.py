@@ -28,6 +28,7 @@ from sprag.service.client.queries import (
     form_of,
     front_query,
     longer_query,
+    narrow_query,
     reporting,
     result_query,
     ribbon_query,
@@ -372,6 +373,17 @@ class AsyncStudy(AsyncCaseAnswers):
         query = longer_query(regime, at_most)
         headers = {"Idempotency-Key": key or uuid.uuid4().hex}
         made = await self._client.request("POST", f"{self._path}:longer", params=query, headers=headers)
+        return AsyncStudy(self._client, made["id"])
+
+    async def narrow(
+        self, steps: int | None = None, at: Mapping[str, Value] | None = None, *, key: str | None = None
+    ) -> AsyncStudy:
+        """Submit this one's sweep once more, with smaller steps where its motion jumps.
+
+        Each of these steps is split into ``steps`` (16). ``at`` maps paths of other axes to their only values.
+        """
+        query, headers = narrow_query(steps, at), {"Idempotency-Key": key or uuid.uuid4().hex}
+        made = await self._client.request("POST", f"{self._path}:narrow", params=query, headers=headers)
         return AsyncStudy(self._client, made["id"])
 
     async def act(self, verb: str) -> StudySummary:

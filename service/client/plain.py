@@ -97,6 +97,13 @@ class ServiceClient:
         query = longer_query(regime, at_most)
         return self._json("POST", f"{study_path(study_id)}:longer", params=query, headers=_once(key))
 
+    def narrow(self, study_id: str, query: Query = (), key: str | None = None) -> dict[str, Any]:
+        """Submit the sweep of a study once more, with smaller steps where its motion jumps.
+
+        The same ``key`` submits it once, however often it is sent.
+        """
+        return self._json("POST", f"{study_path(study_id)}:narrow", params=query, headers=_once(key))
+
     def preview(self, spec: object) -> dict[str, Any]:
         """Number of cases, estimated time and size of a study that is not submitted."""
         return self._json("POST", "/studies:preview", json=spec)

@@ -128,6 +128,11 @@ def longer_query(regime: str | None, at_most: int | None) -> list[tuple[str, str
     return [(name, str(value)) for name, value in given if value is not None]
 
 
+def narrow_query(steps: int | None, at: Mapping[str, Value] | None) -> list[tuple[str, str]]:
+    """Query of a narrowed sweep; None leaves the steps to the service."""
+    return [*given({"steps": steps}), *(("at", f"{path}={value}") for path, value in (at or {}).items())]
+
+
 def branch_query(along: str, low: Value | None, high: Value | None, **more: Value | None) -> list[tuple[str, str]]:
     """Query of a branch, or of a diagram with ``more`` parameters; None leaves one to the service."""
     return [("along", along), *given({"from": low, "to": high, **more})]

@@ -22,6 +22,7 @@ from sprag.service.client.queries import (
     finish_text,
     form_of,
     front_query,
+    narrow_query,
     reporting,
     result_query,
     ribbon_query,
@@ -344,6 +345,15 @@ class Study(CaseAnswers):
         ``not_settled``.
         """
         return Study(self._client, self._client.plain.run_longer(self.id, regime, at_most, key)["id"])
+
+    def narrow(
+        self, steps: int | None = None, at: Mapping[str, Value] | None = None, *, key: str | None = None
+    ) -> Study:
+        """Submit this one's sweep once more, with smaller steps where its motion jumps.
+
+        Each of these steps is split into ``steps`` (16). ``at`` maps paths of other axes to their only values.
+        """
+        return Study(self._client, self._client.plain.narrow(self.id, narrow_query(steps, at), key)["id"])
 
     def act(self, verb: str) -> StudySummary:
         """Request "pause", "resume", "cancel" or "retry"."""

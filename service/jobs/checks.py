@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from sprag.service.faults import FaultError, parameter_error
 from sprag.service.jobs.calibrations import Calibrations
 from sprag.service.jobs.explore import Columns
 from sprag.service.jobs.fronts import Fronts
@@ -18,19 +19,21 @@ from sprag.service.jobs.start_from import with_start
 from sprag.service.jobs.submission import Submission, hash_of, submission
 from sprag.service.json_text import to_bytes
 from sprag.service.results.fits import fit_json, read_fit
+from sprag.service.results.selection import locate_axes
 from sprag.service.schedules.fields import ScheduleFields, change_fields, read_fields
 from sprag.service.spec import units
 from sprag.service.spec.document import load_spec, parse_spec
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.longer import longer_spec
 from sprag.service.spec.machine.shaft_check import compile_elsewhere
+from sprag.service.spec.narrow import narrowed_spec, swept_axis
 from sprag.service.spec.report import SpecError
 from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.pool.child_process import uncounted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from datetime import datetime
 
     from sprag.service.spec.text import Format
@@ -131,6 +134,37 @@ def longer_study(
     named = {"regime" if models.is_settled(store.study(study_id).run) else "flag": kind}
     cases = store.cases_of_kind(study_id, **named)
     parsed = parse_spec(longer_spec(store.spec(study_id), store.study(study_id), cases, at_most))
+    return submission(parsed, store, now, given=given)
+
+
+def narrowed_study(
+    library: Library,
+    study_id: str,
+    steps: int,
+    at: Sequence[tuple[str, str]],
+    now: datetime,
+    given: Mapping[str, object],
+) -> Submission:
+    """The sweep of a study once more, with smaller steps where the motion jumps, at some values of its other axes.
+
+    Raises FaultError where there is no jump, SelectionError, SpecError and StudyNotFoundError.
+    """
+    store = library.store
+    study, record = store.study(study_id), store.get_study(study_id)
+    if study.sweep is None:
+        raise FaultError("wrong-state", "The study is not a sweep: it has no jumps to narrow.")
+    if record.done < record.cases:
+        raise FaultError("wrong-state", f"Only {record.done:,} of {record.cases:,} cases have been run.")
+    fixed = {axis: index for axis, (_, index) in locate_axes(study, at).items()}
+    if swept_axis(study) in fixed:
+        raise parameter_error("at", "conflict", "names the swept axis", study.sweep, "values of the other axes")
+    cases = store.cases_of_kind(study_id, flag=models.JUMPED)
+    indices = study.indices(cases)
+    for axis, index in fixed.items():
+        cases, indices = cases[indices[axis] == index], tuple(one[indices[axis] == index] for one in indices)
+    if not cases.size:
+        raise FaultError("wrong-state", "No case of the study has the flag jumped" + (" there." if fixed else "."))
+    parsed = parse_spec(narrowed_spec(store.spec(study_id), study, cases, steps, fixed))
     return submission(parsed, store, now, given=given)
 
 

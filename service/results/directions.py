@@ -12,12 +12,19 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag.service.answers import Value
+    from sprag.service.answers.studies import AxisInfo
     from sprag.worker.study import Study
 
 
 def in_words(values: Mapping[str, float]) -> dict[str, Value]:
     """Values of parameters by path, that of the direction in words."""
     return {path: direction(value) if path == SWEEP else value for path, value in values.items()}
+
+
+def ends_in_words(axis: AxisInfo) -> tuple[Value, Value]:
+    """The first and the last value of an axis."""
+    first, last = (in_words({axis["paths"][0]: axis[end]})[axis["paths"][0]] for end in ("first", "last"))
+    return first, last
 
 
 def case_values(study: Study, case: int) -> dict[str, Value]:

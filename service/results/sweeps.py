@@ -87,13 +87,12 @@ def hysteresis(curves: Curves) -> str:
         return ""
     name, x = curves.selection.results[0].name, curves.selection.x
     unit = unit_text(curves.selection.units[x])
-    count = sum(len(curve.jumps or ()) for curve in curves.curves)
-    jumps = f"{count} jump{'s' if count != 1 else ''}"
+    widths = [jump["high"] - jump["low"] for curve in curves.curves for jump in curve.jumps or ()]
+    within = f"within {number(max(widths, default=0.0))}{f' {unit}' if unit else ''}"
+    jumps = {0: "no jumps", 1: f"1 jump, {within}"}.get(len(widths), f"{len(widths)} jumps, each {within}")
     pairs = _pairs(curves)
     if not pairs:
-        return (
-            f"{jumps[0].upper()}{jumps[1:]} along the sweep." if count else "The motion does not jump along the sweep."
-        )
+        return f"Along the sweep {jumps}."
     largest, at, wide = 0.0, 0.0, list[tuple[float, float]]()
     for up, down in pairs:
         both = np.array([up.y[name], down.y[name]])

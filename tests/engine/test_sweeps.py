@@ -71,15 +71,36 @@ def test_a_case_continues_the_state_of_its_neighbour() -> None:
     assert np.isnan(found.batch.values[:3, run_up]).all()
 
 
-def test_a_jump_is_narrowed_by_a_sweep_from_the_end_of_the_case_before_it() -> None:
-    found = sweep(_columns(FREQUENCIES), SettledRun(), DOWN)
-    assert found.jumped[0]  # between 16.475 and 16 Hz
-    state = end_state(_case(_columns(FREQUENCIES), 1), SettledRun(), found.starts[1:2])
+def test_a_narrowed_jump_is_that_of_a_finer_sweep_and_of_a_sweep_by_hand() -> None:
+    steps, path = 16, "excitation.frequency"
+    coarse = FREQUENCIES[:3]
+    narrowed = np.union1d(coarse, np.linspace(coarse[0], coarse[1], steps + 1))
+    down = np.arange(narrowed.size)[None, ::-1]
+    found = sweep(_columns(narrowed), SettledRun(), down, path)
+    (jump,) = np.flatnonzero(found.jumped)
+    told = narrowed[jump : jump + 2]
+    assert told[1] - told[0] == pytest.approx(0.475 / steps)
+    # A sweep whose steps are so small everywhere jumps in the same one.
+    every = np.union1d(np.linspace(coarse[0], coarse[1], steps + 1), np.linspace(coarse[1], coarse[2], steps + 1))
+    finer = sweep(_columns(every), SettledRun(), np.arange(every.size)[None, ::-1], path)
+    (same,) = np.flatnonzero(finer.jumped)
+    assert every[same : same + 2].tolist() == told.tolist()
+    # By hand: from the end of the case before the jump, through the same values.
+    state = end_state(_case(_columns(narrowed), steps), SettledRun(), found.starts[steps : steps + 1])
     assert state is not None
-    finer = np.linspace(16.0, 16.475, 5)
-    again = sweep(_columns(finer) | state, SettledRun(), np.array([[4, 3, 2, 1, 0]]))
-    assert _speeds(again.batch)[[4, 0]] == pytest.approx(_speeds(found.batch)[[1, 0]], rel=1e-9)
-    assert again.jumped.sum() == 1
+    by_hand = sweep(_columns(narrowed[:steps]) | state, SettledRun(), down[:, 2:], path)
+    others = [k for k, name in enumerate(NAMES) if not name.startswith(("runup", "regime.settled_after"))]
+    assert by_hand.batch.values[:, others].tobytes() == found.batch.values[:steps, others].tobytes()
+    assert np.flatnonzero(by_hand.jumped).tolist() == [jump]
+
+
+def test_a_larger_step_after_smaller_ones_is_no_jump() -> None:
+    # Between 20 and 20.6 Hz the motion does not jump; orbits a large step apart are far apart compared with those
+    # of the small steps before.
+    frequencies = np.array([*np.linspace(20.0, 20.05, 6), *np.linspace(20.2, 20.6, 3)])
+    columns, up = _columns(frequencies), np.arange(frequencies.size)[None, :]
+    assert not sweep(columns, SettledRun(), up, "excitation.frequency").jumped.any()
+    assert sweep(columns, SettledRun(), up).jumped.any()
 
 
 def test_a_line_has_the_same_bits_beside_others() -> None:

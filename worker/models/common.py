@@ -103,7 +103,7 @@ class ChunkTask:
     ``columns`` maps flat spec paths to SI numbers, or to arrays of shape (count,) where they vary. ``run`` and
     ``structure`` are those of the study. ``refused``, shape (count,), marks cases that are not to be run; then
     ``results`` is the number of their results. ``lines``, shape (lines, steps), are the lines of a sweep: positions of
-    cases in the task in the order in which they are run.
+    cases in the task in the order in which they are run; ``along`` is the column that is swept.
     """
 
     first: int
@@ -115,6 +115,7 @@ class ChunkTask:
     refused: NDArray[np.bool_] | None = None
     results: int = 0
     lines: NDArray[np.int64] | None = None
+    along: str | None = None
 
 
 def run_accepted(task: ChunkTask, run: Callable[[ChunkTask], ChunkResult], ending: str) -> ChunkResult:

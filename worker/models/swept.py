@@ -23,7 +23,7 @@ def swept(task: ChunkTask, flags_of: Callable[[NDArray[np.float64]], list[str]])
     from sprag.engine.vibration_drive.sweep import Begun, sweep
 
     assert task.lines is not None
-    found = sweep(task.columns, settings_of(task.run), task.lines)
+    found = sweep(task.columns, settings_of(task.run), task.lines, task.along)
     raised = {
         JUMPED: found.jumped,
         ARBITRARY_START: found.begun == Begun.ARBITRARY,

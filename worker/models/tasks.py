@@ -22,9 +22,8 @@ def chunk_task(study: Study, first: int, count: int) -> ChunkTask:
     columns: dict[str, Any] = {**study.base, **study.columns(cases)}
     columns = {path: column for path, column in columns.items() if path not in NO_PARAMETERS}
     lines = None if study.sweep is None else lines_of(study, np.asarray(cases, dtype=np.int64))
-    task = ChunkTask(
-        first, count, model_of(study.model).shape_of(study), study.run, columns, study.structure, lines=lines
-    )
+    shape = model_of(study.model).shape_of(study)
+    task = ChunkTask(first, count, shape, study.run, columns, study.structure, lines=lines, along=study.sweep)
     if study.spread is None:
         return task
     model = model_of(study.model)

@@ -14,6 +14,7 @@ from sprag.service.answers import studies as m
 from sprag.service.faults import parameter_error, warned
 from sprag.service.http import views
 from sprag.service.http.api import examples
+from sprag.service.http.api.curves import pairs
 from sprag.service.http.api.document import body, key_header, located, one_of, problems
 from sprag.service.http.api.document import not_modified as documented_304
 from sprag.service.http.context import Context, Ctx, StudyId
@@ -25,7 +26,15 @@ from sprag.service.jobs.submission import Submission, take_in
 from sprag.service.results.regimes import UNSETTLED
 from sprag.service.results.rounds import round_json
 from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
-from sprag.worker.limits import MAX_PAGE_SIZE, MAX_PRIORITY, MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
+from sprag.worker.limits import (
+    MAX_NARROW_STEPS,
+    MAX_PAGE_SIZE,
+    MAX_PRIORITY,
+    MAX_SETTLED_PERIODS,
+    MIN_NARROW_STEPS,
+    MIN_SETTLED_PERIODS,
+    NARROW_STEPS,
+)
 from sprag.worker.models import ENDING_SENTENCES, NOT_SETTLED, OK, REGIME_SENTENCES, WorkerEnding, is_settled
 from sprag.worker.states import StudyState
 
@@ -41,6 +50,7 @@ SpecBody = Annotated[Body, Depends(read_body)]
 _ONCE = "the same key with the same body and parameters submits the study once, however often it is sent"
 IdempotencyKey = Annotated[str | None, key_header("0b6e9a52-feeder", _ONCE)]
 ExtensionKey = Annotated[str | None, key_header("0b6e9a52-further", _ONCE)]
+NarrowKey = Annotated[str | None, key_header("0b6e9a52-narrow", _ONCE)]
 Priority = Annotated[
     int,
     Query(
@@ -317,6 +327,51 @@ def _to_run_longer(context: Context, study_id: str, regime: str | None) -> str:
     if NOT_SETTLED in kinds.flags:
         return NOT_SETTLED
     raise parameter_error("regime", "unknown-name", "no case of this study has the flag `not_settled`")
+
+
+@router.post(
+    "/studies/{study_id:study}:narrow",
+    status_code=202,
+    response_model=m.StudySummary,
+    responses=located(202)
+    | problems(
+        "invalid-parameter",
+        "invalid-selection",
+        *CHECK_PROBLEMS,
+        "study-not-found",
+        "wrong-state",
+        "invalid-spec",
+        "idempotency-conflict",
+        "storage-full",
+        "queue-full",
+    ),
+)
+async def narrow_study(
+    context: Ctx,
+    work: Attended,
+    study_id: StudyId,
+    steps: Annotated[
+        int,
+        Query(
+            ge=MIN_NARROW_STEPS,
+            le=MAX_NARROW_STEPS,
+            description="smaller steps into which each of these steps is split",
+        ),
+    ] = NARROW_STEPS,
+    at: Annotated[
+        list[str] | None,
+        Query(
+            description="`path=value`: the only value of another axis, SI or with a unit, or the only direction "
+            "(`sweep=up`); may be repeated",
+            examples=[["shaft.load=0.1 N*m"]],
+        ),
+    ] = None,
+    idempotency_key: NarrowKey = None,
+) -> Response:
+    """Submit the sweep of a study once more, with smaller steps where its motion jumps."""
+    now, given = context.store.clock.now(), _given(steps=steps, at=at)
+    made = await work.check(checks.narrowed_study, context.library, study_id, steps, pairs(at), now, given)
+    return await run_in_threadpool(_take_in, context, made, idempotency_key, 0)
 
 
 @router.post(

@@ -27,6 +27,7 @@ from sprag.service.jobs.submission import take_in
 from sprag.service.json_text import timestamp
 from sprag.service.results.curve_cases import select
 from sprag.service.results.defaults import MOST_CHOICES, caption, drawn_numbers, varying_axes
+from sprag.service.results.directions import ends_in_words
 from sprag.service.results.exports.inputs import inputs as every_input
 from sprag.service.results.exports.inputs import run_inputs
 from sprag.service.results.pictures import curves as pictures
@@ -34,9 +35,11 @@ from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.regimes import DOUBTFUL, ORDER, counted
 from sprag.service.results.selection import SelectionError
 from sprag.service.spec.catalogue import unit_of
+from sprag.service.spec.narrow import narrowed_cases
 from sprag.service.spec.numbers import parse_number
 from sprag.service.storage.records import Kinds
 from sprag.worker import models
+from sprag.worker.limits import MAX_CASES, NARROW_STEPS
 from sprag.worker.models.parameters import parameter_of
 from sprag.worker.models.starts import has_starts
 from sprag.worker.planning.calibrate.plan import CALIBRATE
@@ -150,8 +153,19 @@ def _study_page(
         # The flags of regimes appear together with the regimes.
         flags={flag: count for flag, count in kinds.flags.items() if flag not in models.REGIME_SENTENCES},
         flag_meanings=models.flags_of(study.model),
+        ends_of=ends_in_words,
         to_run_longer=(*DOUBTFUL, models.NOT_SETTLED),
+        narrowed=_narrowed(context, study, study_id) if models.JUMPED in kinds.flags else 0,
     )
+
+
+def _narrowed(context: Context, study: Study, study_id: str) -> int:
+    """Cases of the sweep with smaller steps where the motion jumps; 0 where it cannot be run, or not yet."""
+    record = context.store.get_study(study_id)
+    if record.done < record.cases:
+        return 0
+    count = narrowed_cases(study, context.store.cases_of_kind(study_id, flag=models.JUMPED))
+    return count if count <= MAX_CASES else 0
 
 
 def _has_goal(study: Study) -> bool:
@@ -287,6 +301,16 @@ async def run_longer(context: Ctx, work: Attended, study_id: StudyId, kind: str)
     # Pressed twice, it submits one study, unless more cases of this kind have finished.
     key = f"longer-{study_id}-{kind}-{counts[kind]}"
     record = await run_in_threadpool(take_in, context.store, made, key)
+    return RedirectResponse(f"/studies/{record.id}", status_code=303)
+
+
+@router.post("/studies/{study_id:study}/narrow")
+async def narrow(context: Ctx, work: Attended, study_id: StudyId) -> Response:
+    """The button beside the count of jumps: submit the sweep once more, with smaller steps there."""
+    now, revision = context.store.clock.now(), (await run_in_threadpool(context.store.get_study, study_id)).revision
+    made = await work.check(checks.narrowed_study, context.library, study_id, NARROW_STEPS, (), now, {})
+    # Pressed twice, it submits one study.
+    record = await run_in_threadpool(take_in, context.store, made, f"narrow-{study_id}-{revision}")
     return RedirectResponse(f"/studies/{record.id}", status_code=303)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import Curves, Fetch, Map
 from sprag.service.results.defaults import main_query
+from sprag.service.results.directions import ends_in_words
 from sprag.service.results.exports.inputs import Input, inputs, run_inputs
 from sprag.service.results.exports.source import given_texts
 from sprag.service.results.pictures.curves import require_drawable
@@ -45,8 +46,8 @@ class AxisRow:
     paths: str
     unit: str
     values: int
-    first: float
-    last: float
+    first: float | str
+    last: float | str
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +124,7 @@ def make_report(
         record.name or record.model,
         _facts(record, study) + ((("motions", counted(regimes)),) if regimes else ()),
         record.warnings,
-        tuple(AxisRow(", ".join(a["paths"]), a["unit"], a["values"], a["first"], a["last"]) for a in axes_json(study)),
+        tuple(AxisRow(", ".join(a["paths"]), a["unit"], a["values"], *ends_in_words(a)) for a in axes_json(study)),
         run_inputs(study, spec),
         tuple((name, count, models.ENDING_SENTENCES.get(name, "")) for name, count in endings.items()),
         inputs(study, spec),

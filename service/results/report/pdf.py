@@ -80,7 +80,7 @@ def _lines(report: Report) -> Iterator[str]:
     yield from _section(
         "What varies",
         [
-            f"{axis.paths} ({axis.unit}): {axis.values} values, {number_text(axis.first)} .. {number_text(axis.last)}"
+            f"{axis.paths} ({axis.unit}): {axis.values} values, {input_text(axis.first)} .. {input_text(axis.last)}"
             for axis in report.axes
         ],
     )

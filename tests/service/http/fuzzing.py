@@ -45,6 +45,7 @@ FURTHER_RULES: Final = (
     "preview_study",
     "extend_study",
     "run_longer",
+    "narrow_study",
     "create_schedule",
     "change_schedule",
     "fit_clutch",

@@ -31,6 +31,7 @@ HEAVY = {
 #: What cases do is not computed here, and no study is of settled motion, has a goal or starts, or is a calibration.
 NEVER_SERVED = {
     "POST /api/v1/studies/{study_id}:longer",
+    "POST /api/v1/studies/{study_id}:narrow",
     *(
         f"GET /api/v1/studies/{{study_id}}/{which}"
         for which in (

@@ -8,12 +8,15 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+import httpx
 import pandas as pd
 import pytest
+from anyio.from_thread import BlockingPortal
 
 from sprag.service.cli.pictures import held_text
+from sprag.service.client import AsyncClient, Client
 from sprag.service.client.frames import Curves, grid_of, table_of
+from sprag.service.client.plain import ServiceClient
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.form.spec import field_of, spec_of, values_of
 from sprag.service.jobs.answers import curves_of
@@ -24,54 +27,20 @@ from sprag.service.results.defaults import main_query
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.sweeps import hysteresis
 from sprag.service.spec.document import parse_spec
+from sprag.service.spec.narrow import narrowed_spec
 from sprag.worker import models
-from sprag.worker.models import ChunkResult
 from sprag.worker.models.starts import motion_of
 from sprag.worker.study import Study
-from tests.service.conftest import API, Service
+from tests.service.conftest import API, PortalTransport, Service
 from tests.service.spec_sample import changed
+from tests.service.swept_study import DOWN, SPEC, UP, swept_study
 
-FREQUENCIES = [16.0, 17.0, 18.0, 19.0, 20.0]
-SPEC: dict[str, Any] = changed(
-    {
-        "/run": {"until": "settled"},
-        "/axes": [
-            {"path": "excitation.frequency", "values": FREQUENCIES, "sweep": "both"},
-            {"path": "shaft.load", "values": [0.1, 0.2]},
-        ],
-    }
-)
 QUERY = {"x": "excitation.frequency", "y": "shaft.speed.mean"}
-#: The lower branch ends above 18 Hz on the way up, the upper one below 17 Hz on the way down.
-UP, DOWN = [1.0, 2.0, 3.0, 14.0, 15.0], [1.0, 12.0, 13.0, 14.0, 15.0]
-
-
-def rows_of(study: Study) -> ChunkResult:
-    """Rows of two branches with a jump each way; those of the larger load have no other numbers."""
-    names = [info.name for info in models.study_results(study)]
-    values = np.full((study.cases, len(names)), 1.0)
-    columns = study.columns(range(study.cases))
-    place = np.searchsorted(FREQUENCIES, columns["excitation.frequency"])
-    down = columns["sweep"] == 1.0
-    values[:, names.index("shaft.speed.mean")] = np.where(down, np.take(DOWN, place), np.take(UP, place))
-    values[:, names.index("regime.order")] = np.where(place >= 3, 2, 1)
-    jumped = np.where(down, place == 0, place == 3)
-    return ChunkResult(0, ["ok"] * study.cases, ["jumped" if one else "" for one in jumped], values)
 
 
 @pytest.fixture
 def study_id(service: Service) -> str:
-    found = service.submit(SPEC)
-    record, study = service.store.get_study(found), service.store.study(found)
-    whole, epoch = rows_of(study), service.store.take_over("test")
-    for chunk in service.store.claim(epoch, service.store.open_chunks(record.number)):
-        known = service.store.known(study, chunk)
-        assert known is not None
-        rows = known.missing.tolist()
-        part = ChunkResult(0, ["ok"] * len(rows), [whole.flags[row] for row in rows], whole.values[rows])
-        assert service.store.commit(epoch, chunk, part, known)
-    service.store.settle(epoch, record.number)
-    return found
+    return swept_study(service)
 
 
 def test_curves_have_both_directions_and_their_jumps(service: Service, study_id: str) -> None:
@@ -146,9 +115,8 @@ def test_a_figure_tells_directions_by_dashes_and_loads_by_colours(service: Servi
     assert [(band.low, band.high) for band in panel.bands[:2]] == [(18.0, 19.0), (16.0, 17.0)]
     told = hysteresis(drawn)
     assert told == figure.below
-    assert (
-        "up and down differ at 17 to 18 Hz, by up to 71 % of the range of shaft.speed.mean (at 17 Hz); 4 jumps" in told
-    )
+    assert "up and down differ at 17 to 18 Hz, by up to 71 % of the range of shaft.speed.mean (at 17 Hz); " in told
+    assert told.endswith("; 4 jumps, each within 1 Hz.")
     dashes = [trace["line"]["dash"] for trace in plotly_figure(figure)["data"] if "line" in trace][:2]
     assert dashes == ["solid", "dash"]
     alone = curves_of(
@@ -156,7 +124,7 @@ def test_a_figure_tells_directions_by_dashes_and_loads_by_colours(service: Servi
         study_id,
         CurveQuery(query.x, query.y, (), (("shaft.load", "0.1"), ("sweep", "up"))),  # type: ignore[arg-type]
     )
-    assert hysteresis(alone) == "1 jump along the sweep."
+    assert hysteresis(alone) == "Along the sweep 1 jump, within 1 Hz."
 
 
 def test_pictures_pages_and_files_of_a_sweep(service: Service, study_id: str) -> None:
@@ -164,6 +132,9 @@ def test_pictures_pages_and_files_of_a_sweep(service: Service, study_id: str) ->
         f"{API}/studies/{study_id}/curves", params={**QUERY, "by": "shaft.load", "format": "svg"}
     )
     assert picture.status_code == 200
+    assert '<td class="num">up</td><td class="num">down</td>' in service.http.get(f"/studies/{study_id}").text
+    report = service.http.get(f"{API}/studies/{study_id}/report").text
+    assert '<td class="number">up</td><td class="number">down</td>' in report
     for page in ("", "/cases", "/cases/0", "/curves?x=excitation.frequency&y=shaft.speed.mean&at=sweep%3Ddown"):
         found = service.http.get(f"/studies/{study_id}{page}")
         assert found.status_code == 200, page
@@ -176,18 +147,68 @@ def test_pictures_pages_and_files_of_a_sweep(service: Service, study_id: str) ->
 
 
 def test_the_example_of_the_guide_says_what_the_guide_says() -> None:
+    def told_by(spec: dict[str, Any]) -> tuple[Study, Any, str]:
+        study = parse_spec(spec).study
+        with run_here(spec, study, processes=0) as run:
+
+            class Library:
+                store = run.store
+
+            query = main_query(study, models.study_results(study))
+            assert query is not None
+            cases = run.store.cases_of_kind(run.record.id, flag="jumped")
+            return study, cases, hysteresis(curves_of(Library(), run.record.id, query))  # type: ignore[arg-type]
+
     text = (Path(__file__).resolve().parents[3] / "docs" / "sweeps.md").read_text(encoding="utf-8")
     spec = json.loads(text.partition("```json")[2].partition("```")[0])
-    study = parse_spec(spec).study
-    with run_here(spec, study, processes=0) as run:
-
-        class Library:
-            store = run.store
-
-        query = main_query(study, models.study_results(study))
-        assert query is not None
-        told = hysteresis(curves_of(Library(), run.record.id, query))  # type: ignore[arg-type]
+    study, cases, told = told_by(spec)
     assert f"> {told}\n" in text
+    assert f"> {told_by(narrowed_spec(spec, study, cases, 16, {}))[2]}\n" in text
+
+
+def test_jumps_are_narrowed_over_http_by_clients_a_command_and_a_button(
+    service: Service, study_id: str, portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch, sprag: Any
+) -> None:
+    made = service.http.post(f"{API}/studies/{study_id}:narrow", params={"steps": 4})
+    assert made.status_code == 202, made.text
+    new = service.store.study(made.json()["id"])
+    assert (new.sweep, new.shape) == ("excitation.frequency", (11, 2, 2))
+    assert new.axes[0].values == (16.0, 16.25, 16.5, 16.75, 17.0, 18.0, 18.25, 18.5, 18.75, 19.0, 20.0)
+    assert new.name.endswith(", narrowed")
+
+    async def narrowed() -> str:
+        async with AsyncClient("http://localhost", transport=httpx.ASGITransport(service.app)) as client:
+            return (await (await client.study(study_id)).narrow(4, {"shaft.load": 0.1, "sweep": "up"})).id
+
+    transport = PortalTransport(service.app, portal)
+    with Client("http://localhost", transport=transport) as client:
+        ids = [client.study(study_id).narrow(4, at={"shaft.load": "0.1 N*m", "sweep": "up"}).id, portal.call(narrowed)]
+    monkeypatch.setattr(
+        "sprag.service.cli.extend.connection", lambda *_: ServiceClient("http://localhost", transport=transport)
+    )
+    done = sprag("narrow", study_id, "--steps", 4, "--at", "shaft.load=0.1", "--at", "sweep=up", "--json")
+    assert done.code == 0, done.err
+    for one in map(service.store.study, [*ids, done.data["id"]]):
+        assert [axis.values for axis in one.axes] == [
+            (16.0, 17.0, 18.0, 18.25, 18.5, 18.75, 19.0, 20.0), (0.1,), (0.0,),
+        ]  # fmt: skip
+    assert "Narrow these jumps</button> 140 cases" in service.http.get(f"/studies/{study_id}").text
+    shown = [service.http.post(f"/studies/{study_id}/narrow").headers["location"] for _ in range(2)]
+    assert shown[0] == shown[1]
+    assert service.store.study(shown[0].rpartition("/")[2]).cases == 140
+
+
+def test_what_has_no_jumps_to_narrow_is_refused(service: Service, study_id: str) -> None:
+    def refused(study: str, **query: Any) -> tuple[int, str]:
+        answer = service.http.post(f"{API}/studies/{study}:narrow", params=query)
+        return answer.status_code, answer.json()["detail"]
+
+    grid = service.submit(changed({"/run": {"until": "settled"}}))
+    assert refused(grid) == (409, "The study is not a sweep: it has no jumps to narrow.")
+    assert refused(service.submit({**SPEC, "name": "not run"})) == (409, "Only 0 of 20 cases have been run.")
+    for query in ({"steps": 1}, {"steps": 1025}, {"at": "excitation.frequency=16 Hz"}, {"at": "shaft.load=0.3"}):
+        assert refused(study_id, **query)[0] == 422, query
+    assert "Narrow these jumps" not in service.http.get(f"/studies/{grid}").text
 
 
 def test_the_form_keeps_a_sweep() -> None:

@@ -13,26 +13,31 @@ sprag.figures = new Map();
 sprag.colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 // Widths of a picture (px) below which its panels stand one under the other, and its legend under them, as on paper.
-const NARROW = 600, BESIDE = 700, ENTRIES = { legend: 110, legend2: 130 }, LINE = 20, SCALE = 80, LETTER = 7;
+const NARROW = 600, BESIDE = 700, ENTRIES = { legend: 110, legend2: 130 }, LINE = 20, SCALE = 80, LETTER = 7, SYMBOL = 60;
 
-// The title of a legend in lines that fit a width (px), as far as its words allow.
-const titleLines = (figure, name, width) => (figure.layout[name]?.title?.text ?? "").split(" ").reduce((lines, word) => {
+// A text in lines that fit a width (px), as far as its words allow.
+const linesOf = (text, width) => text.split(/ |<br>/).reduce((lines, word) => {
   const longer = [lines.at(-1), word].filter(Boolean).join(" ");
   return longer.length * LETTER > width ? [...lines, word] : [...lines.slice(0, -1), longer];
 }, [""]).filter(Boolean);
+
+const titleLines = (figure, name, width) => linesOf(figure.layout[name]?.title?.text ?? "", width);
 
 const hasScale = (figure) => figure.data.some((trace) => trace.colorbar && trace.showscale !== false);
 
 // Pixels that a legend takes over the whole width.
 const legendHeight = (figure, name, width) => {
-  const shown = figure.data.filter((trace) => trace.showlegend !== false && (trace.legend || "legend") === name).length;
-  const rows = Math.ceil(shown / Math.max(Math.floor(width / ENTRIES[name]), 1));
-  return shown && (rows + Math.max(titleLines(figure, name, width).length, 1)) * LINE;
+  const shown = figure.data.filter((trace) => trace.showlegend !== false && (trace.legend || "legend") === name);
+  // Those of several lines stand alone.
+  const long = shown.map((trace) => linesOf(trace.name ?? "", width - SYMBOL).length).filter((lines) => lines > 1);
+  const rows = Math.ceil((shown.length - long.length) / Math.max(Math.floor(width / ENTRIES[name]), 1)) + long.reduce((sum, lines) => sum + lines, 0);
+  return shown.length && (rows + Math.max(titleLines(figure, name, width).length, 1)) * LINE;
 };
 
 // Room for the legends below the panels. In a narrow picture all are there: beside the panels they would leave no room for them.
 sprag.fitted = (figure, width) => {
-  const layout = figure.layout;
+  const { title: heading } = figure.layout, wrapped = heading && { ...heading, text: linesOf(heading.text, width).join("<br>"), xref: "container" };
+  const layout = heading && width < BESIDE ? { ...figure.layout, title: wrapped } : figure.layout;
   if (!layout.showlegend && !hasScale(figure)) return layout;
   const narrow = width < BESIDE, second = legendHeight(figure, "legend2", width), first = narrow ? legendHeight(figure, "legend", width) : 0;
   const { t, b } = layout.margin, scale = narrow && hasScale(figure) ? SCALE : 0;
@@ -46,9 +51,9 @@ sprag.fitted = (figure, width) => {
   return { ...layout, height, margin, ...legends };
 };
 
-// The scale of a map stands below a narrow one, above its legend.
+// The scale of a map stands below a narrow one, above its legend; long names of entries have several lines there.
 sprag.traces = (figure, width, layout) => width >= BESIDE ? figure.data : figure.data.map((trace) => {
-  if (!trace.colorbar) return trace;
+  if (!trace.colorbar) return trace.name ? { ...trace, name: linesOf(trace.name, width - SYMBOL).join("<br>") } : trace;
   const y = legendHeight(figure, "legend2", width) / layout.height, title = { ...trace.colorbar.title, side: "bottom" };
   return { ...trace, colorbar: { ...trace.colorbar, title, orientation: "h", x: 0.5, y, yref: "container", yanchor: "bottom" } };
 });

@@ -20,6 +20,7 @@ from sprag.service.http.guard import OPEN_PATHS
 from sprag.service.http.problems import PROBLEM_TYPES
 from tests.service.calibrating import calibration
 from tests.service.searching import search
+from tests.service.swept_study import swept_study
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -171,7 +172,8 @@ def test_every_example_works(service: Service, document: dict[str, Any]) -> None
             spec = {**SPEC, "starts": {"count": 2, "ranges": ranges}}
         if path.endswith("/transient"):
             spec = tomllib.loads((Path(__file__).resolve().parents[4] / "examples" / "slotter.toml").read_text())
-        chosen = {"front": search, "calibration": calibration}.get(path.rpartition("/")[2])
+        kinds = {"front": search, "calibration": calibration, "{study_id}:narrow": swept_study}
+        chosen = kinds.get(path.rpartition("/")[2])
         study_id = service.submit(spec) if chosen is None else chosen(service)
         if not path.endswith((":cancel", ":pause", ":resume", ":prioritize")):
             service.fill(study_id)
