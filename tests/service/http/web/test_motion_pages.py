@@ -1,0 +1,121 @@
+"""Pages of the motions of a case and of sweeps on a phone, by keyboard, and without scripts."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.acceptance.processes import EXAMPLES
+from tests.service.http.web.fields import drawn
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+    from tests.service.http.web.conftest import Office, Visitor
+
+SPEC: dict[str, Any] = json.loads((EXAMPLES / "coexisting_motions.json").read_text(encoding="utf-8"))
+PHONE = {"viewport": {"width": 390, "height": 800}, "color_scheme": "dark"}
+PAGES = {
+    "case": "",
+    "basin": "/basin?x=shaft.initial_speed&y=pendulums.0.initial_angle&points=3",
+    "branch": "/branch?along=shaft.load&from=0.35&to=0.5",
+    "diagram": "/diagram?along=shaft.load&from=0.35&to=0.5",
+}
+
+
+@pytest.fixture(scope="module")
+def motions(office: Office) -> str:
+    """A study of one case with few starts."""
+    axes = [{"path": "excitation.frequency", "values": ["16.5 Hz"]}]
+    return office.submit(SPEC, axes=axes, starts={**SPEC["starts"], "count": 4})
+
+
+@pytest.fixture(scope="module")
+def swept(office: Office) -> str:
+    """A sweep up and down that jumps on the way down."""
+    spec = {name: value for name, value in SPEC.items() if name != "starts"}
+    axis = {"path": "excitation.frequency", "values": ["16 Hz", "16.475 Hz", "16.95 Hz"], "sweep": "both"}
+    return office.submit(spec, name="Up and down", axes=[axis])
+
+
+def outside(page: Page) -> list[str]:
+    """Texts of pictures that are not wholly within their picture, and what reaches past the page."""
+    found: list[str] = page.evaluate(
+        """() => {
+          const within = (box, of) => !box.width || (box.left >= of.left - 1 && box.right <= of.right + 1);
+          const texts = [...document.querySelectorAll(".plot .main-svg text")].filter(
+            (text) => !within(text.getBoundingClientRect(), text.closest(".plot").getBoundingClientRect()));
+          const wide = document.documentElement.scrollWidth - innerWidth;
+          return [...texts.map((text) => text.textContent), ...(wide > 0 ? [`page: ${wide} px too wide`] : [])];
+        }"""
+    )
+    return found
+
+
+@pytest.mark.parametrize("visitor", [PHONE], indirect=True)
+@pytest.mark.parametrize("which", PAGES)
+def test_a_phone_has_the_whole_page(visitor: Visitor, motions: str, which: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{motions}/cases/0{PAGES[which]}")
+    page.wait_for_function("() => [...document.querySelectorAll('.plot')].every((plot) => plot.dataset.drawn)")
+    page.evaluate("() => { for (const one of document.querySelectorAll('details')) one.open = true; }")
+    assert outside(page) == []
+    # A picture with buttons of its own is no image, in which they would be hidden from screen readers.
+    plots = page.locator(".plot")
+    assert {plots.nth(k).get_attribute("role") for k in range(plots.count())} == {"group"}
+
+
+@pytest.mark.parametrize("visitor", [PHONE], indirect=True)
+def test_a_phone_has_the_whole_table_of_a_single_case(visitor: Visitor, motions: str, office: Office) -> None:
+    spec = {name: value for name, value in SPEC.items() if name not in {"starts", "axes"}}
+    spec["base"] = {**SPEC["base"], "start": {"study": motions, "case": 0, "start": 0}}
+    study_id = office.submit(spec)
+    visitor.page.goto(f"/studies/{study_id}")
+    expect(visitor.page.locator("main")).to_contain_text("shaft.speed.mean")
+    assert outside(visitor.page) == []
+
+
+@pytest.mark.parametrize("visitor", [{"java_script_enabled": False}], indirect=True)
+@pytest.mark.parametrize("which", PAGES)
+def test_without_scripts_there_are_pictures(visitor: Visitor, motions: str, which: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{motions}/cases/0{PAGES[which]}")
+    images = page.locator("noscript img, figure img, .plot img")
+    assert images.count() > 0
+    for k in range(images.count()):
+        address = images.nth(k).get_attribute("src")
+        answer = page.request.get(str(address))
+        assert (answer.status, answer.headers["content-type"].partition(";")[0]) == (200, "image/svg+xml"), address
+
+
+def test_a_basin_is_chosen_by_keyboard(visitor: Visitor, motions: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{motions}/cases/0{PAGES['basin']}")
+    drawn(page)
+    points = page.get_by_label("Points")
+    points.focus()
+    page.keyboard.press("Control+A")
+    page.keyboard.type("2")
+    page.keyboard.press("Tab")
+    expect(page.get_by_role("button", name="Show")).to_be_focused()
+    page.keyboard.press("Enter")
+    page.wait_for_url(re.compile("points=2"))
+    assert sum(len(line["x"]) for line in drawn(page) if line["x"]) == 4
+
+
+def test_jumps_are_narrowed_by_a_button(visitor: Visitor, swept: str, office: Office) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{swept}")
+    drawn(page)
+    expect(page.locator("main")).to_contain_text("1 jump, within 0.475 Hz")
+    page.get_by_role("button", name="Narrow these jumps").click()
+    page.wait_for_url(re.compile(rf"/studies/st_(?!{swept.removeprefix('st_')})\w+$"))
+    office.wait(page.url.rpartition("/")[2])
+    page.reload()
+    drawn(page)
+    expect(page.locator("main")).to_contain_text("1 jump, within 0.029688 Hz")
+    assert page.locator("main").get_by_role("cell", name="down", exact=True).count() == 1
