@@ -51,6 +51,8 @@ FURTHER_RULES: Final = (
     "fit_clutch",
     "list_studies",
     "get_curves",
+    "get_answers",
+    "get_exploration",
     "get_front",
     "get_calibration",
     "get_map",

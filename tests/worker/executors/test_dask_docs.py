@@ -58,6 +58,7 @@ def test_the_commands_for_a_cluster_give_the_rows_of_the_pool(tmp_path: Path) ->
     finally:
         for process in started:
             kill_family(process)
+            process.communicate()
     assert by_cluster == run(f"sprag run {_SPEC}", tmp_path)
 
 

@@ -132,8 +132,8 @@ def check_form(
 
 
 def _beside(name: str, edited: str) -> str:
-    """The field for a fault at ``name``: that of its part which was changed last, where the fault is about a part."""
-    return edited if name and edited.startswith(f"{name}/") else name
+    """The field for a fault at ``name``: where it is about a part of the machine, that of it which was changed last."""
+    return edited if name.startswith("/base/") and edited.startswith(f"{name}/") else name
 
 
 def _assumed(text: str) -> list[str]:

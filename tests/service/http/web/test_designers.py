@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 import pytest
 from playwright.sync_api import expect
 
+from sprag.service.results.figures.figure import NOTES
 from sprag.service.results.regimes import MARKS
 from tests.service.http.web.fields import drawn, fill, named, wrong
 
@@ -48,7 +49,7 @@ def test_from_an_empty_form_to_a_curve_and_a_file(visitor: Visitor, office: Offi
     expect(page.locator("#progress .state")).to_have_text("finished")
     study_id = page.url.rsplit("/", 1)[-1]
     page.wait_for_function("() => document.querySelector('.plot').data?.[0]?.y?.every(value => value !== null)")
-    lines = [line for line in drawn(page) if line["name"] not in MARKS]
+    lines = [line for line in drawn(page) if line["name"] not in {*MARKS, *NOTES.values()}]
     told = office.get(f"/studies/{study_id}/curves", x="shaft.load", y=["shaft.speed.mean", "torque.mean"])
     assert lines[0]["x"] == told["x"]["values"] == [0.0, 0.1, 0.2, 0.4]
     assert lines[0]["y"] == told["curves"][0]["y"]["shaft.speed.mean"]
