@@ -15,6 +15,8 @@ from sprag.service.results.key_answer_words import curve_name, note_of, place_te
 from sprag.service.results.key_answers import answers_query
 from sprag.service.results.pictures.curves import MAX_PICTURE_POINTS
 from sprag.service.results.selection import SelectionError
+from sprag.service.results.wording import unit_text
+from sprag.service.spec.units import split_quantity
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -82,6 +84,11 @@ class AnswersView:
     choices: list[dict[str, Any]] = field(default_factory=list)
     figure: str | None = None
     picture: str | None = None
+
+    @property
+    def place(self) -> str:
+        """The working point with a unit: as typed, or SI."""
+        return self.point if split_quantity(self.point)[1] else f"{self.point} {unit_text(self.unit)}".strip()
 
     @property
     def known(self) -> bool:

@@ -58,7 +58,7 @@ def test_without_scripts_on_a_phone(visitor: Visitor, ten: str) -> None:
     page.goto(f"/studies/{ten}")
     page.get_by_label("Working point").fill("0.15")
     page.get_by_role("button", name="Show").click()
-    expect(page.locator("h2.minor")).to_contain_text("0.15")
+    expect(page.locator("h2.minor")).to_contain_text("0.15 N·m")
     assert re.search(r"[?&]point=0\.15", page.url)
     picture = page.locator("figure img").first
     assert picture.evaluate("(image) => image.decode().then(() => image.naturalWidth)") > 300
