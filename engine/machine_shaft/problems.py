@@ -77,10 +77,11 @@ class AssemblyError(MachineError):
     ending = Ending.CANNOT_ASSEMBLE
 
     def __init__(self, angle: float, rule: str | None = None, prefix: str = "") -> None:
+        what = "is refused" if rule else "cannot be assembled"
         why = rule or "its links do not reach each other there"
         which = f" of {prefix.rstrip('.')}" if prefix else ""
         super().__init__(
-            f"The mechanism{which} cannot be assembled at a shaft angle of {math.degrees(angle):.6g} deg: {why}. "
+            f"The mechanism{which} {what} at a shaft angle of {math.degrees(angle):.6g} deg: {why}. "
             "Change the dimensions."
         )
         self.angle, self.prefix = angle, prefix

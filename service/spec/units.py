@@ -152,6 +152,14 @@ def exact_number(value: object, unit: str) -> Fraction:
     return Fraction(repr(value))
 
 
+def has_unit(text: str) -> bool:
+    """Whether a text is a number with a unit."""
+    try:
+        return bool(split_quantity(text)[1])
+    except QuantityError:
+        return False
+
+
 def split_quantity(text: str) -> tuple[Fraction, str]:
     """Split "2 mm" into number and unit; the unit may be empty. QuantityError when it does not begin with a number."""
     if len(text) > MAX_QUANTITY_LENGTH:

@@ -130,11 +130,13 @@ def test_the_page_says_the_answers_first(filled: tuple[Service, str]) -> None:
     assert {"largest of its curve", "working point"} <= {trace["name"] for trace in figure["data"]}
 
 
-def test_the_page_keeps_a_wrong_point_and_says_why(filled: tuple[Service, str]) -> None:
+@pytest.mark.parametrize("text", ["3 mm", "abc"])
+def test_the_page_keeps_a_wrong_point_and_says_why(filled: tuple[Service, str], text: str) -> None:
     service, study_id = filled
-    page = service.http.get(f"/studies/{study_id}?point=3 mm")
+    page = service.http.get(f"/studies/{study_id}?point={text}")
     assert page.status_code == 422
-    assert '<input name="point" value="3 mm"' in page.text
+    assert f'<input name="point" value="{text}"' in page.text
+    assert f"At shaft load {text}" not in page.text
     assert "<code>point</code>" in page.text
     assert 'class="tiles"' in page.text
 

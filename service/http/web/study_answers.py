@@ -16,7 +16,7 @@ from sprag.service.results.key_answers import answers_query
 from sprag.service.results.pictures.curves import MAX_PICTURE_POINTS
 from sprag.service.results.selection import SelectionError
 from sprag.service.results.wording import unit_text
-from sprag.service.spec.units import split_quantity
+from sprag.service.spec.units import has_unit
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -63,6 +63,7 @@ class AnswersView:
     faults : why they are not those that were asked for
     query : the curves; None where the cases lie on none
     point : the working point as typed, otherwise its SI number; ``unit`` is its unit
+    place : the working point that is shown, with a unit
     chosen : place of the curve whose answers are shown, of the ``names`` of all curves
     tiles, here : its answers, and its main results at the working point
     family : the answers of all curves, where there are several
@@ -74,6 +75,7 @@ class AnswersView:
     faults: tuple[Fault, ...] = ()
     query: CurveQuery | None = None
     point: str = ""
+    place: str = ""
     unit: str = "1"
     chosen: int = 0
     names: list[str] = field(default_factory=list)
@@ -84,11 +86,6 @@ class AnswersView:
     choices: list[dict[str, Any]] = field(default_factory=list)
     figure: str | None = None
     picture: str | None = None
-
-    @property
-    def place(self) -> str:
-        """The working point with a unit: as typed, or SI."""
-        return self.point if split_quantity(self.point)[1] else f"{self.point} {unit_text(self.unit)}".strip()
 
     @property
     def known(self) -> bool:
@@ -139,13 +136,16 @@ def _view(
     pairs = pairs_of(found.query)
     asked = [pair for pair in pairs if pair[0] != "y"]
     shown = [("point", point)] if point and not faults else []
+    usual = f"{found.point:.10g}" if found.point is not None else ""
+    used = point if point and not faults else usual
     drawn = sum(line.cases.size for line in (part.line for part in found.curves)) * len(found.query.y)
     address = views.study_address(study_id)
     named = [("curve", names[chosen]), ("columns", "2")]
     return AnswersView(
         faults,
         found.query,
-        point or (f"{found.point:.10g}" if found.point is not None else ""),
+        point or usual,
+        used if has_unit(used) else f"{used} {unit_text(found.unit)}".strip(),
         found.unit,
         chosen,
         names,

@@ -34,11 +34,12 @@ if TYPE_CHECKING:
 router = APIRouter(include_in_schema=False)
 
 #: Results that are shown beside the picture.
-_TOLD: Final = (
+_SHOWN: Final = (
     "irregularity", "omega.mean", "omega.max", "omega.angle_at_max", "omega.min", "omega.angle_at_min",
     "energy.fluctuation", "energy.mean", "drive_torque.mean", "power.mean", "acceleration.max",
     "omega_squared.amplitude", "s1.amplitude", "s2.amplitude", "s3.amplitude", "s4.amplitude", "s1.share", "s2.share",
-    "s3.share", "s4.share", "energy.coefficient", "required_inertia", "flywheel.stress", "flywheel.margin",
+    "s3.share", "s4.share", "energy.coefficient", "required_inertia", "flywheel.required_mass",
+    "flywheel.required_diameter", "flywheel.stress", "flywheel.margin", "motor.torque.max", "motor.power.mean",
 )  # fmt: skip
 
 
@@ -89,7 +90,9 @@ def _parts(work: Work, chosen: Setting, held: list[Setting], case: dict[str, Any
     values = {
         "chosen": chosen,
         "case": case,
-        "told": [(infos[name], [each["results"][name] for each in cases]) for name in _TOLD if name in infos and cases],
+        "shown": [
+            (infos[name], [each["results"][name] for each in cases]) for name in _SHOWN if name in infos and cases
+        ],
         "held": [
             {
                 "name": _NAMES[index],

@@ -10,7 +10,7 @@ from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.shaft import part_of
 from sprag.service.results.wording import words
 from sprag.service.spec.numbers import parse_number
-from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity
+from sprag.service.spec.units import QuantityError, has_unit, parse_quantity, split_quantity
 from sprag.worker.models.parameters import parameter_of
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class Slider:
     @property
     def has_unit(self) -> bool:
         """Whether its text has a unit of its own."""
-        return bool(split_quantity(self.text)[1])
+        return has_unit(self.text)
 
 
 def slider_of(own: Study, study: Study, path: str, text: str) -> Slider:

@@ -161,3 +161,11 @@ def test_a_machine_of_several_parts_has_sliders_for_each_and_varies_equal_parts_
     assert [axis["path"] for axis in spec["axes"]] == [
         [f"parts.{k}.mechanism.slider_crank.{name}" for k in range(2)] for name in ("ram_mass", "rod_mass")
     ]
+
+
+@pytest.mark.parametrize("field", ["?machine=press&drive.inertia=", "/drive?excitation.frequency="])
+@pytest.mark.parametrize("text", ["abc", "25,5", "nan"])
+def test_a_number_that_cannot_be_read_is_refused_with_a_sentence(office: Office, field: str, text: str) -> None:
+    answer = office.http.get(f"/laboratory{field}{text}")
+    assert answer.status_code == 422
+    assert f"got {text}; allowed" in answer.text
