@@ -122,7 +122,12 @@ def regimes(spec: SpecFile, case: CaseOption = 0, points: PointsFile = None, as_
     study = study_of(spec, points, case, None)
     if not has_starts(study.run):
         raise wrong_option(
-            "/starts", "required", "is required", None, allowed="`starts` in the spec of a settled study"
+            "/starts",
+            "required",
+            "is required",
+            None,
+            allowed="`starts` in the spec of a settled study",
+            detail="the study has no starts",
         )
     done = run_chunk(taken(study, np.array([case])) if study.axes else study, 0, 1)
     infos = {info.name: (place, info) for place, info in enumerate(study_results(study))}

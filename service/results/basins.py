@@ -29,7 +29,8 @@ INITIAL: Final = ("initial_angle", "initial_speed", "initial_windup")
 #: For "x" and "y" the first and the last value as text, None where they are those of the starts.
 Ends = dict[str, tuple[str | None, str | None]]
 #: What is reported of each regime besides its number.
-_SHOWN: Final = ("regime", "regime.order", "regime.share", "shaft.speed.mean")
+_SPEED: Final = "shaft.speed.mean"
+_SHOWN: Final = ("regime", "regime.order", "regime.share", _SPEED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,12 +140,14 @@ def basin_file(study: Study, case: int, query: BasinQuery, form: Format) -> byte
     made = basin_of(study, case, query)
     if form == "csv":
         across, along = np.meshgrid(made.x, made.y)
+        members, speeds = made.members.reshape(-1), made.values[:, made.names.index(_SPEED)]
         columns: list[list[Any]] = [
             across.reshape(-1).tolist(),
             along.reshape(-1).tolist(),
-            made.members.reshape(-1).tolist(),
+            members.tolist(),
+            [float(speeds[member]) if member >= 0 else None for member in members],
         ]
-        return table_csv([*query.paths, "regime.number"], columns)
+        return table_csv([*query.paths, "regime.number", _SPEED], columns)
     return to_bytes(basin_json(study, query, made))
 
 

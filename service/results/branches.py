@@ -54,10 +54,12 @@ def along_of(study: Study, case: int, along: str, low: str | None = None, high: 
             own = case_machine(study, case)
             free = ", ".join(name for name in own if name not in study.derive and not is_initial(name))
             raise parameter_error("along", "conflict", message, path, free)
-    return range_of(study, case, along, low, high)
+    return range_of(study, case, along, low, high, initial=False)
 
 
-def range_of(study: Study, case: int, along: str, low: str | None = None, high: str | None = None) -> Along:
+def range_of(
+    study: Study, case: int, along: str, low: str | None = None, high: str | None = None, *, initial: bool = True
+) -> Along:
     """The parameter along which a case is followed, and its range.
 
     Parameters
@@ -68,6 +70,8 @@ def range_of(study: Study, case: int, along: str, low: str | None = None, high: 
         A path of a spec, or several joined by commas, which all get one value. All paths of an axis belong together.
     low, high : str, optional
         SI numbers or quantities with a unit; by default the ends of the axis.
+    initial : bool
+        Whether an initial value may be the parameter.
 
     Raises
     ------
@@ -80,8 +84,8 @@ def range_of(study: Study, case: int, along: str, low: str | None = None, high: 
     for path in filter(None, (part.strip() for part in along.split(","))):
         if path not in own or path in study.derive:
             message = "is derived from others" if path in study.derive else "is not a numeric parameter of the study"
-            free = ", ".join(name for name in own if name not in study.derive)
-            raise parameter_error("along", "unknown-name", message, path, free)
+            free = [name for name in own if name not in study.derive and (initial or not is_initial(name))]
+            raise parameter_error("along", "unknown-name", message, path, ", ".join(free))
         axis = study.axis_of(path)
         paths += [path] if axis is None else study.axes[axis].paths
     if not paths:

@@ -254,8 +254,10 @@ def test_a_basin_is_a_grid_of_two_initial_values(
     assert body["y_values"] == pytest.approx([-0.1745329, 0.2])
     assert [row["results"]["regime"] for row in body["regimes"]] == ["periodic", "periodic"]
     text = service.http.get(API + own, params={**asked, "format": "csv"}).text
-    assert text.splitlines()[0] == f"{SPEED},{asked['y']},regime.number"
-    assert [line.rpartition(",")[2] for line in text.splitlines()[1:]] == ["0", "1", "0", "-1"]
+    assert text.splitlines()[0] == f"{SPEED},{asked['y']},regime.number,shaft.speed.mean"
+    slow, fast = (str(row["results"]["shaft.speed.mean"]) for row in body["regimes"])
+    regimes = [tuple(line.split(",")[2:]) for line in text.splitlines()[1:]]
+    assert regimes == [("0", slow), ("1", fast), ("0", slow), ("-1", "")]
     picture = service.http.get(API + own, params={**asked, "format": "svg"})
     assert picture.status_code == 200
     assert "<!-- 1: 25 %, 3.5 rad/s, order 2 -->" in picture.text
