@@ -312,7 +312,7 @@ def sample(
         s = min(max(2.0 * (times[first] - clock) / h - 1.0, -1.0), 1.0)
         x = min(max(x0 + integral_to(v[FX], h, s, to_integral, scratch), -1.0), 1.0)
         out[first, 0] = cut + half * (1.0 + x)
-        out[first, 1] = u0 + integral_to(v[FU], h, s, to_integral, scratch)
+        out[first, 1] = max(u0 + integral_to(v[FU], h, s, to_integral, scratch), 0.0)  # 0 but for rounding
         first += 1
     return first
 

@@ -64,7 +64,7 @@ def transient(
 ) -> None:
     """Compute the run-up from rest of a machine shaft, a step of its load, or its coasting, over time."""
     from sprag.service.results.trajectories import trajectory_csv
-    from sprag.service.results.transients import course_of, transient_json
+    from sprag.service.results.transients import course_of, results_json, transient_json
     from sprag.worker.models.transients import run_transient
 
     study = read_study(spec, files=tables).study
@@ -86,7 +86,8 @@ def transient(
         write(content)
     _report(made, case)
     if as_json and to_file(file):
-        write_json({"file": file, "case": case, "outcome": made.outcome, "cause": made.cause})
+        results = results_json(made)
+        write_json({"file": file, "case": case, "outcome": made.outcome, "cause": made.cause, "results": results})
     if made.outcome != completed(course):
         raise typer.Exit(ExitCode.NOT_ALL_OK)
 

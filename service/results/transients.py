@@ -107,8 +107,12 @@ def case_rows(study: Study, course: Course) -> Iterator[dict[str, str | float | 
     """For each case its number, the values of the axes, the outcome of the transient, and its results, in SI units."""
     for case in range(study.cases):
         made = run_transient(study, case, course, MIN_TRAJECTORY_POINTS)
-        results = {name: value if math.isfinite(value) else None for name, value in made.results.items()}
-        yield {"case": case, **study.case_parameters(case), "outcome": made.outcome, **results}
+        yield {"case": case, **study.case_parameters(case), "outcome": made.outcome, **results_json(made)}
+
+
+def results_json(made: Transient) -> dict[str, float | None]:
+    """The results of a transient, SI; None where one does not exist."""
+    return {name: value if math.isfinite(value) else None for name, value in made.results.items()}
 
 
 def transient_json(made: Transient, study: Study, case: int, course: Course) -> TransientData:
@@ -125,7 +129,7 @@ def transient_json(made: Transient, study: Study, case: int, course: Course) -> 
         "revolutions": course.revolutions,
         "outcome": made.outcome,
         "cause": made.cause,
-        "results": {name: value if math.isfinite(value) else None for name, value in made.results.items()},
+        "results": results_json(made),
         "units": {name: unit for name, unit, _ in RESULTS},
         "times": values["times"],
         "variables": values["variables"],

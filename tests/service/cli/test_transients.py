@@ -29,13 +29,18 @@ def test_the_example_of_the_guide(sprag: Sprag, examples: Path, tmp_path: Path) 
         assert (len(rows), float(rows[0]["time"])) == (1000, 0.0)
 
 
-def test_json_and_the_exit_code_of_a_stall(sprag: Sprag, examples: Path) -> None:
+def test_json_and_the_exit_code_of_a_stall(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
     """Case 27 cuts with 40 kN, which stalls the motor wherever the shaft starts."""
     done = sprag("transient", examples / "slotter.toml", "--case", 27, "--kind", "run-up", "--format", "json")
     made = json.loads(done.out)
     assert done.code == 1
     assert (made["outcome"], made["ending"], made["results"]["time"]) == ("stopped", "motor_stalled", None)
     assert "the mean resisting torque" in made["cause"]
+    file = tmp_path / "motion.csv"
+    words = ("--case", 27, "--kind", "run-up", "--json", "-o", file)
+    short = json.loads(sprag("transient", examples / "slotter.toml", *words).out)
+    assert (short["file"], short["results"]) == (str(file), made["results"])
+    assert float(next(csv.DictReader(file.read_text(encoding="utf-8").splitlines()))["omega"]) == 0.0
 
 
 @pytest.mark.parametrize(
