@@ -4,7 +4,8 @@
 
 Lines are random drives of the range of W1 (amplitude, load), swept over the excitation frequency from 16 to 35 Hz, up
 and down. A jump agrees if a sweep with 16 times smaller steps has one in the same step or the next one to either side.
-Then the jumps of each drive are narrowed, and agree where the finer sweep has one within what the narrowed sweep tells.
+Then the sweep of each drive is narrowed at its jumps: of its steps with a jump, those are counted in which the finer
+sweep jumps, too, and those beside such a step.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ def jumps(found: Sweep, lines: NDArray[np.int64], frequencies: Floats) -> list[F
 
 def narrowed(drives: Floats, frequencies: Floats, coarse: list[Floats], fine: list[Floats]) -> None:
     """Print whether the jumps of narrowed sweeps are those of the finer one."""
-    told = within = cases = whole = 0
+    count = within = beside = cases = whole = 0
     for number in range(len(drives)):
         own = np.unique(np.concatenate(coarse[2 * number : 2 * number + 2]), axis=0)
         values = narrowed_values(frequencies, own, FINER)
@@ -71,12 +72,16 @@ def narrowed(drives: Floats, frequencies: Floats, coarse: list[Floats], fine: li
         found = sweep(columns_of(drives[number : number + 1], values), SettledRun(), lines, SWEPT)
         cases += 2 * values.size
         for steps, finer in zip(jumps(found, lines, values), fine[2 * number : 2 * number + 2], strict=True):
-            told += len(steps)
+            count += len(steps)
             whole += int((np.diff(steps) > 1.5 * np.diff(frequencies)[0] / FINER).sum())
             middles = finer.mean(axis=1)
-            within += sum(bool(((middles > low) & (middles < high)).any()) for low, high in steps)
+            inside = [bool(((middles > low) & (middles < high)).any()) for low, high in steps]
+            near = [bool(((middles > 2 * low - high) & (middles < 2 * high - low)).any()) for low, high in steps]
+            within += sum(inside)
+            beside += sum(near) - sum(inside)
     print(
-        f"narrowed: {told} jumps, {within} of them where the finer sweep jumps, {whole} in steps not narrowed yet; "
+        f"narrowed: {count} jumps, {within} in steps in which the finer sweep jumps, {beside} in the step beside one, "
+        f"{whole} in steps not narrowed yet; "
         f"{cases} cases, the finer sweep {2 * len(drives) * (FINER * (frequencies.size - 1) + 1)}"
     )
 

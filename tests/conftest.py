@@ -42,6 +42,7 @@ LONG = (
     "acceptance/test_kills.py",
     "service/storage/test_postgres.py",
     "worker/executors/test_dask.py",
+    "worker/executors/test_lost_cluster.py",
     "acceptance/test_cut_link.py",
     "acceptance/test_same_rows.py",
     "acceptance/test_wheel.py",

@@ -49,6 +49,8 @@ MAX_ORBIT_PERIODS: Final = 64
 #: Range of the scaled distance from its orbit below which a run counts as settled.
 MIN_SETTLED: Final = 1e-10
 MAX_SETTLED: Final = 1e-3
+#: Cases of a selection that one answer or file can have.
+MAX_SELECTED: Final = 100_000
 #: Smaller steps into which a step of a sweep is split where the motion jumps: by default, at least, at most.
 NARROW_STEPS: Final = 16
 MIN_NARROW_STEPS: Final = 2

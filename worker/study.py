@@ -140,6 +140,13 @@ class Study:
         """Position of the axis that varies ``path``; None when it does not vary."""
         return next((i for i, axis in enumerate(self.axes) if path in axis.paths), None)
 
+    def axis_with(self, path: str) -> Axis:
+        """The axis that varies ``path``; raises KeyError when it does not vary."""
+        position = self.axis_of(path)
+        if position is None:
+            raise KeyError(path)
+        return self.axes[position]
+
     def indices(self, cases: Sequence[int] | range | NDArray[np.integer[Any]]) -> tuple[NDArray[np.int64], ...]:
         """Position on each axis of the given cases.
 

@@ -11,9 +11,7 @@ from sprag.service.cli.files import write_pieces
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
 from sprag.service.cli.pictures import file_format, heading
 from sprag.service.cli.remote import connection
-
-#: Cases of a file: as many as the service gives.
-_EVERY = 100_000
+from sprag.worker.limits import MAX_SELECTED
 
 
 def explore(
@@ -25,7 +23,9 @@ def explore(
     sort: Annotated[
         str, typer.Option("--sort", metavar="NAME", help='Parameter or result; "-NAME": from the largest down.')
     ] = "case",
-    limit: Annotated[int, typer.Option("--limit", min=1, max=_EVERY, metavar="N", help="Most cases to show.")] = 20,
+    limit: Annotated[
+        int, typer.Option("--limit", min=1, max=MAX_SELECTED, metavar="N", help="Most cases to show.")
+    ] = 20,
     show: Annotated[
         list[str] | None, typer.Option("--show", metavar="NAME", help="Quantity to show; may be repeated.")
     ] = None,
@@ -34,7 +34,12 @@ def explore(
     flag: Annotated[str | None, typer.Option("--flag", metavar="FLAG", help="Only with this flag.")] = None,
     file: Annotated[
         str | None,
-        typer.Option("-o", "--output", metavar="FILE", help="File to write: .csv, the whole selection."),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help=f"File to write: .csv, the selection, at most {MAX_SELECTED:,} cases.",
+        ),
     ] = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
@@ -48,13 +53,14 @@ def explore(
     with connection(server, token) as client:
         found = client.explore(study_id, [*query, ("limit", str(limit))])
         if file is not None and form is not None:
-            write_pieces(file, client.explore_file(study_id, [*query, ("limit", str(_EVERY)), ("format", form)]))
+            write_pieces(file, client.explore_file(study_id, [*query, ("limit", str(MAX_SELECTED)), ("format", form)]))
     if as_json:
         write_json(found)
     else:
         _show(found)
     if file is not None:
-        say(f"table: {file}")
+        cut = f", the first {MAX_SELECTED:,} cases of the selection" if found["selected"] > MAX_SELECTED else ""
+        say(f"table: {file}{cut}")
 
 
 def _show(found: dict[str, Any]) -> None:

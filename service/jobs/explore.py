@@ -27,7 +27,7 @@ _KEPT: Final = 256_000_000
 
 
 class Columns:
-    """Columns of studies, each read once until the study has other rows; reading takes about 2 s for 10^6 cases."""
+    """Columns of studies, each read once until the study has other rows; reading takes some seconds for 10^6 cases."""
 
     def __init__(self, store: Store) -> None:
         self._store = store

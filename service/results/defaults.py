@@ -72,7 +72,7 @@ def many_values(study: Study, path: str, most: int = _CHOSEN_CURVES) -> tuple[tu
     Its first, its last, that at which it is held otherwise, and others evenly between; () for an axis with few values,
     which are all drawn.
     """
-    axis = study.axes[next(place for place, one in enumerate(study.axes) if path in one.paths)]
+    axis = study.axis_with(path)
     values = np.unique(axis.array)
     if values.size <= _MOST_CURVES:
         return ()
@@ -151,7 +151,7 @@ def drawn_numbers(study: Study, query: CurveQuery) -> int:
     if study.combine == "zip":
         return study.cases * len(query.y) + (0 if mapped is None else squares(mapped) ** 2)
     of = Counter(path for path, _ in query.of)
-    axes = [(path, axis) for path in (query.x, *query.by) for axis in study.axes if path in axis.paths]
+    axes = [(path, study.axis_with(path)) for path in (query.x, *query.by)]
     return math.prod(of[path] or len(axis) for path, axis in axes) * len(query.y)
 
 

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 #: What a range may look like.
 EXAMPLES: Final = "for instance shaft.load <= 2 N*m or efficiency >= 0.5"
-#: Most ranges, quantities and rows of one question.
-MOST_RANGES, MOST_SHOWN, MOST_ROWS = 40, 12, 100_000
+#: Most ranges and quantities of one question.
+MOST_RANGES, MOST_SHOWN = 40, 12
 ROWS: Final = 50
 BINS: Final = 24
 

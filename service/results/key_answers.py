@@ -151,7 +151,7 @@ def read_point(study: Study, query: CurveQuery, text: str | None) -> float | Non
     """
     if text is not None and text.strip():
         return value_of(query.x, text.strip(), unit_of(study, query.x), "point")
-    axis = study.axes[next(place for place, one in enumerate(study.axes) if query.x in one.paths)]
+    axis = study.axis_with(query.x)
     base = study.base.get(query.x)
     between = base is not None and axis.array.min() <= base <= axis.array.max()
     return base if between else usual_value(study, axis)

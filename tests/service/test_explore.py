@@ -19,6 +19,7 @@ from anyio.from_thread import BlockingPortal
 
 from sprag.service.cli import explore
 from sprag.service.client import AsyncClient, Client
+from sprag.service.http.web import explore as explore_pages
 from sprag.service.jobs.explore import Columns
 from tests.conftest import Finished
 from tests.service.conftest import API, PortalTransport, Service
@@ -130,6 +131,25 @@ def test_the_command_lists_and_writes_them(
     assert [row["case"] for row in told["cases"]] == expected[:3]
 
 
+def test_a_file_that_has_not_the_whole_selection_says_so(
+    filled: tuple[Service, str],
+    sprag: Callable[..., Finished],
+    connected: Callable[[ModuleType], None],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    connected(explore)
+    service, study_id = filled
+    assert ">The selection as" in service.http.get(f"/studies/{study_id}/explore").text
+    for module in (explore, explore_pages):
+        monkeypatch.setattr(module, "MAX_SELECTED", 10)
+    assert ">The first 10 cases of the selection as" in service.http.get(f"/studies/{study_id}/explore").text
+    file = tmp_path / "first.csv"
+    done = sprag("explore", study_id, "-o", file)
+    assert done.err.splitlines()[-1] == f"table: {file}, the first 10 cases of the selection"
+    assert len(file.read_text(encoding="utf-8").splitlines()) == 1 + 10
+
+
 def test_the_page_has_its_choice_in_the_address(filled: tuple[Service, str]) -> None:
     service, study_id = filled
     address = f"/studies/{study_id}/explore?max:shaft.load=300 N*mm&sort=-efficiency&limit=4&x=shaft.load&y=efficiency"
@@ -142,7 +162,7 @@ def test_the_page_has_its_choice_in_the_address(filled: tuple[Service, str]) -> 
     (figure,) = re.findall(r'data-figure="([^"]+)"', text)
     drawn = service.http.get(figure.replace("&amp;", "&")).json()
     assert [trace["name"] for trace in drawn["data"]][-1] == "first in the table"
-    assert sorted(drawn["data"][-1]["customdata"]) == sorted(set(shown) & set(drawn["data"][-1]["customdata"]))
+    assert sorted(drawn["data"][-1]["customdata"]) == sorted(shown)
     (picture,) = re.findall(r'<noscript><img src="([^"]+)"', text)
     assert service.http.get(picture.replace("&amp;", "&")).text.startswith("<?xml")
     (download,) = re.findall(r'href="([^"]+format=csv)"', text)

@@ -17,7 +17,8 @@ from sprag.service.http.respond import choose_format
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import explore
 from sprag.service.jobs.answers import FEW
-from sprag.service.results.explore import MOST_ROWS, ROWS, ExploreQuery
+from sprag.service.results.explore import ROWS, ExploreQuery
+from sprag.worker.limits import MAX_SELECTED
 
 if TYPE_CHECKING:
     from sprag.service.storage.records import StudyRecord
@@ -60,7 +61,7 @@ async def get_exploration(
             examples=["-efficiency"],
         ),
     ] = "case",
-    limit: Annotated[int, Query(ge=1, le=MOST_ROWS, description="most rows", examples=[10])] = ROWS,
+    limit: Annotated[int, Query(ge=1, le=MAX_SELECTED, description="most rows", examples=[10])] = ROWS,
     show: Annotated[
         list[str] | None,
         Query(

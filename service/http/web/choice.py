@@ -82,7 +82,7 @@ def value_choices(study: Study, query: CurveQuery) -> list[dict[str, Any]]:
     """For each axis of by of which some values are drawn: its values, and which of them are."""
     found = []
     for path in dict.fromkeys(path for path, _ in query.of):
-        axis = study.axes[next(place for place, one in enumerate(study.axes) if path in one.paths)]
+        axis = study.axis_with(path)
         unit, texts = unit_of(study, path), [text for own, text in query.of if own == path]
         places = {axis.index_of(value_of(path, text, unit, "of")) for text in texts}
         drawn = {axis.value(place) for place in places if place is not None}

@@ -21,11 +21,12 @@ from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.jobs.answers import FEW
 from sprag.service.jobs.explore import explored
-from sprag.service.results.explore import MOST_ROWS, ROWS, ExploreQuery, explored_json, quantities
+from sprag.service.results.explore import ROWS, ExploreQuery, explored_json, quantities
 from sprag.service.results.figures.explore import chosen_pair
 from sprag.service.results.selection import SelectionError, refused
 from sprag.service.spec.numbers import parse_number
 from sprag.worker import models
+from sprag.worker.limits import MAX_SELECTED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -130,10 +131,10 @@ def _page(context: Context, study_id: str, view: ExploreView, given: Sequence[tu
         paths=set(study.column_paths),
         regimes=[] if (regime := models.regime_info(infos)) is None else regime.categories,
         flags=models.flags_of(study.model),
-        most=_MOST_ON_PAGE,
+        most_in_file=MAX_SELECTED,
         figure=f"/studies/{study_id}/figures/explore?{drawn}",
         picture=f"{views.study_address(study_id)}/explore?{drawn}&format=svg",
-        files=f"{views.study_address(study_id)}/explore?{urlencode([*asked, ('limit', str(MOST_ROWS))])}",
+        files=f"{views.study_address(study_id)}/explore?{urlencode([*asked, ('limit', str(MAX_SELECTED))])}",
         address=lambda sort: f"/studies/{study_id}/explore?{urlencode([*kept, ('sort', sort)])}",
     )
 
