@@ -151,7 +151,8 @@ def drawn_numbers(study: Study, query: CurveQuery) -> int:
     if study.combine == "zip":
         return study.cases * len(query.y) + (0 if mapped is None else squares(mapped) ** 2)
     of = Counter(path for path, _ in query.of)
-    axes = [(path, study.axis_with(path)) for path in (query.x, *query.by)]
+    # A path that does not vary is refused where the curves are drawn.
+    axes = [(path, axis) for path in (query.x, *query.by) for axis in study.axes if path in axis.paths]
     return math.prod(of[path] or len(axis) for path, axis in axes) * len(query.y)
 
 
