@@ -11,9 +11,8 @@ import os
 import stat
 import tempfile
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
-
-import numba
 
 from sprag.engine.compile.ways import WAY
 from sprag.engine.sources import engine_folder, source_hash
@@ -26,7 +25,8 @@ _TEMPORARY_NAME = f"sprag-kernels-{os.getuid()}"
 @cache
 def _engine_hash() -> str:
     sources = source_hash(engine_folder())
-    return hashlib.sha256(f"{numba.__version__} {WAY} {sources}".encode()).hexdigest()[:16]
+    # Whoever only looks for the folder, such as the service, does not load numba for it.
+    return hashlib.sha256(f"{version('numba')} {WAY} {sources}".encode()).hexdigest()[:16]
 
 
 def _writable(folder: Path) -> bool:

@@ -1,8 +1,6 @@
 """The only access to numba: decorators and lane loops of the way that this process uses (``ways``)."""
 
-import numba
-
-from sprag.engine.compile.cache import cache_folder
+from sprag.engine.compile.places import use_cache
 from sprag.engine.compile.vectors import use_full_vectors
 from sprag.engine.compile.ways import PLAIN, WAY
 
@@ -22,7 +20,7 @@ else:
     from sprag.engine.compile.decorators import compiled, inlined, part, unmanaged
     from sprag.engine.compile.lowering import constant_record, constant_shape, lane_loops, lane_mask, lowest
 
-setattr(numba.config, "CACHE_DIR", str(cache_folder()))  # noqa: B010  (numba does not declare it)
+use_cache()
 use_full_vectors()
 
 __all__ = [

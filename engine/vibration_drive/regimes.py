@@ -27,22 +27,17 @@ class Regime(IntEnum):
         """Description of the regime."""
         return _SENTENCES[self]
 
-    def sentence_of(self, order: int | None) -> str:
-        """Description of a motion of this regime: periodic motion with its order, where known."""
-        if self is not Regime.PERIODIC or order is None:
-            return self.sentence
-        return _PERIODIC.format("one excitation period" if order == 1 else f"{order} excitation periods")
-
     @property
     def repeats(self) -> bool:
         """Whether the motion has an orbit, with an order."""
         return self in (Regime.PERIODIC, Regime.HELD, Regime.COASTING)
 
 
-_PERIODIC = "The motion repeats after {}, and disturbances of it die away."
 _SENTENCES = {
     Regime.NONE: "The case did not end ok.",
-    Regime.PERIODIC: _PERIODIC.format("a whole number of excitation periods"),
+    Regime.PERIODIC: (
+        "The motion repeats after a whole number of excitation periods, and disturbances of it die away."
+    ),
     Regime.HELD: "The pendulums settle to a periodic motion, or to rest, and never turn the shaft.",
     Regime.COASTING: "Without a load the shaft turns steadily at the limit of a vanishing load.",
     Regime.IRREGULAR: (

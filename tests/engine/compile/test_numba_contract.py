@@ -12,6 +12,7 @@ from typing import Any
 
 import llvmlite.binding
 import numba
+import numba.core.caching
 import numba.core.compiler
 import numba.core.compiler_lock
 import pytest
@@ -52,6 +53,8 @@ def _objects() -> dict[str, Any]:
         "numba.core.compiler_lock": numba.core.compiler_lock,
         "numba.core.compiler": numba.core.compiler,
         "numba.config": numba.config,
+        "locator": numba.core.caching,
+        "locator class": numba.core.caching.UserProvidedCacheLocator(_identity.py_func, __file__),
     }
 
 
@@ -105,8 +108,13 @@ USED = {
     ("cgutils", "for_range"): "the loop over lanes",
     ("cgutils", "get_null_value"): "no reference count",
     ("cgutils", "global_constant"): "the layout as a constant",
-    # jit.py
+    # places.py
     ("numba.config", "CACHE_DIR"): "where compiled code is kept (documented as an environment variable only)",
+    ("numba.config", "CACHE_LOCATOR_CLASSES"): "which classes name the folder of a function (documented likewise)",
+    ("locator", "UserProvidedCacheLocator"): "the class that names a folder in CACHE_DIR by the path of the sources",
+    ("locator class", "_cache_path"): "replaced: the folder that get_cache_path gives",
+    ("locator class", "ensure_cache_path"): "extended: once for all functions of a folder",
+    ("locator class", "from_function"): "extended: only functions of the engine",
 }
 
 

@@ -143,7 +143,7 @@ def test_a_motor_acts_through_its_train(motor: Any) -> None:
 def test_a_belt_with_a_mass_needs_its_radius() -> None:
     spec = replace(PLAIN, drive=Drive(stages=("gear", "belt")))
     numbers = NUMBERS | {"drive.stages.0.ratio": 2.0, "drive.stages.1.ratio": 2.0, "drive.stages.1.mass": 3.0}
-    with pytest.raises(RelationError, match="the belt, which has a mass") as error:
+    with pytest.raises(RelationError) as error:
         check(spec, numbers | {"drive.inertia": 1.0})
     assert error.value.path == "drive.stages.1.radius"
     check(spec, numbers | {"drive.inertia": 1.0, "drive.stages.1.radius": 0.1})

@@ -184,8 +184,9 @@ def test_a_part_that_cannot_be_assembled_is_named() -> None:
     numbers = of_shaft(PRESS_NUMBERS) | in_part(0, PRESS_NUMBERS) | in_part(1, PRESS_NUMBERS, crank_angle=1.0)
     numbers["parts.1.mechanism.slider_crank.rod"] = 0.05
     assert ending_of(spec, numbers) is Ending.CANNOT_ASSEMBLE
-    with pytest.raises(AssemblyError, match="of part") as error:
+    with pytest.raises(AssemblyError) as error:
         check(spec, numbers)
+    assert error.value.prefix == "parts.1."
     # The crank pin is more than a rod's length above the ram's line from 30 to 150 deg of the part, so from there at 0.
     assert error.value.angle == 0.0
     numbers["parts.1.crank_angle"] = -0.2

