@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import logging
 from contextlib import suppress
-from itertools import groupby
 from typing import TYPE_CHECKING, assert_never
 
 from sprag.worker import dispatch
 from sprag.worker.dispatch import Dispatch
-from sprag.worker.ports import Chunk, EpochLostError, Fate, KernelError, Outcome, StoreFullError
+from sprag.worker.opening import Opening
+from sprag.worker.ports import Chunk, EpochLostError, Fate, Finished, KernelError, Outcome, StoreFullError
+from sprag.worker.reports import Reporter
 from sprag.worker.reuse import no_cases, taken
 from sprag.worker.rounds import PlanError, Rounds
 from sprag.worker.states import StudyState
@@ -17,7 +18,6 @@ from sprag.worker.states import StudyState
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from sprag.worker.models import ChunkResult
     from sprag.worker.ports import ActiveStudy, Clock, Executor, Known, News, Store
     from sprag.worker.study import Study
 
@@ -28,19 +28,17 @@ POLL_SECONDS = 0.1
 #: The same with notifications from the store; polling then finds only changes without a notification.
 QUIET_POLL_SECONDS = 2.0
 HEARTBEAT_SECONDS = 5.0
-#: Number of studies active at the same time; the others wait in order of submission.
-OPEN_STUDIES = 8
-#: Seconds that a study waits for its kernel before this is reported; cached kernels load sooner.
-NOTE_SECONDS = 3.0
+#: Cases after which a transaction of results ends, because other writers wait for it: a fraction of a second.
+GROUP_CASES = 20_000
 #: Seconds before a store that refused writes is retried: doubled each time, reset after a success.
 FULL_SECONDS = (2.0, 60.0)
-COMPILING = "The kernel of this study is being compiled, once, which can take a minute; other studies continue."
 
 
 class Dispatcher:
-    """Runs every study of a store, or only study number ``only``.
+    """Runs the studies of a store that belong to it, or only study number ``only``.
 
-    The caller ensures, by a lock, that there is one dispatcher at a time; the epoch enforces it. ``renew`` returns a
+    Where the store admits several dispatchers they share the studies; the epoch ensures that each study has one of them
+    at a time. ``renew`` returns a
     new executor that compiles its kernels anew, replacing one whose chunks all crash. With ``news`` the store is polled
     when it has changed, and rarely otherwise.
     """
@@ -65,17 +63,17 @@ class Dispatcher:
         self._news = news
         self._machine = Dispatch(executor.capacity)
         self._rounds = Rounds(store)
+        self._reporter = Reporter()
         self._studies: dict[int, Study] = {}
         self._ids: dict[int, str] = {}
-        #: Studies waiting for their kernels, and those that cannot run at present; with the time when this began.
-        self._compiling: dict[int, float] = {}
-        self._short: dict[int, float] = {}
-        #: The reasons recorded on studies.
-        self._notes: dict[int, str | None] = {}
-        self._priorities: dict[int, int] = {}
+        self._opening = Opening(store, clock, only)
         #: By ticket: cases of a chunk in flight that the store already has; and outcomes of chunks it has completely.
         self._known: dict[int, Known] = {}
         self._had_all: list[Outcome] = []
+        #: Finished chunks to be stored and chunks to be claimed by the next transaction.
+        self._finished: list[Finished] = []
+        self._waiting_cases = 0
+        self._runs: list[dispatch.Run] = []
         #: Why the store refused the last write; claims must still be returned then.
         self._full: str | None = None
         self._full_delay = FULL_SECONDS[0]
@@ -89,7 +87,7 @@ class Dispatcher:
 
         Raises EpochLostError when another dispatcher took over, ExecutorError when nothing can be run.
         """
-        self._epoch = self._store.take_over(self._owner)
+        self._epoch = self._opening.epoch = self._store.take_over(self._owner)
         try:
             while not stopping():
                 self.step()
@@ -112,22 +110,29 @@ class Dispatcher:
         now = self._clock.monotonic()
         try:
             if now >= self._next_beat:
-                self._store.heartbeat(self._epoch)
+                report = self._reporter.summary(self._executor.report(), self._machine.in_flight, now)
+                self._store.heartbeat(self._epoch, report)
                 self._next_beat = now + HEARTBEAT_SECONDS
             if now >= self._next_poll or (self._news is not None and self._news.wait(0.0)):
                 self._poll()
                 # There are no notifications about compiled kernels or free space.
-                quiet = self._news is not None and not self._compiling
+                quiet = self._news is not None and not self._opening.compiling
                 self._next_poll = now + (QUIET_POLL_SECONDS if quiet else POLL_SECONDS)
             at_once, self._had_all = self._had_all, []
-            if self._news is not None and not (at_once or self._compiling or self._machine.in_flight):
-                # The executor has nothing to report.
+            timeout = 0.0 if at_once else POLL_SECONDS
+            if self._news is not None and not (at_once or self._opening.compiling or self._machine.in_flight):
+                # The executor has no outcomes, and is only asked so that it looks for workers that come and go.
                 if self._news.wait(POLL_SECONDS):
                     self._next_poll = now
-                return
-            for outcome in (*at_once, *self._executor.wait(0.0 if at_once else POLL_SECONDS)):
-                self._handle(dispatch.Ended(outcome.ticket, outcome.fate, outcome.detail), outcome.result)
-                self._known.pop(outcome.ticket, None)
+                timeout = 0.0
+            for outcome in (*at_once, *self._executor.wait(timeout)):
+                known = self._known.pop(outcome.ticket, None)
+                for instruction in self._machine.handle(dispatch.Ended(outcome.ticket, outcome.fate, outcome.detail)):
+                    if isinstance(instruction, dispatch.Commit):
+                        self._store_later(instruction.chunk, outcome, known)
+                    else:
+                        self._do(instruction)
+            self._exchange()
         except StoreFullError as error:
             self._store_is_full(str(error))
 
@@ -136,8 +141,7 @@ class Dispatcher:
             self._try_again = self._clock.monotonic() + self._full_delay
             self._full_delay = min(2.0 * self._full_delay, FULL_SECONDS[1])
         self._full = reason
-        self._known.clear()
-        self._had_all.clear()
+        self._drop()
         self._handle(dispatch.Lost())
         for number in list(self._studies):
             self._forget(number)
@@ -162,52 +166,54 @@ class Dispatcher:
         return True
 
     def _poll(self) -> None:
-        """Pass the state of every study in the store to the state machine; known facts change nothing."""
+        """Pass the state of every study that is ours or free to the state machine; known facts change nothing."""
         self._machine.capacity = self._executor.capacity  # changes as workers join and leave
-        studies = self._store.active_studies()
+        self._store.end_absent(self._epoch)
+        studies = self._opening.studies()
         if not self._has_room(studies):
-            studies = self._store.active_studies()
-        for study in studies:
-            self._priorities[study.number] = study.priority
-            if self._only not in {None, study.number}:
-                continue
+            studies = self._opening.studies()
+        given = self._opening.given(studies)
+        for study in filter(self._opening.chosen, studies):
             over = study.finish_by is not None and study.finish_by <= self._clock.now()
             paused = study.state is StudyState.PAUSED and not (over and study.goes_on)
-            if paused or study.state is StudyState.CANCELLING:
-                self._notes.pop(study.number, None)
-                if self._compiling.pop(study.number, None) is not None:
+            if paused or study.number == given:
+                self._part_with(study)
+            elif study.state is StudyState.CANCELLING:
+                self._opening.unnoted(study.number)
+                if self._opening.stop_waiting(study.number):
                     self._forget(study.number)
-                wish = dispatch.Paused if study.state is StudyState.PAUSED else dispatch.Cancelled
-                self._handle(wish(study.number))
+                if self._opening.adopted(study):
+                    self._handle(dispatch.Cancelled(study.number))
             elif over:
-                self._time_is_over(study.number)
+                self._time_is_over(study)
             elif study.number in self._machine.studies:
-                self._tell_shortage(study.number)
+                self._opening.tell_shortage(study.number, self._executor)
                 self._handle(dispatch.Offered(study.number, priority=study.priority))
-            elif self._may_open(study) and self._has_kernel(study):
+            elif self._opening.may_open(study, self._machine.studies) and self._has_kernel(study):
                 chunks = self._store.open_chunks(study.number)
                 self._say("The study %s starts: %d cases in %d chunks to be run.", study.number,
                     sum(chunk.count for chunk in chunks), len(chunks))  # fmt: skip
                 self._handle(dispatch.Offered(study.number, chunks, study.priority, study.proven))
 
-    def _time_is_over(self, number: int) -> None:
+    def _part_with(self, study: ActiveStudy) -> None:
+        """A study is paused, or another dispatcher is to have it: it is free when its chunks in flight have ended."""
+        self._opening.unnoted(study.number)
+        if self._opening.stop_waiting(study.number):
+            self._forget(study.number)
+        self._handle(dispatch.Paused(study.number))
+        if self._opening.is_ours(study) and study.number not in self._machine.studies and not study.waits_for_room:
+            self._store.leave(self._epoch, study.number)
+            self._forget(study.number)
+
+    def _time_is_over(self, study: ActiveStudy) -> None:
         """The deadline of the study has passed: chunks in flight finish, then the study is held."""
-        self._compiling.pop(number, None)
+        number = study.number
+        self._opening.stop_waiting(number)
         self._handle(dispatch.Paused(number))
-        if number not in self._machine.studies:
+        if number not in self._machine.studies and self._opening.adopted(study):
             self._store.time_is_over(self._epoch, number)
             self._say("The deadline of the study %s has passed.", number)
             self._forget(number)
-
-    def _may_open(self, study: ActiveStudy) -> bool:
-        """Whether a study may become active; those that wait for kernels or have a lower priority do not count."""
-        if study.number in self._compiling:
-            return True
-        rivals = (self._machine.studies, self._compiling)
-        return all(
-            sum(self._priorities.get(number, 0) >= study.priority for number in group) < OPEN_STUDIES
-            for group in rivals
-        )
 
     def _has_kernel(self, study: ActiveStudy) -> bool:
         """Whether the study can run now; if not, its kernel is being loaded or the study is held."""
@@ -216,34 +222,11 @@ class Dispatcher:
             self._studies[number] = self._store.study_of(number)
             self._ids[number] = study.id
         try:
-            ready = self._executor.ready(self._studies[number])
+            return self._opening.loaded(number, self._studies[number], self._executor)
         except KernelError as error:
-            self._compiling.pop(number, None)
+            self._opening.stop_waiting(number)
             self._handle(dispatch.Broken(number, str(error)))
             return False
-        if ready:
-            self._compiling.pop(number, None)
-            self._notes.pop(number, None)
-            self._store.note(self._epoch, number, None)  # the reason may come from an earlier dispatcher
-            return True
-        now = self._clock.monotonic()
-        if now - self._compiling.setdefault(number, now) >= NOTE_SECONDS:
-            self._note(number, self._executor.shortage or COMPILING)
-        return False
-
-    def _tell_shortage(self, number: int) -> None:
-        """Record on an active study that nothing can be run, when this persists."""
-        shortage, now = self._executor.shortage, self._clock.monotonic()
-        if shortage is None:
-            self._short.pop(number, None)
-            self._note(number, None)
-        elif now - self._short.setdefault(number, now) >= NOTE_SECONDS:
-            self._note(number, shortage)
-
-    def _note(self, number: int, note: str | None) -> None:
-        if self._notes.get(number) != note:
-            self._store.note(self._epoch, number, note)
-            self._notes[number] = note
 
     def _hold(self, number: int, reason: str) -> None:
         """Hold a study for a fault outside its cases, and log it."""
@@ -261,8 +244,7 @@ class Dispatcher:
         self._studies.pop(number, None)
         self._rounds.forget(number)
         self._ids.pop(number, None)
-        for known in (self._compiling, self._short, self._notes):
-            known.pop(number, None)
+        self._opening.forget(number)
 
     def _begin_again(self, number: int, reason: str) -> None:
         """Restart with new processes and kernels, because the cached kernels may be damaged."""
@@ -275,30 +257,47 @@ class Dispatcher:
             self._ids.get(number, number), reason,
         )  # fmt: skip
         self._executor.close()
-        self._known.clear()
-        self._had_all.clear()
+        self._drop()
         self._executor = self._renew()
         self._store.begin_again(self._epoch, number)
         for known in list(self._studies):
             self._forget(known)
 
-    def _handle(self, event: dispatch.Event, result: ChunkResult | None = None) -> None:
-        """Pass the event to the state machine and carry out its instructions."""
-        for starts, instructions in groupby(self._machine.handle(event), lambda item: isinstance(item, dispatch.Run)):
-            if starts:
-                self._start([item for item in instructions if isinstance(item, dispatch.Run)])
-            else:
-                for instruction in instructions:
-                    self._do(instruction, result)
+    def _drop(self) -> None:
+        """Forget the results and claims of chunks in flight."""
+        for pending in (self._known, self._had_all, self._finished, self._runs):
+            pending.clear()
 
-    def _start(self, runs: Sequence[dispatch.Run]) -> None:
-        """Claim the chunks in one transaction and start those that were granted."""
-        got: set[Chunk] = set(self._store.claim(self._epoch, [run.chunk for run in runs]))
+    def _handle(self, event: dispatch.Event) -> None:
+        """Pass an event that stores no rows to the state machine and carry out its instructions."""
+        for instruction in self._machine.handle(event):
+            self._do(instruction)
+        self._exchange()
+
+    def _store_later(self, chunk: Chunk, outcome: Outcome, known: Known | None) -> None:
+        """Let the next transaction store a finished chunk."""
+        if outcome.result is None:
+            raise ValueError(f"the executor gave no result for {chunk}")
+        self._finished.append(Finished(chunk, outcome.result, known, outcome.host))
+        self._waiting_cases += chunk.count
+        if self._waiting_cases >= GROUP_CASES:
+            self._exchange()
+
+    def _exchange(self) -> None:
+        """Store what is finished and claim what is to run next, in one transaction; start what was granted."""
+        finished, self._finished = self._finished, []
+        runs, self._runs = self._runs, []
+        self._waiting_cases = 0
+        if not (finished or runs):
+            return
+        claimed = set(self._store.exchange(self._epoch, finished, [run.chunk for run in runs])[1])
+        if finished:
+            self._full_delay = FULL_SECONDS[0]
         for run in runs:
-            if run.chunk in got:
+            if run.chunk in claimed:
                 self._submit(run.ticket, run.chunk)
         for run in runs:
-            if run.chunk not in got:
+            if run.chunk not in claimed:
                 self._handle(dispatch.Refused(run.ticket))
 
     def _submit(self, ticket: int, chunk: Chunk) -> None:
@@ -325,20 +324,20 @@ class Dispatcher:
                 return
             if appended is not None:
                 self._studies[number] = appended.study
-                priority = self._priorities.get(number, 0)
+                priority = self._opening.priorities.get(number, 0)
                 self._handle(dispatch.Offered(number, appended.chunks, priority, proven=True))
                 return
         ended = self._store.settle(self._epoch, number)
         self._say("The study %s is %s.", number, ended.value)
         self._forget(number)
 
-    def _do(self, instruction: dispatch.Instruction, result: ChunkResult | None) -> None:
+    def _do(self, instruction: dispatch.Instruction) -> None:
+        """Carry out an instruction, in order: only claims may be put off, to be made together."""
+        if isinstance(instruction, dispatch.Run):
+            self._runs.append(instruction)
+            return
+        self._exchange()
         match instruction:
-            case dispatch.Commit(ticket=ticket, chunk=chunk):
-                if result is None:
-                    raise ValueError(f"the executor gave no result for {chunk}")
-                self._store.commit(self._epoch, chunk, result, self._known.get(ticket))
-                self._full_delay = FULL_SECONDS[0]
             case dispatch.PutBack(chunk=chunk, detail=detail):
                 self._store.put_back(self._epoch, chunk, detail)
             case dispatch.Split(chunk=chunk, parts=parts, detail=detail):
@@ -354,7 +353,7 @@ class Dispatcher:
                 self._begin_again(number, reason)
             case dispatch.Settle(study=number):
                 self._settle(number)
-            case dispatch.Run():
-                self._start([instruction])
+            case dispatch.Commit():
+                raise AssertionError("only the end of a chunk stores rows")
             case _:
                 assert_never(instruction)

@@ -1,5 +1,8 @@
 """What determines the bits of a result besides its parameters: code, libraries and processor of the process.
 
+numpy and the C library choose their code by the processor itself: what they chose is told by their answers
+(`sprag.worker.known_answers`).
+
 Two processes with the same fingerprint give the same bits for the same case. If a fingerprint differs from the
 dispatcher's, a worker of a cluster is refused and a process of the pool exits. Rows are reused only under the
 fingerprint with which they were computed.
@@ -19,6 +22,7 @@ from pathlib import Path
 from typing import Final
 
 from sprag.worker import models
+from sprag.worker.known_answers import known_answers
 
 _SOURCES: Final = "engine sources"
 _FEATURES: Final = "processor features"
@@ -63,6 +67,7 @@ def collect() -> dict[str, str]:
         _FEATURES: _features(),
         "compiler": models.compiler(),
         "numba settings": _numba_settings(),
+        **known_answers(),
     }
 
 
@@ -85,7 +90,10 @@ def _version(package: str) -> str:
 
 
 def _features() -> str:
-    """The processor features that numba compiles for, sorted; without AVX where numba's setting disables it."""
+    """The processor features that numba compiles for, sorted; without AVX where numba's setting disables it.
+
+    Where the setting names them, the real processor shows in the known answers only.
+    """
     chosen = os.environ.get("NUMBA_CPU_FEATURES")
     if chosen is not None:
         return " ".join(sorted(item[1:] for item in chosen.split(",") if item.startswith("+")))
@@ -105,11 +113,17 @@ def own() -> Mapping[str, str]:
 
 def digest() -> str:
     """SHA-256 (hexadecimal) of `own`."""
-    return _digest(own())
+    return digest_of(own())
 
 
-def _digest(fingerprint: Mapping[str, str]) -> str:
-    return hashlib.sha256(json.dumps(dict(fingerprint), sort_keys=True).encode()).hexdigest()
+def digest_of(fingerprint: Mapping[str, str]) -> str:
+    """SHA-256 (hexadecimal) of a fingerprint."""
+    return hashlib.sha256(text_of(fingerprint).encode()).hexdigest()
+
+
+def text_of(fingerprint: Mapping[str, str]) -> str:
+    """A fingerprint as JSON data, equal for equal ones."""
+    return json.dumps(dict(fingerprint), sort_keys=True)
 
 
 def differences(own: Mapping[str, str], other: object) -> str:
@@ -146,7 +160,7 @@ def prepare_as(expected: str) -> None:
 
 
 def _require(expected: str) -> None:
-    if _digest(collect()) != expected:
+    if digest_of(collect()) != expected:
         raise SystemExit(
             "Sprag, a library or the engine's files changed while the worker ran: it must be started again."
         )

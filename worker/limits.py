@@ -18,7 +18,9 @@ MAX_STARTS: Final = 4_096
 MAX_START_RANGES: Final = 24
 #: Values of each initial value of a basin.
 MAX_BASIN_POINTS: Final = 64
-#: Cases of one study.
+#: Cases of one study. Rows are run, stored and exported in blocks, but orders of cases, shared cases and columns of all
+#: cases are arrays with a number for each case: 80 MB each at this limit, several at a time. More cases are more
+#: studies, of which each is one file, one page and one dispatcher's work.
 MAX_CASES: Final = 10_000_000
 #: Values on all axes of one study together (they are stored with the study).
 MAX_AXIS_VALUES: Final = 1_000_000
@@ -33,6 +35,18 @@ MAX_BODY_BYTES: Final = 1024 * 1024
 MAX_DEPTH: Final = 32
 #: Characters of a study's name.
 MAX_NAME_LENGTH: Final = 200
+#: Characters of the notes on a study; tags of a study, and characters of one.
+MAX_NOTES_LENGTH: Final = 10_000
+MAX_TAGS: Final = 20
+MAX_COMPONENTS: Final = 2_000
+#: Saved views of a database, figures in the report of a study, and characters of the choices of a view.
+MAX_VIEWS: Final = 10_000
+MAX_REPORT_FIGURES: Final = 12
+MAX_VIEW_QUERY: Final = 4_000
+MAX_TAG_LENGTH: Final = 40
+#: Characters of a search, and of the token of a page: it has what the list is sorted by.
+MAX_SEARCH_LENGTH: Final = 200
+MAX_PAGE_TOKEN: Final = 1_000
 #: Characters of one quantity with its unit ("0.01 N*m*s/rad").
 MAX_QUANTITY_LENGTH: Final = 80
 #: Decimal digits of an integer in a spec; doubles end at about 308.
@@ -51,6 +65,8 @@ MIN_SETTLED: Final = 1e-10
 MAX_SETTLED: Final = 1e-3
 #: Cases of a selection that one answer or file can have.
 MAX_SELECTED: Final = 100_000
+#: Cases of a selection that a new study can have as its points.
+MAX_POINTS_SELECTED: Final = 10_000
 #: Smaller steps into which a step of a sweep is split where the motion jumps: by default, at least, at most.
 NARROW_STEPS: Final = 16
 MIN_NARROW_STEPS: Final = 2

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     from sprag.worker.models import ChunkResult
     from sprag.worker.planning.rounds import Rows
+    from sprag.worker.reports import ExecutorReport
+    from sprag.worker.sharing import Peer
     from sprag.worker.states import StudyState
     from sprag.worker.study import Study
 
@@ -61,12 +63,26 @@ class Known:
 
 
 @dataclass(frozen=True, slots=True)
+class Finished:
+    """A chunk that was run, on ``host`` ("" where no case was run).
+
+    With ``known`` the result covers the missing cases only; the other rows are copied.
+    """
+
+    chunk: Chunk
+    result: ChunkResult
+    known: Known | None = None
+    host: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class ActiveStudy:
     """An unfinished study, as polled by the dispatcher.
 
     Higher ``priority`` runs first. ``waits_for_room`` marks a paused study that resumes when there is room, ``goes_on``
     one that resumes by itself for any reason. No chunk starts after ``finish_by``. ``proven``: an earlier round of the
-    study has results, which shows that the engine works.
+    study has results, which shows that the engine works. ``dispatcher`` is the epoch of the dispatcher to which it
+    belongs, None for none; ``fingerprint`` that of its rows, "" where it has none, or rows of several.
     """
 
     number: int
@@ -77,6 +93,8 @@ class ActiveStudy:
     finish_by: datetime | None = None
     goes_on: bool = False
     proven: bool = False
+    dispatcher: int | None = None
+    fingerprint: str = ""
 
 
 class StoreError(Exception):
@@ -106,15 +124,31 @@ class KernelError(Exception):
 class Store(Protocol):
     """The dispatcher's view of the database. Every write is one short transaction that first checks the epoch.
 
-    A method that takes ``epoch`` raises EpochLostError, and changes nothing, when the epoch is no longer the latest.
+    A method that takes ``epoch`` raises EpochLostError, and changes nothing, when the epoch has ended. Studies that
+    belong to another dispatcher are left as they are.
     Any method may raise StoreFullError, and has changed nothing then.
     """
 
     def take_over(self, owner: str) -> int:
-        """Increase the epoch, return every claim of an older one to waiting, and return the new epoch."""
+        """Begin an epoch and return it; end the dispatchers that are gone, whose claims return to waiting."""
 
-    def heartbeat(self, epoch: int) -> None:
-        """Record that the dispatcher is alive. A missing heartbeat raises alarms but never decides ownership."""
+    def end_absent(self, epoch: int) -> bool:
+        """End the other dispatchers that are gone; whether there were any."""
+
+    def peers(self, epoch: int) -> list[Peer]:
+        """The other dispatchers at work."""
+
+    def adopt(self, epoch: int, number: int) -> bool:
+        """Let an unfinished study that belongs to nobody belong to this dispatcher; whether it does."""
+
+    def leave(self, epoch: int, number: int) -> None:
+        """Let a study of this dispatcher, of which nothing is in flight, belong to nobody."""
+
+    def heartbeat(self, epoch: int, report: Mapping[str, Any]) -> None:
+        """Record that the dispatcher is alive, and the `Reporter.summary` of its workers.
+
+        A missing heartbeat raises alarms but never decides ownership.
+        """
 
     def active_studies(self) -> list[ActiveStudy]:
         """Studies that have not ended, by priority and then in order of submission.
@@ -128,24 +162,23 @@ class Store(Protocol):
     def open_chunks(self, number: int) -> list[Chunk]:
         """Unfinished chunks of a study, in the order in which they will run."""
 
-    def claim(self, epoch: int, chunks: Sequence[Chunk]) -> list[Chunk]:
-        """Claim waiting chunks of queued or running studies before their deadline; returns the claimed ones."""
-
     def known(self, study: Study, chunk: Chunk) -> Known | None:
         """Which cases of a chunk of ``study`` must be run, and which can be copied from other studies.
 
         None where all must be run and they are numbered ``chunk.first`` to ``chunk.last``.
         """
 
-    def commit(self, epoch: int, chunk: Chunk, result: ChunkResult, known: Known | None = None) -> bool:
-        """Insert the rows of a claimed chunk and mark it done. False, and no change, when it is not claimed by us.
+    def exchange(
+        self, epoch: int, finished: Sequence[Finished], wanted: Sequence[Chunk] = ()
+    ) -> tuple[list[Chunk], list[Chunk]]:
+        """Store finished chunks and claim waiting ones, in one transaction: the chunks stored, and those claimed.
 
-        With ``known`` the result covers the missing cases only, and the other rows are copied; where one of them is
-        gone, the chunk returns to waiting instead (False).
+        A finished chunk that is not claimed by us is ignored. One whose rows were to be copied from a study that is
+        gone returns to waiting. Claimed are chunks of queued or running studies before their deadline.
         """
 
     def release(self, epoch: int) -> None:
-        """Return every claim of this epoch to waiting: the dispatcher ends."""
+        """End the epoch: its claims return to waiting, its studies belong to nobody."""
 
     def put_back(self, epoch: int, chunk: Chunk, detail: str) -> None:
         """Return a claimed chunk to waiting, with ``chunk.failures`` as its new count and what happened to it."""
@@ -172,7 +205,7 @@ class Store(Protocol):
         """Why there is no room for more rows, as a sentence; None where there is room."""
 
     def hold(self, epoch: int, reason: str, *, returned: bool) -> None:
-        """Pause every study that is queued or running, with the reason, until `let_go`.
+        """Pause every study of this dispatcher or of none that is queued or running, with the reason, until `let_go`.
 
         With ``returned`` every claim of this epoch goes back to waiting, too.
         """
@@ -216,12 +249,16 @@ class Fate(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The end of one submitted chunk; ``result`` is given when the fate is DONE, otherwise ``detail`` explains it."""
+    """The end of one submitted chunk.
+
+    ``result`` and the ``host`` that computed it are given when the fate is DONE; otherwise ``detail`` explains it.
+    """
 
     ticket: int
     fate: Fate
     result: ChunkResult | None = None
     detail: str = ""
+    host: str = ""
 
 
 class Executor(Protocol):
@@ -249,6 +286,9 @@ class Executor(Protocol):
 
     def stop(self, ticket: int) -> None:
         """Stop a chunk, running or not; its outcome is STOPPED unless it has just finished."""
+
+    def report(self) -> ExecutorReport:
+        """The workers as they are now; asks nobody."""
 
     def close(self) -> None:
         """Stop everything and end all processes."""

@@ -32,7 +32,7 @@ class Appended:
 
 
 @dataclass(slots=True)
-class _Told:
+class _Kept:
     planner: Planner
     rounds: int = 0
 
@@ -45,7 +45,7 @@ class Rounds:
 
     def __init__(self, store: Store) -> None:
         self._store = store
-        self._planners: LRUCache[int, _Told] = LRUCache(_KEPT)
+        self._planners: LRUCache[int, _Kept] = LRUCache(_KEPT)
 
     def advance(self, epoch: int, number: int, study: Study) -> Appended | None:
         """Append the next round of a study whose cases all have their rows, or end it where there is none.
@@ -73,13 +73,13 @@ class Rounds:
         if study.plan is None:
             raise PlanError("the study has no plan")
         try:
-            told = self._planners.get(number)
-            if told is None or told.rounds > len(done):
-                told = self._planners[number] = _Told(planner_of(study.plan))
-            for cases in done[told.rounds :]:
-                told.planner.tell(self._store.round_rows(number, study, cases, told.planner.results))
-                told.rounds += 1
-            return told.planner.ask()
+            current = self._planners.get(number)
+            if current is None or current.rounds > len(done):
+                current = self._planners[number] = _Kept(planner_of(study.plan))
+            for cases in done[current.rounds :]:
+                current.planner.tell(self._store.round_rows(number, study, cases, current.planner.results))
+                current.rounds += 1
+            return current.planner.ask()
         except (ArithmeticError, LookupError, MemoryError, TypeError, ValueError) as error:
             self.forget(number)
             raise PlanError(f"the next round cannot be planned: {type(error).__name__}: {error}") from error

@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Callable
+from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,7 @@ from sprag.worker import models
 from sprag.worker.executors.process_pool import ProcessPoolExecutor
 from sprag.worker.models import ChunkResult, ChunkTask, KernelShape
 from sprag.worker.pool.child_process import uncounted
+from sprag.worker.reports import ExecutorReport, Reporter, WorkerReport
 from sprag.worker.study import Axis, Study
 
 BASE = {
@@ -57,6 +60,12 @@ def result(first: int, count: int, ending: str = models.OK) -> ChunkResult:
     return ChunkResult(first, [ending] * count, [""] * count, values(first, count))
 
 
+def report(*workers: WorkerReport, shortage: str = "", **cases: int) -> dict[str, Any]:
+    """What a dispatcher reports of workers of a cluster that have run ``cases`` on their hosts."""
+    found = ExecutorReport("dask", workers, cases, shortage, "tls://head:8786", "http://head:8787/status")
+    return Reporter().summary(found, 0, 0.0)
+
+
 def run(
     task: ChunkTask, *, crash: frozenset[int] = frozenset(), hang: frozenset[int] = frozenset(), failing: bool = False
 ) -> ChunkResult:
@@ -88,6 +97,14 @@ def raising(task: ChunkTask) -> ChunkResult:
 
 def load(shape: KernelShape) -> None:
     """No kernel is needed."""
+
+
+def load_answering(shape: KernelShape, *, folder: str) -> str:
+    """The kernel of the first worker that loads one gives other answers than those of the others."""
+    with suppress(FileExistsError):
+        Path(folder, "first").touch(exist_ok=False)
+        return "ones"
+    return "others"
 
 
 #: A file in the cache that stands for a damaged kernel.
@@ -226,3 +243,8 @@ def fail_while_loading() -> None:
     """What is to be loaded is damaged."""
     with uncounted():
         raise ZeroDivisionError
+
+
+def numpy_features() -> list[str]:
+    """The features of this processor by which numpy chooses its code."""
+    return [str(name) for name in np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])]

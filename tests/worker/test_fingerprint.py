@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 
 import pytest
 
-from sprag.worker import fingerprint
+from sprag.worker import fingerprint, known_answers
 from tests.conftest import ROOT
+from tests.worker.fakes import numpy_features
 
 OWN = {"numpy": "2.1", "processor features": "avx avx2 fma", "numba settings": ""}
 
 
-def collected(**environment: str) -> str:
-    """The digest of a process of its own."""
-    command = [sys.executable, "-c", "from sprag.worker import fingerprint; print(fingerprint.digest())"]
+def collected(code: str = "print(fingerprint.digest())", **environment: str) -> str:
+    """What a process of its own prints: by default its digest."""
+    command = [sys.executable, "-c", f"import json; from sprag.worker import fingerprint; {code}"]
     return subprocess.run(
         command, cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT), **environment}, capture_output=True, text=True,
         check=True, timeout=600,
@@ -34,6 +36,27 @@ def test_every_process_of_one_installation_has_the_same() -> None:
 def test_settings_that_change_the_code_change_it(setting: str) -> None:
     name, value = setting.split("=")
     assert collected(**{name: value}) != fingerprint.digest()
+
+
+def test_another_choice_of_numpy_or_the_c_library_changes_it() -> None:
+    features = numpy_features()
+    if not features:
+        pytest.skip("this processor has no feature that numpy chooses by")
+    other = collected(code="print(json.dumps(fingerprint.collect()))", NPY_DISABLE_CPU_FEATURES=" ".join(features))
+    assert fingerprint.differences(fingerprint.own(), json.loads(other)).startswith("known answers of numpy: ")
+
+
+def test_answers_that_differ_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = fingerprint.collect()
+    for name in ("_NUMPY", "_C"):
+        functions = getattr(known_answers, name)
+        monkeypatch.setattr(known_answers, name, (functions[1], functions[0], *functions[2:]))
+    monkeypatch.setattr(fingerprint, "known_answers", known_answers.known_answers.__wrapped__)
+    after = fingerprint.collect()
+    assert [name for name in before if before[name] != after[name]] == [
+        "known answers of numpy",
+        "known answers of the C library",
+    ]
 
 
 def test_files_that_change_under_a_running_process_change_it(monkeypatch: pytest.MonkeyPatch) -> None:

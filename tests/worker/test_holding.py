@@ -10,12 +10,11 @@ import pytest
 from sprag.service.storage.store import Store
 from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import (
-    COMPILING,
-    NOTE_SECONDS,
     POLL_SECONDS,
     Dispatcher,
 )
 from sprag.worker.executors.inline import InlineExecutor
+from sprag.worker.opening import COMPILING, NOTE_SECONDS
 from sprag.worker.ports import KernelError, Outcome, StoreFullError
 from sprag.worker.states import StudyState
 from sprag.worker.study import Study
@@ -51,8 +50,7 @@ class Tank:
         """See `Store`."""
         return self.short
 
-    commit = partialmethod(_write, "commit")
-    claim = partialmethod(_write, "claim")
+    exchange = partialmethod(_write, "exchange")
     release = partialmethod(_write, "release")
     hold = partialmethod(_write, "hold")
     heartbeat = partialmethod(_write, "heartbeat")

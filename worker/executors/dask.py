@@ -20,14 +20,13 @@ from typing import TYPE_CHECKING, Any, Final
 from uuid import uuid4
 
 import dask
-from distributed import LocalCluster
 from distributed.scheduler import KilledWorker
 
 from sprag.worker import fingerprint, models
-from sprag.worker.executors.dask_jobs import Job, Waiting, Worker, refusals
-from sprag.worker.executors.dask_link import Link, value_of
-from sprag.worker.executors.dask_tasks import INTRODUCE, load_kernel, run_chunk, scheduler_address
-from sprag.worker.executors.process_pool import MAX_LOADS, SPARE_CHUNKS
+from sprag.worker.executors import dask_tasks as tasks
+from sprag.worker.executors.dask_jobs import Job, Waiting, Worker, outcome_of, refusals, report_of
+from sprag.worker.executors.dask_link import Link, own_cluster, value_of
+from sprag.worker.executors.process_pool import MAX_LOADS, useful_chunks
 from sprag.worker.limits import WALL_TIMES
 from sprag.worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
 
@@ -36,6 +35,7 @@ if TYPE_CHECKING:
 
     from distributed import Future
 
+    from sprag.worker.reports import ExecutorReport
     from sprag.worker.study import Study
 
 _LOG = logging.getLogger(__name__)
@@ -73,7 +73,8 @@ class DaskExecutor:
     chunk_timeout : float
         Seconds of processor time after which a chunk ends with its worker; `WALL_TIMES` times as many of elapsed time.
     run, load : functions
-        Called in a worker for a chunk and for a new kernel; importable by name. Replaced in tests.
+        Called in a worker for a chunk, and for a new kernel, for its known answers; importable by name. Replaced in
+        tests.
     expected : mapping, optional
         Fingerprint required of workers; default: that of this process.
     scheduler_seconds : float
@@ -89,7 +90,7 @@ class DaskExecutor:
         *,
         chunk_timeout: float,
         run: Callable[[models.ChunkTask], models.ChunkResult] = models.run_task,
-        load: Callable[[models.KernelShape], None] = models.load,
+        load: Callable[[models.KernelShape], str | None] = tasks.load_and_answer,
         expected: Mapping[str, str] | None = None,
         scheduler_seconds: float = SCHEDULER_SECONDS,
         renew: bool = False,
@@ -98,6 +99,7 @@ class DaskExecutor:
         self._run = run
         self._load = load
         self._expected = fingerprint.own() if expected is None else expected
+        self._digest = fingerprint.digest_of(self._expected)
         self._scheduler_seconds = scheduler_seconds
         self._name = uuid4().hex[:12]
         self._lock = RLock()
@@ -107,30 +109,24 @@ class DaskExecutor:
         self._renew = uuid4().hex if renew else ""
         self._discards: dict[str, str] = {}
         self._failed_loads: Counter[tuple[str, models.KernelShape]] = Counter()
+        self._cases: Counter[str] = Counter()
         #: Hosts that cannot load a kernel, and kernels that no host can load, with the reason.
         self._unable: set[tuple[str, models.KernelShape]] = set()
         self._broken: dict[models.KernelShape, str] = {}
         self._outcomes: SimpleQueue[Outcome | None] = SimpleQueue()
         self._next_look = 0.0
         self._gone_since: float | None = None
-        self._cluster: LocalCluster | None = None
         with dask.config.set(_CONFIG):
-            address, security = scheduler_address(url) if url else self._start_cluster(processes)
-        self._link = Link(address, security, f"sprag-{self._name}", self._lock)
+            self._cluster = None if url else own_cluster(processes)
+        place = tasks.scheduler_address(url) if self._cluster is None else (self._cluster.scheduler_address, None)
+        self._link = Link(*place, f"sprag-{self._name}", self._lock)
         self._look()
-
-    def _start_cluster(self, processes: int) -> tuple[str, None]:
-        self._cluster = LocalCluster(
-            n_workers=processes, threads_per_worker=1, host="127.0.0.1", memory_limit=0,
-            dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False}, silence_logs=logging.CRITICAL,
-        )  # fmt: skip
-        return self._cluster.scheduler_address, None
 
     @property
     def capacity(self) -> int:
         """Useful number of chunks in flight; it changes as workers join and leave."""
         with self._lock:
-            return sum(worker.usable for worker in self._workers.values()) + SPARE_CHUNKS
+            return useful_chunks(sum(worker.usable for worker in self._workers.values()))
 
     @property
     def shortage(self) -> str | None:
@@ -153,7 +149,7 @@ class DaskExecutor:
                 raise KernelError(reason)
             if any(shape in worker.shapes for worker in self._workers.values()):
                 return True
-            if not any(self._loads(worker, shape) for worker in self._workers.values()):
+            if not any(worker.loads(shape) for worker in self._workers.values()):
                 idle = (worker for worker in self._workers.values() if worker.usable and worker.job is None)
                 able = next((worker for worker in idle if (worker.host, shape) not in self._unable), None)
                 if able is not None:
@@ -199,6 +195,11 @@ class DaskExecutor:
                 job.dropped = time.monotonic()
             self._outcomes.put(Outcome(ticket, Fate.STOPPED, detail="stopped"))
 
+    def report(self) -> ExecutorReport:
+        """The workers that the last poll found."""
+        with self._lock:
+            return report_of(self._link, self._workers.values(), self._cases, self.shortage)
+
     def close(self) -> None:
         """Leave the cluster, and end it if this executor started it."""
         with self._lock:
@@ -224,9 +225,9 @@ class DaskExecutor:
                 self._worker_is_gone(self._workers.pop(address))
             for address, info in present.items():
                 if address not in self._workers:
-                    self._workers[address] = worker = Worker(address, str(info.get("host", address)))
+                    self._workers[address] = worker = Worker.joined(address, info)
                     key = f"sprag-introduce-{self._name}-{uuid4().hex}"
-                    self._begin(worker, Job("introduce", now), key, eval, INTRODUCE.format(self._renew))
+                    self._begin(worker, Job("introduce", now), key, eval, tasks.INTRODUCE.format(self._renew))
             ended = []
             for worker in self._workers.values():
                 if (job := worker.job) and job.kind == "chunk":
@@ -298,9 +299,6 @@ class DaskExecutor:
             self._discards[host] = uuid4().hex
         self._load_failed(host, shape, "the worker that compiled its kernel died", MAX_LOADS + 1)
 
-    def _loads(self, worker: Worker, shape: models.KernelShape) -> bool:
-        return worker.job is not None and worker.job.kind == "load" and worker.job.shape == shape
-
     def _fill(self) -> None:
         """Give waiting chunks to idle workers; on each host one worker compiles and the others load."""
         for worker in self._workers.values():
@@ -312,19 +310,20 @@ class DaskExecutor:
             if chosen is not None:
                 self._waiting.remove(chosen)
                 job = Job("chunk", time.monotonic(), chosen.ticket)
-                self._begin(worker, job, chosen.key, run_chunk, self._run, chosen.task, self._timeout, self._wall)
+                given = (self._digest, self._run, chosen.task, self._timeout, self._wall)
+                self._begin(worker, job, chosen.key, tasks.run_chunk, *given)
                 continue
             shape = next((s for item in self._waiting if (worker.host, s := item.task.shape) not in self._unable), None)
             if shape is None:
                 continue
             fellows = [other for other in self._workers.values() if other.host == worker.host]
-            if any(shape in other.shapes for other in fellows) or not any(self._loads(o, shape) for o in fellows):
+            if any(shape in other.shapes for other in fellows) or not any(other.loads(shape) for other in fellows):
                 self._begin_load(worker, shape)
 
     def _begin_load(self, worker: Worker, shape: models.KernelShape) -> None:
         key = f"sprag-load-{self._name}-{uuid4().hex}"
-        discard = self._discards.get(worker.host, "")
-        self._begin(worker, Job("load", time.monotonic(), shape=shape), key, load_kernel, self._load, shape, discard)
+        given = (self._digest, self._load, shape, self._discards.get(worker.host, ""))
+        self._begin(worker, Job("load", time.monotonic(), shape=shape), key, tasks.load_kernel, *given)
 
     def _begin(self, worker: Worker, job: Job, key: str, function: Callable[..., Any], *given: Any) -> None:
         worker.job = job
@@ -343,16 +342,18 @@ class DaskExecutor:
             if worker.job is not job:  # abandoned in the meantime
                 return
             worker.job = None
-            if isinstance(error, KilledWorker):
+            if isinstance(error, KilledWorker | tasks.OtherFingerprintError):  # the next poll finds who has the address
                 self._workers.pop(worker.address, None)
+            if isinstance(error, KilledWorker):
                 self._died(worker, job)
             elif job.kind == "chunk":
                 if job.dropped is None:
-                    self._outcomes.put(_outcome(job.ticket, value, error))
+                    self._cases[worker.host] += 0 if error is not None else value.count
+                    self._outcomes.put(outcome_of(job.ticket, value, error, worker.host))
             elif job.kind == "introduce":
                 self._introduced(worker, value, error)
             elif job.shape is not None:
-                self._loaded(worker, job.shape, error)
+                self._loaded(worker, job.shape, value, error)
             self._fill()
 
     def _introduced(self, worker: Worker, found: object, error: BaseException | None) -> None:
@@ -366,12 +367,19 @@ class DaskExecutor:
             worker.usable = True
             self._outcomes.put(None)
 
-    def _loaded(self, worker: Worker, shape: models.KernelShape, error: BaseException | None) -> None:
+    def _loaded(self, worker: Worker, shape: models.KernelShape, answers: Any, error: BaseException | None) -> None:
         if error is None:
-            worker.shapes.add(shape)
-            self._failed_loads.pop((worker.host, shape), None)
+            first = next((other for other in self._workers.values() if shape in other.shapes), worker)
+            if (expected := first.shapes.setdefault(shape, answers)) != answers:
+                worker.refusal = f"known answers of its kernel: {answers} instead of {expected} of {first.address}"
+                worker.usable = False
+                worker.shapes.clear()
+                _LOG.error("The worker %s is refused: %s.", worker.address, worker.refusal)
+            else:
+                worker.shapes[shape] = answers
+                self._failed_loads.pop((worker.host, shape), None)
             self._outcomes.put(None)
-        elif not isinstance(error, CancelledError):
+        elif not isinstance(error, CancelledError | tasks.OtherFingerprintError):
             self._load_failed(worker.host, shape, f"its kernel cannot be compiled ({type(error).__name__}: {error})", 1)
 
     def _load_failed(self, host: str, shape: models.KernelShape, reason: str, allowed: int) -> None:
@@ -390,11 +398,3 @@ class DaskExecutor:
                 self._waiting.remove(item)
                 self._outcomes.put(Outcome(item.ticket, Fate.CRASHED, detail=reason))
             self._outcomes.put(None)
-
-
-def _outcome(ticket: int, value: Any, error: BaseException | None) -> Outcome:
-    if error is None:
-        return Outcome(ticket, Fate.DONE, value)
-    if isinstance(error, CancelledError):
-        return Outcome(ticket, Fate.STOPPED, detail=f"its result was lost on the way ({error})")
-    return Outcome(ticket, Fate.CRASHED, detail=f"{type(error).__name__}: {error}")

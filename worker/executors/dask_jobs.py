@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
+from sprag.worker.executors.dask_tasks import OtherFingerprintError
+from sprag.worker.ports import Fate, Outcome
+from sprag.worker.reports import ExecutorReport, WorkerReport
+
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from distributed import Future
 
     from sprag.worker import models
+    from sprag.worker.executors.dask_link import Link
 
 
 @dataclass(eq=False, slots=True)
@@ -33,14 +39,25 @@ class Worker:
     """A worker of the cluster.
 
     ``usable`` is False until its introduction is accepted; for a refused worker ``refusal`` states why.
+    ``shapes`` has the known answers of the kernels that it has loaded.
     """
 
     address: str
     host: str
+    threads: int = 1
     usable: bool = False
     refusal: str = ""
-    shapes: set[models.KernelShape] = field(default_factory=set)
+    shapes: dict[models.KernelShape, str | None] = field(default_factory=dict)
     job: Job | None = None
+
+    @classmethod
+    def joined(cls, address: str, info: Mapping[str, Any]) -> Worker:
+        """A worker as the scheduler describes it."""
+        return cls(address, str(info.get("host", address)), int(info.get("nthreads", 1)))
+
+    def loads(self, shape: models.KernelShape) -> bool:
+        """Whether it loads that kernel at present."""
+        return self.job is not None and self.job.kind == "load" and self.job.shape == shape
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,3 +76,23 @@ def refusals(workers: Iterable[Worker]) -> str:
         return ""
     more = f" (and {len(refused) - 1} more)" if len(refused) > 1 else ""
     return f" {refused[0]}{more}."
+
+
+def report_of(link: Link, workers: Iterable[Worker], cases: Mapping[str, int], shortage: str | None) -> ExecutorReport:
+    """The report of workers that have run ``cases`` on their hosts."""
+    found = (
+        WorkerReport(worker.address, worker.host, worker.usable, worker.job is not None, worker.threads, worker.refusal)
+        for worker in workers
+    )
+    return ExecutorReport("dask", tuple(found), dict(cases), shortage or "", link.address, link.dashboard)
+
+
+def outcome_of(ticket: int, value: Any, error: BaseException | None, host: str) -> Outcome:
+    """The outcome of a chunk whose worker, on ``host``, returned a value, or an error."""
+    if error is None:
+        return Outcome(ticket, Fate.DONE, value, host=host)
+    if isinstance(error, CancelledError):
+        return Outcome(ticket, Fate.STOPPED, detail=f"its result was lost on the way ({error})")
+    if isinstance(error, OtherFingerprintError):
+        return Outcome(ticket, Fate.STOPPED, detail="another process has the address of its worker")
+    return Outcome(ticket, Fate.CRASHED, detail=f"{type(error).__name__}: {error}")

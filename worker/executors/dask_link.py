@@ -10,7 +10,7 @@ from threading import Condition
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlsplit
 
-from distributed import Client
+from distributed import Client, LocalCluster
 from distributed.client import AllExit
 
 from sprag.worker.executors.dask_tasks import blame_at_once, end_worker
@@ -47,6 +47,8 @@ class Link:
         self.address = address
         #: Why the scheduler did not answer the last time that it did not.
         self.trouble = ""
+        #: URL of the scheduler's dashboard; "" where it has none.
+        self.dashboard = ""
         self._security = security
         self._name = name
         self._client: Client | None = None
@@ -78,6 +80,8 @@ class Link:
             raise OSError("the connection to the scheduler is lost")
         scheduler: Any = self._client.scheduler
         found: dict[str, Any] = self._client.sync(scheduler.identity, n_workers=-1, callback_timeout=ANSWER_SECONDS)
+        port = found.get("services", {}).get("dashboard")
+        self.dashboard = f"http://{urlsplit(self.address).hostname}:{port}/status" if port else ""
         present: dict[str, dict[str, Any]] = found["workers"]
         return present
 
@@ -122,6 +126,14 @@ class Link:
         if client is not None:
             with suppress(Exception):
                 client.close(timeout=timeout)
+
+
+def own_cluster(processes: int) -> LocalCluster:
+    """A cluster of that many workers on this machine."""
+    return LocalCluster(
+        n_workers=processes, threads_per_worker=1, host="127.0.0.1", memory_limit=0,
+        dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False}, silence_logs=logging.CRITICAL,
+    )  # fmt: skip
 
 
 def value_of(future: Future[Any]) -> tuple[Any, BaseException | None]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import faulthandler
 import fcntl
+import hashlib
 import ipaddress
 import os
 from contextlib import suppress
@@ -33,6 +34,10 @@ _loaded: set[models.KernelShape] = set()
 INTRODUCE: Final = "__import__('sprag.worker.executors.dask_tasks', fromlist=['']).introduce('{}')"
 
 
+class OtherFingerprintError(Exception):
+    """The process is not the one that was introduced at its address: it has another fingerprint."""
+
+
 def introduce(discard: str) -> dict[str, str]:
     """Runs in each worker that joins: loads the engine and returns its fingerprint.
 
@@ -46,11 +51,23 @@ def introduce(discard: str) -> dict[str, str]:
     return fingerprint.collect()
 
 
-def load_kernel(load: Callable[[models.KernelShape], None], shape: models.KernelShape, discard: str) -> None:
-    """Runs in each worker before its first chunk of a shape; ``discard`` as in `introduce`."""
+def load_kernel(
+    expected: str, load: Callable[[models.KernelShape], str | None], shape: models.KernelShape, discard: str
+) -> str | None:
+    """Runs in each worker before its first chunk of a shape, and returns what ``load`` does.
+
+    ``expected`` as in `run_chunk`, ``discard`` as in `introduce`.
+    """
+    _require(expected)
     _discard_once(discard)
     _loaded.add(shape)
-    _within(LOAD_SECONDS, partial(load, shape))
+    return _within(LOAD_SECONDS, partial(load, shape))
+
+
+def load_and_answer(shape: models.KernelShape) -> str:
+    """Load a kernel; returns a hash of its known answers."""
+    models.load(shape)
+    return hashlib.sha256(models.model_of(shape.model).known_answers(shape)).hexdigest()[:16]
 
 
 def _discard_once(token: str) -> None:
@@ -67,10 +84,24 @@ def _discard_once(token: str) -> None:
 
 
 def run_chunk(
-    run: Callable[[models.ChunkTask], models.ChunkResult], task: models.ChunkTask, seconds: float, wall: float
+    expected: str,
+    run: Callable[[models.ChunkTask], models.ChunkResult],
+    task: models.ChunkTask,
+    seconds: float,
+    wall: float,
 ) -> models.ChunkResult:
-    """Runs in a worker for each chunk, with limits of processor time and elapsed time (s)."""
+    """Runs in a worker for each chunk, with limits of processor time and elapsed time (s).
+
+    Raises OtherFingerprintError where the digest of the worker's fingerprint is not ``expected``.
+    """
+    _require(expected)
     return _within(wall, partial(within_processor_time, seconds, run, task))
+
+
+def _require(expected: str) -> None:
+    # An address says nothing: a process that was restarted on a fixed port has that of the one before.
+    if fingerprint.digest() != expected:
+        raise OtherFingerprintError(fingerprint.digest())
 
 
 def _within(seconds: float, function: Callable[[], _T]) -> _T:

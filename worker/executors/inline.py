@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import socket
 import time
 from collections import deque
 from typing import TYPE_CHECKING
 
 from sprag.worker import models
 from sprag.worker.ports import Chunk, Fate, Outcome
+from sprag.worker.reports import ExecutorReport, WorkerReport
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,6 +24,7 @@ class InlineExecutor:
         self._run = run
         self._waiting: deque[tuple[int, models.ChunkTask]] = deque()
         self._stopped: list[Outcome] = []
+        self._cases = 0
 
     @property
     def capacity(self) -> int:
@@ -51,7 +54,9 @@ class InlineExecutor:
             return []
         ticket, task = self._waiting.popleft()
         try:
-            return [Outcome(ticket, Fate.DONE, self._run(task))]
+            result = self._run(task)
+            self._cases += result.count
+            return [Outcome(ticket, Fate.DONE, result, host=socket.gethostname())]
         except Exception as error:  # a bug, reported like the crash of a process
             return [Outcome(ticket, Fate.CRASHED, detail=f"{type(error).__name__}: {error}")]
 
@@ -61,6 +66,11 @@ class InlineExecutor:
         if len(kept) < len(self._waiting):
             self._waiting = kept
             self._stopped.append(Outcome(ticket, Fate.STOPPED, detail="stopped"))
+
+    def report(self) -> ExecutorReport:
+        """This process, between two chunks."""
+        host = socket.gethostname()
+        return ExecutorReport("inline", (WorkerReport("this process", host, True),), {host: self._cases})
 
     def close(self) -> None:
         """Drop what has not run."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import socket
 from collections import Counter
 from functools import partial
 from queue import Empty, SimpleQueue
@@ -15,6 +16,7 @@ from sprag.worker.pool.child_pool import ChildPool, JobStoppedError
 from sprag.worker.pool.child_process import ProcessDiedError, ProcessStartError
 from sprag.worker.pool.processes import single_threaded_children, within_processor_time
 from sprag.worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
+from sprag.worker.reports import ExecutorReport, WorkerReport
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,12 +25,20 @@ if TYPE_CHECKING:
     from sprag.worker.pool.child_pool import Job
     from sprag.worker.study import Study
 
-#: Chunks in flight beyond one per process, so that a finished process finds the next one waiting.
+#: Chunks in flight beyond one per process, so that a finished process finds the next one waiting: at least so many,
+#: and that share of the processes, because more of them finish while the rows of others are being stored.
 SPARE_CHUNKS = 2
+SPARE_SHARE = 0.25
 #: Successive failed starts per process, without any completed work, after which the executor gives up.
 MAX_FAILED_STARTS = 3
+_NO_START = "The processes of the pool end as they start; the log says why."
 #: Failed compilations of a kernel after which its studies are held.
 MAX_LOADS = 2
+
+
+def useful_chunks(processes: int) -> int:
+    """Useful number of chunks in flight for that many processes or workers."""
+    return processes + max(SPARE_CHUNKS, int(SPARE_SHARE * processes))
 
 
 class ProcessPoolExecutor:
@@ -78,6 +88,7 @@ class ProcessPoolExecutor:
         self._loaded: set[models.KernelShape] = set()
         self._loading: dict[models.KernelShape, Job[None]] = {}
         self._failed_loads: Counter[models.KernelShape] = Counter()
+        self._cases = 0
         self._ready: SimpleQueue[Outcome | None] = SimpleQueue()
         single_threaded_children()
         self._pool = ChildPool(processes, prepare or partial(prepare_as, fingerprint.digest()))
@@ -85,12 +96,12 @@ class ProcessPoolExecutor:
     @property
     def capacity(self) -> int:
         """Useful number of chunks in flight."""
-        return self._processes + SPARE_CHUNKS
+        return useful_chunks(self._processes)
 
     @property
-    def shortage(self) -> None:
-        """Always None: no workers have to join."""
-        return None
+    def shortage(self) -> str | None:
+        """A sentence while the processes die as they start, more often than each of them once."""
+        return _NO_START if self._pool.failed_starts > self._processes else None
 
     def ready(self, study: Study) -> bool:
         """Whether the kernel of ``study`` is loaded; starts loading it otherwise."""
@@ -136,7 +147,7 @@ class ProcessPoolExecutor:
         error = JobStoppedError() if future.cancelled() else future.exception()
         match error:
             case None:
-                return Outcome(ticket, Fate.DONE, future.result())
+                return Outcome(ticket, Fate.DONE, future.result(), host=socket.gethostname())
             case JobStoppedError():
                 return Outcome(ticket, Fate.STOPPED, detail="stopped")
             case ProcessStartError():
@@ -160,6 +171,7 @@ class ProcessPoolExecutor:
             came = self._ready.get(timeout=timeout)
             while came is not None:
                 self._jobs.pop(came.ticket, None)
+                self._cases += came.result.count if came.result is not None else 0
                 found.append(came)
                 came = self._ready.get_nowait()
         except Empty:
@@ -172,6 +184,15 @@ class ProcessPoolExecutor:
         """Stop a chunk, with its process when it runs."""
         if job := self._jobs.get(ticket):
             job.stop()
+
+    def report(self) -> ExecutorReport:
+        """The processes of the pool; they start with the first chunk."""
+        host, busy, shortage = socket.gethostname(), len(self._jobs) + len(self._loading), self.shortage
+        workers = tuple(
+            WorkerReport(f"process {number + 1}", host, shortage is None, number < busy)
+            for number in range(self._processes)
+        )
+        return ExecutorReport("pool", workers, {host: self._cases}, shortage or "")
 
     def close(self) -> None:
         """Kill all processes."""

@@ -57,7 +57,6 @@ from sprag.worker.models.settled import (
     REGIME_SENTENCES,
     SETTLED,
     is_settled,
-    motion_sentence,
     settled_study,
 )
 from sprag.worker.models.tasks import chunk_task, run_chunk, run_task
@@ -150,7 +149,6 @@ __all__ = [
     "load",
     "model_names",
     "model_of",
-    "motion_sentence",
     "numbered_by",
     "parameter_catalogue",
     "parameters_of",

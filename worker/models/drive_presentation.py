@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from sprag.worker.models.drive_words import CAPTIONS, LETTERS
 from sprag.worker.models.presentation import Answer, Panel, Presentation
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ def _phases(names: Sequence[str]) -> tuple[tuple[str, str, str], ...]:
 _POINT: Final = ("excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y", "shaft.load")
 
 PRESENTATION: Final = Presentation(
+    title="Vibration drive",
     along=("shaft.load", "excitation.frequency"),
     apart=_POINT,
     drawn=("shaft.speed.mean", "shaft.speed.max"),
@@ -90,5 +92,22 @@ PRESENTATION: Final = Presentation(
         "phi'(0)": ("ω", "0"),
         "phi_e'(0)": ("ω", "e0"),
         "c_(K+1)": ("c", "k"),
+    },
+    captions=CAPTIONS,
+    letters=LETTERS,
+    sections={"excitation": "Vibration of the base", "shaft": "Output shaft", "": "Surroundings"},
+    theory={
+        **dict.fromkeys(
+            ("gravity", "excitation", "pendulums", "pendulums.clutch", "shaft", "clutch"), "theory#equations-of-motion"
+        ),
+        **dict.fromkeys(
+            (f"pendulums.initial_{name}" for name in ("angle", "speed", "windup", "clutch")), "theory#the-automaton"
+        ),
+        "shaft.initial_speed": "theory#the-automaton",
+        **{
+            f"{clutch}.{name}": "theory#clutch-law-from-measured-data"
+            for clutch in ("clutch", "pendulums.clutch")
+            for name in ("data", "accuracy", "max_degree", "windup_limit")
+        },
     },
 )

@@ -82,6 +82,7 @@ class Presentation:
 
     Attributes
     ----------
+    title : what the model is called; "" for its name
     along, apart : paths of the axes to draw along, and of those distinguished by colour, in order of preference
     drawn : results of the main curve
     main : the main results of a machine; ``heading`` is their common title
@@ -98,8 +99,13 @@ class Presentation:
     portrait : description of the phase portrait; "" where there is none
     motion, motion_note : short description of the plots, and a note for the reader
     symbols : symbol of the catalogue -> base and index as in print
+    captions : what people read instead of a name of the catalogue, with N and K for indices; ``{}`` is the last index
+    letters : base and index, as in print, of results
+    sections : first part of paths -> title of its fields in the form, in their order; "" for parameters without parts
+    theory : beginning of paths without indices -> page of docs/ and heading that explain it, as in a URL
     """
 
+    title: str = ""
     along: tuple[str, ...] = ()
     apart: tuple[str, ...] = ()
     drawn: tuple[str, ...] = ()
@@ -120,3 +126,13 @@ class Presentation:
     motion: str = "Motion of the case"
     motion_note: str = ""
     symbols: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    captions: Mapping[str, str] = field(default_factory=dict)
+    letters: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    sections: Mapping[str, str] = field(default_factory=dict)
+    theory: Mapping[str, str] = field(default_factory=dict)
+
+    def explained(self, path: str) -> str:
+        """Page of docs/ and heading that explain a parameter or another entry of the base; "" where none does."""
+        parts = [part for part in path.split(".") if not part.isdigit() and part not in {"N", "K"}]
+        beginnings = (".".join(parts[:length]) for length in range(len(parts), 0, -1))
+        return next((self.theory[own] for own in beginnings if own in self.theory), "")

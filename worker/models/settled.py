@@ -46,11 +46,6 @@ _PERIODIC_PERIODS, _IRREGULAR_SHARE, _IRREGULAR_COST = 135.0, 0.15, 1.3
 _FOLLOWED_TIMES, _FOLLOWED_PERIODS = 2.0, 120.0
 
 
-def motion_sentence(regime: str, order: int | None) -> str:
-    """Description of a motion by its regime and the order of its orbit (None: it has none)."""
-    return Regime[regime.upper()].sentence_of(order)
-
-
 def is_settled(run: Mapping[str, Any]) -> bool:
     """Whether a run is settled."""
     return run.get("until") == SETTLED

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.worker.models.presentation import Answer, Panel, Presentation, Reference
+from sprag.worker.models.shaft_words import CAPTIONS, LETTERS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -54,7 +55,30 @@ def _references(made: Trajectory) -> Mapping[str, tuple[Reference, ...]]:
     return {_ENERGY: tuple(levels), _SQUARES: (whole,)}
 
 
+#: Heading of docs/theory-machine-shaft.md by the beginning of paths.
+_THEORY: Final = {
+    "mean_speed": "the-mean-speed-and-t_0",
+    "mean_speed_is": "the-mean-speed-and-t_0",
+    "wanted_irregularity": "the-mean-speed-and-t_0",
+    "cycle": "the-machine",
+    "gravity": "mechanisms",
+    "phi_c": "four-squares",
+    "balance": "balance-of-works",
+    "balance_side": "balance-of-works",
+    "drive": "the-drive-train",
+    "drive.torque": "balance-of-works",
+    "drive.scale": "balance-of-works",
+    "drive.motor": "balance-of-works",
+    "drive.flywheel": "flywheels",
+    "mechanism": "mechanisms",
+    "parts": "several-parts",
+    "parts.mechanism": "mechanisms",
+    "parts.operation": "operations",
+    **dict.fromkeys(("operation", "friction_torque", "constants"), "operations"),
+}
+
 PRESENTATION: Final = Presentation(
+    title="Machine shaft",
     along=("drive.inertia",),
     apart=("mean_speed",),
     drawn=("irregularity",),
@@ -73,6 +97,9 @@ PRESENTATION: Final = Presentation(
     motion="Speed, energy, squares of the speed and torques over the angle of the shaft",
     motion_note="ω² = S₁ + S₂ + S₃ + S₄: shares of the least energy, of the mean energy above it, of the drive's and "
     "of the resistance's work.",
+    captions=CAPTIONS,
+    letters=LETTERS,
+    theory={path: f"theory-machine-shaft#{heading}" for path, heading in _THEORY.items()},
 )
 
 _OF_FLYWHEEL: Final = ("flywheel.inertia", "flywheel.stress", "flywheel.margin", "flywheel.required_mass")

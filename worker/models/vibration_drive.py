@@ -79,6 +79,16 @@ _INFOS: Final[dict[str, Callable[[int], tuple[ResultInfo, ...]]]] = {
     "": result_infos, _SETTLED_VARIANT: settled_infos, _STARTS_VARIANT: started_infos,
 }  # fmt: skip
 
+#: A drive whose known answers show all phases of its motion.
+_DRIVEN: Final = {
+    "excitation.frequency": 28.6, "excitation.amplitude_x": 1.7e-3, "excitation.amplitude_y": 1.7e-3,
+    "shaft.inertia": 2e-3, "shaft.load": 0.3,
+}  # fmt: skip
+_PENDULUM_OF_IT: Final = {
+    "inertia": 1e-3, "mass": 0.5, "arm": 0.03, "spring_rate": 9000.0, "spring_arm": 0.05, "damping": 0.01,
+    "backlash": 0.005,
+}  # fmt: skip
+
 _PENDULUM = re.compile(r"pendulums\.(\d+)\.")
 _COEFFICIENT = re.compile(r"(?:^|\.)clutch\.coefficients\.(\d+)$")
 
@@ -328,6 +338,17 @@ class VibrationDrive(Model):
         from sprag.engine.vibration_drive.simulate import warm_up
 
         warm_up(*_key_of(shape))
+
+    def known_answers(self, shape: KernelShape) -> bytes:
+        from sprag.engine.vibration_drive.simulate import simulate
+
+        pendulums, coefficients, tolerance = _key_of(shape)
+        columns = dict(_DRIVEN)
+        for number in range(pendulums):
+            columns |= {f"pendulums.{number}.{name}": value for name, value in _PENDULUM_OF_IT.items()}
+        columns |= {f"clutch.coefficients.{k}": 200.0 for k in range(max(1, coefficients))}
+        run = Run(duration=Span(20.0, "periods"), tolerance=tolerance)
+        return simulate(columns, run, cases=1).values.tobytes()
 
 
 def _run_starts(task: ChunkTask, number: int) -> ChunkResult:

@@ -128,12 +128,12 @@ def intervals(samples: Samples) -> Intervals:
     # What passed only because it scatters.
     scattered = passed[:, None] & (errors > error)
     own = _through_zones(curve, low, width, both, jumps | scattered | (both[:, None] & ~samples.has_width))
-    told = _without_gaps(curve * 2 * (plan.finest + most) + low, width, own, most)
-    told |= (sensitive(samples, curve, low, width) & (~passed | (width == 1)))[:, None]
-    told = _with_beside(told, weak(samples, curve, low, width)[:, None], (curve[1:] == curve[:-1])[:, None])
+    reported = _without_gaps(curve * 2 * (plan.finest + most) + low, width, own, most)
+    reported |= (sensitive(samples, curve, low, width) & (~passed | (width == 1)))[:, None]
+    reported = _with_beside(reported, weak(samples, curve, low, width)[:, None], (curve[1:] == curve[:-1])[:, None])
     why = _reasons(samples, curve, low, width, both, np.asarray(jumps.any(axis=1)))
     worth = np.where(width > plan.finest // (plan.start - 1), 2.0 * width, np.minimum(worst, 1.0))
-    return Intervals(curve, low, width, resolved, errors, told, why, worth)
+    return Intervals(curve, low, width, resolved, errors, reported, why, worth)
 
 
 def _all_triples(samples: Samples, ranges: Floats) -> dict[int, _Triples]:

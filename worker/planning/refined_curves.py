@@ -169,17 +169,17 @@ def _largest_of(errors: Floats, passed: bool) -> float | None:
 def _merged(plan: RefinePlan, own: Intervals, jumps: Bools) -> list[list[Jump]]:
     """Jumps of every curve; neighbouring intervals are one, except where the reasons are of different kinds."""
     merged: list[list[Jump]] = [[] for _ in range(plan.combinations)]
-    told = np.flatnonzero(jumps.any(axis=1))
-    if not len(told):
+    reported = np.flatnonzero(jumps.any(axis=1))
+    if not len(reported):
         return merged
-    curve, why = own.curve[told], own.why[told]
+    curve, why = own.curve[reported], own.why[reported]
     kind = np.where(np.isin(why, _CHANGES), _CHANGES[0], why)
-    new = np.append(True, (np.diff(told) > 1) | (np.diff(curve) != 0) | (np.diff(kind) != 0))
-    first, last = told[new], told[np.append(new[1:], True)]
+    new = np.append(True, (np.diff(reported) > 1) | (np.diff(curve) != 0) | (np.diff(kind) != 0))
+    first, last = reported[new], reported[np.append(new[1:], True)]
     axis = plan.adaptive[0]
     lows, highs = axis.at(own.low[first], plan.finest), axis.at(own.low[last] + own.width[last], plan.finest)
     starts = np.flatnonzero(new)
-    concerned = np.logical_or.reduceat(jumps[told], starts, axis=0).tolist()
+    concerned = np.logical_or.reduceat(jumps[reported], starts, axis=0).tolist()
     reasons = np.minimum.reduceat(why, starts).tolist()
     every = zip(curve[new].tolist(), lows.tolist(), highs.tolist(), reasons, concerned, strict=True)
     for index, low, high, reason, row in every:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -13,7 +12,7 @@ from pathlib import Path
 
 import psutil
 
-from benchmarks.faults.harness import kill_family
+from benchmarks.faults.harness import free_port, kill_family
 from tests.conftest import ROOT
 
 DEADLINE = 600.0
@@ -61,9 +60,7 @@ def _dask(*arguments: object, folder: Path = ROOT, **environment: str) -> subpro
 
 @contextmanager
 def clusters() -> Iterator[Cluster]:
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
-    made = Cluster(port)
+    made = Cluster(free_port())
     try:
         yield made
     finally:

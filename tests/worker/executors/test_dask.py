@@ -16,12 +16,14 @@ import pytest
 from distributed import Client, Future
 
 from sprag.service.jobs.dispatching import WorkerSettings, pool
+from sprag.service.jobs.workers import worker_list
 from sprag.service.storage.part import SystemClock
 from sprag.service.storage.store import Store
 from sprag.worker import fingerprint, models
 from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.dask import DaskExecutor
+from sprag.worker.executors.dask_tasks import load_and_answer
 from sprag.worker.executors.inline import InlineExecutor
 from sprag.worker.executors.process_pool import SPARE_CHUNKS, ProcessPoolExecutor
 from sprag.worker.ports import Chunk, Executor, ExecutorError, Fate, KernelError, Outcome
@@ -91,7 +93,7 @@ def start(cluster: Cluster) -> Iterator[Callable[..., DaskExecutor]]:
 
 def test_inline_pool_and_dask_give_the_same_bits(start: Callable[..., DaskExecutor]) -> None:
     study = fakes.study(30)
-    dask = start(run=models.run_task, load=models.load)
+    dask = start(run=models.run_task, load=load_and_answer)
     processes = ProcessPoolExecutor(2, chunk_timeout=DEADLINE)
     cuts = ((InlineExecutor(), 30), (processes, 4), (dask, 7))
     try:
@@ -229,6 +231,34 @@ def test_a_worker_with_another_numpy_is_refused(
     assert f"{reason} (and 1 more)." in (executor.shortage or "")
 
 
+def test_another_process_at_the_address_of_a_worker_runs_nothing(start: Callable[..., DaskExecutor]) -> None:
+    executor, study = start(), fakes.study(8)
+    ready(executor, study)
+    accepted, executor._digest = executor._digest, "of the processes before"
+    executor.submit(0, study, Chunk(1, 0, 4))
+    outcome = gather(executor, 1)[0]
+    assert (outcome.fate, outcome.detail) == (Fate.STOPPED, "another process has the address of its worker")
+    another = fakes.study(4, tolerance=1e-8)
+    executor.ready(another)
+    executor.wait(1.0)
+    assert not executor.ready(another)  # a failed load would be a KernelError
+    executor._digest = accepted
+    assert {found.fate for found in run_all(executor, another, 4).values()} == {Fate.DONE}
+
+
+def test_a_worker_whose_kernel_gives_other_answers_is_refused(
+    start: Callable[..., DaskExecutor], tmp_path: Path
+) -> None:
+    executor, study = start(load=partial(fakes.load_answering, folder=str(tmp_path))), fakes.study(40)
+    eventually(lambda: executor.wait(0.05) or executor.capacity == 2 + SPARE_CHUNKS)
+    outcomes = run_all(executor, study, 4)
+    assert {outcome.fate for outcome in outcomes.values()} == {Fate.DONE}
+    eventually(lambda: executor.wait(0.05) or executor.capacity == 1 + SPARE_CHUNKS)
+    (refused,) = [worker for worker in executor.report().workers if not worker.usable]
+    (first,) = [worker for worker in executor.report().workers if worker.usable]
+    assert refused.refusal == f"known answers of its kernel: others instead of ones of {first.address}"
+
+
 def edited_engine(folder: Path) -> dict[str, str]:
     """A copy of the sources whose engine is a hundred times less accurate, under the same version."""
     for package in ("sprag", "engine", "worker"):
@@ -252,6 +282,12 @@ def no_fma(folder: Path) -> dict[str, str]:
     return {"NUMBA_CPU_FEATURES": ",".join(("-" if name == "fma" else "+") + name for name in features)}
 
 
+def other_numpy(folder: Path) -> dict[str, str]:
+    """The same processor features for numba, but numpy takes its code for any processor."""
+    (folder / "sprag").symlink_to(ROOT / "sprag")
+    return {"NPY_DISABLE_CPU_FEATURES": " ".join(fakes.numpy_features())}
+
+
 def test_workers_that_would_give_other_values_run_nothing_and_the_study_says_so(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -260,6 +296,8 @@ def test_workers_that_would_give_other_values_run_nothing_and_the_study_says_so(
         no_sprag: "it cannot run Sprag (ImportError: there is no Sprag here)",
         no_fma: "processor features: without fma",
     }
+    if fakes.numpy_features():
+        others[other_numpy] = "known answers of numpy: "
     with clusters() as made, Store.open(f"sqlite:///{tmp_path / 'a.sqlite3'}", chunking=Chunking(cases=4)) as store:
         record = store.create_study({}, fakes.study(20))
         made.start_scheduler()
@@ -271,13 +309,23 @@ def test_workers_that_would_give_other_values_run_nothing_and_the_study_says_so(
 
         def told() -> bool:
             reason = store.get_study(record.id).reason or ""
-            return "(and 2 more)" in reason and any(each in reason for each in others.values())
+            reported = sum(len(item["refused"]) for item in worker_list(store)["dispatchers"]) == len(others)
+            return (
+                reported
+                and f"(and {len(others) - 1} more)" in reason
+                and any(each in reason for each in others.values())
+            )
 
         begin = time.monotonic()
         Dispatcher(store, executor, SystemClock()).run(lambda: told() or time.monotonic() - begin > DEADLINE)
         assert told()
         assert store.get_study(record.id).done == 0
         assert [each for each in others.values() if each not in caplog.text] == []
+        (found,) = worker_list(store)["dispatchers"]
+        assert (found["usable"], [host["refused"] for host in found["hosts"]]) == (0, [len(others)])
+        reasons = " ".join(worker["reason"] for worker in found["refused"])
+        assert [each for each in others.values() if each not in reasons] == []
+        assert (found["shortage"] or "").startswith("No usable worker")
 
 
 def test_a_kernel_that_cannot_be_had_is_told(start: Callable[..., DaskExecutor]) -> None:

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
-import socket
 import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
-from benchmarks.faults.harness import kill_family
+from benchmarks.faults.harness import free_port, kill_family
 from tests.conftest import ROOT
+from tests.worker.executors.certificates import CERTIFICATES, SECTION, SETTINGS, require_openssl
 
-_SECTION = (ROOT / "docs" / "deployment.md").read_text(encoding="utf-8").split("## A Dask cluster")[1]
-_CERTIFICATES, _SETTINGS, _COMMANDS = re.findall(r"```sh\n(.*?)```", _SECTION, re.DOTALL)[:3]
+_COMMANDS = re.findall(r"```sh\n(.*?)```", SECTION, re.DOTALL)[2]
 _SPEC = ROOT / "examples" / "one_pendulum.json"
 
 
@@ -38,11 +34,8 @@ def run(command: str, folder: Path) -> bytes:
 
 
 def test_the_commands_for_a_cluster_give_the_rows_of_the_pool(tmp_path: Path) -> None:
-    if shutil.which("openssl") is None:
-        assert "CI" not in os.environ, "CI installs openssl"
-        pytest.skip("there is no command openssl to make certificates with")
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        place = f"127.0.0.1:{free.getsockname()[1]}"
+    require_openssl()
+    place = f"127.0.0.1:{free_port()}"
 
     def here(text: str) -> str:
         host, port = place.split(":")
@@ -51,8 +44,8 @@ def test_the_commands_for_a_cluster_give_the_rows_of_the_pool(tmp_path: Path) ->
     scheduler, worker, service = here(_COMMANDS).splitlines()
     assert (scheduler.split()[:2], worker.split()[:2]) == (["dask", "scheduler"], ["dask", "worker"])
     setting, _ = service.split(" ", 1)
-    run(here(_CERTIFICATES), tmp_path)
-    settings = here(_SETTINGS)
+    run(here(CERTIFICATES), tmp_path)
+    settings = here(SETTINGS)
     started = [shell(f"{settings}\nexec {command} >parts.log 2>&1", tmp_path) for command in (scheduler, worker)]
     try:
         by_cluster = run(f"{settings}\n{setting} sprag run {_SPEC}", tmp_path)

@@ -213,6 +213,8 @@ def test_processes_that_die_as_they_start_are_not_started_for_ever(start: Callab
         insist()
     assert set(fates) <= {Fate.STOPPED}
     assert len(fates) <= MAX_FAILED_STARTS + 1
+    assert pool.shortage == pool.report().shortage == "The processes of the pool end as they start; the log says why."
+    assert not any(worker.usable for worker in pool.report().workers)
 
 
 def test_an_idle_process_that_is_killed_costs_nothing(start: Callable[..., ProcessPoolExecutor]) -> None:

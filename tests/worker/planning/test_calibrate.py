@@ -72,6 +72,26 @@ def test_values_intervals_and_correlations_of_a_line_are_those_of_regression(kno
     assert found.curve[:, 0] == pytest.approx(exact[0] + exact[1] * found.others[:, 0])
 
 
+def test_each_result_has_the_degrees_of_freedom_of_its_own_scatter() -> None:
+    x = np.linspace(0.0, 5.0, 6)
+
+    def form(parameters: Floats, at: Floats) -> dict[str, Floats]:
+        a, b, c, d = parameters.T
+        return {"y": a + b * at[:, 0], "z": c + d * at[:, 0]}
+
+    noise = np.random.default_rng(3).normal(size=(2, 6))
+    plan = plan_of([(-5.0, 5.0)] * 4, x, {"y": 1.0 + x + 0.1 * noise[0], "z": 2.0 - x + 0.3 * noise[1]}, refits=1000)
+    assert plan.scales == {0: 4, 1: 4}
+    found = _answer(plan, form)
+    assert found.intervals is not None
+    design = np.stack([np.ones_like(x), x], axis=1)
+    for column, values in enumerate(plan.values.reshape(2, 6)):
+        squares = np.linalg.lstsq(design, values)[1][0]
+        deviation = np.sqrt(np.diag(squares / 4 * np.linalg.inv(design.T @ design)))
+        half = np.ptp(found.intervals[2 * column : 2 * column + 2], axis=1) / 2.0
+        assert half == pytest.approx(stats.t.ppf(0.975, 4) * deviation, rel=0.1)
+
+
 def test_the_next_point_is_where_the_line_is_known_least() -> None:
     found = _answer(plan_of([(-5.0, 5.0), (-5.0, 5.0)], X, {"y": _measured(_line)}), _line)
     assert found.next is not None

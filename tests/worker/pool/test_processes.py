@@ -28,7 +28,7 @@ def test_children_start_with_interrupts_blocked_and_this_process_goes_on_without
     with interrupts_held_back():
         process.start()
     assert signal.pthread_sigmask(signal.SIG_BLOCK, []) == before
-    assert ours.poll(60)
+    assert ours.poll(600)
     assert ours.recv() is True
     process.join()
 
@@ -37,7 +37,7 @@ def test_pool_processes_are_started_so_and_then_ignore_interrupts() -> None:
     pool = fakes.pool(1, prepare=fakes.interrupt)
     try:
         study = fakes.study(4)
-        assert any(pool.ready(study) or pool.wait(60.0) for _ in range(3))
+        assert any(pool.ready(study) or pool.wait(600.0) for _ in range(3))
     finally:
         pool.close()
 
@@ -46,7 +46,7 @@ def test_pool_processes_give_way_to_the_process_that_answers() -> None:
     child = ChildProcess(fakes.prepare_nothing)
     child.start()
     try:
-        assert child.run(os.nice, (0,), 60.0) == min(os.nice(0) + NICENESS, 19)
+        assert child.run(os.nice, (0,), 600.0) == min(os.nice(0) + NICENESS, 19)
     finally:
         child.close()
         child.join()

@@ -245,8 +245,8 @@ def _refitted(plan: CalibratePlan, state: State, attempt: int) -> Generator[Requ
     best = state.best
     assert best is not None
     values = drawn(
-        state.data, np.nan_to_num(best.modelled[0]), leverages(state.data, best), plan.refits, plan.freedom,
-        plan.known_sigma, Draws(plan.seed, 1),
+        state.data, np.nan_to_num(best.modelled[0]), leverages(state.data, best), plan.refits, plan.scales,
+        plan.places[1], Draws(plan.seed, 1),
     )  # fmt: skip
     wide = yield from _widely(plan, state, best)
     sets = tuple(np.concatenate(parts) for parts in zip(*state.library, strict=True))

@@ -145,6 +145,14 @@ class CalibratePlan:
         return self.count - len(self.unknown)
 
     @property
+    def scales(self) -> dict[int, int]:
+        """Degrees of freedom of each standard deviation that follows from residuals, by the position of its result."""
+        left = self.freedom / self.count
+        return {
+            column: max(1, round(left * len(one.values))) for column, one in enumerate(self.measured) if not one.sigma
+        }
+
+    @property
     def scan(self) -> int:
         """Sets of parameters of the scan."""
         return max(LEAST_SCAN, SCAN * len(self.unknown))

@@ -54,26 +54,26 @@ class Refits:
 
 
 def drawn(
-    data: Data, modelled: Floats, leverage: Floats, count: int, freedom: int, known: bool, draws: Draws
+    data: Data, modelled: Floats, leverage: Floats, count: int, scales: dict[int, int], columns: Ints, draws: Draws
 ) -> Floats:
     """Sets of data as they might have been measured, shape (count, measured).
 
-    With ``known`` standard deviations and the linear loss: the ``modelled`` values with normal noise. Otherwise
-    residuals of the fit, drawn with replacement, each divided by the root of 1 less its ``leverage``; as the standard
-    deviation is only known from ``freedom`` degrees of freedom, each set has its own, by a distribution of
-    chi-square.
+    Where the standard deviations are given (no ``scales``) and the loss is linear: the ``modelled`` values with normal
+    noise. Otherwise residuals of the fit, drawn with replacement, each divided by the root of 1 less its ``leverage``.
+    Where the standard deviation of a result, one of the ``columns`` (measured,), is only known from so many degrees of
+    freedom (``scales``), each set has its own, by a distribution of chi-square.
     """
     used = data.weights > 0.0
     scale = np.where(used, 1.0 / np.where(used, data.weights, 1.0), 0.0)
-    if known and data.loss == "linear":
+    if not scales and data.loss == "linear":
         return modelled + draws.normals(count, len(modelled)) * scale
     residuals = data.residuals(modelled)[used] / np.sqrt(np.maximum(1.0 - leverage[used], 0.05))
     residuals = residuals - _centre(data.loss, residuals)
     noise = np.zeros((count, len(modelled)))
     noise[:, used] = residuals[draws.integers(len(residuals), count, len(residuals))]
-    if not known:
-        normals = draws.normals(count, max(freedom, 1))
-        noise = noise * np.sqrt(max(freedom, 1) / total(normals * normals))[:, None]
+    for column, freedom in scales.items():
+        normals = draws.normals(count, freedom)
+        noise[:, columns == column] *= np.sqrt(freedom / total(normals * normals))[:, None]
     return modelled + noise * scale
 
 

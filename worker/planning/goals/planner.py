@@ -137,8 +137,11 @@ class GoalPlanner:
         else:
             scores = judge(self.plan, np.array([self._known[key] for key in self._keys]))
         if self._polish is not None:
+            if self._polish.differentiates:
+                self._record.differentiated(scores[self._new])
+            else:
+                self._record.polished(scores[self._new])
             self._polish.take(scores.outputs)
-            self._record.polished(scores[self._new])
             return
         if len(scores):
             self._search.take(self._proposed, scores)

@@ -85,10 +85,15 @@ class Polish:
         """Whether nothing is left to try."""
         return self._trials >= MOST_TRIALS or not any(start.active for start in self._starts)
 
+    @property
+    def differentiates(self) -> bool:
+        """Whether the designs of this round serve the derivatives only."""
+        return self._trials < 0
+
     def propose(self) -> Floats:
         """Coordinates of the next designs, shape (designs, dimensions)."""
         active = [start for start in self._starts if start.active]
-        if self._trials < 0:
+        if self.differentiates:
             return np.concatenate([self._apart(start.place) for start in active])
         for start in active:
             start.trial = start.place + start.length * self._step(start)
@@ -97,7 +102,7 @@ class Polish:
     def take(self, outputs: Floats) -> None:
         """Go on by the outputs of the designs proposed last."""
         active = [start for start in self._starts if start.active]
-        if self._trials < 0:
+        if self.differentiates:
             for start, own in zip(active, outputs.reshape(len(active), -1, outputs.shape[1]), strict=True):
                 start.derivatives = self._differences(start, own)
         else:

@@ -53,8 +53,13 @@ class Record:
             if self._reference is not None:
                 self._volume = hypervolume(goals[fronts(goals) == 0], self._reference)
 
+    def differentiated(self, new: Scores) -> None:
+        """Take the round of the polish whose designs serve derivatives only: they count as no designs of their own."""
+        before = self._polish or {"designs": 0, "met": 0}
+        self._polish = {**before, "designs": before["designs"] + len(new)}
+
     def polished(self, new: Scores) -> None:
-        """Take the new designs of a round of the polish."""
+        """Take the new designs of a step of the polish."""
         self._count(new)
         before = self._polish or {"designs": 0, "met": 0}
         exact = (misses(self._plan, new.outputs) <= MET) & new.feasible

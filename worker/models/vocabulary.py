@@ -1,0 +1,83 @@
+"""What people read of a parameter, a result or a variable instead of its name: a caption, and a letter."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Final
+
+from sprag.worker.models.model import model_of
+from sprag.worker.models.parameters import general_path, model_parameter
+
+_HALF_WIDTH: Final = ".half_width"
+#: Caption of the half width of a mean.
+HALF_WIDTH: Final = "{caption}, half width"
+#: What a numbered part is called, by the first words of its paths.
+_PARTS: Final = (("pendulums", "pendulum"), ("parts", "part"), ("drive.stages", "stage"))
+#: Where the short form of a description ends.
+_END: Final = re.compile(r"[;,:(]| / ")
+
+
+def words(name: str) -> str:
+    """A name without a caption as words: ``output.level`` as ``Output level``."""
+    text = name.replace(".", " ").replace("_", " ").strip()
+    text = re.sub(r"^pendulums (\d+)", r"pendulum \1", text)
+    return text[:1].upper() + text[1:] if text[:1].isascii() else text
+
+
+def caption(model: str, name: str, translate: Callable[[str], str] = str) -> str:
+    """The caption of a path of a spec, a result or a variable of ``model``: ``Spring rate, pendulum 0``.
+
+    Without one of its own, a parameter has the beginning of its description, anything else its name in words.
+    ``translate`` gives each text of `caption_texts` in another language.
+    """
+    if name.endswith(_HALF_WIDTH):
+        return translate(HALF_WIDTH).format(caption=caption(model, name.removesuffix(_HALF_WIDTH), translate))
+    text, index, part = _caption(model, name)
+    return translate(text).format(index) + (f", {translate(part[0])} {part[1]}" if part else "")
+
+
+@lru_cache(maxsize=4096)
+def _caption(model: str, name: str) -> tuple[str, str, tuple[str, str] | None]:
+    """The text, the number for its ``{}``, and word and number of the part that it belongs to."""
+    own, part = _own(name)
+    captions = model_of(model).presentation.captions
+    general = general_path(name)
+    found = next((captions[key] for key in (name, general, general_path(own)) if key in captions), None)
+    if found is not None:
+        index = re.findall(r"\.(\d+)", name)
+        return found, index[-1] if index else "", part
+    entry = model_parameter(model, name)
+    if entry is None or name.startswith("constants."):
+        return _without_places(words(own if part else name)), "", part
+    text = _END.split(entry.help, maxsplit=1)[0].strip()
+    return _without_places(text[:1].upper() + text[1:]), "", part
+
+
+def _without_places(text: str) -> str:
+    return text.replace("{", "{{").replace("}", "}}")
+
+
+def caption_texts(model: str) -> list[str]:
+    """Every text that captions of ``model`` are made of, once."""
+    known = model_of(model)
+    names = [entry.path for entry in known.parameters()] + [info.name for info in known.result_catalogue()]
+    own = (name for name in names if not name.endswith(_HALF_WIDTH))
+    found = [*known.presentation.captions.values(), *(_caption(model, name)[0] for name in own)]
+    return list(dict.fromkeys([HALF_WIDTH, *(word for _, word in _PARTS), *found]))
+
+
+def _own(name: str) -> tuple[str, tuple[str, str] | None]:
+    """The name within its numbered part; word and number of this part."""
+    for first, word in _PARTS:
+        found = re.fullmatch(rf"{re.escape(first)}\.(\d+|\*)\.(.+)", name)
+        if found:
+            return found[2], (word, found[1])
+    return name, None
+
+
+def letter(model: str, name: str) -> tuple[str, str] | None:
+    """Base and index of the letter of a result; None where it has none."""
+    letters = model_of(model).presentation.letters
+    return letters.get(name) or letters.get(general_path(name))

@@ -1,0 +1,130 @@
+"""Which studies a dispatcher takes up: its share of those of the database, as soon as their kernels are loaded."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sprag.worker import fingerprint
+from sprag.worker.sharing import gives, takes
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+
+    from sprag.worker.ports import ActiveStudy, Clock, Executor, Store
+    from sprag.worker.sharing import Peer
+    from sprag.worker.study import Study
+
+#: Number of studies active at the same time; the others wait in order of submission.
+OPEN_STUDIES = 8
+#: Seconds that a study waits for its kernel before this is reported; cached kernels load sooner.
+NOTE_SECONDS = 3.0
+COMPILING = "The kernel of this study is being compiled, once, which can take a minute; other studies continue."
+
+
+class Opening:
+    """Studies on their way to being run. ``only``: the number of the only one to be run."""
+
+    def __init__(self, store: Store, clock: Clock, only: int | None) -> None:
+        self.epoch = 0
+        self.priorities: dict[int, int] = {}
+        self._store = store
+        self._clock = clock
+        self._only = only
+        #: Studies waiting for their kernels, and those that cannot run at present; with the time when this began.
+        self._compiling: dict[int, float] = {}
+        self._short: dict[int, float] = {}
+        #: The reasons recorded on studies.
+        self._notes: dict[int, str | None] = {}
+        #: Number of studies of this dispatcher, and the other dispatchers, at the latest poll.
+        self._own = 0
+        self._peers: list[Peer] = []
+
+    def studies(self) -> list[ActiveStudy]:
+        """The unfinished studies that belong to this dispatcher or to none."""
+        found = self._store.active_studies()
+        self.priorities.update((study.number, study.priority) for study in found)
+        return [study for study in found if study.dispatcher in {None, self.epoch}]
+
+    def chosen(self, study: ActiveStudy) -> bool:
+        """Whether this dispatcher runs such studies."""
+        return self._only in {None, study.number}
+
+    def is_ours(self, study: ActiveStudy) -> bool:
+        """Whether the study belonged to this dispatcher when it was polled."""
+        return study.dispatcher == self.epoch
+
+    def given(self, studies: Sequence[ActiveStudy]) -> int | None:
+        """The study that is to be given to another dispatcher; None for none."""
+        ours = [study for study in studies if self.is_ours(study)]
+        self._own = len(ours)
+        # Nobody is asked where there is nothing to share.
+        shared = self._only is None and (len(ours) > 1 or len(ours) < len(studies))
+        self._peers = self._store.peers(self.epoch) if shared else []
+        return gives([study for study in ours if study.state.going], self._peers)
+
+    def adopted(self, study: ActiveStudy) -> bool:
+        """Whether the study belongs to this dispatcher now, however many it has."""
+        return self.is_ours(study) or self._store.adopt(self.epoch, study.number)
+
+    def may_open(self, study: ActiveStudy, active: Collection[int]) -> bool:
+        """Whether a study may become active, and belongs to this dispatcher.
+
+        Those that wait for kernels or have a lower priority than it do not count among the ``active`` ones.
+        """
+        if study.number in self._compiling:
+            return True
+        if not all(
+            sum(self.priorities.get(number, 0) >= study.priority for number in group) < OPEN_STUDIES
+            for group in (active, self._compiling)
+        ):
+            return False
+        if self.is_ours(study):
+            return True
+        if not takes(study, fingerprint.digest(), self._own, self._peers) or not self.adopted(study):
+            return False
+        self._own += 1
+        return True
+
+    def loaded(self, number: int, study: Study, executor: Executor) -> bool:
+        """Whether the kernel of a study is loaded; if not, this is reported after a while. Raises KernelError."""
+        if executor.ready(study):
+            self._compiling.pop(number, None)
+            self._notes.pop(number, None)
+            self._store.note(self.epoch, number, None)  # the reason may come from an earlier dispatcher
+            return True
+        now = self._clock.monotonic()
+        if now - self._compiling.setdefault(number, now) >= NOTE_SECONDS:
+            self._note(number, executor.shortage or COMPILING)
+        return False
+
+    def tell_shortage(self, number: int, executor: Executor) -> None:
+        """Record on an active study that nothing can be run, when this persists."""
+        shortage, now = executor.shortage, self._clock.monotonic()
+        if shortage is None:
+            self._short.pop(number, None)
+            self._note(number, None)
+        elif now - self._short.setdefault(number, now) >= NOTE_SECONDS:
+            self._note(number, shortage)
+
+    def _note(self, number: int, note: str | None) -> None:
+        if self._notes.get(number) != note:
+            self._store.note(self.epoch, number, note)
+            self._notes[number] = note
+
+    @property
+    def compiling(self) -> bool:
+        """Whether any study waits for its kernel."""
+        return bool(self._compiling)
+
+    def stop_waiting(self, number: int) -> bool:
+        """Let a study no longer wait for its kernel; whether it did."""
+        return self._compiling.pop(number, None) is not None
+
+    def forget(self, number: int) -> None:
+        """Drop what is known of a study."""
+        for known in (self._compiling, self._short, self._notes):
+            known.pop(number, None)
+
+    def unnoted(self, number: int) -> None:
+        """Another reason was recorded on a study."""
+        self._notes.pop(number, None)

@@ -1,0 +1,47 @@
+"""How several dispatchers share the studies of a database, without I/O.
+
+Each study has one dispatcher at a time. A dispatcher leaves a new study to another that has fewer, and one with rows to
+a dispatcher of the fingerprint of these rows; of its own, it gives one away where another has two fewer. So the numbers
+of studies differ by one at most once they have settled.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from sprag.worker.ports import ActiveStudy
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """Another dispatcher that is at work and has usable workers: its fingerprint and its number of studies."""
+
+    fingerprint: str
+    studies: int
+
+
+def takes(study: ActiveStudy, fingerprint: str, studies: int, peers: Sequence[Peer]) -> bool:
+    """Whether a dispatcher with this fingerprint and number of studies takes a study that belongs to nobody."""
+    if study.fingerprint:
+        alike = [peer for peer in peers if peer.fingerprint == study.fingerprint]
+        if fingerprint != study.fingerprint and alike:
+            return False
+        peers = alike if fingerprint == study.fingerprint else peers
+    return all(peer.studies >= studies for peer in peers)
+
+
+def gives(own: Iterable[ActiveStudy], peers: Sequence[Peer]) -> int | None:
+    """Number of the study that a dispatcher gives away: its latest of the lowest priority; None for none.
+
+    A study with rows goes to dispatchers of their fingerprint only.
+    """
+    mine = sorted(own, key=lambda study: (study.priority, -study.number))
+    for study in mine:
+        able = (peer for peer in peers if not study.fingerprint or peer.fingerprint == study.fingerprint)
+        if any(peer.studies + 2 <= len(mine) for peer in able):
+            return study.number
+    return None
