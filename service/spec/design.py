@@ -1,4 +1,6 @@
-"""A study of a single design of a search: its values in the base, alone or over a range of one parameter."""
+"""Studies of cases of another study: of one with its values in the base, alone or over a range of one parameter; of
+several as points.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,7 @@ from sprag.worker.models.parameters import parameter_of
 from sprag.worker.spread import DRIVE
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from sprag.worker.study import Study
 
@@ -52,6 +54,25 @@ def design_spec(spec: Mapping[str, Any], study: Study, case: int, along: str | N
         least = 0.0 if entry is None or entry.accepts(0.0) else most / _VALUES
         made["axes"] = [{"path": along, "linspace": [_text(study, along, least), _text(study, along, most), _VALUES]}]
     return made
+
+
+def points_spec(spec: Mapping[str, Any], study: Study, cases: Sequence[int]) -> dict[str, Any]:
+    """The spec of a study of these cases, in their order: a line of values (SI) for each, equal ones once.
+
+    Derived parameters follow from the others. Of a study of drives with tolerances each case keeps the values of its
+    drive. Raises IndexError for numbers of cases that there are not, and ValueError where nothing varies.
+    """
+    columns = study.columns(cases)
+    paths = [path for path in study.column_paths if path not in {*study.derive, *NO_PARAMETERS}]
+    if not paths:
+        raise ValueError("nothing varies")
+    heads = [path if (unit := unit_of(study, path)) == "1" else f"{path} [{unit}]" for path in paths]
+    rows = zip(*(columns[path].tolist() for path in paths), strict=True)
+    lines = dict.fromkeys(",".join(map(repr, row)) for row in rows)
+    kept = {key: value for key, value in spec.items() if key not in WHICH_CASES}
+    name, suffix = spec.get("name", ""), f", {len(lines)} of its cases"
+    points = {"points": "\n".join([",".join(heads), *lines])}
+    return {**kept, "name": name[: MAX_NAME_LENGTH - len(suffix)] + suffix, "axes": [points]}
 
 
 def _text(study: Study, path: str, value: float) -> float | str:

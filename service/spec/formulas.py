@@ -24,7 +24,7 @@ _PIECE: Final = re.compile(
     r"|(?P<name>[A-Za-z_][A-Za-z_0-9]*(?:\.[A-Za-z_0-9]+)*)"
 )
 _UNIT: Final = re.compile(
-    r"\s*(?P<name>[A-Za-zµ°][A-Za-zµ°_0]*)(?![A-Za-z_0-9.(])"
+    r"\s*(?P<name>[A-Za-zµ°А-Яа-яЁё][A-Za-zµ°А-Яа-яЁё_0]*)(?![A-Za-zА-Яа-яЁё_0-9.(])"
     r"(?:\s*(?:\*\*|\^)\s*[+-]?[0-9]{1,2}(?![0-9.])|[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+)?"
 )
 _BETWEEN_UNITS: Final = re.compile(r"\s*[*/](?!\*)|(?=\s)")

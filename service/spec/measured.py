@@ -1,9 +1,10 @@
 """Measured data of a clutch from a test bench: a text file with two columns, angle and torque.
 
-Columns are separated by commas, semicolons, tabs or blanks; with semicolons or tabs a decimal comma is allowed. A
-header is optional and may name the units: ``angle_deg, torque_Nmm`` or ``angle [mrad]; torque [N*m]``. Without units
-the numbers are taken as rad and N*m, with a warning; other headers are refused. Cells may be quoted. Empty lines and
-lines that begin with ``#`` are skipped.
+Columns are separated by commas, semicolons, tabs or blanks; with semicolons or tabs numbers may have decimal commas,
+which are ambiguous only where tabs separate columns and every comma is before three digits. A header is optional and
+may name the units: ``angle_deg, torque_Nmm`` or ``angle [mrad]; torque [N*m]``. Without units the numbers are taken as
+rad and N*m, with a warning; other headers are refused. Cells may be quoted. Empty lines and lines that begin with ``#``
+are skipped.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.service.faults import Fault, FaultError
-from sprag.service.spec.numbers import parse_number
+from sprag.service.spec.numbers import is_ambiguous, parse_number, settled_rows
 from sprag.worker.limits import MAX_CLUTCH_ROWS
 from sprag.worker.models import WarningText
 
@@ -26,12 +27,12 @@ _MAX_PROBLEMS = 20
 _QUANTITIES = (("angle", "rad"), ("torque", "N*m"))
 #: Accepted headings without a unit, by column.
 _WORDS = (
-    frozenset({"angle", "windup", "twist", "rotation", "phi", "xi", "u"}),
-    frozenset({"torque", "moment", "m", "t"}),
+    frozenset({"angle", "windup", "twist", "rotation", "phi", "xi", "u", "угол"}),
+    frozenset({"torque", "moment", "m", "t", "момент"}),
 )
 #: Larger angles without a unit are probably degrees, not rad.
 _LARGEST_PLAUSIBLE = 0.5
-_UNIT_IN_HEADER = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]$|^[A-Za-z]+_(\S+)$")
+_UNIT_IN_HEADER = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]$|^[A-Za-zА-Яа-яЁё]+_(\S+)$")
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,10 +93,10 @@ def parse_measured(text: str, convert: Callable[[str, str], float]) -> MeasuredD
 
 def _cells(line: str) -> list[str]:
     if ";" in line:
-        return [_unquoted(cell).replace(",", ".") for cell in line.split(";")]
+        return [_unquoted(cell) for cell in line.split(";")]
     parts = line.split("\t")
     if len(parts) == 2 and not any(part.strip().endswith(",") for part in parts):
-        return [_unquoted(part).replace(",", ".") for part in parts]
+        return [_unquoted(part) for part in parts]
     separator = "," if "," in line else "\t" if "\t" in line else None
     return [_unquoted(cell) for cell in line.split(separator)]
 
@@ -106,7 +107,7 @@ def _unquoted(cell: str) -> str:
 
 
 def _is_header(cells: list[str]) -> bool:
-    return all(parse_number(cell) is None for cell in cells)
+    return all(parse_number(cell) is None and not is_ambiguous(cell) for cell in cells)
 
 
 def _factors(number: int, line: str, convert: Callable[[str, str], float]) -> tuple[float | None, float | None]:
@@ -165,7 +166,8 @@ def _assumed(factors: tuple[float | None, float | None], rows: NDArray[np.float6
 
 
 def _numbers(lines: list[tuple[int, str]], factors: tuple[float | None, float | None]) -> MeasuredData:
-    problems = list(_wrong_rows(lines))
+    cells = settled_rows([_cells(line) for _, line in lines], decimal=any(";" in line for _, line in lines))
+    problems = list(_wrong_rows(lines, cells))
     if problems:
         raise MeasuredDataError(problems[:_MAX_PROBLEMS])
     if not 1 <= len(lines) <= MAX_CLUTCH_ROWS:
@@ -173,14 +175,13 @@ def _numbers(lines: list[tuple[int, str]], factors: tuple[float | None, float | 
         raise MeasuredDataError(
             [Fault("data", "empty" if not lines else "too-many", message, len(lines), f"1 .. {MAX_CLUTCH_ROWS} rows")]
         )
-    rows = np.array([[float(cell) for cell in _cells(line)] for _, line in lines], dtype=np.float64)
+    rows = np.array([[float(cell) for cell in row] for row in cells], dtype=np.float64)
     scaled = rows * np.array([1.0 if factor is None else factor for factor in factors])
     return MeasuredData(scaled, tuple(number for number, _ in lines), tuple(_assumed(factors, rows)))
 
 
-def _wrong_rows(lines: list[tuple[int, str]]) -> Iterator[Fault]:
-    for number, line in lines:
-        cells = _cells(line)
+def _wrong_rows(lines: list[tuple[int, str]], rows: list[list[str]]) -> Iterator[Fault]:
+    for (number, line), cells in zip(lines, rows, strict=True):
         if len(cells) != 2:
             few = f"{len(cells)} column" + ("" if len(cells) == 1 else "s")
             allowed = "two columns: angle, torque"
@@ -190,7 +191,10 @@ def _wrong_rows(lines: list[tuple[int, str]]) -> Iterator[Fault]:
             continue
         for cell, (name, _) in zip(cells, _QUANTITIES, strict=True):
             value = parse_number(cell)
-            if value is None:
+            if is_ambiguous(cell):
+                message = f"the comma of the {name} could be decimal or separate thousands"
+                yield Fault(f"line {number}", "ambiguous-comma", message, cell[:80], "a decimal point, or no comma")
+            elif value is None:
                 yield Fault(f"line {number}", "not-a-number", f"the {name} is not a number", cell[:80], "a number")
             elif not math.isfinite(value):
                 yield Fault(f"line {number}", "not-finite", f"the {name} is not finite", cell[:80], "a finite number")

@@ -5,6 +5,8 @@ is a dimension like length or mass. (In pint's default registry the radian is di
 Hz is off by the factor 2 pi.) One revolution is one period: angular speeds are divided by 2 pi where a frequency is
 expected, and only there.
 
+A number may have a decimal comma (`numbers`), and a unit its Cyrillic name (`cyrillic`): "0,3 град" is "0.3 deg".
+
 Numbers are kept as fractions, so "1.1 mm" is the double nearest to 0.0011 and "1500 rpm" is exactly 25 Hz.
 """
 
@@ -19,6 +21,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from sprag.service.faults import Code
+from sprag.service.spec.cyrillic import latin
+from sprag.service.spec.numbers import is_ambiguous, with_point
 from sprag.worker.limits import MAX_QUANTITY_LENGTH
 
 if TYPE_CHECKING:
@@ -74,7 +78,7 @@ _EXAMPLES: Final = {
 
 _QUANTITY: Final = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?)\s*(.*)", re.DOTALL)
 _TOKEN: Final = re.compile(
-    r"\s*(?:(?P<name>[A-Za-zµ°][A-Za-zµ°_0]*)|(?:\*\*|\^)\s*(?P<power>[+-]?[0-9]{1,2})(?![0-9])"
+    r"\s*(?:(?P<name>[A-Za-zµ°А-Яа-яЁё][A-Za-zµ°А-Яа-яЁё_0]*)|(?:\*\*|\^)\s*(?P<power>[+-]?[0-9]{1,2})(?![0-9])"
     r"|(?P<operator>[*/()])|(?P<one>1)(?![0-9]))"
 )
 _SUPERSCRIPT: Final = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+")
@@ -91,6 +95,16 @@ class QuantityError(ValueError):
     def __init__(self, code: Code, message: str) -> None:
         super().__init__(message)
         self.code: Code = code
+
+
+class AmbiguousCommaError(QuantityError):
+    """A number such as 1,234, whose comma could be decimal or separate thousands."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "ambiguous-comma",
+            "has a comma that could be decimal or separate thousands: write a decimal point, or no comma",
+        )
 
 
 def example(unit: str) -> str:
@@ -124,6 +138,7 @@ def parse_quantity(value: object, unit: str) -> float:
 def parse_exact(value: object, unit: str) -> Fraction:
     """As `parse_quantity`, but exact: the decimal number as written, times the exact factor of its unit."""
     if isinstance(value, str) and unit == "1":
+        _refuse_ambiguous(value)
         raise QuantityError("wrong-type", "must be a plain number, without a unit or quotation marks")
     if isinstance(value, str):
         number, text = split_quantity(value)
@@ -161,19 +176,30 @@ def has_unit(text: str) -> bool:
 
 
 def split_quantity(text: str) -> tuple[Fraction, str]:
-    """Split "2 mm" into number and unit; the unit may be empty. QuantityError when it does not begin with a number."""
+    """Split "2 mm" into number and unit; the unit, with its Latin names, may be empty.
+
+    Raises
+    ------
+    QuantityError
+        When it does not begin with a number, or with one whose comma could be decimal or separate thousands.
+    """
     if len(text) > MAX_QUANTITY_LENGTH:
         raise QuantityError("too-long", f"is longer than {MAX_QUANTITY_LENGTH} characters")
-    match = _QUANTITY.fullmatch(text.translate(_SIGNS).strip())
+    text = text.translate(_SIGNS).strip()
+    _refuse_ambiguous(text)
+    match = _QUANTITY.fullmatch(with_point(text))
     if match is None:
-        raise QuantityError(
-            "not-a-number", "must begin with a number (decimal point, no thousands separators) followed by its unit"
-        )
+        raise QuantityError("not-a-number", "must begin with a number (no thousands separators) followed by its unit")
     number = Fraction(match[1])
     to_float(number)
     if match[2].startswith((",", ".")):
-        raise QuantityError("not-a-number", "must have a decimal point and no thousands separators")
-    return number, match[2].strip()
+        raise QuantityError("not-a-number", "must have one decimal point or comma and no thousands separators")
+    return number, latin(match[2].strip())
+
+
+def _refuse_ambiguous(text: str) -> None:
+    if is_ambiguous(text):
+        raise AmbiguousCommaError
 
 
 def to_float(number: Fraction) -> float:
@@ -200,14 +226,14 @@ def measure(text: str) -> tuple[Fraction, dict[str, int]]:
     QuantityError
         When it cannot be read or is unknown.
     """
-    factor, powers = _measure(text)
+    factor, powers = _measure(latin(text))
     return factor / Fraction(1000) ** powers.get("gram", 0), powers
 
 
 def is_unit(name: str) -> bool:
     """Whether a single name, such as "mm", is that of a unit."""
     try:
-        _named(name)
+        _named(latin(name))
     except QuantityError:
         return False
     return True

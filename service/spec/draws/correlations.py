@@ -41,6 +41,12 @@ def read_correlations(
         coefficient = COEFFICIENT.read(report, where, found)
         if coefficient is None or not pairs:
             continue
+        if abs(coefficient) > 1.0 - _LEAST:
+            report.fault(
+                join(where, "coefficient"), "conflict", "makes one of them a function of the other; derive it",
+                coefficient, allowed="between -1 and 1, both excluded",
+            )  # fmt: skip
+            continue
         for a, b in pairs:
             if a == b or matrix[a, b]:
                 message = "share one draw" if a == b else "are correlated already"

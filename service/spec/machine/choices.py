@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+from sprag.service.languages import N_
 from sprag.service.spec.described import FIT
 from sprag.service.spec.machine import shaft, shaft_drive, shaft_parts
 
@@ -13,8 +14,8 @@ if TYPE_CHECKING:
     from sprag.worker.study import Study
 
 #: The choices of a machine shaft.
-_MEANINGS: Final = {
-    "cycle": "revolutions of a cycle",
+MEANINGS: Final = {
+    "cycle": N_("revolutions of a cycle"),
     "mean_speed_is": shaft.MEAN_SPEED_IS.help,
     "balance": shaft_drive.BALANCE.help,
     "balance_side": shaft_drive.BALANCE_SIDE.help,
@@ -22,8 +23,8 @@ _MEANINGS: Final = {
     "drive.motor.kind": shaft_drive.MOTOR.help,
     "drive.flywheel.kind": shaft_drive.FLYWHEEL.help,
     "drive.stages": shaft_drive.STAGES.help,
-    "mechanism": "the mechanism",
-    "operation": "how the resistance is given",
+    "mechanism": N_("the mechanism"),
+    "operation": N_("how the resistance is given"),
     **{
         f"mechanism.{kind}.{name}": field.help
         for kind, fields in shaft_parts.MECHANISM_CHOICES.items()
@@ -56,13 +57,13 @@ def drive_choices(study: Study, spec: Mapping[str, Any]) -> Iterator[Choice]:
             for name, field in FIT.items():
                 yield Choice(f"{place}.{name}", str(clutch.get(name, field.default)).lower(), field.help)
         elif clutch and f"{place}.windup_limit" not in (*study.base, *study.axis_paths):
-            yield Choice(f"{place}.windup_limit", "none", "largest windup; none: the law holds for any")
+            yield Choice(f"{place}.windup_limit", "none", N_("largest windup; none: the law holds for any"))
 
 
 def shaft_choices(study: Study, _: Mapping[str, Any]) -> Iterator[Choice]:
     """The structure of a machine shaft."""
     for path, text in _chosen(study.structure or {}):
-        yield Choice(path, text, _MEANINGS[_PART.sub("", path)])
+        yield Choice(path, text, MEANINGS[_PART.sub("", path)])
 
 
 def _chosen(structure: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -72,7 +73,7 @@ def _chosen(structure: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "balance", structure["balance"]
     if "balance_side" in structure:
         yield "balance_side", structure["balance_side"]
-    yield "phi_c", "the first at which T rises" if phi_c is None else str(phi_c)
+    yield "phi_c", N_("the first at which T rises") if phi_c is None else str(phi_c)
     if drive["motor"]:
         yield "drive.motor.kind", drive["motor"]
     if drive.get("flywheel"):

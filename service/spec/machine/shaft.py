@@ -153,7 +153,7 @@ def _unused(report: Report, found: Mapping[str, Any], structure: Mapping[str, An
         report.warn(
             "no-effect", "/base/drive/flywheel/poisson_ratio: is not used: the stress of a rim does not depend on it"
         )
-    told = "selects strokes, but this diagram is over the angle"
+    text = "selects strokes, but this diagram is over the angle"
     owners = [("/base", found, structure)]
     several = zip(found.get("parts") or (), structure.get("parts", ()), strict=True)
     owners += [(f"/base/parts/{k}", given, own) for k, (given, own) in enumerate(several)]
@@ -163,5 +163,5 @@ def _unused(report: Report, found: Mapping[str, Any], structure: Mapping[str, An
             sense = f"{pointer}/operation/sense: is not used: a positive torque always resists; `sense` is for forces"
             report.warn("no-effect", sense)
         if isinstance(operation, Mapping) and own["operation"]["over"] == "angle" and "during" in operation:
-            report.fault(f"{pointer}/operation/during", "not-used", told,
+            report.fault(f"{pointer}/operation/during", "not-used", text,
                            operation["during"], allowed='with `over` "stroke" only')  # fmt: skip

@@ -63,8 +63,8 @@ def read_balance(report: Report, found: Mapping[str, Any], drive: Mapping[str, A
         )
         return None
     if balance == "scale" and side == "operation" and not acts:
-        told = 'is required by the balance "scale" on its side, which multiplies it by a factor'
-        report.fault("/base/operation", "required", told, allowed="an operation")
+        text = 'is required by the balance "scale" on its side, which multiplies it by a factor'
+        report.fault("/base/operation", "required", text, allowed="an operation")
         return None
     if balance == "scale" and not given:
         report.fault(

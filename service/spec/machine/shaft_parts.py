@@ -157,8 +157,8 @@ def read_mechanism(report: Report, data: object, places: dict[str, str], prefix:
             else {"kind": diagram["form"], "table": diagram["table"], "formula": diagram["formula"]}
         )
     if "interpolation" in found:
-        told = "applies to a table, and there is none"
-        report.fault(join(where, "interpolation"), "not-used", told, found["interpolation"])
+        text = "applies to a table, and there is none"
+        report.fault(join(where, "interpolation"), "not-used", text, found["interpolation"])
     choices = MECHANISM_CHOICES[kind]
     own = read_object(report, pointer, found[kind], (*choices, *numbers_under(f"mechanism.{kind}.")))
     if own is None:
@@ -229,8 +229,8 @@ def _beside(report: Report, where: str, found: Mapping[str, Any], form: str) -> 
     foreign = [name for name in found if name not in {form, "scale", "efficiency"}]
     what = "a gas" if form == "gas" else "an indicator diagram"
     for name in foreign:
-        told = f"does not belong to {what}, which acts on the working part over the whole cycle"
-        report.fault(join(where, name), "not-used", told, found[name], allowed=f"{form}, scale, efficiency")
+        text = f"does not belong to {what}, which acts on the working part over the whole cycle"
+        report.fault(join(where, name), "not-used", text, found[name], allowed=f"{form}, scale, efficiency")
     return bool(foreign)
 
 
@@ -260,17 +260,17 @@ def read_recorded_at(report: Report, where: str, found: Mapping[str, Any], over:
     pointer = join(where, "recorded_at")
     if over != "time":
         if "recorded_at" in found:
-            told = "belongs to a diagram over time, and this one is not"
-            report.fault(pointer, "not-used", told, found["recorded_at"], allowed='with `over` "time" only')
+            text = "belongs to a diagram over time, and this one is not"
+            report.fault(pointer, "not-used", text, found["recorded_at"], allowed='with `over` "time" only')
             return None
         return 1.0
     if form not in {"table", "csv"}:
-        told = f"is possible for what was recorded, a table or csv, and not for {form}; a formula may use the time t"
-        report.fault(join(where, "over"), "conflict", told, over, allowed='"angle" or "stroke"')
+        text = f"is possible for what was recorded, a table or csv, and not for {form}; a formula may use the time t"
+        report.fault(join(where, "over"), "conflict", text, over, allowed='"angle" or "stroke"')
         return None
     if "recorded_at" not in found:
-        told = "is required by a diagram over time: the angle is this speed times the time"
-        report.fault(pointer, "required", told, allowed=RECORDED_AT.range_text(), unit=RECORDED_AT.unit)
+        text = "is required by a diagram over time: the angle is this speed times the time"
+        report.fault(pointer, "required", text, allowed=RECORDED_AT.range_text(), unit=RECORDED_AT.unit)
         return None
     return read_number(report, pointer, found["recorded_at"], RECORDED_AT)
 

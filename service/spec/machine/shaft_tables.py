@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import re
-from typing import Final
-
 from sprag.service.spec.csv_text import HEADING, read_csv
 from sprag.service.spec.fields import exact
-from sprag.service.spec.numbers import parse_number
+from sprag.service.spec.numbers import is_ambiguous, parse_number
 from sprag.service.spec.report import Report
-from sprag.service.spec.units import QuantityError, parse_exact, to_float
+from sprag.service.spec.units import AmbiguousCommaError, QuantityError, parse_exact, to_float
 from sprag.worker.models import Parameter, machine_shaft
-
-_COMMA: Final = re.compile(r"\s*[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?\s*")
 
 
 def read_csv_rows(report: Report, where: str, text: object, *columns: Parameter) -> list[list[float]]:
@@ -30,8 +25,8 @@ def read_csv_rows(report: Report, where: str, text: object, *columns: Parameter)
         report.fault(where, "wrong-type", f"must have {len(columns)} columns with headings", allowed=example)
         return []
     if any(parse_number(cell.replace(",", ".")) is not None for cell in rows[0].cells):
-        told = "must begin with headings: its first line has a number, which would be lost"
-        report.fault(where, "wrong-type", told, ", ".join(rows[0].cells), allowed=example)
+        text = "must begin with headings: its first line has a number, which would be lost"
+        report.fault(where, "wrong-type", text, ", ".join(rows[0].cells), allowed=example)
         return []
     units = [(heading[2] or "") if heading else "" for heading in headings]
     before = report.found
@@ -60,17 +55,19 @@ def read_csv_rows(report: Report, where: str, text: object, *columns: Parameter)
 
 
 def _read_cell(report: Report, where: str, line: int, cell: str, unit: str, column: Parameter) -> float | None:
-    text = cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell.strip()
+    text = cell.strip()
     try:
         value: object = f"{text} {unit}"
         if not unit or column.unit == "1":
             number = parse_number(text)
+            if number is None and is_ambiguous(text):
+                raise AmbiguousCommaError
             if number is None:
                 raise QuantityError("wrong-type", "is not a number")
             value = number / 100 if unit == "%" else number
         return to_float(exact(value, column))
     except QuantityError as error:
-        told = f"; without a unit in the heading it is in {column.unit}" if not unit and column.unit != "1" else ""
-        report.fault(where, error.code, f"line {line}, column {column.path}: {error}{told}", cell,
+        message = f"; without a unit in the heading it is in {column.unit}" if not unit and column.unit != "1" else ""
+        report.fault(where, error.code, f"line {line}, column {column.path}: {error}{message}", cell,
                        allowed=column.range_text(), unit=column.unit)  # fmt: skip
         return None

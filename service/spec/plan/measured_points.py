@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 SIGMA: Final = "sigma"
 #: Columns at most.
 MOST_COLUMNS: Final = 32
-_COMMA: Final = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 _EXAMPLE: Final = "as in shaft.load [N*m],shaft.speed.mean [rad/s],sigma"
 
 
@@ -148,7 +147,7 @@ def _conditions(report: Report, where: str, rows: Sequence[CsvRow], column: Colu
     entry = machine.parameters[column.name]
     values = []
     for row in rows:
-        cell = _plain(row.cells[column.place])
+        cell = row.cells[column.place].strip()
         try:
             values.append(to_float(exact(_quantity(cell, column.unit), entry)) + 0.0)
         except QuantityError as error:
@@ -196,7 +195,7 @@ def read_results(
 
 def _value(report: Report, where: str, row: CsvRow, column: Column, unit: str) -> float:
     try:
-        return _number(_plain(row.cells[column.place]), column.unit, unit) + 0.0
+        return _number(row.cells[column.place].strip(), column.unit, unit) + 0.0
     except QuantityError as error:
         _fault(report, where, row, column, error, f"a number of {unit}", unit)
         return math.nan
@@ -208,7 +207,7 @@ def _deviation(report: Report, where: str, row: CsvRow, column: Column, value: f
     A number without a unit is in that of the column of its result, ``units[0]``, or else in SI, ``units[1]``.
     """
     written, unit = units
-    cell = _plain(row.cells[column.place])
+    cell = row.cells[column.place].strip()
     share = re.fullmatch(r"(.*?)\s*%", f"{cell} {column.unit}" if parse_number(cell) is not None else cell)
     try:
         if share is not None:
@@ -224,12 +223,6 @@ def _deviation(report: Report, where: str, row: CsvRow, column: Column, value: f
     except QuantityError as error:
         _fault(report, where, row, column, error, f"greater than 0, in {unit}, or as a share [%] of the value", unit)
         return math.nan
-
-
-def _plain(cell: str) -> str:
-    """A cell with a decimal point; commas can only be decimal ones, as they do not separate columns then."""
-    cell = cell.strip()
-    return cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell
 
 
 def _number(cell: str, written: str, unit: str) -> float:
@@ -251,6 +244,6 @@ def _fault(
     report: Report, where: str, row: CsvRow, column: Column, error: QuantityError, allowed: str, unit: str
 ) -> None:
     cell = row.cells[column.place].strip()
-    written = f"{cell} {column.unit}" if column.unit and parse_number(_plain(cell)) is not None else cell
+    written = f"{cell} {column.unit}" if column.unit and parse_number(cell) is not None else cell
     message = f"line {row.line}, column {shorten_text(str(column))}: {error}"
     report.fault(where, error.code, message, written, allowed=allowed, unit=unit)

@@ -214,7 +214,7 @@ def test_cases_are_left_out(exclude: list[Any], left: set[tuple[float, float]] |
         ({"/axes": [{"points": "shaft.load\n1\n1\n"}], "/exclude": []}, "/axes/0/points", "repeated"),
         ({"/axes": [{"points": "shaft.load\n1\n1\n"}, FREQUENCY]}, "/axes",
          "repeated"),
-        ({"/axes": [{"points": "shaft.load;excitation.frequency\n0,1;20\n"}]}, "/axes/0/points", "not-a-number"),
+        ({"/axes": [{"points": "shaft.load;excitation.frequency\n0,1.5;20\n"}]}, "/axes/0/points", "not-a-number"),
         ({"/axes": [{"axes": [LOAD]}, {"axes": [LOAD]}]}, "/axes/1/path", "repeated"),
         ({"/axes": [{"axes": [{"axes": [LOAD]}]}]}, "/axes/0/axes/0", "conflict"),
         ({"/axes": [{"axes": [LOAD, FREQUENCY], "combine": "zip"}]}, "/axes/0/axes", "unequal-lengths"),

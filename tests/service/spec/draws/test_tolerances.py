@@ -270,7 +270,8 @@ def between(*paths: str, coefficient: float = 0.5) -> dict[str, Any]:
         (between(BACKLASH), "/correlations/0/between", "wrong-type"),
         (between(BACKLASH, BACKLASH), "/correlations/0/between", "repeated"),
         (between(BACKLASH, LOAD, coefficient=2.0), "/correlations/0/coefficient", "out-of-range"),
-        (between(BACKLASH, LOAD, coefficient=1.0), "/correlations", "conflict"),
+        (between(BACKLASH, LOAD, coefficient=1.0), "/correlations/0/coefficient", "conflict"),
+        (between(BACKLASH, LOAD, coefficient=-1.0), "/correlations/0/coefficient", "conflict"),
         (
             {"axes": [{"path": LOAD, "adaptive": [0, 1]}], "refine": {"results": ["efficiency"]}},
             "/tolerances",

@@ -198,3 +198,12 @@ def test_the_schema_has_the_calibration() -> None:
     schema = spec_schema()["properties"]["calibrate"]
     assert set(schema["properties"]) == {"unknown", "measured", "loss", "refits", "seed"}
     assert schema["required"] == ["unknown", "measured"]
+
+
+def test_a_calibration_of_drives_with_valid_tolerances_is_refused_for_that_alone() -> None:
+    tolerances = [{"path": "pendulums.0.backlash", "plus_minus": "10 %"}]
+    with pytest.raises(SpecError) as error:
+        parse_spec(spec_of(tolerances=tolerances, drives=8))
+    assert [(fault.where, fault.code) for fault in error.value.faults] == [("/tolerances", "conflict")]
+    assert "calibrate" in error.value.faults[0].message
+    assert parse_spec(spec_of()).study.spread is None

@@ -1,0 +1,245 @@
+"""Components of the office's own: springs, clutches and motors that are described once and taken into many machines.
+
+A component has a kind, a name that is unique within the kind, and fields with quantities as somebody wrote them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any, Final
+
+from sprag.service.faults import Fault
+from sprag.service.spec.csv_text import HEADING, read_csv, unescape
+from sprag.service.spec.fields import exact, placed, read_object
+from sprag.service.spec.labels import LINES_ALLOWED, printable_lines
+from sprag.service.spec.numbers import parse_number, settled
+from sprag.service.spec.report import Report, SpecError, join
+from sprag.service.spec.units import QuantityError
+from sprag.worker import models
+from sprag.worker.limits import MAX_COMPONENTS, MAX_NAME_LENGTH, MAX_NOTES_LENGTH
+
+SPRING, CLUTCH, MOTOR = "spring", "clutch", "motor"
+KINDS: Final = (SPRING, CLUTCH, MOTOR)
+#: Field of a motor with the kind of its characteristic, and the parameters of each.
+CHARACTERISTIC: Final = "characteristic"
+CHARACTERISTICS: Final = {
+    "kloss": ("synchronous_speed", "breakdown_torque", "breakdown_slip"),
+    "linear": ("no_load_speed", "stall_torque"),
+}
+#: Field of a clutch with a list.
+COEFFICIENTS: Final = "coefficients"
+_DRIVE: Final = models.VIBRATION_DRIVE
+_PATHS: Final[Mapping[str, tuple[tuple[str, str], ...]]] = {
+    SPRING: ((_DRIVE, "pendulums.N.spring_rate"), (_DRIVE, "pendulums.N.damping")),
+    CLUTCH: ((_DRIVE, "clutch.coefficients.K"), (_DRIVE, "clutch.windup_limit"), (_DRIVE, "pendulums.N.backlash")),
+    MOTOR: tuple(
+        (models.MACHINE_SHAFT, f"drive.motor.{name}")
+        for name in (*(name for names in CHARACTERISTICS.values() for name in names), "inertia")
+    ),
+}
+_REQUIRED: Final = {SPRING: ("spring_rate",), CLUTCH: (COEFFICIENTS,), MOTOR: (CHARACTERISTIC,)}
+#: What every component has beside its fields.
+COLUMNS: Final = ("kind", "name", "note")
+#: Columns of a CSV file that are no numbers.
+_TEXTS: Final = ("name", "note")
+#: A list of numbers that only blanks separate.
+_BARE: Final = re.compile(r"(?:[-+0-9.eE\s]|,[0-9])+")
+
+SCHEMA: Final[dict[str, Any]] = {
+    "type": "object",
+    "description": "Components, or the text of a CSV file of them; those of the same kind and name are replaced.",
+    "additionalProperties": False,
+    "properties": {
+        "components": {
+            "type": "array",
+            "minItems": 1,
+            "maxItems": MAX_COMPONENTS,
+            "items": {
+                "type": "object",
+                "required": ["kind", "name", "fields"],
+                "additionalProperties": False,
+                "properties": {
+                    "kind": {"enum": list(KINDS)},
+                    "name": {"type": "string", "minLength": 1, "maxLength": MAX_NAME_LENGTH},
+                    "note": {"type": "string", "maxLength": MAX_NOTES_LENGTH},
+                    "fields": {
+                        "type": "object",
+                        "description": "quantities with their units, as in a field of the form",
+                        "additionalProperties": {"type": "string", "maxLength": MAX_NOTES_LENGTH},
+                    },
+                },
+            },
+        },
+        "csv": {"type": "string", "description": "columns kind, name, note and the fields, with units in brackets"},
+    },
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """A component; ``fields`` maps names of fields to quantities as somebody wrote them."""
+
+    kind: str
+    name: str
+    note: str = ""
+    fields: Mapping[str, str] = field(default_factory=dict)
+
+
+@lru_cache(maxsize=8)
+def fields_of(kind: str) -> Mapping[str, models.Parameter | None]:
+    """The fields of a kind by name, with their parameters; None for the characteristic of a motor."""
+    catalogues = {model: {e.path: e for e in models.parameter_catalogue(model)} for model, _ in _PATHS[kind]}
+    known = {path.removesuffix(".K").rpartition(".")[2]: catalogues[model][path] for model, path in _PATHS[kind]}
+    return {CHARACTERISTIC: None, **known} if kind == MOTOR else known
+
+
+def needed(kind: str, fields: Mapping[str, str]) -> tuple[str, ...]:
+    """The fields that a component must have."""
+    return (*_REQUIRED[kind], *CHARACTERISTICS.get(fields.get(CHARACTERISTIC, ""), ()))
+
+
+def list_text(text: str) -> list[str]:
+    """The items of a list, as texts with decimal points; blanks separate numbers where there is nothing else."""
+    items = text.split() if _BARE.fullmatch(text) else re.split(r"[;\n]|,\s", text)
+    return settled([item.strip() for item in items if item.strip()])
+
+
+def read_components(data: object) -> list[Component]:
+    """The components of a request; raises SpecError with every fault."""
+    report = Report(data)
+    found = read_object(report, "", data, SCHEMA["properties"]) or {}
+    if len(found) != 1 and not report.found:
+        report.fault("", "exactly-one", "must have either `components` or `csv`", allowed="one of them")
+    made = _read_csv(report, found["csv"]) if "csv" in found else _read_list(report, found.get("components", []))
+    places: dict[tuple[str, str], str] = {}
+    for where, one in made:
+        if places.setdefault((one.kind, one.name), where) != where:
+            report.fault(where, "repeated", f"the {one.kind} is given twice", one.name, allowed="each once")
+    report.raise_if_any()
+    return [one for _, one in made]
+
+
+def _read_list(report: Report, items: object) -> list[tuple[str, Component]]:
+    if not isinstance(items, list) or not 1 <= len(items) <= MAX_COMPONENTS:
+        report.fault("/components", "wrong-type", "must be a list", allowed=f"1 to {MAX_COMPONENTS:,} components")
+        return []
+    made = []
+    for index, item in enumerate(items):
+        where = join("/components", index)
+        found = read_object(report, where, item, (*COLUMNS, "fields"))
+        if found is not None:
+            one = _checked(report, where, found, found.get("fields"), join(where, "fields"))
+            made += [(where, one)] if one is not None else []
+    return made
+
+
+def _checked(report: Report, where: str, found: Mapping[str, Any], fields: object, at: str) -> Component | None:
+    """A component whose parts are given; None, and faults recorded, where it is invalid."""
+    before, kind, name, note = report.found, found.get("kind"), found.get("name"), found.get("note", "")
+    if kind not in KINDS:
+        report.fault(
+            join(where, "kind"), "invalid-choice", "is not a kind of component", kind, allowed=", ".join(KINDS)
+        )
+    if not isinstance(name, str) or not 0 < len(name.strip()) <= MAX_NAME_LENGTH or not name.isprintable():
+        report.fault(join(where, "name"), "invalid-text", "must be a printable text in one line", name,
+                     allowed=f"1 to {MAX_NAME_LENGTH} characters")  # fmt: skip
+    text = printable_lines(note)
+    if text is None:
+        report.fault(join(where, "note"), "invalid-text", "must be a printable text", note, allowed=LINES_ALLOWED)
+    texts: dict[str, str] = {}
+    if isinstance(fields, Mapping) and all(isinstance(text, str) for text in fields.values()):
+        texts = {key: text.strip() for key, text in fields.items()}
+    else:
+        report.fault(at, "wrong-type", "must be an object of texts", allowed="quantities with their units")
+    if report.found > before:
+        return None
+    given = {key: text for key, text in texts.items() if text}
+    for fault in faults_of(str(kind), given):
+        report.fault(
+            join(at, fault.where or ""), fault.code, fault.message, fault.value, allowed=fault.allowed, unit=fault.unit
+        )
+    return Component(str(kind), str(name).strip(), text or "", given) if report.found == before else None
+
+
+def faults_of(kind: str, fields: Mapping[str, str]) -> list[Fault]:
+    """What is wrong with the fields of a component; ``where`` is the name of the field."""
+    known, found = fields_of(kind), list[Fault]()
+    for name in needed(kind, fields):
+        if name not in fields:
+            found.append(Fault(name, "required", "is required"))
+    others = {name for names in CHARACTERISTICS.values() for name in names} - set(needed(kind, fields))
+    for name, text in fields.items():
+        if name not in known or (kind == MOTOR and name in others):
+            allowed = ", ".join(one for one in known if kind != MOTOR or one not in others)
+            found.append(Fault(name, "unknown-field", f"is not a field of this {kind}", text, allowed))
+        elif name == CHARACTERISTIC:
+            if text not in CHARACTERISTICS:
+                allowed = ", ".join(CHARACTERISTICS)
+                found.append(Fault(name, "invalid-choice", "is not a characteristic", text, allowed))
+        else:
+            found += _faults_of_field(kind, name, text)
+    return found
+
+
+def _faults_of_field(kind: str, name: str, text: str) -> list[Fault]:
+    parameter = fields_of(kind)[name]
+    assert parameter is not None
+    if name != COEFFICIENTS:
+        pairs = [(text, parameter)]
+    else:
+        items = list_text(text)
+        if not 1 <= len(items) <= models.MAX_COEFFICIENTS:
+            allowed = f"1 to {models.MAX_COEFFICIENTS} coefficients, separated by semicolons"
+            return [Fault(name, "too-many", f"has {len(items)} coefficients", text, allowed)]
+        pairs = [(item, placed(parameter, f"{COEFFICIENTS}.{index}")) for index, item in enumerate(items)]
+    found = []
+    for item, one in pairs:
+        number = parse_number(item)
+        try:
+            exact(item if number is None else number, one)
+        except QuantityError as error:
+            found.append(Fault(name, error.code, str(error), item, one.range_text(), one.unit))
+    return found
+
+
+def _read_csv(report: Report, text: object) -> list[tuple[str, Component]]:
+    example = "columns kind, name, note and the fields"
+    rows = read_csv(report, "/csv", text, (MAX_COMPONENTS, 40), example, texts=_TEXTS)
+    if rows is None:
+        return []
+    headings = [HEADING.fullmatch(cell) for cell in rows[0].cells]
+    names = [heading[1] if heading else "" for heading in headings]
+    known = {*COLUMNS, *(name for kind in KINDS for name in fields_of(kind))}
+    for name, cell in zip(names, rows[0].cells, strict=True):
+        if name not in known or names.count(name) > 1:
+            message = "is a column twice" if name in known else "has a column that is no field"
+            report.fault("/csv", "unknown-field", message, cell, allowed=", ".join(sorted(known)))
+    if report.found:
+        return []
+    made = []
+    for row in rows[1:]:
+        cells = {
+            name: f"{cell} {heading[2]}" if heading and heading[2] and parse_number(cell) is not None else cell
+            for name, heading, cell in zip(names, headings, map(str.strip, row.cells), strict=True)
+        }
+        cells |= {name: unescape(cells[name]) for name in _TEXTS if name in cells}
+        line = Report(None)
+        fields = {name: cell for name, cell in cells.items() if name not in COLUMNS}
+        one = _checked(line, "", cells, fields, "")
+        for fault in line.faults:
+            message = f"line {row.line}, {(fault.where or '').strip('/')}: {fault.message}"
+            report.fault("/csv", fault.code, message, fault.value, allowed=fault.allowed, unit=fault.unit)
+        made += [(f"/csv line {row.line}", one)] if one is not None else []
+    return made
+
+
+def require_component(data: Mapping[str, Any]) -> Component:
+    """One component as a form sends it; raises SpecError, whose pointers begin with ``/fields`` or a field's name."""
+    report = Report(data)
+    one = _checked(report, "", data, data.get("fields"), "/fields")
+    if one is None:
+        raise SpecError(report.faults)
+    return one
