@@ -58,8 +58,8 @@ class Server:
         """The folder of the database cluster."""
         return self.folder / "data"
 
-    def start(self) -> None:
-        """Start it and wait until it answers."""
+    def start(self, **more: str) -> None:
+        """Start it, with settings of one's own where given, and wait until it answers."""
         options = {
             "listen_addresses": "''",
             "unix_socket_directories": str(self.folder),
@@ -67,6 +67,7 @@ class Server:
             "shared_buffers": "32MB",
             "max_connections": "60",
             "autovacuum": "off",
+            **more,
         }
         text = " ".join(f"-c {name}={value}" for name, value in options.items())
         self._call("pg_ctl", "-D", str(self.data), "-l", str(self.folder / "log"), "-o", text, "-w", "start")
@@ -121,15 +122,15 @@ def _somebody() -> str:
 
 
 @contextmanager
-def running() -> Iterator[Server]:
-    """A server that is started here and stopped at the end."""
+def running(**settings: str) -> Iterator[Server]:
+    """A server that is started here, with those settings, and stopped at the end."""
     require()
     # The names of sockets are short, those of pytest's folders are not.
     folder = Path(tempfile.mkdtemp(prefix="sprag-pg-"))
     server = None
     try:
         server = Server(folder)
-        server.start()
+        server.start(**settings)
         yield server
     finally:
         if server is not None and (server.data / "postmaster.pid").exists():

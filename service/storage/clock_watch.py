@@ -39,7 +39,7 @@ class ClockWatch:
         self._noted: datetime | None = None
         #: The elapsed time when the clock was first found behind the trusted time.
         self._behind_since: float | None = None
-        self._told = False
+        self._reported = False
 
     def believable(self) -> bool:
         """Check the clock: False while it is ahead of the expected time. Raises StoreError."""
@@ -50,13 +50,13 @@ class ClockWatch:
             else:
                 expected, allowed = self._believed[0] + timedelta(seconds=elapsed - self._believed[1]), JUMP
             if now - expected > allowed:
-                if not self._told:
-                    self._told = True
+                if not self._reported:
+                    self._reported = True
                     _LOG.error("%s.", jump_message(expected, now))
                 return False
-            if self._told:
+            if self._reported:
                 _LOG.warning("The clock is trusted again: it is %s.", now.isoformat(timespec="seconds"))
-                self._told = False
+                self._reported = False
             back = self._put_back(now, expected, elapsed)
             self._believed = now if back else max(expected, now), elapsed
             if back or noted is None or now - noted > NOTE_AFTER:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, cast
 
 import numpy as np
 import sqlalchemy as sa
@@ -11,11 +12,11 @@ import sqlalchemy as sa
 from sprag.service.storage.cases import Cases
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
-#: Rows that are converted at once.
+#: Rows that are read at once.
 _PART: Final = 20_000
 
 
@@ -46,20 +47,42 @@ class WholeColumns(Cases):
     def row_columns(self, study_id: str, names: Sequence[str]) -> RowColumns:
         """Results ``names`` of every finished case; raises StudyNotFoundError, and KeyError for an unknown name."""
         kinds: dict[tuple[str, str], int] = {}
+        types = [("case", np.int64), ("ending", object), ("flags", object)]
+        layout = np.dtype([*types, *((f"value{index}", np.float64) for index in range(len(names)))])
         parts: list[tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]] = []
         with self.session.read() as connection:
             rows = self._rows(connection, study_id)
-            own = {info.name: rows.table.c[info.column] for info in rows.infos}
-            c = rows.table.c
-            query = sa.select(c.case_number, c.ending, c.flags, *(own[name] for name in names))
-            query = query.where(c.study == rows.number).order_by(c.case_number)
-            for part in connection.execution_options(yield_per=_PART).execute(query).partitions(_PART):
-                numbers, endings, flags, *results = zip(*part, strict=True)
-                codes = [kinds.setdefault(pair, len(kinds)) for pair in zip(endings, flags, strict=True)]
-                values = np.array(results, dtype=np.float64).reshape(len(names), len(part))
-                parts.append((np.array(numbers, dtype=np.int64), np.array(codes, dtype=np.int32), values))
+            c, own = rows.table.c, {info.name: rows.table.c[info.column] for info in rows.infos}
+            query = sa.select(c.case_number, c.ending, c.flags, *(_number(own[name]) for name in names))
+            query = query.where(c.study == rows.number).order_by(c.case_number).limit(_PART)
+            last = -1
+            while len(part := _records(connection, query.where(c.case_number > last), layout)):
+                pairs = zip(part["ending"].tolist(), part["flags"].tolist(), strict=True)
+                codes = np.array([kinds.setdefault(pair, len(kinds)) for pair in pairs], dtype=np.int32)
+                columns = [part[f"value{index}"] for index in range(len(names))]
+                parts.append((part["case"].copy(), codes, np.array(columns).reshape(len(names), len(part))))
+                last = int(part["case"][-1])
         if not parts:
             return RowColumns(np.empty(0, np.int64), (), np.empty(0, np.int32), {name: np.empty(0) for name in names})
         cases, kind = (np.concatenate([part[index] for part in parts]) for index in (0, 1))
-        values = np.concatenate([part[2] for part in parts], axis=1)
-        return RowColumns(cases, tuple(kinds), kind.astype(np.int32), dict(zip(names, values, strict=True)))
+        values = {name: np.concatenate([part[2][row] for part in parts]) for row, name in enumerate(names)}
+        return RowColumns(cases, tuple(kinds), kind.astype(np.int32), values)
+
+
+def _number(column: sa.Column[float]) -> sa.ColumnElement[float]:
+    """The column with a text that numpy and PostgreSQL read as NaN in place of null."""
+    if not isinstance(column.type, sa.Double):
+        return sa.func.coalesce(sa.cast(column, sa.Double), sa.literal_column("'NaN'"))
+    return sa.func.coalesce(column, sa.literal_column("'NaN'"))
+
+
+def _records(
+    connection: sa.Connection, query: sa.Select[tuple[object, ...]], layout: np.dtype[np.void]
+) -> NDArray[np.void]:
+    """The rows of a query as records: straight from the driver's cursor, in half the time of rows of SQLAlchemy."""
+    result = connection.execute(query)
+    with closing(result):
+        try:
+            return np.fromiter(cast("Iterable[tuple[object, ...]]", result.cursor), layout)
+        except connection.dialect.loaded_dbapi.Error as error:  # SQLAlchemy wraps those of its own steps only
+            raise sa.exc.DBAPIError(str(query), None, error) from error

@@ -3,11 +3,13 @@
 from sprag.worker.ports import StoreError, StoreFullError
 
 __all__ = [
+    "ComponentNotFoundError",
     "DatabaseBusyError",
     "DatabaseError",
     "DatabaseFullError",
     "EndingError",
     "IdempotencyConflictError",
+    "NotOwnerError",
     "NothingToRetryError",
     "PageTokenError",
     "ScheduleNotFoundError",
@@ -17,7 +19,12 @@ __all__ = [
     "StudyEndedError",
     "StudyNotFoundError",
     "TokenNotFoundError",
+    "TooManyComponentsError",
     "TooManySchedulesError",
+    "TooManyViewsError",
+    "UserExistsError",
+    "UserNotFoundError",
+    "ViewNotFoundError",
     "busy",
 ]
 
@@ -80,6 +87,36 @@ class ScheduleNotFoundError(StoreError):
         super().__init__(f"there is no schedule {schedule_id!r}")
 
 
+class ComponentNotFoundError(StoreError):
+    """There is no component of that id."""
+
+    code = "component-not-found"
+
+    def __init__(self, component_id: str) -> None:
+        super().__init__(f"there is no component {component_id!r}")
+
+
+class TooManyComponentsError(StoreError):
+    """The limit of components is reached."""
+
+    code = "wrong-state"
+
+
+class ViewNotFoundError(StoreError):
+    """There is no saved view of that id."""
+
+    code = "view-not-found"
+
+    def __init__(self, view_id: str) -> None:
+        super().__init__(f"there is no saved view {view_id!r}")
+
+
+class TooManyViewsError(StoreError):
+    """The limit of saved views is reached."""
+
+    code = "wrong-state"
+
+
 class TooManySchedulesError(StoreError):
     """The limit of schedules is reached."""
 
@@ -93,6 +130,27 @@ class TokenNotFoundError(StoreError):
 
     def __init__(self, token_id: str) -> None:
         super().__init__(f"there is no token {token_id!r}")
+
+
+class UserNotFoundError(StoreError):
+    """No user has that name."""
+
+    code = "user-not-found"
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"there is no user {name!r}")
+
+
+class UserExistsError(StoreError):
+    """The name belongs to a user, or did."""
+
+    code = "user-exists"
+
+
+class NotOwnerError(StoreError):
+    """The object belongs to another user."""
+
+    code = "not-owner"
 
 
 class StudyBusyError(StoreError):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import sqlalchemy as sa
 
 from sprag.service.storage.part import Part, micros_of, moment
-from sprag.service.storage.tables import CHUNKS, DISPATCHER, ENDINGS, HELD_AT_DEADLINE, STUDIES
+from sprag.service.storage.tables import CHUNKS, DISPATCHERS, ENDINGS, HELD_AT_DEADLINE, STUDIES
 from sprag.worker.states import TERMINAL, ChunkState
 
 if TYPE_CHECKING:
@@ -20,8 +20,8 @@ _TERMINAL = [state.value for state in TERMINAL]
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """Studies by state, cases by ending, cases to be run, cases reused from other studies, the worker's latest
-    heartbeat.
+    """Studies by state, cases by ending, cases to be run, cases reused from other studies, and the latest heartbeat of
+    the dispatcher that has been silent longest.
     """
 
     studies: Mapping[str, int]
@@ -59,7 +59,10 @@ class Totals(Part):
             endings = connection.execute(
                 sa.select(ENDINGS.c.ending, sa.func.sum(ENDINGS.c.cases)).group_by(ENDINGS.c.ending)
             ).all()
-            beat = connection.execute(sa.select(DISPATCHER.c.heartbeat_at)).scalar_one_or_none()
+            # Of those at work, otherwise of the last one.
+            d = DISPATCHERS.c
+            order = (d.ended_at.is_not(None), sa.case((d.ended_at.is_(None), d.heartbeat_at), else_=-d.heartbeat_at))
+            beat = connection.execute(sa.select(d.heartbeat_at).order_by(*order).limit(1)).scalar_one_or_none()
         return Figures(
             {str(state): int(count) for state, count in states},
             {ending: int(cases) for ending, cases in endings},
@@ -67,6 +70,14 @@ class Totals(Part):
             int(reused),
             None if beat is None else moment(beat),
         )
+
+    def database_bytes(self) -> int:
+        """Size of the database in bytes, with the log beside its file."""
+        if not self.session.on_server:
+            file = self.session.path
+            return sum(path.stat().st_size for path in (file, file.with_name(f"{file.name}-wal")) if path.exists())
+        with self.session.read() as connection:
+            return int(connection.execute(sa.select(sa.func.pg_database_size(sa.func.current_database()))).scalar_one())
 
     def finished_since(self, since: datetime) -> list[FinishedWork]:
         """Chunks finished after ``since``, in order."""

@@ -8,32 +8,26 @@ import select
 import signal
 import socket
 from pathlib import Path
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 from sprag.service.storage.private_files import create_private
 from sprag.worker.pool.process_table import start_time
+
+if TYPE_CHECKING:
+    from collections.abc import Set as AbstractSet
 
 #: Seconds to wait for a killed process to exit.
 _KILL_SECONDS: Final = 10.0
 
 
-class OneHolder(Protocol):
-    """A lock of at most one process, released when that process ends."""
+class Presence(Protocol):
+    """The dispatchers at work on a database that admits several; each has a lock of its own while it lives."""
 
-    def take(self) -> bool:
-        """Take the lock if it is free; True when it is ours."""
+    def enter(self, epoch: int) -> None:
+        """Be present as the dispatcher of this epoch until the connection ends or `release`."""
 
-    def seize(self) -> None:
-        """Take the lock from its holder; only the epoch then prevents the old holder from writing."""
-
-    def end_holder(self) -> bool:
-        """Kill the process that holds the lock, where it is known and reachable; whether it was killed."""
-
-    def holder(self) -> str:
-        """The last process that took the lock, "" where none did."""
-
-    def release(self) -> None:
-        """Release the lock."""
+    def present(self) -> AbstractSet[int]:
+        """Epochs of the dispatchers that are present. Raises DatabaseError when our own presence was lost."""
 
 
 class DispatcherLock:

@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING
 import sqlalchemy as sa
 
 from sprag.service.stale_files import mark, sweep
-from sprag.service.storage import schedule_tables, sessions, tokens  # noqa: F401 - their tables are made, too
+from sprag.service.storage import component_tables, schedule_tables, sessions, tokens, user_tables  # noqa: F401 - their tables are made, too
+from sprag.service.storage.audit import note
 from sprag.service.storage.errors import DatabaseError, SchemaError
+from sprag.service.storage.part import SystemClock, micros_of
 from sprag.service.storage.private_files import create_private, sync_folder
 from sprag.service.storage.records import CheckReport
 from sprag.service.storage.sqlite_files import sqlite_version, sqlite_warning
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
 CHECKED_BYTES = 256_000_000
 #: The table in which Alembic keeps the revision.
 _VERSION = sa.Table("alembic_version", sa.MetaData(), sa.Column("version_num", sa.String(32), primary_key=True))
+#: Begins the revision of the target of a move (`moving`) that is not complete yet.
+MOVING = "moving-"
 #: Suffix of a backup that is not complete yet.
 PART_SUFFIX = ".part"
 
@@ -51,7 +55,13 @@ def require_current(session: Session) -> None:
     if found is None:
         upgrade(session)
     elif found != HEAD_REVISION:
-        raise SchemaError(_other_revision(session, found))
+        raise other_revision(session, found)
+
+
+def set_revision(session: Session, found: str) -> None:
+    """Record another revision, without changing anything else."""
+    with session.write() as connection:
+        connection.execute(_VERSION.update().values(version_num=found))
 
 
 def create(session: Session) -> None:
@@ -66,15 +76,18 @@ def create(session: Session) -> None:
             connection.execute(_VERSION.insert().values(version_num=HEAD_REVISION))
 
 
-def _other_revision(session: Session, found: str) -> str:
+def other_revision(session: Session, found: str | None) -> SchemaError:
+    """The error of a database whose revision is not that of this program, with the command that helps."""
+    where = f"the database {session.location}"
+    if found is None:
+        return SchemaError(f"{where} is empty")
+    if found.startswith(MOVING):
+        return SchemaError(f"{where} is the target of a move that is not complete: run the same `sprag db move` again")
     if found in known_revisions():
-        return (
-            f"the database {session.location} has revision {found}, this program needs {HEAD_REVISION}: "
-            "run `sprag db upgrade`"
-        )
-    return (
-        f"the database {session.location} has revision {found}, which is newer than this program's "
-        f"({HEAD_REVISION}): install the newer Sprag and run its `sprag db upgrade`"
+        return SchemaError(f"{where} has revision {found}, this program needs {HEAD_REVISION}: run `sprag db upgrade`")
+    return SchemaError(
+        f"{where} has revision {found}, which is newer than this program's ({HEAD_REVISION}): install the newer Sprag "
+        "and run its `sprag db upgrade`"
     )
 
 
@@ -99,7 +112,7 @@ def upgrade(session: Session) -> tuple[str | None, str]:
     """
     before = revision(session)
     if before is not None and before not in known_revisions():
-        raise SchemaError(_other_revision(session, before))
+        raise other_revision(session, before)
     if before is None and not session.on_server:
         create(session)
     else:
@@ -116,9 +129,13 @@ def migrate(session: Session) -> None:
     logging.getLogger("alembic").setLevel(logging.WARNING)
     config = Config()
     config.set_main_option("script_location", str(_migrations()).replace("%", "%%"))
+    before = revision(session)
     with session.write() as connection:
         config.attributes["connection"] = connection
         command.upgrade(config, "head")
+        if before not in {None, HEAD_REVISION}:
+            now = micros_of(SystemClock().now())
+            note(connection, now, "database.upgrade", "", before=before, after=HEAD_REVISION)
 
 
 def require_sound(session: Session) -> None:
@@ -142,7 +159,7 @@ def check(session: Session) -> CheckReport:
         if found is None:
             problems.append("the database is empty: run `sprag db upgrade`")
         elif found != HEAD_REVISION:
-            problems.append(_other_revision(session, found))
+            problems.append(str(other_revision(session, found)))
         if not session.on_server:
             problems += _look_over_file(session)
     except DatabaseError as error:

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 
 from sprag.service.storage.errors import StudyNotFoundError
-from sprag.service.storage.tables import CHUNKS, DISPATCHER, STUDIES
-from sprag.worker.ports import EpochLostError
+from sprag.service.storage.tables import CHUNKS, STUDIES
 from sprag.worker.states import ChunkState, StudyEvent, StudyState, follow
 
 if TYPE_CHECKING:
@@ -97,12 +96,6 @@ class Part:
             raise StudyNotFoundError(study_id)
         return found
 
-    def _own(self, connection: sa.Connection, epoch: int) -> None:
-        """Raise EpochLostError when the epoch is no longer the latest."""
-        latest = connection.execute(sa.select(DISPATCHER.c.epoch).with_for_update()).scalar_one_or_none()
-        if latest != epoch:
-            raise EpochLostError(f"another dispatcher has taken over (epoch {latest}, this one has {epoch})")
-
     def _lift_deadline(self, connection: sa.Connection, number: int) -> None:
         """Let a resumed study run although its deadline has passed."""
         self._change(connection, number, STUDIES.c.finish_by <= self._now(), finish_by=None)
@@ -131,6 +124,7 @@ class Part:
             values["started_at"] = sa.func.coalesce(STUDIES.c.started_at, self._now())
         if after.terminal:
             values["finished_at"] = self._now()
+            values["dispatcher"] = None
         elif before.terminal:
             values["finished_at"] = None
         self._change(connection, number, **values)

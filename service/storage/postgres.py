@@ -14,21 +14,21 @@ import psycopg
 import sqlalchemy as sa
 from sqlalchemy.engine import URL
 
+from sprag.service.storage import binary_copy
 from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError, busy
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable
 
-#: First key of every advisory lock of Sprag ("SPRA" in ASCII); the second key gives its purpose.
-_LOCKS: Final = 0x53505241
-_WRITER, _DISPATCHER = 1, 2
-_HOLDER: Final = (
-    "FROM pg_locks AS l JOIN pg_stat_activity AS a ON a.pid = l.pid "
-    "WHERE l.locktype = 'advisory' AND l.granted AND l.classid = %s::oid AND l.objid = %s::oid "
-    "AND l.database = (SELECT oid FROM pg_database WHERE datname = current_database())"
-)
+    from sprag.service.storage.rows import Block, Target
+
+#: First key of the advisory locks of Sprag ("SPRA" in ASCII), of which the second key gives the purpose; and of those
+#: of the dispatchers ("SPRB"), whose second key is the epoch.
+LOCKS: Final = 0x53505241
+EPOCHS: Final = 0x53505242
+WRITER, CHORES, USERS = 1, 2, 3
 #: Begins a write transaction.
-TAKE_WRITER: Final = f"SELECT pg_advisory_xact_lock({_LOCKS}, {_WRITER})"
+TAKE_WRITER: Final = f"SELECT pg_advisory_xact_lock({LOCKS}, {WRITER})"
 #: The channel of notifications about changed studies.
 CHANNEL: Final = "sprag"
 #: Older versions lack features that are used here, and are out of support.
@@ -163,89 +163,42 @@ def writer_is_free(connection: sa.Connection, seconds: float) -> bool:
     """Whether the writers' lock can be acquired within ``seconds``; it is released immediately."""
     until = time.monotonic() + seconds
     while True:
-        if connection.exec_driver_sql(f"SELECT pg_try_advisory_xact_lock({_LOCKS}, {_WRITER})").scalar_one():
+        if connection.exec_driver_sql(f"SELECT pg_try_advisory_xact_lock({LOCKS}, {WRITER})").scalar_one():
             return True
         if time.monotonic() > until:
             return False
         time.sleep(0.05)
 
 
-def copy_in(connection: sa.Connection, table: str, columns: Sequence[str], rows: Iterable[tuple[Any, ...]]) -> None:
-    """Insert many rows by COPY, which is several times faster than INSERT. Raises sqlalchemy.exc.DBAPIError."""
+def copy_blocks(connection: sa.Connection, place: Target, blocks: Iterable[Block]) -> None:
+    """Insert rows by a binary COPY; the server takes a block while the next one is built.
+
+    Raises sqlalchemy.exc.DBAPIError.
+    """
     driver: psycopg.Connection[Any] | None = connection.connection.driver_connection
     assert driver is not None
-    statement = f"COPY {table} ({', '.join(columns)}) FROM STDIN"
+    statement = f"COPY {place.table} ({', '.join(place.columns)}) FROM STDIN (FORMAT BINARY)"
+    try:
+        with driver.cursor() as cursor, cursor.copy(statement.encode()) as copy:
+            copy.write(binary_copy.HEADER)
+            for rows in blocks:
+                copy.write(binary_copy.encoded(place, rows))
+            copy.write(binary_copy.TRAILER)
+    except psycopg.Error as error:
+        raise sa.exc.DBAPIError(statement, None, error) from error
+
+
+def copy_in(connection: sa.Connection, table: str, rows: Iterable[tuple[Any, ...]]) -> None:
+    """Insert any rows by COPY; ``table`` is its name with its columns. Raises sqlalchemy.exc.DBAPIError."""
+    driver: psycopg.Connection[Any] | None = connection.connection.driver_connection
+    assert driver is not None
+    statement = f"COPY {table} FROM STDIN"
     try:
         with driver.cursor() as cursor, cursor.copy(statement.encode()) as copy:
             for row in rows:
                 copy.write_row(row)
     except psycopg.Error as error:
         raise sa.exc.DBAPIError(statement, None, error) from error
-
-
-class ServerLock:
-    """An advisory lock of the server, which releases it when its holder's connection ends.
-
-    A holder that has not noticed the loss of its connection is stopped by the next holder's epoch at its next write.
-    """
-
-    def __init__(self, url: URL, owner: str, lock_seconds: float) -> None:
-        self._url = url
-        self._owner = owner
-        self._lock_seconds = lock_seconds
-        self._connection: psycopg.Connection[Any] | None = None
-        self._held = False
-
-    def take(self) -> bool:
-        """Take the lock if it is free; True when it is ours. Raises DatabaseError when the server cannot be reached."""
-        if not self._held:
-            row = self._ask("SELECT pg_try_advisory_lock(%s::int, %s::int)")
-            self._held = bool(row and row[0])
-        return self._held
-
-    def seize(self) -> None:
-        """Take the lock from its holder by ending its connection; only the epoch then prevents the holder from writing.
-
-        Raises DatabaseError when the server does not permit this user to do so.
-        """
-        while not self.take():
-            self._ask(f"SELECT pg_terminate_backend(a.pid, {LOST_SECONDS * 1000}) {_HOLDER}")
-
-    def end_holder(self) -> bool:
-        """End the connection of a hung process whose transaction blocks all writers; whether there was one.
-
-        `seize` ends the connection that holds the lock, which is a different one.
-        """
-        frozen = "AND a.state LIKE 'idle in transaction%%' AND clock_timestamp() - a.state_change > interval '1 s'"
-        return self._ask(f"SELECT pg_terminate_backend(a.pid, {LOST_SECONDS * 1000}) {_HOLDER} {frozen}", _WRITER) == (
-            True,
-        )
-
-    def holder(self) -> str:
-        """Host and process of the holder of the lock, "" where there is none."""
-        row = self._ask(f"SELECT a.application_name {_HOLDER}")
-        return str(row[0]) if row else ""
-
-    def _ask(self, statement: str, lock: int = _DISPATCHER) -> tuple[Any, ...] | None:
-        if self._connection is None or self._connection.closed:
-            self._held = False
-            self._connection = connect(self._url, self._lock_seconds, self._owner)
-        try:
-            return self._connection.execute(statement.encode(), (_LOCKS, lock)).fetchone()
-        except psycopg.Error as error:
-            self.release()
-            raise explained(error, location(self._url)) or error from None
-
-    def release(self) -> None:
-        """Release the lock; never fails."""
-        held, self._held = self._held, False
-        connection, self._connection = self._connection, None
-        if connection is not None:
-            with suppress(psycopg.Error):
-                if held:  # takes effect now; the server notices the end of a connection a little later
-                    connection.execute("SELECT pg_advisory_unlock_all()")
-            with suppress(psycopg.Error):
-                connection.close()
 
 
 class News:

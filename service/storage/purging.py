@@ -1,23 +1,107 @@
-"""Removal of the rows of deleted studies in steps, so that other writers can work in between."""
+"""Deletion of studies, its undoing, and removal of their rows in steps, so that other writers can work in between."""
 
 from __future__ import annotations
 
+from contextlib import suppress
+from datetime import timedelta
 from typing import TYPE_CHECKING, Final
 
 import sqlalchemy as sa
 
-from sprag.service.storage.part import Part
-from sprag.service.storage.tables import CHUNKS, ROUNDS, STUDIES, further_table, results_table
+from sprag.service.storage.audit import note, require_own
+from sprag.service.storage.errors import StudyBusyError, StudyNotFoundError
+from sprag.service.storage.part import micros_of
+from sprag.service.storage.tables import (
+    CHUNKS,
+    ENDINGS,
+    HELD_AT_DEADLINE,
+    IDEMPOTENCY_KEYS,
+    ROUNDS,
+    STUDIES,
+    further_table,
+    results_table,
+)
+from sprag.service.storage.users import Users
+from sprag.service.storage.view_tables import SAVED_VIEWS
+from sprag.worker.states import TERMINAL, StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from datetime import datetime
+    from threading import Event
 
 #: Rows deleted in one transaction: other writers wait for it.
 PURGED_ROWS: Final = 5_000
 
 
-class Purging(Part):
-    """The rows of deleted studies."""
+class Purging(Users):
+    """Deletion of studies, and their rows."""
+
+    #: Set when a study is deleted whose rows are to be removed now (`Studies`).
+    deleted: Event
+    #: For how long a deleted study can be restored; set by the service.
+    restorable = timedelta(0)
+
+    def delete_study(self, study_id: str, *, at_once: bool = False) -> None:
+        """Delete a study that has ended or is held at its deadline.
+
+        Raises StudyNotFoundError, or StudyBusyError for any other study.
+
+        The study is invisible when this returns, and can be restored for the time `restorable`, unless it is to be
+        deleted ``at_once``; `Purging.purge_steps` removes its rows later.
+        """
+        now = self._now()
+        purge_at = 0 if at_once else now + self.restorable // timedelta(microseconds=1)
+        with self.session.write() as connection:
+            c = STUDIES.c
+            row = self._row(connection, study_id, c.number, c.state, c.waits_for, c.owner, c.name)
+            require_own("study", study_id, row.owner)
+            state = StudyState(row.state)
+            if not state.terminal and row.waits_for != HELD_AT_DEADLINE:
+                raise StudyBusyError(f"the study {study_id} is {state.value}: cancel it before it is deleted")
+            # From now on its key submits a new study.
+            connection.execute(sa.delete(IDEMPOTENCY_KEYS).where(IDEMPOTENCY_KEYS.c.study == row.number))
+            self._change(connection, row.number, deleted_at=now, purge_at=purge_at)
+            note(connection, now, "study.delete", study_id, name=row.name, owner=row.owner)
+        if purge_at <= now:
+            self.deleted.set()
+
+    def restore_study(self, study_id: str) -> None:
+        """Undo the deletion of a study; raises StudyNotFoundError when its rows are being removed.
+
+        FaultError where its results exceed the quota of the present user.
+        """
+        now, c = self._now(), STUDIES.c
+        with self.session.write() as connection:
+            found = connection.execute(
+                sa.select(c.number, c.owner, c.name, c.estimated_bytes).where(
+                    c.id == study_id, c.deleted_at.is_not(None), c.purge_at > now
+                )
+            ).one_or_none()
+            if found is None:
+                self._row(connection, study_id, c.number)  # one that is not deleted stays as it is
+                return
+            require_own("study", study_id, found.owner)
+            self._require_quota(connection, 0, found.estimated_bytes or 0)
+            self._change(connection, found.number, deleted_at=None, purge_at=None)
+            note(connection, now, "study.restore", study_id, name=found.name)
+
+    def prune(self, ended_before: datetime, *, dry: bool = False) -> list[str]:
+        """Delete every study that ended, or was held at its deadline, before ``ended_before``; returns their ids.
+
+        They cannot be restored: this is how room is made.
+        ``dry``: only return the ids.
+        """
+        c = STUDIES.c
+        ended = c.state.in_([state.value for state in TERMINAL]) & (c.finished_at < micros_of(ended_before))
+        over = (c.waits_for == HELD_AT_DEADLINE) & (c.finish_by < micros_of(ended_before))
+        old = (ended | over) & c.deleted_at.is_(None)
+        with self.session.read() as connection:
+            found = list(connection.execute(sa.select(c.id).where(old).order_by(c.number)).scalars())
+        for study_id in () if dry else found:
+            with suppress(StudyNotFoundError, StudyBusyError):  # somebody else has deleted it or runs it again
+                self.delete_study(study_id, at_once=True)
+        return found
 
     def purge(self) -> None:
         """Remove all of them now."""
@@ -27,8 +111,15 @@ class Purging(Part):
     def purge_steps(self) -> Iterator[int]:
         """Remove them in short transactions; yields the number of rows that each deleted."""
         c = STUDIES.c
+        over = c.deleted_at.is_not(None) & (sa.func.coalesce(c.purge_at, 0) <= self._now())
         with self.session.read() as connection:
-            gone = connection.execute(sa.select(c.number, c.model, c.variant).where(c.deleted_at.is_not(None))).all()
+            if connection.execute(sa.select(c.number).where(over).limit(1)).first() is None:
+                return
+        with self.session.write() as connection:
+            # A clock that is set back does not let a study be restored of which half is gone.
+            gone = connection.execute(
+                sa.update(STUDIES).where(over).values(purge_at=0).returning(c.number, c.model, c.variant)
+            ).all()
         for number, model, variant in gone:
             rows = results_table(model, variant)
             yield from self._emptied(rows, rows.c.case_number, number)
@@ -36,7 +127,8 @@ class Purging(Part):
                 yield from self._emptied(further, further.c.case_number, number)
             yield from self._emptied(CHUNKS, CHUNKS.c["first"], number)
             with self.session.write() as connection:
-                connection.execute(sa.delete(ROUNDS).where(ROUNDS.c.study == number))
+                for table in (ENDINGS, ROUNDS, SAVED_VIEWS):
+                    connection.execute(sa.delete(table).where(table.c.study == number))
                 connection.execute(sa.delete(STUDIES).where(c.number == number))
             yield 1
 

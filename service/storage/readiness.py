@@ -12,6 +12,8 @@ from sprag.service.storage.part import SILENT_SECONDS
 from sprag.worker.ports import StoreError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
     from sprag.service.storage.store import Store
 
 #: Seconds that others may hold the write lock: far longer than any write transaction of Sprag.
@@ -29,6 +31,8 @@ class Readiness:
         self._store = store
         self._locked_seconds = locked_seconds
         self._looking = Lock()
+        self._dispatcher_fails: Callable[[], str | None] = lambda: None
+        self._late: Callable[[], int] = lambda: 0
         self._found: tuple[str, ...] = ()
         self._until = float("-inf")
         # Services check the pages when they start.
@@ -45,12 +49,40 @@ class Readiness:
             self._looking.release()
         return self._found
 
+    def watch(self, dispatcher_fails: Callable[[], str | None]) -> None:
+        """Ask also whether the service's own dispatcher fails again and again; the answer is a sentence, or None."""
+        self._dispatcher_fails = dispatcher_fails
+
+    def watch_schedules(self, late: Callable[[], int]) -> None:
+        """Ask also how many schedules are late."""
+        self._late = late
+
     def warnings(self) -> tuple[str, ...]:
         """What does not prevent work but needs attention, one sentence each."""
+        found = []
         with suppress(StoreError):
             if problem := clock_problem(self._store):
-                return (f"{problem}.",)
-        return ()
+                found.append(f"{problem}.")
+            found += self._hindered()
+        with suppress(StoreError):
+            if late := self._late():
+                # Anyone may read this, so it must not show names.
+                found.append(f"Schedules are late: {late}. The page of the last night says which, and why.")
+        return tuple(found)
+
+    def _hindered(self) -> Iterator[str]:
+        """What hinders one of several dispatchers."""
+        found = [record for record in self._store.dispatchers() if record.ended_at is None]
+        for record in found if len(found) > 1 else ():
+            shortage = (record.report or {}).get("shortage")
+            if record.silent:
+                yield (
+                    f"The worker {record.owner} has not responded since "
+                    f"{record.heartbeat_at.isoformat(timespec='seconds')}: its {record.studies} studies are not run "
+                    "(`sprag worker --take-over` ends it)."
+                )
+            elif shortage:
+                yield f"The worker {record.owner}: {shortage}"
 
     def _look(self) -> list[str]:
         try:
@@ -74,6 +106,10 @@ class Readiness:
 
     def _worker(self) -> list[str]:
         silence = self._store.silence()
-        if silence is None or silence <= SILENT_SECONDS:
-            return []
-        return [f"No worker has responded for {silence:.0f} s: studies are not run."]
+        if silence is not None and silence > SILENT_SECONDS:
+            return [f"No worker has responded for {silence:.0f} s: studies are not run."]
+        if failing := self._dispatcher_fails():
+            return [failing]
+        # Another dispatcher runs the studies of one whose workers are missing.
+        shortages = [(record.report or {}).get("shortage") for record in self._store.responding()]
+        return [shortages[0]] if shortages and all(shortages) and shortages[0] else []

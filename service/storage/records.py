@@ -14,7 +14,7 @@ from sprag.service.storage.warning_texts import read_warnings
 from sprag.worker.states import StudyState
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
     from datetime import datetime
 
     import sqlalchemy as sa
@@ -33,7 +33,10 @@ class StudyRecord:
     change of the record or its rows: together with ``id`` it forms the ETag. Studies of higher ``priority`` run first.
     ``reused`` counts the cases whose rows were copied from earlier studies. A study is held at ``finish_by``;
     ``coarse`` states that its cases run coarse to fine, and ``time_over`` that its deadline holds it. A study that
-    chooses its own cases has at most ``most_cases`` of them, in at most ``most_rounds``; None for any other.
+    chooses its own cases has at most ``most_cases`` of them, in at most ``most_rounds``; None for any other. ``notes``
+    and ``tags`` are what people write about it; it is kept out of the usual list since ``archived_at``.
+    A deleted one can be restored until ``purge_at``, which is None for any other.
+    ``owner`` is the user to whom it belongs, None for nobody.
     """
 
     number: int
@@ -61,6 +64,11 @@ class StudyRecord:
     time_over: bool
     most_cases: int | None
     most_rounds: int | None
+    notes: str
+    tags: tuple[str, ...]
+    archived_at: datetime | None
+    purge_at: datetime | None
+    owner: str | None
 
     @property
     def over(self) -> bool:
@@ -243,12 +251,46 @@ class Kinds:
 
 @dataclass(frozen=True, slots=True)
 class DispatcherRecord:
-    """The dispatcher that took over last, and its latest heartbeat."""
+    """A dispatcher and its workers.
+
+    Attributes
+    ----------
+    epoch : int
+        Its number; later ones have larger numbers.
+    owner : str
+        Its host and process.
+    fingerprint : str
+        Of its process and of all its workers (`sprag.worker.fingerprint`); "" where it was not recorded.
+    started_at, heartbeat_at : datetime
+    ended_at : datetime or None
+        None while it is at work.
+    silent : bool
+        Whether the last heartbeat is older than `SILENT_SECONDS`, so that the workers are not known.
+    report : Mapping[str, Any] or None
+        `sprag.worker.reports.Reporter.summary`; None before its first heartbeat.
+    studies : int
+        Studies that belong to it.
+    differs : str or None
+        How its fingerprint differs from that of the first dispatcher, as a clause; None where it does not.
+    """
 
     epoch: int
     owner: str
+    fingerprint: str
     started_at: datetime
     heartbeat_at: datetime
+    ended_at: datetime | None
+    silent: bool
+    report: Mapping[str, Any] | None
+    studies: int
+    differs: str | None = None
+
+    @property
+    def usable(self) -> int:
+        """Number of workers that can be given chunks, as far as they are known."""
+        if self.report is None or self.silent or self.ended_at is not None:
+            return 0
+        return sum(host["usable"] for host in self.report["hosts"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,13 +312,17 @@ def split_flags(flags: str) -> tuple[str, ...]:
 
 def record_of(row: sa.Row[Any]) -> StudyRecord:
     """The record in a row of `RECORD_COLUMNS`."""
-    times = {name: optional_moment(getattr(row, name)) for name in ("started_at", "finished_at", "finish_by")}
+    times = {
+        name: optional_moment(getattr(row, name))
+        for name in ("started_at", "finished_at", "finish_by", "archived_at", "purge_at")
+    }
     own = {
         "state": StudyState(row.state),
         "warnings": read_warnings(row.warnings),
         "created_at": moment(row.created_at),
         "coarse": row.coarse == COARSE_TO_FINE,
         "time_over": row.waits_for == HELD_AT_DEADLINE,
+        "tags": tuple(row.tags.split("\n")[1:-1]),
         **times,
     }
     return StudyRecord(**{name: own[name] if name in own else getattr(row, name) for name in StudyRecord.__slots__})

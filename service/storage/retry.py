@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sqlalchemy as sa
 
+from sprag.service.storage.audit import note, require_own
 from sprag.service.storage.cases import conditions
 from sprag.service.storage.errors import NothingToRetryError
 from sprag.service.storage.order import Orders
@@ -57,7 +58,10 @@ class Retries(Orders):
         c = STUDIES.c
         while True:
             with self.session.read() as connection:
-                row = self._row(connection, study_id, c.number, c.model, c.variant, c.state, c.revision, c.cases)
+                row = self._row(
+                    connection, study_id, c.number, c.model, c.variant, c.state, c.revision, c.cases, c.owner
+                )
+                require_own("study", study_id, row.owner)
                 follow(StudyState(row.state), StudyEvent.RETRY)
                 counts = _failed(connection, row.number, endings)
                 if not counts:
@@ -78,6 +82,9 @@ class Retries(Orders):
                 self._lift_deadline(connection, row.number)
                 # The cases must be run, not copied from a study in which they failed in the same way.
                 connection.execute(sa.update(STUDIES).where(c.number == row.number).values(fresh=1))
+                note(
+                    connection, self._now(), "study.retry", study_id, cases=sum(counts.values()), endings=sorted(counts)
+                )
                 return record_of(self._row(connection, study_id, *RECORD_COLUMNS))
 
 

@@ -13,6 +13,7 @@ from cachetools import LRUCache
 
 from sprag.service.storage.cases import conditions
 from sprag.service.storage.order import Orders
+from sprag.service.storage.origins import HOSTS_BETWEEN
 from sprag.service.storage.round_table import latest_round
 from sprag.service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, further_table, results_table
 from sprag.service.storage.warning_texts import read_warnings, write_warnings
@@ -44,6 +45,7 @@ _SOURCE: Final[tuple[sa.ColumnElement[Any], ...]] = (
     STUDIES.c.model,
     STUDIES.c.variant,
     STUDIES.c.coarse,
+    STUDIES.c.fingerprint,
     STUDIES.c.study,
 )
 #: Endings that do not result from the case itself; such cases are run anew.
@@ -51,8 +53,8 @@ _NO_RESULT: Final = tuple(ending.value for ending in WorkerEnding)
 
 _MIXED: Final = WarningText(
     "The cases of this study were not all computed by one version of Sprag and its libraries on one kind of processor: "
-    "they may differ in more than their parameters, so other studies do not reuse them. A fresh study runs all of "
-    "them alike.",
+    "they may differ in more than their parameters, so other studies reuse only those that were computed like their "
+    "own. A fresh study runs all of them alike.",
     "mixed-origins",
 )
 
@@ -87,10 +89,13 @@ class Reuse(Orders):
         The search at the first chunk of a study covers all its chunks.
         """
         found = self._of_study(study, chunk.study)
-        plain, cases = self._order(chunk.study) is None, self._cases(chunk)
+        plain = self._order(chunk.study) is None
+        if found is None and plain:
+            return None
+        cases = self._cases(chunk)
         if found is None:
             nothing = np.empty(0, dtype=np.int64)
-            return None if plain else Known(cases, nothing, nothing, nothing)
+            return Known(cases, nothing, nothing, nothing)
         at = np.searchsorted(found.cases, cases)
         at[at == found.cases.size] = 0
         there = found.cases[at] == cases
@@ -115,6 +120,22 @@ class Reuse(Orders):
     def _forget_reuse(self, number: int) -> None:
         """Search again at the next chunk of the study, because its sources have changed."""
         self._found.pop(number, None)
+
+    def _hosts_of(self, connection: sa.Connection, known: Known) -> set[str]:
+        """The hosts that computed the rows of other studies which a chunk takes; as far as they were recorded."""
+        c, found = CHUNKS.c, set[str]()
+        for source in np.unique(known.studies).tolist():
+            there, order = known.there[known.studies == source], self._order(source, connection)
+            places = np.sort(there if order is None else order.positions(there))
+            begins, ends = int(places[0]), int(places[-1])
+            query = sa.select(c["first"], c["count"], c.host).where(
+                c.study == source, c["first"] <= ends, c["first"] + c["count"] > begins, c.host.is_not(None)
+            )
+            for first, count, host in connection.execute(query):
+                at = np.searchsorted(places, first)
+                if at < places.size and places[at] < first + count:
+                    found.update(host.split(HOSTS_BETWEEN))
+        return found
 
 
 class _Spans:
@@ -170,7 +191,7 @@ def _find(connection: sa.Connection, spans: _Spans, study: Study, kin: str, numb
     for candidate in spans.candidates(connection, wanted, kin, number):
         source = connection.execute(
             sa.select(*_SOURCE).where(
-                c.number == candidate, c.done > 0, c.deleted_at.is_(None), c.fingerprint == fingerprint.digest()
+                c.number == candidate, c.done > 0, c.deleted_at.is_(None), c.fingerprint.in_([fingerprint.digest(), ""])
             )
         ).one_or_none()
         if source is None:
@@ -205,15 +226,17 @@ def _find(connection: sa.Connection, spans: _Spans, study: Study, kin: str, numb
 
 
 def _has_rows(connection: sa.Connection, source: sa.Row[Any], study: Study, cases: Cases) -> NDArray[np.bool_]:
-    """Which cases of a study have rows with results."""
+    """Which cases of a study have rows with results that were computed under the fingerprint of this process."""
     stored = np.ones(cases.size, dtype=np.bool_)
     if not cases.size:
         return stored
     c = CHUNKS.c
-    if source.state not in {StudyState.FINISHED.value, StudyState.FAILED.value}:
+    if source.state not in {StudyState.FINISHED.value, StudyState.FAILED.value} or not source.fingerprint:
+        # Chunks from before revision 0022 have none of their own.
+        alike = sa.func.coalesce(c.fingerprint, source.fingerprint) == fingerprint.digest()
         done = connection.execute(
             sa.select(c["first"], c["count"])
-            .where(c.study == source.number, c.state == ChunkState.DONE)
+            .where(c.study == source.number, c.state == ChunkState.DONE, alike)
             .order_by(c["first"])
         ).all()
         if not done:
@@ -241,8 +264,8 @@ def mark_origin(connection: sa.Connection, number: int) -> None:
     origin, warnings = connection.execute(sa.select(STUDIES.c.fingerprint, STUDIES.c.warnings).where(this)).one()
     if origin is None:
         connection.execute(sa.update(STUDIES).where(this).values(fingerprint=fingerprint.digest()))
-    elif origin != fingerprint.digest() and _MIXED not in (told := read_warnings(warnings)):
-        values = {"fingerprint": "", "warnings": write_warnings([*told, _MIXED])}
+    elif origin != fingerprint.digest() and _MIXED not in (earlier := read_warnings(warnings)):
+        values = {"fingerprint": "", "warnings": write_warnings([*earlier, _MIXED])}
         connection.execute(sa.update(STUDIES).where(this).values(values))
 
 

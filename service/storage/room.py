@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 
 import sqlalchemy as sa
 
+from sprag.service.languages import recorded
+from sprag.service.storage.dispatchers import Dispatchers, return_claims
 from sprag.service.storage.errors import DatabaseFullError
-from sprag.service.storage.part import Part
 from sprag.service.storage.private_files import create_private
 from sprag.service.storage.tables import STUDIES, WAITS_FOR_ROOM
-from sprag.service.storage.work import return_claims
 from sprag.worker.states import GOING, StudyEvent
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ RESERVE_BYTES = 4 * 1024 * 1024
 RESERVE_FILE_BYTES = 1024 * 1024
 #: Value for unknown free space: enough for any request.
 UNKNOWN_BYTES = 1 << 62
-GOES_ON = "the study continues when there is room"
+GOES_ON = recorded.NO_ROOM.rpartition("; ")[2]
 
 
 def room(session: Session) -> tuple[int, str]:
@@ -48,8 +48,8 @@ def room(session: Session) -> tuple[int, str]:
     free = shutil.disk_usage(session.path.parent).free
     limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
     size, log = _size(session.path), _size(session.path.with_name(f"{session.path.name}-wal"))
-    disk = f"the disk that holds {session.path} has {free / 1e6:.3g} MB left"
-    limited = f"files cannot grow beyond {limit / 1e6:.3g} MB here (ulimit -f)"
+    disk = recorded.DISK.format(path=session.path, free=f"{free / 1e6:.3g}")
+    limited = recorded.LARGEST_FILE.format(size=f"{limit / 1e6:.3g}")
     capped = limit != resource.RLIM_INFINITY
     if free >= RESERVE_BYTES and not (capped and limit - size - log < RESERVE_BYTES):
         return (limit - size - log, limited) if capped and limit - size - log < free else (free, disk)
@@ -81,7 +81,7 @@ def _within(session: Session) -> tuple[int, int]:
     return unused * page, (logged * page if logged == moved else 0)
 
 
-class Room(Part):
+class Room(Dispatchers):
     """Studies held while the disk is full. Part of `sprag.worker.ports.Store`."""
 
     def room(self) -> int:
@@ -92,7 +92,7 @@ class Room(Part):
         """Why there is no room for more rows, as a sentence; None where there is room."""
         left, limit = room(self.session)
         if left < RESERVE_BYTES:
-            return f"no room: {limit}; {GOES_ON}"
+            return recorded.NO_ROOM.format(limit=limit)
         self._keep_reserve()
         return None
 
@@ -109,7 +109,7 @@ class Room(Part):
             os.fsync(file.fileno())
 
     def hold(self, epoch: int, reason: str, *, returned: bool) -> None:
-        """Pause every study that is queued or running, with the reason, until `let_go`.
+        """Pause every study of this dispatcher or of none that is queued or running, with the reason, until `let_go`.
 
         With ``returned`` every claim of this epoch goes back to waiting in the same transaction.
         """
@@ -125,16 +125,20 @@ class Room(Part):
         with self.session.write() as connection:
             self._own(connection, epoch)
             if returned:
-                return_claims(connection)
-            numbers = connection.execute(sa.select(STUDIES.c.number).where(STUDIES.c.state.in_(GOING))).scalars().all()
+                return_claims(connection, epoch)
+            ours = sa.func.coalesce(STUDIES.c.dispatcher, epoch) == epoch
+            going = sa.select(STUDIES.c.number).where(STUDIES.c.state.in_(GOING), ours)
+            numbers = connection.execute(going).scalars().all()
             for number in numbers:
                 self._move(connection, number, StudyEvent.FAULT, reason)
-                self._change(connection, number, waits_for=WAITS_FOR_ROOM)
+                self._change(connection, number, waits_for=WAITS_FOR_ROOM, dispatcher=epoch)
 
     def let_go(self, epoch: int) -> None:
         """Queue again every study that `hold` paused and nobody has changed since."""
         with self.session.write() as connection:
             self._own(connection, epoch)
-            numbers = connection.execute(sa.select(STUDIES.c.number).where(STUDIES.c.waits_for == WAITS_FOR_ROOM))
+            ours = sa.func.coalesce(STUDIES.c.dispatcher, epoch) == epoch
+            held = sa.select(STUDIES.c.number).where(STUDIES.c.waits_for == WAITS_FOR_ROOM, ours)
+            numbers = connection.execute(held)
             for number in numbers.scalars().all():
                 self._move(connection, number, StudyEvent.RESUME)

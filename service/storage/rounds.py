@@ -62,8 +62,7 @@ class Rounds(Studies, Cases, Work):
         sizes = list(spans(count, self.chunking.cases_of(study, count)))
         text = study.to_text()
         with self.session.write() as connection:
-            self._own(connection, epoch)
-            if not _needs_round(connection, number, first):
+            if not self._may_change(connection, epoch, number) or not _needs_round(connection, number, first):
                 return None
             add_round(connection, number, first, count, summary, self._now())
             chunks = [Chunk(number, first + start, size) for start, size in sizes]

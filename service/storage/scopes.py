@@ -1,6 +1,10 @@
-"""Scopes of tokens, apart from their storage, so that the command line starts without the database."""
+"""Scopes of tokens and names of users, apart from their storage, so that the command line starts without it."""
 
 from enum import StrEnum
+from typing import Final
+
+#: Most characters in the name of a user.
+MAX_USER_NAME: Final = 80
 
 
 class TokenScope(StrEnum):

@@ -16,13 +16,14 @@ from sqlalchemy.engine import URL, make_url
 
 from sprag.service.storage import sqlite_files
 from sprag.service.storage.errors import DatabaseError, EndingError, busy
-from sprag.service.storage.lock import DispatcherLock
+from sprag.service.storage.file_news import FileNews
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator
     from types import ModuleType
 
-    from sprag.service.storage.lock import OneHolder
+    from sprag.service.storage.rows import Block, Target
+    from sprag.service.storage.server_lock import ServerLock
     from sprag.worker.ports import News
 
 #: Seconds a connection waits for another writer before it gives up.
@@ -177,12 +178,10 @@ class Session:
         except sa.exc.DBAPIError as error:
             raise self._explained(error) from error
 
-    def insert_rows(
-        self, connection: sa.Connection, table: str, columns: Sequence[str], rows: Sequence[tuple[Any, ...]]
-    ) -> None:
-        """Insert rows into one of our own tables, bypassing SQLAlchemy for speed."""
-        insert = _postgres().copy_in if self.on_server else sqlite_files.insert_rows
-        insert(connection, table, columns, rows)
+    def insert_blocks(self, connection: sa.Connection, place: Target, blocks: Iterable[Block]) -> None:
+        """Insert rows of finished chunks, bypassing SQLAlchemy for speed."""
+        insert = _postgres().copy_blocks if self.on_server else sqlite_files.insert_blocks
+        insert(connection, place, blocks)
 
     @contextmanager
     def plain(self) -> Iterator[sa.Connection]:
@@ -194,14 +193,16 @@ class Session:
         except sa.exc.DBAPIError as error:
             raise self._explained(error) from error
 
-    def server_lock(self, owner: str) -> OneHolder:
-        """The dispatcher's lock of a database on a server, for ``owner`` (a name for people)."""
-        lock: OneHolder = _postgres().ServerLock(self.url, owner, BUSY_SECONDS)
-        return lock
+    def server_lock(self, owner: str) -> ServerLock:
+        """The presence of the dispatcher ``owner`` (a name for people) on a database server."""
+        _postgres()
+        from sprag.service.storage.server_lock import ServerLock
 
-    def news(self) -> News | None:
-        """Notifications of changes; None where the database must be polled."""
-        news: News | None = _postgres().News(self.url, BUSY_SECONDS) if self.on_server else None
+        return ServerLock(self.url, owner, BUSY_SECONDS)
+
+    def news(self) -> News:
+        """Notifications of changes."""
+        news: News = _postgres().News(self.url, BUSY_SECONDS) if self.on_server else FileNews(self.path)
         return news
 
     def _explained(self, error: sa.exc.DBAPIError) -> Exception:
@@ -230,8 +231,3 @@ def _begin(connection: sa.Connection) -> None:
     # transaction once another process has written in between, so writers take the lock when they begin.
     if statement := connection.get_execution_options().get(_BEGIN):
         connection.exec_driver_sql(statement)
-
-
-def lock_of(session: Session, owner: str) -> OneHolder:
-    """The dispatcher's lock of a database: a file beside an SQLite file, an advisory lock of a server."""
-    return session.server_lock(owner) if session.on_server else DispatcherLock(session.path)

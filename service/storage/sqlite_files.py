@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from contextlib import suppress
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -11,12 +12,15 @@ import sqlalchemy as sa
 
 from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError, busy
 from sprag.service.storage.private_files import PRIVATE_FOLDER_MODE, create_private
+from sprag.service.storage.rows import tuples
 from sprag.worker.ports import StoreError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable
 
     from sqlalchemy.engine import URL
+
+    from sprag.service.storage.rows import Block, Target
 
 #: Older libraries can corrupt a write-ahead log that several connections share.
 SAFE_SQLITE: Final = (3, 51, 3)
@@ -231,7 +235,16 @@ class DatabaseFile:
         return DatabaseError(self.damage, "database-damaged")
 
 
-def insert_rows(connection: sa.Connection, table: str, columns: Sequence[str], rows: Sequence[tuple[Any, ...]]) -> None:
-    """Insert rows into one of our own tables; they go past SQLAlchemy for speed."""
-    marks = ", ".join("?" * len(columns))
-    connection.exec_driver_sql(f"INSERT INTO {table} ({', '.join(columns)}) VALUES ({marks})", list(rows))  # noqa: S608
+def insert_blocks(connection: sa.Connection, place: Target, blocks: Iterable[Block]) -> None:
+    """Insert rows; the driver takes one after the other, so that they are never all in memory as Python's numbers.
+
+    Raises sqlalchemy.exc.DBAPIError.
+    """
+    marks = ", ".join("?" * len(place.columns))
+    statement = f"INSERT INTO {place.table} ({', '.join(place.columns)}) VALUES ({marks})"  # noqa: S608
+    driver = connection.connection.driver_connection
+    assert driver is not None
+    try:
+        driver.executemany(statement, chain.from_iterable(map(tuples, blocks)))
+    except sqlite_driver().Error as error:
+        raise sa.exc.DBAPIError(statement, None, error) from error

@@ -5,13 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Self
 
 from sprag.service.storage import maintenance
+from sprag.service.storage.audit import Audit
 from sprag.service.storage.columns import WholeColumns
+from sprag.service.storage.components import Components
 from sprag.service.storage.figures import Totals
+from sprag.service.storage.labelling import Labelling
+from sprag.service.storage.late_runs import LateRuns
+from sprag.service.storage.origins import Origins
 from sprag.service.storage.part import SystemClock
 from sprag.service.storage.purging import Purging
 from sprag.service.storage.retry import Retries
 from sprag.service.storage.room import Room
 from sprag.service.storage.rounds import Rounds
+from sprag.service.storage.saved_views import SavedViews
 from sprag.service.storage.schedules import Schedules
 from sprag.service.storage.session import Session
 from sprag.service.storage.sessions import Sessions
@@ -26,7 +32,23 @@ if TYPE_CHECKING:
     from sprag.worker.ports import Clock
 
 
-class Store(Rounds, WholeColumns, Purging, Retries, Room, Schedules, Sessions, Tokens, Totals):
+class Store(
+    Labelling,
+    Rounds,
+    WholeColumns,
+    Purging,
+    Retries,
+    Room,
+    Schedules,
+    Sessions,
+    Tokens,
+    Audit,
+    Totals,
+    Origins,
+    LateRuns,
+    Components,
+    SavedViews,
+):
     """One database. Safe to use from several threads; close it at the end (it is a context manager)."""
 
     @classmethod

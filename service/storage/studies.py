@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 from cachetools import LRUCache
 
+from sprag.service.actor import acting
+from sprag.service.languages import recorded
+from sprag.service.storage.audit import note, require_own
+from sprag.service.storage.dispatchers import Dispatchers
 from sprag.service.storage.errors import (
     IdempotencyConflictError,
-    PageTokenError,
-    StudyBusyError,
     StudyEndedError,
-    StudyNotFoundError,
 )
 from sprag.service.storage.order import Orders
 from sprag.service.storage.part import (
-    MAX_INTEGER,
     SILENT_SECONDS,
     add_chunks,
     announce,
@@ -31,20 +31,21 @@ from sprag.service.storage.part import (
     optional_moment,
 )
 from sprag.service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
-from sprag.service.storage.records import Progress, RoundProgress, StudyPage, StudyRecord, record_of
+from sprag.service.storage.records import Progress, RoundProgress, StudyRecord, record_of
 from sprag.service.storage.round_table import add_round, latest_round
-from sprag.service.storage.schedules import lift_window
+from sprag.service.storage.searching import search_text
 from sprag.service.storage.study_row import study_row
 from sprag.service.storage.tables import (
     CHUNKS,
     COARSE_TO_FINE,
-    DISPATCHER,
     ENDINGS,
     HELD_AT_DEADLINE,
     IDEMPOTENCY_KEYS,
     RECORD_COLUMNS,
     STUDIES,
 )
+from sprag.service.storage.users import Users
+from sprag.service.storage.windows import lift_window
 from sprag.worker import models
 from sprag.worker.chunking import Chunking, spans
 from sprag.worker.limits import MAX_AXIS_VALUES
@@ -59,18 +60,18 @@ if TYPE_CHECKING:
     from sprag.service.storage.session import Session
     from sprag.worker.ports import Clock
 
-MAX_PAGE = 1000
 #: Studies kept in memory after reading, and the total number of their axis values, 8 bytes each.
 KEPT_STUDIES = 32
 KEPT_VALUES = 2 * MAX_AXIS_VALUES
+_CHANGED = (STUDIES.c.owner, STUDIES.c.revision)
 
 
-class Studies(Orders):
+class Studies(Users, Orders, Dispatchers):
     """Studies as the service sees them."""
 
     def __init__(self, session: Session, clock: Clock, chunking: Chunking) -> None:
         super().__init__(session, clock)
-        self.chunking = chunking
+        self.base_chunking = chunking
         # Each counts at least as its share of the number of studies.
         self._studies: LRUCache[str, Study] = LRUCache(
             KEPT_VALUES, lambda study: max(_values(study), KEPT_VALUES // KEPT_STUDIES)
@@ -130,6 +131,8 @@ class Studies(Orders):
             # The cases of a round are in order of their value already.
             "coarse": row["coarse"] or COARSE_TO_FINE * (finish_by is not None and row["most_cases"] is None),
             "revision": 1,
+            "owner": acting().user,
+            "search": search_text(row["name"]),
             "created_at": self._now(),
         }
         with self.session.write() as connection:
@@ -137,6 +140,7 @@ class Studies(Orders):
                 earlier = _study_of_key(connection, idempotency_key, body_hash)
                 if earlier is not None:
                     return earlier
+            self._require_quota(connection, row["most_cases"] or row["cases"], row.get("estimated_bytes") or 0)
             number = connection.execute(sa.insert(STUDIES).values(values).returning(STUDIES.c.number)).scalar_one()
             if row["most_cases"] is not None:
                 add_round(connection, number, 0, row["cases"], {}, values["created_at"])
@@ -148,6 +152,7 @@ class Studies(Orders):
                     )
                 )
             announce(connection)
+            note(connection, values["created_at"], "study.create", values["id"], name=row["name"], cases=row["cases"])
             written = connection.execute(sa.select(*RECORD_COLUMNS).where(STUDIES.c.number == number)).one()
             return self._with_silence(connection, record_of(written))
 
@@ -163,14 +168,13 @@ class Studies(Orders):
         """The study; where its worker is silent and cannot record a reason itself, with that reason."""
         if record.reason is not None or not record.state.going:
             return record
-        row = connection.execute(sa.select(DISPATCHER.c.owner, DISPATCHER.c.heartbeat_at)).one_or_none()
+        row = self._dispatcher_of(connection, record.number)
         if row is None or self.clock.now() - moment(row.heartbeat_at) <= timedelta(seconds=SILENT_SECONDS):
             return record
         since = moment(row.heartbeat_at).isoformat(timespec="seconds")
         return replace(
             record,
-            reason=f"the worker (process {row.owner}) has not responded since {since}; the study continues when "
-            "a worker is at work",
+            reason=recorded.SILENT.format(process=row.owner, since=since),
         )
 
     def spec(self, study_id: str) -> dict[str, Any]:
@@ -180,20 +184,19 @@ class Studies(Orders):
         return spec
 
     def study(self, study_id: str) -> Study:
-        """The study in SI numbers; raises StudyNotFoundError.
+        """The study in SI numbers, with its present name; raises StudyNotFoundError.
 
-        Some are kept in memory, because they change only by further rounds.
+        Some are kept in memory, because they change only by further rounds, and by another name.
         """
         with self._lock:
             kept = self._studies.get(study_id)
-        if kept is not None and kept.plan is not None:
-            with self.session.read() as connection:
-                if self._row(connection, study_id, STUDIES.c.cases).cases != kept.cases:
-                    with self._lock:
-                        self._studies.pop(study_id, None)
-                    kept = None
         if kept is not None:
-            return kept
+            with self.session.read() as connection:
+                now = self._row(connection, study_id, STUDIES.c.cases, STUDIES.c.name)
+            if (now.cases, now.name) == (kept.cases, kept.name):
+                return kept
+            with self._lock:
+                self._studies.pop(study_id, None)
         with self._reading:  # one long study at a time, read once for all who wait for it
             return self._read_study(study_id)
 
@@ -202,28 +205,11 @@ class Studies(Orders):
             if study_id in self._studies:
                 return self._studies[study_id]
         with self.session.read() as connection:
-            text = self._row(connection, study_id, STUDIES.c.study).study
-        study = Study.from_text(text)
+            row = self._row(connection, study_id, STUDIES.c.study, STUDIES.c.name)
+        study = replace(Study.from_text(row.study), name=row.name)
         with self._lock, suppress(ValueError):  # too large for the cache
             self._studies[study_id] = study
         return study
-
-    def list_studies(
-        self, page_size: int = 50, page_token: str | None = None, state: StudyState | None = None
-    ) -> StudyPage:
-        """A page of studies, newest first. ``page_token`` comes from the previous page; raises PageTokenError for any
-        other.
-        """
-        size = min(max(page_size, 1), MAX_PAGE)
-        query = sa.select(*RECORD_COLUMNS).where(STUDIES.c.deleted_at.is_(None))
-        if page_token is not None:
-            query = query.where(STUDIES.c.number < min(_number_of(page_token), MAX_INTEGER))
-        if state is not None:
-            query = query.where(STUDIES.c.state == state.value)
-        with self.session.read() as connection:
-            rows = connection.execute(query.order_by(STUDIES.c.number.desc()).limit(size + 1)).all()
-            records = tuple(self._with_silence(connection, record_of(row)) for row in rows[:size])
-        return StudyPage(records, str(records[-1].number) if len(rows) > size else None)
 
     def waiting_studies(self) -> int:
         """Number of studies that have not ended, except those held at their deadline."""
@@ -296,7 +282,8 @@ class Studies(Orders):
 
     def _wish(self, study_id: str, event: StudyEvent) -> StudyRecord:
         with self.session.write() as connection:
-            row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.waits_for)
+            row = self._row(connection, study_id, STUDIES.c.number, *_CHANGED, STUDIES.c.waits_for)
+            require_own("study", study_id, row.owner)
             self._move(connection, row.number, event)
             if event is StudyEvent.RESUME:
                 self._lift_deadline(connection, row.number)
@@ -304,7 +291,7 @@ class Studies(Orders):
             # It was paused, but not by the user.
             if event is StudyEvent.PAUSE and row.waits_for not in {None, HELD_AT_DEADLINE}:
                 self._change(connection, row.number, waits_for=None, reason=None)
-            return self._study_record(connection, study_id)
+            return self._noted(connection, study_id, row, f"study.{event.value}")
 
     def prioritize_study(self, study_id: str, priority: int) -> StudyRecord:
         """Change the priority of the study: among waiting studies the highest runs first.
@@ -312,13 +299,23 @@ class Studies(Orders):
         Raises StudyNotFoundError, and StudyEndedError where the study has ended.
         """
         with self.session.write() as connection:
-            row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.state)
+            row = self._row(connection, study_id, STUDIES.c.number, *_CHANGED, STUDIES.c.state)
+            require_own("study", study_id, row.owner)
             number, state = row.number, StudyState(row.state)
             if state.terminal:
                 raise StudyEndedError(f"the study {study_id} is {state.value}: its priority no longer matters")
             self._change(connection, number, STUDIES.c.priority != priority, priority=priority)
             announce(connection)
-            return self._study_record(connection, study_id)
+            return self._noted(connection, study_id, row, "study.prioritize", priority=priority)
+
+    def _noted(
+        self, connection: sa.Connection, study_id: str, before: sa.Row[Any], action: str, **detail: Any
+    ) -> StudyRecord:
+        """The study after ``action``, which the log has where it changed something."""
+        record = self._study_record(connection, study_id)
+        if record.revision != before.revision:
+            note(connection, self._now(), action, study_id, **detail)
+        return record
 
     def study_of_key(self, idempotency_key: str, body_hash: str | None) -> StudyRecord | None:
         """The study that was submitted with that key; ``body_hash`` None stands for any body.
@@ -327,39 +324,6 @@ class Studies(Orders):
         """
         with self.session.read() as connection:
             return _study_of_key(connection, idempotency_key, body_hash)
-
-    def delete_study(self, study_id: str) -> None:
-        """Delete a study that has ended or is held at its deadline.
-
-        Raises StudyNotFoundError, or StudyBusyError for any other study.
-
-        The study is invisible when this returns; `Purging.purge_steps` removes its rows later.
-        """
-        with self.session.write() as connection:
-            row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.state, STUDIES.c.waits_for)
-            state = StudyState(row.state)
-            if not state.terminal and row.waits_for != HELD_AT_DEADLINE:
-                raise StudyBusyError(f"the study {study_id} is {state.value}: cancel it before it is deleted")
-            for table in (ENDINGS, IDEMPOTENCY_KEYS):
-                connection.execute(sa.delete(table).where(table.c.study == row.number))
-            connection.execute(sa.update(STUDIES).where(STUDIES.c.number == row.number).values(deleted_at=self._now()))
-        self.deleted.set()
-
-    def prune(self, ended_before: datetime, *, dry: bool = False) -> list[str]:
-        """Delete every study that ended, or was held at its deadline, before ``ended_before``; returns their ids.
-
-        ``dry``: only return the ids.
-        """
-        c = STUDIES.c
-        ended = c.state.in_([state.value for state in TERMINAL]) & (c.finished_at < micros_of(ended_before))
-        over = (c.waits_for == HELD_AT_DEADLINE) & (c.finish_by < micros_of(ended_before))
-        old = (ended | over) & c.deleted_at.is_(None)
-        with self.session.read() as connection:
-            found = list(connection.execute(sa.select(c.id).where(old).order_by(c.number)).scalars())
-        for study_id in () if dry else found:
-            with suppress(StudyNotFoundError, StudyBusyError):  # somebody else has deleted it or runs it again
-                self.delete_study(study_id)
-        return found
 
 
 def _values(study: Study) -> int:
@@ -379,9 +343,3 @@ def _study_of_key(connection: sa.Connection, key: str, body_hash: str | None) ->
             f"the idempotency key {key!r} was already used with another body or other parameters"
         )
     return record_of(row)
-
-
-def _number_of(token: str) -> int:
-    if not (token.isascii() and token.isdigit() and len(token) < 19):
-        raise PageTokenError(f"{token[:40]!r} is not a page token of this list")
-    return int(token)

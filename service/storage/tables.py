@@ -9,7 +9,7 @@ from sprag.worker import models
 from sprag.worker.states import ChunkState
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0020"
+HEAD_REVISION = "0031"
 
 METADATA = sa.MetaData(
     naming_convention={
@@ -44,7 +44,7 @@ STUDIES = sa.Table(
     sa.Column("created_at", sa.BigInteger, nullable=False),
     sa.Column("started_at", sa.BigInteger),
     sa.Column("finished_at", sa.BigInteger),
-    # Set when a study is deleted; its rows are then removed in short transactions, and this row last.
+    # Set when a study is deleted; after `purge_at` its rows are removed in short transactions, and this row last.
     sa.Column("deleted_at", sa.BigInteger),
     # The study with the higher priority runs first.
     sa.Column("priority", sa.Integer, nullable=False, server_default="0"),
@@ -67,6 +67,22 @@ STUDIES = sa.Table(
     # Of a study that chooses its own cases: more cases and rounds than this it never has; NULL for any other.
     sa.Column("most_cases", sa.Integer),
     sa.Column("most_rounds", sa.Integer),
+    # Name of the user to whom it belongs; NULL: to nobody, so every designer may change it.
+    sa.Column("owner", sa.String(80), index=True),
+    # Rough size of its results, for the quota of its owner; NULL: unknown.
+    sa.Column("estimated_bytes", sa.BigInteger),
+    # What people write about it; tags one after the other, each between line feeds ("" where there are none).
+    sa.Column("notes", sa.Text, nullable=False, server_default=""),
+    sa.Column("tags", sa.Text, nullable=False, server_default=""),
+    # Set while it is kept out of the usual list.
+    sa.Column("archived_at", sa.BigInteger),
+    # Until then a deleted study can be restored; 0, or NULL in those deleted before revision 0023: its rows are being
+    # removed.
+    sa.Column("purge_at", sa.BigInteger),
+    # Name, tags and notes as they are searched (`sprag.service.storage.searching`).
+    sa.Column("search", sa.Text, nullable=False, server_default=""),
+    # Epoch of the dispatcher to which it belongs; NULL: to none, so any of them may take it.
+    sa.Column("dispatcher", sa.Integer),
     sqlite_autoincrement=True,
 )
 
@@ -82,12 +98,12 @@ HELD_AT_DEADLINE = "deadline"
 #: Values of `STUDIES.c.coarse` of studies that are not run in the order of their case numbers.
 COARSE_TO_FINE, LINE_BY_LINE = 1, 2
 
-#: The columns of a `StudyRecord`, without the long texts.
-RECORD_COLUMNS = tuple(
-    column
-    for column in STUDIES.c
-    if column.name not in {"spec", "study", "deleted_at", "kin_hash", "fresh", "fingerprint"}
+#: Long texts, and what only the storage needs.
+_BESIDE = frozenset(
+    {"spec", "study", "search", "deleted_at", "kin_hash", "fresh", "fingerprint", "estimated_bytes", "dispatcher"}
 )
+#: The columns of a `StudyRecord`.
+RECORD_COLUMNS = tuple(column for column in STUDIES.c if column.name not in _BESIDE)
 
 _CHUNK_STATE = sa.Enum(ChunkState, native_enum=False, length=8, values_callable=lambda states: list(map(str, states)))
 
@@ -104,6 +120,10 @@ CHUNKS = sa.Table(
     sa.Column("detail", sa.Text),
     sa.Column("claimed_at", sa.BigInteger),
     sa.Column("finished_at", sa.BigInteger),
+    # Host and fingerprint of the process that computed its rows; NULL: no rows yet, or from before revision 0022. Of
+    # rows copied from other studies the hosts there, several with commas between them.
+    sa.Column("host", sa.String(255)),
+    sa.Column("fingerprint", sa.String(64)),
     sa.Index("ix_chunks_study_state_finished_at", "study", "state", "finished_at"),
     sqlite_with_rowid=False,
 )
@@ -141,17 +161,30 @@ IDEMPOTENCY_KEYS = sa.Table(
     sa.Column("created_at", sa.BigInteger, nullable=False),
 )
 
-#: One row: the latest epoch and its owner.
-DISPATCHER = sa.Table(
-    "dispatcher",
+#: Starts of dispatchers: those at work, and the last one.
+DISPATCHERS = sa.Table(
+    "dispatchers",
     METADATA,
-    sa.Column("id", sa.Integer, primary_key=True, autoincrement=False),
-    sa.Column("epoch", sa.Integer, nullable=False),
+    sa.Column("epoch", sa.Integer, primary_key=True, autoincrement=False),
     sa.Column("owner", sa.Text, nullable=False),
+    # Of its process and its workers (`sprag.worker.fingerprint`); "": from before revision 0028.
+    sa.Column("fingerprint", sa.String(64), nullable=False),
     sa.Column("started_at", sa.BigInteger, nullable=False),
     sa.Column("heartbeat_at", sa.BigInteger, nullable=False),
-    # The last time at which the clock was trusted; NULL before the first check.
+    # When it ended or was found to be gone; NULL while it is at work.
+    sa.Column("ended_at", sa.BigInteger),
+    # The last time at which the clock was trusted, the same in all rows; NULL before the first check.
     sa.Column("clock_at", sa.BigInteger),
+    # What it last reported of its workers, as JSON data (`sprag.worker.reports`); NULL before its first heartbeat.
+    sa.Column("report", sa.Text),
+)
+
+#: What a fingerprint says, by its digest in chunks and dispatchers; none of versions before revision 0031.
+FINGERPRINTS = sa.Table(
+    "fingerprints",
+    METADATA,
+    sa.Column("digest", sa.String(64), primary_key=True),
+    sa.Column("content", sa.Text, nullable=False),
 )
 
 #: Held while a table of results is defined: the first requests of a service ask for the same one at the same time.

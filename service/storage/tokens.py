@@ -12,12 +12,15 @@ from typing import TYPE_CHECKING, Final
 
 import sqlalchemy as sa
 
+from sprag.service.storage.audit import note
 from sprag.service.storage.errors import TokenNotFoundError
-from sprag.service.storage.part import Part, moment, optional_moment
+from sprag.service.storage.part import Part, micros_of, moment, optional_moment
 from sprag.service.storage.scopes import TokenScope
 from sprag.service.storage.tables import METADATA
+from sprag.service.storage.users import require_user
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from datetime import datetime
     from typing import Any
 
@@ -36,13 +39,22 @@ TOKENS = sa.Table(
     sa.Column("created_at", sa.BigInteger, nullable=False),
     # Revoked tokens stay listed, so a service that ever had a token never becomes open again.
     sa.Column("revoked_at", sa.BigInteger),
+    # Name of the user whose token it is; NULL: nobody's.
+    sa.Column("owner", sa.String(80)),
+    # NULL: it never expires.
+    sa.Column("expires_at", sa.BigInteger),
+    # The last use, to the minute; NULL: never used.
+    sa.Column("used_at", sa.BigInteger),
     sqlite_autoincrement=True,
 )
 
 
 @dataclass(frozen=True, slots=True)
 class TokenRecord:
-    """A token without its secret; ``digest`` is the SHA-256 of the secret in hexadecimal digits."""
+    """A token without its secret; ``digest`` is the SHA-256 of the secret in hexadecimal digits.
+
+    ``owner`` is the user whose token it is, None for nobody's; ``used_at`` the time of its last use, to the minute.
+    """
 
     id: str
     name: str
@@ -50,6 +62,13 @@ class TokenRecord:
     digest: str
     created_at: datetime
     revoked_at: datetime | None
+    owner: str | None = None
+    expires_at: datetime | None = None
+    used_at: datetime | None = None
+
+    def valid_at(self, now: datetime) -> bool:
+        """Whether the token is neither revoked nor expired."""
+        return self.revoked_at is None and (self.expires_at is None or now < self.expires_at)
 
 
 def digest_of(token: bytes) -> str:
@@ -60,8 +79,13 @@ def digest_of(token: bytes) -> str:
 class Tokens(Part):
     """The tokens of a database."""
 
-    def create_token(self, name: str, scope: TokenScope) -> tuple[str, TokenRecord]:
-        """Create a token; returns its secret, which cannot be shown again, and its record."""
+    def create_token(
+        self, name: str, scope: TokenScope, *, owner: str | None = None, expires_at: datetime | None = None
+    ) -> tuple[str, TokenRecord]:
+        """Create a token; returns its secret, which cannot be shown again, and its record.
+
+        ``owner`` is the user whose token it is; raises UserNotFoundError.
+        """
         secret = TOKEN_PREFIX + secrets.token_urlsafe(_TOKEN_BYTES)
         values = {
             "id": f"tk_{secrets.token_hex(6)}",
@@ -69,8 +93,14 @@ class Tokens(Part):
             "scope": scope.value,
             "digest": digest_of(secret.encode("ascii")),
             "created_at": self._now(),
+            "owner": owner,
+            "expires_at": None if expires_at is None else micros_of(expires_at),
         }
         with self.session.write() as connection:
+            if owner is not None:
+                require_user(connection, owner)
+            said = {"name": name, "scope": scope.value, "owner": owner}
+            note(connection, self._now(), "token.create", str(values["id"]), **said)
             row = connection.execute(sa.insert(TOKENS).values(values).returning(TOKENS)).one()
         return secret, _record(row)
 
@@ -91,10 +121,26 @@ class Tokens(Part):
             ).one_or_none()
             if row is None:
                 raise TokenNotFoundError(token_id)
+            note(connection, self._now(), "token.revoke", token_id, name=row.name, owner=row.owner)
             return _record(row)
+
+    def note_uses(self, uses: Mapping[str, int]) -> None:
+        """Record when tokens were last used: µs since 1970 by id."""
+        with self.session.write() as connection:
+            for token_id, used in uses.items():
+                later = TOKENS.c.used_at.is_(None) | (TOKENS.c.used_at < used)
+                connection.execute(sa.update(TOKENS).where(TOKENS.c.id == token_id, later).values(used_at=used))
 
 
 def _record(row: Any) -> TokenRecord:
     return TokenRecord(
-        row.id, row.name, TokenScope(row.scope), row.digest, moment(row.created_at), optional_moment(row.revoked_at)
+        row.id,
+        row.name,
+        TokenScope(row.scope),
+        row.digest,
+        moment(row.created_at),
+        optional_moment(row.revoked_at),
+        row.owner,
+        optional_moment(row.expires_at),
+        optional_moment(row.used_at),
     )

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
+from sprag.service.storage.dispatchers import CLAIMED
 from sprag.service.storage.owners import run_owner
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import CHUNKS
-from sprag.service.storage.work import CLAIMED
 from sprag.worker.ports import Chunk, EpochLostError
 from sprag.worker.states import StudyState
 from tests.contract.filling import SPEC, create, finish
@@ -65,7 +65,7 @@ def test_a_new_epoch_takes_over_and_the_old_one_can_do_nothing(store: Store) -> 
         lambda: store.hold(old, "no room", returned=False),
         lambda: store.let_go(old),
         lambda: store.settle(old, record.number),
-        lambda: store.heartbeat(old),
+        lambda: store.heartbeat(old, fakes.report()),
         lambda: store.release(old),
     ):
         with pytest.raises(EpochLostError, match="another dispatcher"):
@@ -108,7 +108,7 @@ def test_a_stale_result_of_a_returned_claim_is_dropped(store: Store) -> None:
     epoch = store.take_over("test")
     chunk = store.open_chunks(record.number)[0]
     store.claim(epoch, [chunk])
-    store.release(epoch)
+    store.begin_again(epoch, record.number)
     assert not store.commit(epoch, chunk, fakes.result(0, 10))
     assert len(store.case_rows(record.id)) == 0
 

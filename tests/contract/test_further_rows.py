@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
+from sprag.service.storage.columns import _records
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import further_table
 from sprag.worker import models
@@ -82,6 +83,15 @@ def test_a_number_chooses_among_the_rows_of_each_case(store: Store) -> None:
     second = store.rows_for_cases(study_id, [2, 0, 1], [SPEED], number=1)
     assert second.endings == [models.OK] * 3
     np.testing.assert_array_equal(second.values[SPEED], [12.0, 10.0, np.nan])
+
+
+def test_a_failure_between_two_rows_of_columns_is_an_error_of_the_database(store: Store) -> None:
+    """Drivers raise errors of their own there, which become DatabaseErrors where the session ends."""
+    query = sa.text("SELECT 1 UNION ALL SELECT abs(-9223372036854775807 - 1)")
+    with store.session.read() as connection:
+        with pytest.raises(sa.exc.DBAPIError):
+            _records(connection, query, np.dtype([("number", np.int64)]))  # type: ignore[arg-type]
+        connection.rollback()
 
 
 def test_rows_of_a_case_are_committed_together(store: Store) -> None:

@@ -86,7 +86,7 @@ def test_columns_are_aligned_with_the_cases_asked_for(store: Store) -> None:
 
 
 def test_many_scattered_cases_are_read_in_several_statements(store: Store) -> None:
-    store.chunking = Chunking(cases=20_000)
+    store.base_chunking = Chunking(cases=20_000)
     record = create(store, 20_000)
     finish(store, record)
     cases = np.random.default_rng(2).permutation(20_000)[:12_000]

@@ -9,6 +9,7 @@ import pytest
 
 from sprag.service.storage import sqlite_files
 from sprag.service.storage.errors import IdempotencyConflictError, PageTokenError, StudyBusyError, StudyNotFoundError
+from sprag.service.storage.listing import StudyFilter
 from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.ports import Chunk
@@ -77,11 +78,14 @@ def test_lists_go_page_by_page_newest_first(store: Store) -> None:
             break
     assert pages == [["study 4", "study 3"], ["study 2", "study 1"], ["study 0"]]
     store.cancel_study(records[2].id)
-    assert [study.name for study in store.list_studies(state=StudyState.CANCELLING).studies] == ["study 2"]
-    assert store.list_studies(2, "1").studies == ()
+    assert [study.name for study in store.list_studies(wanted=StudyFilter(state=StudyState.CANCELLING)).studies] == [
+        "study 2"
+    ]
 
 
-@pytest.mark.parametrize("token", ["", "x", "-1", "1.5", "９", "1" * 40])
+@pytest.mark.parametrize(
+    "token", ["", "x", "-1", "1.5", "９", "1" * 40, "WyJuYW1lIiwiYSIsMV0", "WyJuZXdlc3QiLCIxIiwxXQ"]
+)
 def test_a_token_of_no_page_is_refused(store: Store, token: str) -> None:
     with pytest.raises(PageTokenError):
         store.list_studies(2, token)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import os
 import signal
 import subprocess
@@ -27,7 +28,8 @@ from sprag.service.settings import Settings
 from sprag.service.storage import postgres as storage
 from sprag.service.storage import session as session_module
 from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, SchemaError
-from sprag.service.storage.session import Session, lock_of
+from sprag.service.storage.server_lock import ServerLock
+from sprag.service.storage.session import Session
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import HEAD_REVISION, STUDIES, all_tables
 from sprag.worker import models
@@ -99,7 +101,7 @@ def test_a_server_that_is_not_there_is_told_in_one_line_without_the_password(tmp
         Store.open(url)
     assert "secret" not in str(caught.value)
     assert "\n" not in str(caught.value)
-    lock = storage.ServerLock(storage.checked(sa.make_url(url)), "a", 1.0)
+    lock = ServerLock(storage.checked(sa.make_url(url)), "a", 1.0)
     with refused(DatabaseError, "database-unreachable"):
         lock.take()
 
@@ -175,25 +177,33 @@ def test_one_writer_at_a_time_and_readers_of_one_moment(postgres_url: str, monke
             assert connection.execute(count).scalar_one() == 0
 
 
-def test_one_dispatcher_at_a_time(postgres_url: str) -> None:
+def test_dispatchers_know_of_each_other_by_their_connections(postgres_url: str) -> None:
     with Store.open(postgres_url) as store:
-        first, second, third = (lock_of(store.session, f"host:{number}") for number in (1, 2, 3))
-        assert second.holder() == ""
-        assert first.take()
-        assert first.take()
-        assert not second.take()
-        assert second.holder() == "host:1"
-        first.release()
-        first.release()
-        assert second.take()
-        first.seize()
-        assert first.holder() == "host:1"
-        assert not third.take()
+        first, second, mover = (store.session.server_lock(f"host:{number}") for number in (1, 2, 3))
+        assert (first.take(), first.take(), second.take()) == (True, True, True)
+        first.enter(1)
+        second.enter(2)
+        assert first.present() == second.present() == {1, 2}
+        assert not mover.take_alone()
+        assert mover.holder() == "host:1, host:2"
+        assert first.take_chores()
+        assert not second.take_chores()
+        with refused(DatabaseError, "database-busy"):
+            second.enter(1)
+        second.end([1])
+        assert second.present() == {2}
         with refused(DatabaseError, "database-unreachable"):
-            second.holder()  # its connection was ended
+            first.present()
+        with refused(DatabaseError, "database-unreachable"):  # a new connection, by which nobody knows of it
+            first.present()
+        assert second.take_chores()
         first.release()
         second.release()
-        third.release()
+        assert mover.take_alone()
+        assert not first.take()
+        assert first.holder() == "host:3"
+        mover.release()
+        first.release()
 
 
 def test_news_come_with_every_wish_and_not_without(postgres_url: str) -> None:
@@ -233,10 +243,12 @@ def test_the_service_answers_as_it_does_with_a_file(
         found = service.get(f"/studies/{study}/cases")["cases"]
         assert [row["ending"] for row in found] == rows.endings
         assert found[0]["results"]["shaft.speed.mean"] == rows.values[0, 0]
+        beyond = base64.urlsafe_b64encode(f'["newest",{"9" * 18},{"9" * 18}]'.encode()).decode().rstrip("=")
         for address, status in {
             f"/studies/{study}/results?format=csv": 200,
             f"/studies/{study}/results?format=parquet": 200,
-            "/studies?page_token=" + "9" * 18: 200,
+            f"/studies?page_token={beyond}": 200,
+            "/studies?page_token=" + "9" * 18: 422,
             f"/studies/{study}/cases?page_token=" + "9" * 18: 200,
             f"/studies/{study}/cases?ending=a%00b": 422,
             f"/studies/{study}/cases/999999999999999999": 404,
@@ -274,46 +286,36 @@ def worker(url: str) -> subprocess.Popen[str]:
     return subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
 
 
-def epoch(store: Store) -> int:
-    record = store.dispatcher()
-    return 0 if record is None else record.epoch
-
-
-def test_a_standby_takes_over_when_the_dispatcher_is_killed_or_loses_its_lock(postgres_url: str) -> None:
+def test_workers_share_studies_and_take_over_those_of_one_that_is_killed_or_loses_its_connection(
+    postgres_url: str,
+) -> None:
     with Store.open(postgres_url, chunking=Chunking(cases=4)) as store:
-        workers = [worker(postgres_url)]
+        workers = [worker(postgres_url), worker(postgres_url)]
         try:
-            eventually(lambda: epoch(store) == 1)
-            workers.append(worker(postgres_url))
-            standby = workers[1].stderr
-            assert standby is not None
-            assert f":{workers[0].pid}) is working on postgresql://sprag@/" in standby.readline()
-            record = store.create_study({}, fakes.study(40))
-            eventually(lambda: store.get_study(record.id).done > 0)
+            eventually(lambda: len([record for record in store.dispatchers() if record.usable]) == 2)
+            studies = [store.create_study({}, fakes.study(400, f"{number}"), fresh=True) for number in range(4)]
+            eventually(lambda: {record.studies for record in store.dispatchers()} == {2})
+            eventually(lambda: all(store.get_study(record.id).done for record in studies))
             workers[0].send_signal(signal.SIGKILL)
-            eventually(lambda: epoch(store) == 2)
-            second = store.dispatcher()
-            assert second is not None
-            assert second.owner.endswith(f":{workers[1].pid}")
-            eventually(lambda: store.get_study(record.id).state is StudyState.FINISHED)
-            expected = models.run_chunk(fakes.study(40), 0, 40).values
-            np.testing.assert_array_equal(store.case_rows(record.id).values, expected)
-
-            # Its connection is cut and it does not know: the next one's epoch stops it.
+            eventually(
+                lambda: [record.owner.rpartition(":")[2] for record in store.dispatchers()] == [f"{workers[1].pid}"]
+            )
             workers.append(worker(postgres_url))
-            third = workers[2].stderr
-            assert third is not None
-            assert "waiting for it to stop" in third.readline()
+            eventually(lambda: len(store.dispatchers()) == 2)
+            (lost, _) = store.dispatchers()
+
+            # Its connection is cut and it does not know; it ends when it asks who is there, or is refused.
             with store.session.plain() as connection:
                 connection.exec_driver_sql(
-                    "SELECT pg_terminate_backend(pid) FROM pg_locks WHERE locktype = 'advisory' AND objid = 2 "
+                    "SELECT pg_terminate_backend(pid) FROM pg_locks WHERE locktype = 'advisory' "
+                    f"AND classid = {storage.EPOCHS} AND objid = {lost.epoch} "
                     "AND database = (SELECT oid FROM pg_database WHERE datname = current_database())"
                 )
-            eventually(lambda: epoch(store) == 3)
             assert workers[1].wait(DEADLINE) == 3
-            assert "another dispatcher has taken over" in standby.read()
-            more = store.create_study({}, fakes.study(9), fresh=True)
-            eventually(lambda: store.get_study(more.id).state is StudyState.FINISHED)
+            eventually(lambda: all(store.get_study(record.id).state is StudyState.FINISHED for record in studies))
+            expected = models.run_chunk(fakes.study(400), 0, 400).values
+            for record in studies:
+                np.testing.assert_array_equal(store.case_rows(record.id, limit=400).values, expected)
         finally:
             for process in workers:
                 process.terminate()
@@ -327,10 +329,8 @@ def test_a_standby_takes_over_when_the_dispatcher_is_killed_or_loses_its_lock(po
 #: Takes the dispatcher's lock, begins to write, and stands still.
 STOPPED = """
 import os, signal, sys
-from sprag.service.storage.session import Session, lock_of
+from sprag.service.storage.session import Session
 session = Session(sys.argv[1])
-lock = lock_of(session, "host:1")
-assert lock.take()
 with session.write() as connection:
     print("ready", flush=True)
     os.kill(os.getpid(), signal.SIGSTOP)
@@ -354,7 +354,7 @@ def test_a_worker_that_was_stopped_in_its_transaction_keeps_nobody_from_taking_o
                 WorkerSettings(postgres_url, 1, 60.0), lambda: True, say=said.append,
                 executor=lambda _: InlineExecutor(fakes.run), take_over=True,
             )  # fmt: skip
-            assert said[0] == "the transaction of process host:1 hung and was ended"
+            assert said[0] == "a hung transaction that blocked all others was ended"
             assert store.session.can_write(0.01)
         finally:
             process.kill()

@@ -96,7 +96,7 @@ def test_a_silent_worker_is_told_by_readyz_and_by_studies(
     assert {late.reason, store.prioritize_study(late.id, 1).reason} == {reason}, "in the answers to a change too"
     assert store.pause_study(late.id).reason is None
     assert store.resume_study(late.id).reason == reason
-    store.heartbeat(epoch)
+    store.heartbeat(epoch, fakes.report())
     clock.seconds += 10.0
     assert http.get("/readyz").status_code == 200
     assert store.get_study(study.id).reason is None
@@ -209,7 +209,7 @@ def test_a_worker_that_was_stopped_in_its_transaction_is_ended_by_take_over(
         WorkerSettings(settings.database_url, 1, 60.0), lambda: True, say=said.append,
         executor=lambda _: InlineExecutor(fakes.run), take_over=True,
     )  # fmt: skip
-    assert stopped.wait(60) == -signal.SIGKILL
+    assert stopped.wait(600) == -signal.SIGKILL
     assert said[0] == f"process {stopped.pid} hung and was ended"
     record = store.create_study({}, fakes.study(4))
     assert study(record.id).cases == 4

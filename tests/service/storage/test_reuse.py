@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+import sqlalchemy as sa
 
+from sprag.service.results.exports.source import stored
+from sprag.service.storage.origins import CasesOf
 from sprag.service.storage.part import SystemClock
 from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.store import Store
+from sprag.service.storage.tables import CHUNKS
 from sprag.worker import fingerprint, models
 from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.inline import InlineExecutor
 from sprag.worker.models import ChunkResult, ChunkTask, WarningText
+from sprag.worker.ports import Chunk, Finished
 from sprag.worker.study import Axis, Study
 from tests.worker.fakes import BASE, RUN
 
@@ -155,7 +161,7 @@ def test_rows_of_another_engine_library_or_processor_are_never_taken(
     assert run(store, study, engine).reused == 2
 
 
-def test_a_study_whose_rows_have_several_origins_says_so_and_is_no_source(
+def test_of_a_study_with_several_origins_only_the_rows_of_the_own_one_are_taken(
     store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study, engine = grid([20.0, 25.0], [0.1, 0.3, 0.5]), Engine()
@@ -166,13 +172,29 @@ def test_a_study_whose_rows_have_several_origins_says_so_and_is_no_source(
     store.commit(epoch, first, engine(models.chunk_task(study, first.first, first.count)))
     assert store.get_study(record.id).warnings == ("odd",)
     monkeypatch.setattr(fingerprint, "digest", lambda: "another")
+    monkeypatch.setattr(fingerprint, "own", partial(dict, fingerprint.own(), numpy="0.9"))
     Dispatcher(store, InlineExecutor(engine), SystemClock()).run(lambda: store.get_study(record.id).state.terminal)
     odd, mixed = store.get_study(record.id).warnings
     assert odd == "odd"
     assert isinstance(mixed, WarningText)
     assert mixed.code == "mixed-origins"
-    assert store.reusable(study) == 0
+    assert store.reusable(study) == 2
+    assert run(store, study, engine).reused == 2
+    assert store.reusable(study) == 6
     monkeypatch.undo()
+    own = {origin.fingerprint: (origin.cases, origin.differs) for origin in store.origins(record.id)}
+    assert own == {fingerprint.digest(): (4, None), "another": (2, f"numpy: 0.9 instead of {np.__version__}")}
+    assert stored(store, record, study).about["cases_by_fingerprint"] == [
+        {"fingerprint": fingerprint.digest(), "first": 0, "last": 3},
+        {"fingerprint": "another", "first": 4, "last": 5},
+    ]
+    assert f"2 cases in 1 chunks (numpy: 0.9 instead of {np.__version__})" in store.origins(record.id)[1].sentence
+    assert store.reusable(study) == 4
+    with store.session.write() as connection:
+        connection.execute(sa.update(CHUNKS).where(CHUNKS.c.study == record.number).values(fingerprint="one"))
+    assert store.cases_by_fingerprint(record.id) == [CasesOf("one", 0, 5)], "neighbours are one range"
+    with store.session.write() as connection:  # a chunk of a version that did not record it, of a study with several
+        connection.execute(sa.update(CHUNKS).where(CHUNKS.c.study == record.number).values(fingerprint=None))
     assert store.reusable(study) == 0
 
 
@@ -204,15 +226,15 @@ def test_a_source_that_is_deleted_meanwhile_costs_a_run_and_no_row(
 ) -> None:
     study, engine = grid([20.0, 25.0], [0.1, 0.3, 0.5, 0.7]), Engine()
     source = run(store, study, engine)
-    commit = store.commit
+    exchange = store.exchange
 
-    def deleted_first(*args: Any) -> bool:
-        if store.list_studies().studies[-1].id == source.id:
+    def deleted_first(epoch: int, finished: Sequence[Finished], wanted: Sequence[Chunk]) -> Any:
+        if finished and store.list_studies().studies[-1].id == source.id:
             store.delete_study(source.id)
             store.purge()
-        return commit(*args)
+        return exchange(epoch, finished, wanted)
 
-    monkeypatch.setattr(store, "commit", deleted_first)
+    monkeypatch.setattr(store, "exchange", deleted_first)
     record = run(store, study, engine)
     assert (record.reused, len(engine.ran)) == (0, 16)
     rows_are_right(store, record, study)

@@ -1,0 +1,90 @@
+"""The office's own springs, clutches and motors: kept, listed, removed."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import sqlalchemy as sa
+
+from sprag.service.actor import acting
+from sprag.service.spec.components import Component
+from sprag.service.storage.audit import note, require_own
+from sprag.service.storage.component_tables import COMPONENTS
+from sprag.service.storage.errors import ComponentNotFoundError, TooManyComponentsError
+from sprag.service.storage.part import Part, moment
+from sprag.worker.limits import MAX_COMPONENTS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from datetime import datetime
+
+_C = COMPONENTS.c
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentRecord:
+    """A component of the catalogue; ``owner`` is the user who added it, None for nobody."""
+
+    id: str
+    component: Component
+    changed_at: datetime
+    owner: str | None
+
+
+class Components(Part):
+    """The components of a database."""
+
+    def components(self, kind: str | None = None) -> tuple[ComponentRecord, ...]:
+        """Every component, or those of a kind, by kind and name."""
+        query = sa.select(COMPONENTS).order_by(_C.kind, _C.name)
+        with self.session.read() as connection:
+            rows = connection.execute(query if kind is None else query.where(_C.kind == kind)).all()
+        return tuple(map(_record, rows))
+
+    def put_components(self, given: Iterable[Component]) -> tuple[ComponentRecord, ...]:
+        """Add components, all of them or none; those of the same kind and name are replaced.
+
+        Raises NotOwnerError for one of another user, and TooManyComponentsError.
+        """
+        with self.session.write() as connection:
+            made = [self._put(connection, one) for one in given]
+            if (connection.execute(sa.select(sa.func.count()).select_from(COMPONENTS)).scalar() or 0) > MAX_COMPONENTS:
+                raise TooManyComponentsError(f"there would be more than {MAX_COMPONENTS:,} components; remove some")
+        return tuple(made)
+
+    def _put(self, connection: sa.Connection, one: Component) -> ComponentRecord:
+        same = (_C.kind == one.kind, _C.name == one.name)
+        old = connection.execute(sa.select(_C.id, _C.owner).where(*same).with_for_update()).one_or_none()
+        values: dict[str, Any] = {
+            "note": one.note,
+            "fields": json.dumps(dict(one.fields), ensure_ascii=False),
+            "changed_at": self._now(),
+        }
+        if old is None:
+            own = {"id": f"cp_{secrets.token_hex(8)}", "kind": one.kind, "name": one.name, "owner": acting().user}
+            change: Any = sa.insert(COMPONENTS).values(values | own)
+        else:
+            require_own("component", old.id, old.owner)
+            change = sa.update(COMPONENTS).where(*same).values(values)
+        row = connection.execute(change.returning(COMPONENTS)).one()
+        action = "component.add" if old is None else "component.change"
+        note(connection, self._now(), action, row.id, kind=one.kind, name=one.name, fields=dict(one.fields))
+        return _record(row)
+
+    def remove_component(self, component_id: str) -> None:
+        """Remove a component; studies that took it keep its values. Raises ComponentNotFoundError, NotOwnerError."""
+        with self.session.write() as connection:
+            row = connection.execute(sa.select(COMPONENTS).where(_C.id == component_id)).one_or_none()
+            if row is None:
+                raise ComponentNotFoundError(component_id)
+            require_own("component", row.id, row.owner)
+            connection.execute(sa.delete(COMPONENTS).where(_C.id == component_id))
+            note(connection, self._now(), "component.remove", row.id, kind=row.kind, name=row.name)
+
+
+def _record(row: Any) -> ComponentRecord:
+    component = Component(row.kind, row.name, row.note, json.loads(row.fields))
+    return ComponentRecord(row.id, component, moment(row.changed_at), row.owner)

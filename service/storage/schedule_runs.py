@@ -1,0 +1,225 @@
+"""Due times of schedules: taken up once, submitted, refused, skipped or missed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import timedelta
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import sqlalchemy as sa
+
+from sprag.service.languages import recorded
+from sprag.service.schedules.policies import CatchUp
+from sprag.service.storage.audit import note
+from sprag.service.storage.part import micros_of, moment
+from sprag.service.storage.run_outcomes import COLUMNS, RunOutcomes, outcome_of, runs_with_studies
+from sprag.service.storage.saved_views import inherit_figures
+from sprag.service.storage.schedule_rows import fields_of
+from sprag.service.storage.schedule_tables import SCHEDULE_RUNS, SCHEDULES
+from sprag.service.storage.tables import GO_ON, STUDIES
+from sprag.worker.states import StudyState
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from datetime import datetime
+
+    from sprag.service.schedules.fields import ScheduleFields
+    from sprag.service.schedules.outcomes import Outcome
+    from sprag.service.schedules.policies import DueTime
+
+_S, _R = SCHEDULES.c, SCHEDULE_RUNS.c
+
+
+class RunState(StrEnum):
+    """Outcome of a due time."""
+
+    TAKEN = "taken"
+    SUBMITTED = "submitted"
+    REFUSED = "refused"
+    SKIPPED = "skipped"
+    MISSED = "missed"
+
+
+@dataclass(frozen=True, slots=True)
+class RunRecord:
+    """A due time that was taken up, and what has become of it.
+
+    ``study`` is None where none was submitted or it has been deleted.
+    """
+
+    due: datetime
+    state: RunState
+    missed: int
+    begun_at: datetime
+    study: str | None
+    problem: str | None
+    outcome: Outcome
+
+
+@dataclass(frozen=True, slots=True)
+class ScheduleRecord:
+    """A schedule: its fields, its next due time, and its last run."""
+
+    number: int
+    id: str
+    fields: ScheduleFields
+    next_due: datetime | None
+    created_at: datetime
+    last: RunRecord | None
+    owner: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class OpenRun:
+    """A due time that was taken up at ``begun_at`` and has no outcome yet; ``problem`` states why."""
+
+    schedule: int
+    id: str
+    due: int
+    fields: ScheduleFields
+    begun_at: datetime
+    problem: str | None
+    owner: str | None
+
+
+class ScheduleRuns(RunOutcomes):
+    """The due times of schedules."""
+
+    def take_due(
+        self, record: ScheduleRecord, dues: Sequence[DueTime], following: datetime | None, now: datetime
+    ) -> bool:
+        """Take up ``dues`` once: False when another process did so first, or the schedule was changed in the meantime.
+
+        Those that are too late at ``now`` have the outcome that they were missed.
+        """
+        assert record.next_due is not None
+        with self.session.write() as connection:
+            moved = connection.execute(
+                sa.update(SCHEDULES)
+                .where(_S.number == record.number, _S.next_due == micros_of(record.next_due))
+                .values(next_due=None if following is None else micros_of(following), paused_until=None)
+            )
+            if not moved.rowcount:
+                return False
+            # After the clock was put back, the same due times come again.
+            again = sa.select(_R.due).where(
+                _R.schedule == record.number, _R.due.in_([micros_of(each.due) for each in dues])
+            )
+            known = set(connection.execute(again).scalars())
+            new = [each for each in dues if micros_of(each.due) not in known]
+            for each in new:
+                problem = _late(now - each.due, record) if each.too_late else None
+                connection.execute(
+                    sa.insert(SCHEDULE_RUNS).values(
+                        schedule=record.number,
+                        due=micros_of(each.due),
+                        state=(RunState.MISSED if each.too_late else RunState.TAKEN).value,
+                        missed=each.missed,
+                        begun_at=self._now(),
+                        unbound=0,
+                        problem=problem,
+                    )
+                )
+                if each.too_late:
+                    note(connection, self._now(), "schedule.miss", record.id, due=each.due.isoformat(), problem=problem)
+        return bool(new)
+
+    def open_runs(self) -> list[OpenRun]:
+        """Due times that were taken up and have neither a study nor a problem yet."""
+        with self.session.read() as connection:
+            query = (
+                sa.select(_R.due, _R.begun_at, _R.problem, SCHEDULES)
+                .join_from(SCHEDULE_RUNS, SCHEDULES)
+                .where(_R.state == RunState.TAKEN.value, _S.deleted_at.is_(None))
+                .order_by(_R.due)
+            )
+            rows = connection.execute(query).all()
+        return [
+            OpenRun(row.number, row.id, row.due, fields_of(row), moment(row.begun_at), row.problem, row.owner)
+            for row in rows
+        ]
+
+    def put_off_run(self, run: OpenRun, problem: str) -> None:
+        """Record why a due time has no study yet; it stays open."""
+        with self.session.write() as connection:
+            connection.execute(
+                sa.update(SCHEDULE_RUNS).where(_R.schedule == run.schedule, _R.due == run.due).values(problem=problem)
+            )
+
+    def close_run(
+        self, run: OpenRun, *, study: int | None = None, problem: str | None = None, skipped: bool = False
+    ) -> None:
+        """Record the outcome of a due time: the number of its study, or why there is none.
+
+        The study has the figures of the report of the one before it.
+        """
+        without = RunState.SKIPPED if skipped else RunState.REFUSED
+        with self.session.write() as connection:
+            connection.execute(
+                sa.update(SCHEDULE_RUNS)
+                .where(_R.schedule == run.schedule, _R.due == run.due)
+                .values(state=(without if study is None else RunState.SUBMITTED).value, study=study, problem=problem)
+            )
+            if study is not None:
+                before = (
+                    sa.select(_R.study)
+                    .join_from(SCHEDULE_RUNS, STUDIES, STUDIES.c.number == _R.study)
+                    .where(_R.schedule == run.schedule, _R.due < run.due, STUDIES.c.deleted_at.is_(None))
+                    .order_by(_R.due.desc())
+                    .limit(1)
+                )
+                inherit_figures(connection, connection.execute(before).scalar(), study)
+            else:
+                action = "schedule.skip" if skipped else "schedule.refuse"
+                note(connection, self._now(), action, run.id, due=moment(run.due).isoformat(), problem=problem)
+
+    def earlier_studies(self, run: OpenRun) -> list[str]:
+        """Ids of the studies of earlier due times of that schedule that run, wait, or continue by themselves."""
+        c = STUDIES.c
+        query = (
+            sa.select(c.id)
+            .join_from(SCHEDULE_RUNS, STUDIES, c.number == _R.study)
+            .where(
+                _R.schedule == run.schedule,
+                _R.due < run.due,
+                c.deleted_at.is_(None),
+                c.state.in_([state.value for state in StudyState if state.going]) | c.waits_for.in_(GO_ON),
+            )
+            .order_by(_R.due)
+        )
+        with self.session.read() as connection:
+            return list(connection.execute(query).scalars())
+
+    @staticmethod
+    def _runs(connection: sa.Connection, number: int, most: int) -> tuple[RunRecord, ...]:
+        rows = connection.execute(
+            sa.select(*COLUMNS)
+            .select_from(runs_with_studies())
+            .where(_R.schedule == number)
+            .order_by(_R.due.desc())
+            .limit(most)
+        ).all()
+        return tuple(
+            RunRecord(
+                moment(row.due),
+                RunState(row.state),
+                row.missed,
+                moment(row.begun_at),
+                row.study,
+                row.problem,
+                outcome_of(row),
+            )
+            for row in rows
+        )
+
+
+def _late(delay: timedelta, record: ScheduleRecord) -> str:
+    """Why a due time is not run that was taken up with ``delay``."""
+    policies = record.fields.policies
+    if policies.catch_up is CatchUp.NONE:
+        rule = recorded.NOT_MADE_UP
+    else:
+        rule = recorded.GRACE.format(grace=policies.misfire_grace)
+    late = timedelta(seconds=round(delay.total_seconds()))
+    return recorded.NOTICED_LATE.format(delay=late, rule=rule)

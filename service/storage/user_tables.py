@@ -1,0 +1,41 @@
+"""The tables of users and of the audit log. Times are microseconds since 1970-01-01 UTC."""
+
+import sqlalchemy as sa
+
+from sprag.service.storage.tables import METADATA
+
+USERS = sa.Table(
+    "users",
+    METADATA,
+    sa.Column("number", sa.Integer, primary_key=True, autoincrement=True),
+    # The name under which the user owns things, and by which a proxy calls the user. It is never given to another.
+    sa.Column("name", sa.String(80), nullable=False, unique=True),
+    sa.Column("role", sa.String(16), nullable=False),
+    sa.Column("created_at", sa.BigInteger, nullable=False),
+    # A removed user stays listed and keeps the name, so nobody else inherits what the user owned.
+    sa.Column("removed_at", sa.BigInteger),
+    # Quotas; NULL where the settings apply, 0: no limit.
+    sa.Column("most_cases", sa.BigInteger),
+    sa.Column("most_bytes", sa.BigInteger),
+    sa.Column("most_checks", sa.Integer),
+    sqlite_autoincrement=True,
+)
+
+#: One row for each change, written in the transaction of the change.
+AUDIT_LOG = sa.Table(
+    "audit_log",
+    METADATA,
+    sa.Column("number", sa.Integer, primary_key=True, autoincrement=True),
+    sa.Column("at", sa.BigInteger, nullable=False, index=True),
+    # By which way the change came (`sprag.service.actor`).
+    sa.Column("door", sa.String(16), nullable=False),
+    sa.Column("actor", sa.String(200), nullable=False, index=True),
+    sa.Column("token", sa.String(40)),
+    sa.Column("address", sa.String(200), nullable=False),
+    sa.Column("request", sa.String(64)),
+    sa.Column("action", sa.String(40), nullable=False),
+    sa.Column("target", sa.String(200), nullable=False, index=True),
+    # What else is to be known of it, as JSON data.
+    sa.Column("detail", sa.Text, nullable=False),
+    sqlite_autoincrement=True,
+)

@@ -1,0 +1,206 @@
+"""Users: added, changed, removed; and the quotas of what belongs to them.
+
+A user has no password: users log in with a token of theirs, or a trusted proxy names them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import sqlalchemy as sa
+
+from sprag.service.actor import Role, acting
+from sprag.service.faults import FaultError
+from sprag.service.storage.audit import note
+from sprag.service.storage.component_tables import COMPONENTS
+from sprag.service.storage.errors import UserExistsError, UserNotFoundError
+from sprag.service.storage.part import Part, moment, optional_moment
+from sprag.service.storage.schedule_tables import SCHEDULES
+from sprag.service.storage.tables import HELD_AT_DEADLINE, STUDIES
+from sprag.service.storage.user_tables import USERS
+from sprag.service.storage.view_tables import SAVED_VIEWS
+from sprag.worker.states import TERMINAL
+
+if TYPE_CHECKING:
+    from datetime import datetime
+
+    from sprag.service.settings import Settings
+
+_U = USERS.c
+
+
+@dataclass(frozen=True, slots=True)
+class Quota:
+    """Limits of one user: cases that wait, bytes of results, simultaneous checks of specs.
+
+    0: no limit; None: as the settings have it.
+    """
+
+    cases: int | None = None
+    bytes: int | None = None
+    checks: int | None = None
+
+    def over(self, default: Quota) -> Quota:
+        """This quota, where it says nothing ``default``."""
+        return Quota(
+            *(getattr(default if getattr(self, name) is None else self, name) for name in ("cases", "bytes", "checks"))
+        )
+
+
+def quota_of(settings: Settings) -> Quota:
+    """The quota of users who have none of their own."""
+    return Quota(settings.user_cases, settings.user_storage * 2**20, settings.user_checks)
+
+
+@dataclass(frozen=True, slots=True)
+class UserRecord:
+    """A user; ``removed_at`` is None for one who may use the service. ``quota`` is the user's own."""
+
+    name: str
+    role: Role
+    created_at: datetime
+    removed_at: datetime | None
+    quota: Quota
+
+
+@dataclass(frozen=True, slots=True)
+class Usage:
+    """What belongs to a user: cases that wait, and rough bytes of results."""
+
+    cases: int
+    bytes: int
+
+
+class Users(Part):
+    """The users of a database."""
+
+    #: Quotas of users who have none of their own; set by the service.
+    default_quota = Quota()
+
+    def add_user(self, name: str, role: Role, quota: Quota | None = None) -> UserRecord:
+        """Add a user; raises UserExistsError, also for the name of a removed one."""
+        values = {"name": name, "role": role.value, "created_at": self._now(), **_columns(quota or Quota())}
+        with self.session.write() as connection:
+            if connection.execute(sa.select(_U.name).where(_U.name == name)).first():
+                raise UserExistsError(f"there is a user {name!r} already, or was one, who can be restored")
+            row = connection.execute(sa.insert(USERS).values(values).returning(USERS)).one()
+            note(connection, self._now(), "user.add", name, role=role.value, **_set(quota))
+            return _user_record(row)
+
+    def users(self) -> tuple[UserRecord, ...]:
+        """Every user, removed ones included, by name."""
+        with self.session.read() as connection:
+            return tuple(map(_user_record, connection.execute(sa.select(USERS).order_by(_U.name)).all()))
+
+    def change_user(
+        self, name: str, role: Role | None = None, quota: Quota | None = None, *, removed: bool | None = None
+    ) -> UserRecord:
+        """Change the given fields of a user, whose studies, schedules and tokens are kept; raises UserNotFoundError.
+
+        A number of ``quota`` that is None is kept. Tokens of a removed user are worth nothing until the
+        user is restored.
+        """
+        given = {column: value for column, value in _columns(quota or Quota()).items() if value is not None}
+        values: dict[str, Any] = {**given, **({} if role is None else {"role": role.value})}
+        if removed is not None:
+            values["removed_at"] = sa.func.coalesce(_U.removed_at, self._now()) if removed else None
+        with self.session.write() as connection:
+            row = None
+            if values:
+                change = sa.update(USERS).where(_U.name == name).values(values).returning(USERS)
+                row = connection.execute(change).one_or_none()
+            if row is None:
+                raise UserNotFoundError(name)
+            action = "user.change" if removed is None else "user.remove" if removed else "user.restore"
+            said = {} if role is None else {"role": role.value}
+            note(connection, self._now(), action, name, **said, **_set(quota))
+            return _user_record(row)
+
+    def hand_over(self, name: str, heir: str) -> tuple[int, int]:
+        """Give the studies, schedules, components and views of a user to another; returns the numbers of the first two.
+
+        Raises UserNotFoundError.
+        """
+        with self.session.write() as connection:
+            for each in (name, heir):
+                require_user(connection, each, removed=each == name)
+            present = STUDIES.c.deleted_at.is_(None) | (STUDIES.c.purge_at > self._now())  # those can be restored
+            studies, schedules = (
+                connection.execute(
+                    sa.update(table)
+                    .where(table.c.owner == name, present if table is STUDIES else table.c.deleted_at.is_(None))
+                    .values(owner=heir, **({"revision": table.c.revision + 1} if table is STUDIES else {}))
+                ).rowcount
+                for table in (STUDIES, SCHEDULES)
+            )
+            for kept in (COMPONENTS, SAVED_VIEWS):
+                connection.execute(sa.update(kept).where(kept.c.owner == name).values(owner=heir))
+            note(connection, self._now(), "user.hand-over", name, to=heir, studies=studies, schedules=schedules)
+        return studies, schedules
+
+    def usage(self, name: str) -> Usage:
+        """What counts against the quota of a user."""
+        with self.session.read() as connection:
+            return _usage(connection, name)
+
+    def _require_quota(self, connection: sa.Connection, cases: int, size: int) -> None:
+        """Raise FaultError where a new study of that many cases and bytes exceeds a quota of the present user."""
+        user = acting().user
+        if user is None:
+            return
+        row = connection.execute(sa.select(USERS).where(_U.name == user)).one_or_none()
+        quota = (Quota() if row is None else _quota(row)).over(self.default_quota)
+        used = _usage(connection, user)
+        if cases and quota.cases and used.cases + cases > quota.cases:
+            raise FaultError(
+                "quota-exceeded",
+                f"{cases:,} more cases exceed the quota of {user}: {used.cases:,} of {quota.cases:,} wait already.",
+            )
+        if quota.bytes and used.bytes + size > quota.bytes:
+            raise FaultError(
+                "quota-exceeded",
+                f"The results would take about {_mib(size)} MiB, and {user} has used {_mib(used.bytes)} of "
+                f"{_mib(quota.bytes)} MiB: delete studies first.",
+            )
+
+
+def require_user(connection: sa.Connection, name: str, *, removed: bool = False) -> None:
+    """Raise UserNotFoundError where there is no such user; ``removed``: one who was removed will do."""
+    query = sa.select(_U.name).where(_U.name == name, sa.true() if removed else _U.removed_at.is_(None))
+    if connection.execute(query).first() is None:
+        raise UserNotFoundError(name)
+
+
+def _usage(connection: sa.Connection, name: str) -> Usage:
+    c = STUDIES.c
+    going = c.state.not_in([state.value for state in TERMINAL]) & c.waits_for.is_distinct_from(HELD_AT_DEADLINE)
+    waiting = sa.func.coalesce(c.most_cases, c.cases) - c.done
+    row = connection.execute(
+        sa.select(
+            sa.func.coalesce(sa.func.sum(sa.case((going, waiting), else_=0)), 0).label("cases"),
+            sa.func.coalesce(sa.func.sum(c.estimated_bytes), 0).label("bytes"),
+        ).where(c.owner == name, c.deleted_at.is_(None))
+    ).one()
+    return Usage(int(row.cases), int(row.bytes))
+
+
+def _columns(quota: Quota) -> dict[str, int | None]:
+    return {"most_cases": quota.cases, "most_bytes": quota.bytes, "most_checks": quota.checks}
+
+
+def _set(quota: Quota | None) -> dict[str, int]:
+    """The numbers that a quota has, for the log."""
+    return {name: value for name, value in _columns(quota or Quota()).items() if value is not None}
+
+
+def _quota(row: Any) -> Quota:
+    return Quota(row.most_cases, row.most_bytes, row.most_checks)
+
+
+def _user_record(row: Any) -> UserRecord:
+    return UserRecord(row.name, Role(row.role), moment(row.created_at), optional_moment(row.removed_at), _quota(row))
+
+
+def _mib(size: int) -> str:
+    return f"{size / 2**20:,.{0 if size >= 100 * 2**20 else 1}f}"

@@ -1,0 +1,58 @@
+"""The catalogue of components: kept, replaced, removed, with owners and the audit log, in every store."""
+
+from __future__ import annotations
+
+import pytest
+
+from sprag.service.actor import Actor, Door, act_as
+from sprag.service.spec.components import Component
+from sprag.service.storage.audit import AuditFilter
+from sprag.service.storage.errors import ComponentNotFoundError, NotOwnerError, TooManyComponentsError
+from sprag.service.storage.store import Store
+from sprag.worker.limits import MAX_COMPONENTS
+
+SPRING = Component("spring", "F-120", "store 3", {"spring_rate": "9 Н/мм"})
+CLUTCH = Component("clutch", "FW 20", "", {"coefficients": "0; 200"})
+
+
+def test_components_are_kept_replaced_and_removed(store: Store) -> None:
+    made = store.put_components([SPRING, CLUTCH])
+    assert [record.component for record in made] == [SPRING, CLUTCH]
+    assert [record.component.kind for record in store.components()] == ["clutch", "spring"]
+    changed = Component("spring", "F-120", "", {"spring_rate": "10 N/mm"})
+    again = store.put_components([changed])
+    assert (again[0].id, again[0].component) == (made[0].id, changed)
+    assert [record.component for record in store.components("spring")] == [changed]
+    store.remove_component(made[0].id)
+    assert store.components("spring") == ()
+    with pytest.raises(ComponentNotFoundError):
+        store.remove_component(made[0].id)
+    found = [(entry.action, entry.target) for entry in store.audit_log(AuditFilter()).records[:4]]
+    assert found == [
+        ("component.remove", made[0].id),
+        ("component.change", made[0].id),
+        ("component.add", made[1].id),
+        ("component.add", made[0].id),
+    ]
+
+
+def test_a_component_of_another_user_is_not_changed(store: Store) -> None:
+    dora = Actor(Door.API, "dora", "", "dora", everything=False)
+    emil = Actor(Door.API, "emil", "", "emil", everything=False)
+    with act_as(dora):
+        made = store.put_components([SPRING])[0]
+        assert made.owner == "dora"
+    with act_as(emil):
+        with pytest.raises(NotOwnerError):
+            store.put_components([CLUTCH, SPRING])
+        with pytest.raises(NotOwnerError):
+            store.remove_component(made.id)
+    assert [record.component for record in store.components()] == [SPRING]  # all or none
+
+
+def test_the_catalogue_has_a_limit(store: Store) -> None:
+    many = [Component("spring", f"F-{number}", "", {"spring_rate": "1 N/mm"}) for number in range(MAX_COMPONENTS)]
+    store.put_components(many)
+    with pytest.raises(TooManyComponentsError):
+        store.put_components([CLUTCH])
+    assert len(store.components()) == MAX_COMPONENTS

@@ -1,0 +1,209 @@
+"""Users, quotas and the audit log on every database: what is written, and that it is written with its change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from datetime import timedelta
+from typing import Any
+
+import pytest
+import sqlalchemy as sa
+
+from sprag.service.actor import Actor, Door, Role, act_as, acting
+from sprag.service.faults import FaultError
+from sprag.service.spec.components import Component
+from sprag.service.spec.saved_views import View
+from sprag.service.storage import purging
+from sprag.service.storage.audit import AuditFilter
+from sprag.service.storage.errors import NotOwnerError, UserExistsError, UserNotFoundError
+from sprag.service.storage.scopes import TokenScope
+from sprag.service.storage.store import Store
+from sprag.service.storage.tables import STUDIES
+from sprag.service.storage.users import Quota
+from sprag.worker.states import StudyState
+from tests.contract.filling import create, finish
+from tests.worker import fakes
+
+
+def user(name: str, role: Role = Role.DESIGNER) -> Actor:
+    """A user who asks from somewhere."""
+    return Actor(Door.API, name, "192.0.2.1", name, role is Role.ADMINISTRATOR)
+
+
+def actions(store: Store) -> list[tuple[str, str, str]]:
+    """Actor, action and target of every row, earliest first."""
+    return [(row.actor, row.action, row.target) for row in store.audit_rows(AuditFilter())]
+
+
+def test_users_are_added_changed_removed_and_restored(store: Store) -> None:
+    made = store.add_user("dora", Role.DESIGNER, Quota(cases=7))
+    assert (made.name, made.role, made.removed_at, made.quota) == ("dora", "designer", None, Quota(cases=7))
+    with pytest.raises(UserExistsError):
+        store.add_user("dora", Role.VIEWER)
+    assert store.change_user("dora", quota=Quota(bytes=3)).quota == Quota(7, 3)
+    assert store.change_user("dora", Role.VIEWER).role is Role.VIEWER
+    assert store.change_user("dora", removed=True).removed_at == store.clock.now()
+    with pytest.raises(UserExistsError):
+        store.add_user("dora", Role.VIEWER)
+    with pytest.raises(UserNotFoundError):
+        store.create_token("hers", TokenScope.WRITE, owner="dora")
+    assert store.change_user("dora", removed=False).removed_at is None
+    with pytest.raises(UserNotFoundError):
+        store.change_user("emil", removed=True)
+    assert [row[1] for row in actions(store)] == [
+        "user.add", "user.change", "user.change", "user.remove", "user.restore",
+    ]  # fmt: skip
+
+
+def test_what_users_make_is_theirs_and_is_handed_over(store: Store) -> None:
+    for name in ("dora", "emil"):
+        store.add_user(name, Role.DESIGNER)
+    with act_as(user("dora")):
+        made = create(store)
+        store.put_components([Component("spring", "F-120", "", {"spring_rate": "9 N/mm"})])
+        store.save_view(View("studies", "mine", "owner=dora"))
+    finish(store, made)
+    assert store.get_study(made.id).owner == "dora"
+    for change in (store.retry_study, store.delete_study, lambda i: store.prioritize_study(i, 3)):
+        with act_as(user("emil")), pytest.raises(NotOwnerError):
+            change(made.id)
+    store.restorable = timedelta(days=1)
+    with act_as(user("dora")):
+        deleted = create(store)
+        finish(store, deleted)
+        store.delete_study(deleted.id)
+    assert store.hand_over("dora", "emil") == (2, 0)
+    with act_as(user("emil")):
+        store.restore_study(deleted.id)
+    assert [one.owner for one in (*store.components(), *store.saved_views())] == ["emil", "emil"]
+    with pytest.raises(UserNotFoundError):
+        store.hand_over("emil", "nobody")
+    with act_as(user("dora")), pytest.raises(NotOwnerError):
+        store.delete_study(made.id)
+    with act_as(user("emil")):
+        store.delete_study(made.id)
+    assert actions(store)[-3:] == [
+        (acting().name, "user.hand-over", "dora"), ("emil", "study.restore", deleted.id),
+        ("emil", "study.delete", made.id),
+    ]  # fmt: skip
+
+
+def test_a_change_that_fails_leaves_no_row_and_a_row_that_fails_no_change(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = create(store)
+    finish(store, made)
+    before = actions(store)
+
+    def fail(*_: Any, **__: Any) -> None:
+        raise RuntimeError("the process dies here")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(purging, "note", fail)
+        with pytest.raises(RuntimeError):
+            store.delete_study(made.id)
+    assert store.get_study(made.id).state is StudyState.FINISHED
+    connections = store.session.write
+
+    @contextmanager
+    def dying() -> Iterator[sa.Connection]:
+        with connections() as connection:
+            yield connection
+            raise RuntimeError("killed before the commit")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(store.session, "write", dying)
+        with pytest.raises(RuntimeError):
+            store.delete_study(made.id)
+    assert store.get_study(made.id).state is StudyState.FINISHED
+    assert actions(store) == before
+
+
+def test_quotas_count_what_waits_and_what_is_stored(store: Store) -> None:
+    store.add_user("dora", Role.DESIGNER, Quota(cases=50))
+    store.default_quota = Quota(cases=10, bytes=1000)
+    with act_as(user("dora")):
+        first = create(store, 30)
+        with pytest.raises(FaultError) as refused:
+            create(store, 30)
+        assert refused.value.code == "quota-exceeded"
+        assert "30 of 50" in refused.value.detail
+        create(store, 20)
+        finish(store, first)
+        create(store, 30)
+    with store.session.write() as connection:
+        connection.execute(sa.update(STUDIES).where(STUDIES.c.id == first.id).values(estimated_bytes=900))
+    assert (store.usage("dora").cases, store.usage("dora").bytes) == (50, 900)
+    store.change_user("dora", quota=Quota(cases=0))
+    row = {"name": "", "spec": "{}"}
+    with act_as(user("dora")), pytest.raises(FaultError, match=r"about 20,480 MiB, and dora has used 0\.0 of 0\.0 MiB"):
+        store.insert_study({**_row(store), **row, "estimated_bytes": 20 * 2**30})
+    with act_as(user("dora")), pytest.raises(FaultError, match="MiB"):
+        store.insert_study({**_row(store), **row, "estimated_bytes": 101})
+    store.delete_study(first.id)
+    with act_as(user("dora")):
+        store.insert_study({**_row(store), **row, "estimated_bytes": 1000})
+    create(store, 1000)  # of nobody
+
+
+def test_an_ended_study_is_restored_over_the_quota_of_cases(store: Store) -> None:
+    store.add_user("dora", Role.DESIGNER)
+    store.restorable = timedelta(days=1)
+    with act_as(user("dora")):
+        ended = create(store, 3)
+        finish(store, ended)
+        create(store, 30)
+        store.delete_study(ended.id)
+        store.change_user("dora", quota=Quota(cases=10))
+        store.restore_study(ended.id)
+    assert store.get_study(ended.id).id == ended.id
+
+
+def _row(store: Store) -> dict[str, Any]:
+    from sprag.service.storage.study_row import study_row
+
+    return study_row({}, fakes.study(3), store.chunking)
+
+
+def test_submissions_side_by_side_do_not_exceed_a_quota_together(store: Store) -> None:
+    store.add_user("dora", Role.DESIGNER, Quota(cases=100))
+
+    def submit(_: int) -> bool:
+        with act_as(user("dora")):
+            try:
+                create(store, 30)
+            except FaultError:
+                return False
+            return True
+
+    with ThreadPoolExecutor(8) as pool:
+        assert sum(pool.map(submit, range(16))) == 3
+    assert store.usage("dora").cases == 90
+
+
+def test_the_log_is_kept_as_long_as_told(store: Store, clock: fakes.HandClock) -> None:
+    for _ in range(3):
+        create(store)
+        clock.seconds += 86_400.0
+    assert store.prune_audit(store.clock.now() - timedelta(days=2)) == 1
+    assert [row.action for row in store.audit_rows(AuditFilter())] == ["study.create", "study.create", "audit.delete"]
+    assert store.prune_audit(store.clock.now() - timedelta(days=2)) == 0
+    page = store.audit_log(AuditFilter(action="study.create"), 1)
+    assert page.next_token is not None
+    assert store.audit_log(AuditFilter(action="study.create"), 1, page.next_token).next_token is None
+
+
+def test_tokens_have_an_end_and_a_last_use(store: Store, clock: fakes.HandClock) -> None:
+    store.add_user("dora", Role.DESIGNER)
+    end = store.clock.now() + timedelta(days=1)
+    _, made = store.create_token("laptop", TokenScope.WRITE, owner="dora", expires_at=end)
+    assert made.valid_at(end - timedelta(microseconds=1))
+    assert not made.valid_at(end)
+    for micros, expected in ((2_000_000, 2), (1_000_000, 2), (3_000_000, 3)):
+        store.note_uses({made.id: micros, "tk_none": micros})
+        (kept,) = store.tokens()
+        assert kept.used_at is not None
+        assert kept.used_at.timestamp() == expected
+    assert (kept.owner, kept.expires_at) == ("dora", end)
