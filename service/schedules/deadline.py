@@ -8,7 +8,7 @@ from zoneinfo import ZoneInfo
 
 from sprag.service.faults import Code
 from sprag.service.schedules.times import TimingError, read_time_of_day
-from sprag.service.spec.units import QuantityError, parse_quantity
+from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity
 from sprag.worker.limits import MAX_FINISH_DAYS
 from sprag.worker.models import WarningText
 from sprag.worker.order import coverage, order_of
@@ -18,12 +18,20 @@ if TYPE_CHECKING:
 
 #: Shortest time to a deadline, in s; a shorter one is a mistake.
 _LEAST_SECONDS: Final = 1.0
+_MOST_SECONDS: Final = MAX_FINISH_DAYS * 86400.0
+#: Seconds of the units of time on the clock that times of a run do not have, by their names in both languages.
+_CLOCK_UNITS: Final[dict[str, float]] = {
+    **dict.fromkeys(("хв", "хвилина", "хвилини", "хвилин"), 60.0),
+    **dict.fromkeys(("год", "година", "години", "годин"), 3600.0),
+    **dict.fromkeys(("d", "day", "days", "д", "дн", "день", "дні", "днів", "доба", "доби", "діб"), 86400.0),
+    **dict.fromkeys(("w", "wk", "week", "weeks", "тиж", "тиждень", "тижні", "тижнів"), 604800.0),
+}
 ALLOWED: Final = (
     'a future time with its offset, such as "2027-01-31T06:00+01:00", or a duration from the submission, such as '
-    f'"8 h"; 1 s to {MAX_FINISH_DAYS} days ahead'
+    f'"8 h" or "2 days"; 1 s to {MAX_FINISH_DAYS} days ahead'
 )
 ALLOWED_OF_RUNS: Final = (
-    'a time of day, such as "06:00", or a duration from the beginning of the run, such as "8 h"; 1 s to '
+    'a time of day, such as "06:00", or a duration from the beginning of the run, such as "8 h" or "2 days"; 1 s to '
     f"{MAX_FINISH_DAYS} days"
 )
 
@@ -42,7 +50,7 @@ def finish_at(text: str, now: datetime) -> datetime:
     try:
         moment = datetime.fromisoformat(text)
     except ValueError:
-        return now + timedelta(seconds=_seconds(text))
+        return now + timedelta(seconds=_seconds_ahead(text))
     if moment.tzinfo is None:
         # An unencoded plus sign in a URL is decoded as a blank.
         raise FinishError("invalid-time", "has no offset from UTC; write Z, or +01:00 (in an address %2B01:00)")
@@ -59,19 +67,38 @@ def finish_at(text: str, now: datetime) -> datetime:
     return moment
 
 
-def _seconds(text: str) -> float:
-    try:
-        seconds = parse_quantity(text, "s")
-    except QuantityError:
-        raise FinishError("invalid-time", "is neither a time nor a duration with a unit") from None
+def duration_seconds(text: str) -> float:
+    """Seconds of a duration with its unit, 1 s to `MAX_FINISH_DAYS`; raises FinishError."""
+    seconds = _seconds(text, "is not a duration with a unit")
+    if not _LEAST_SECONDS <= seconds <= _MOST_SECONDS:
+        limit = (
+            f"shorter than {_LEAST_SECONDS:g} s" if seconds < _LEAST_SECONDS else f"longer than {MAX_FINISH_DAYS} days"
+        )
+        raise FinishError("out-of-range", f"is {limit}")
+    return seconds
+
+
+def _seconds_ahead(text: str) -> float:
+    """Seconds to a deadline that is given as a duration; raises FinishError."""
+    seconds = _seconds(text, "is neither a time nor a duration with a unit")
     if seconds <= 0.0:
         raise FinishError("out-of-range", "is not in the future")
     _require_near(seconds)
     return seconds
 
 
+def _seconds(text: str, otherwise: str) -> float:
+    try:
+        number, unit = split_quantity(text)
+        if (seconds := _CLOCK_UNITS.get(unit)) is not None:
+            return float(number) * seconds
+        return parse_quantity(text, "s")
+    except QuantityError:
+        raise FinishError("invalid-time", otherwise) from None
+
+
 def _require_near(seconds: float) -> None:
-    if not _LEAST_SECONDS <= seconds <= MAX_FINISH_DAYS * 86400.0:
+    if not _LEAST_SECONDS <= seconds <= _MOST_SECONDS:
         raise FinishError("out-of-range", "is too soon" if seconds < _LEAST_SECONDS else "is too far away")
 
 
@@ -81,7 +108,7 @@ def check_run_finish(text: str) -> str:
     try:
         return f"{read_time_of_day(text):%H:%M}"
     except TimingError:
-        _seconds(text)
+        _seconds_ahead(text)
         return text
 
 
@@ -94,7 +121,7 @@ def run_finish_at(text: str, zone: str, begin: datetime) -> datetime:
     try:
         clock = read_time_of_day(text)
     except TimingError:
-        return begin + timedelta(seconds=_seconds(text))
+        return begin + timedelta(seconds=duration_seconds(text))
     local = begin.astimezone(ZoneInfo(zone))
     for day in range(3):
         due = datetime.combine(local.date() + timedelta(days=day), clock, ZoneInfo(zone)).astimezone(UTC)

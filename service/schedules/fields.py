@@ -2,29 +2,63 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from datetime import timedelta
 from typing import TYPE_CHECKING, Any, Final
-from zoneinfo import ZoneInfo
 
 from sprag.service.schedules.deadline import ALLOWED_OF_RUNS, FinishError, check_run_finish, run_finish_at
-from sprag.service.schedules.times import Timing, TimingError, Window, check_cron, read_moment, read_time_of_day, zones
-from sprag.service.spec.described import Described, named
+from sprag.service.schedules.policies import GRACE_ALLOWED, CatchUp, Overlap, Policies, check_grace
+from sprag.service.schedules.report_to import ReportTo, ReportWhen, read_report_to
+from sprag.service.schedules.times import (
+    Timing,
+    TimingError,
+    Window,
+    check_cron,
+    local_time,
+    read_moment,
+    read_time_of_day,
+)
+from sprag.service.spec.described import Described, choice, named
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.fields import read_object
 from sprag.service.spec.report import Report, SpecError, did_you_mean
+from sprag.service.zones import zones
 from sprag.worker.limits import MAX_NAME_LENGTH, MAX_PRIORITY
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
     from datetime import datetime
 
 PLAIN: Final = named(
     Described("priority", "", "priority of its studies", "whole", -MAX_PRIORITY, MAX_PRIORITY, 0),
     Described("fresh", "", "run every case, including those that other studies already have", "flag", default=False),
     Described("enabled", "", "whether it is due at all", "flag", default=True),
+    choice(
+        "overlap",
+        "at a due time while an earlier study of the schedule is queued, running or held by its window: queue, its "
+        "study waits its turn; skip, the due time has no study; replace, the earlier study is cancelled",
+        *Overlap,
+        default=Overlap.QUEUE,
+    ),
+    choice(
+        "catch_up",
+        "which of several due times are run that passed while no worker was running: latest; all, up to the latest 50; "
+        "none",
+        *CatchUp,
+        default=CatchUp.LATEST,
+    ),
+    choice(
+        "report_when",
+        "whether it reports after every run, or only after those that need attention",
+        *ReportWhen,
+        default=ReportWhen.ALWAYS,
+    ),
 )
-FIELDS: Final = ("name", "spec", "cron", "at", "zone", "window", "finish_by", *PLAIN)
-_CRON_ALLOWED: Final = 'five fields, such as "0 22 * * 1-5": at 22:00 from Monday to Friday'
+FIELDS: Final = (
+    *("name", "spec", "cron", "at", "zone", "window", "finish_by", *PLAIN, "misfire_grace", "paused_until"),
+    *("report_email", "report_webhook"),
+)
+_CRON_ALLOWED: Final = 'five fields, such as "0 22 * * 1-5": at 22:00 from Monday to Friday; or "@daily" and the like'
 _AT_ALLOWED: Final = 'a future time, such as "2027-01-31T22:00"'
 _WINDOW_ALLOWED: Final = 'two different times of day, such as ["22:00", "06:00"]'
 _LONGEST_CRON: Final = 200
@@ -47,22 +81,31 @@ class ScheduleFields:
     fresh: bool
     enabled: bool
     finish_by: str | None = None
+    policies: Policies = field(default_factory=Policies)
+    report_to: ReportTo = field(default_factory=ReportTo)
 
     @property
-    def times(self) -> tuple[Timing, Window | None, str | None, bool]:
+    def times(self) -> tuple[Timing, Window | None, str | None, bool, datetime | None]:
         """The fields that determine when its runs begin, may run and end."""
-        return self.timing, self.window, self.finish_by, self.enabled
+        return self.timing, self.window, self.finish_by, self.enabled, self.policies.paused_until
 
     def next_due(self, now: datetime) -> datetime | None:
         """The next due time; None for a schedule that is disabled or over."""
-        return self.timing.next_after(now) if self.enabled else None
+        paused = self.policies.paused_until
+        if not self.enabled:
+            return None
+        if paused is None or paused <= now:
+            return self.timing.next_after(now)
+        # One that is due at the end of the pause runs then.
+        return self.timing.next_after(paused - timedelta(microseconds=1))
 
     def to_json(self) -> dict[str, Any]:
         """The fields as `read_fields` reads them."""
-        timing, window = self.timing, self.window
+        timing, window, policies = self.timing, self.window, self.policies
         when: dict[str, Any] = {"cron": timing.cron}
         if timing.at is not None:
-            when = {"at": timing.at.astimezone(ZoneInfo(timing.zone)).isoformat()}
+            when = {"at": local_time(timing.at, timing.zone)}
+        paused = policies.paused_until
         return {
             "name": self.name,
             "spec": self.spec,
@@ -72,7 +115,12 @@ class ScheduleFields:
             "priority": self.priority,
             "fresh": self.fresh,
             "finish_by": self.finish_by,
+            "overlap": policies.overlap.value,
+            "catch_up": policies.catch_up.value,
+            "misfire_grace": policies.misfire_grace,
             "enabled": self.enabled,
+            "paused_until": None if paused is None else local_time(paused, timing.zone),
+            **self.report_to.to_json(),
         }
 
 
@@ -101,13 +149,22 @@ def _read(data: object, now: datetime, old: ScheduleFields | None = None) -> Sch
     zone = _read_zone(report, found.get("zone", "UTC"))
     timing = _read_timing(report, found, zone, now, old)
     window = _read_window(report, found.get("window"), zone)
-    priority, fresh, enabled = (field.read(report, "", found) for field in PLAIN.values())
-    finish_by = _read_finish(report, found.get("finish_by"))
+    priority, fresh, enabled, overlap, catch_up, when = (plain.read(report, "", found) for plain in PLAIN.values())
+    finish_by = _read_duration(report, "finish_by", found, check_run_finish, ALLOWED_OF_RUNS)
+    grace = _read_duration(report, "misfire_grace", found, check_grace, GRACE_ALLOWED)
+    paused_until = _read_pause(report, found.get("paused_until"), zone, now, old)
+    report_to = read_report_to(report, found, when)
     title, spec = _read_spec(report, found, old)
     name = _read_name(report, found.get("name"), title)
     report.raise_if_any()
     assert timing is not None
-    fields = ScheduleFields(name, spec, timing, window, priority, fresh, enabled, finish_by)
+    if timing.at is not None and paused_until is not None and paused_until > timing.at:
+        report.fault(
+            "/paused_until", "conflict", "is later than `at`", found["paused_until"], allowed="a time before `at`"
+        )
+        report.raise_if_any()
+    policies = Policies(Overlap(overlap), CatchUp(catch_up), grace, paused_until)
+    fields = ScheduleFields(name, spec, timing, window, priority, fresh, enabled, finish_by, policies, report_to)
     if old is None or fields.times != old.times:
         _require_open_window(report, fields, now)
         report.raise_if_any()
@@ -204,15 +261,33 @@ def _read_timing(
     return Timing(None, moment, zone)
 
 
-def _read_finish(report: Report, value: object) -> str | None:
+def _read_pause(report: Report, value: object, zone: str, now: datetime, old: ScheduleFields | None) -> datetime | None:
+    if value is None:
+        return None
+    try:
+        if not isinstance(value, str):
+            raise TimingError("wrong-type", "is not a time")
+        moment = read_moment(value, zone)
+        if moment <= now and not (old is not None and old.policies.paused_until == moment):
+            raise TimingError("out-of-range", "is in the past")
+    except TimingError as error:
+        report.fault("/paused_until", error.code, str(error), value, allowed=_AT_ALLOWED)
+        return None
+    return moment
+
+
+def _read_duration(
+    report: Report, name: str, found: Mapping[str, Any], check: Callable[[str], str], allowed: str
+) -> str | None:
+    value = found.get(name)
     if value is None:
         return None
     try:
         if not isinstance(value, str):
             raise FinishError("wrong-type", "must be a text")
-        return check_run_finish(value)
+        return check(value)
     except FinishError as error:
-        report.fault("/finish_by", error.code, str(error), value, allowed=ALLOWED_OF_RUNS)
+        report.fault(f"/{name}", error.code, str(error), value, allowed=allowed)
         return None
 
 

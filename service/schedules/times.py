@@ -1,8 +1,9 @@
 """When a schedule is due, and whether its window is open: arithmetic of wall-clock times without a clock of its own.
 
-Cron expressions refer to the wall clock of their zone. A fixed time that daylight saving time skips is due at the first
-moment after the gap; one that occurs twice is due the first time only. Expressions without a fixed hour ("every 30
-minutes") follow real time instead. (These are the rules of Debian's cron and of `cronsim`.)
+Cron expressions, and short forms of them such as ``@daily``, refer to the wall clock of their zone. A fixed time that
+daylight saving time skips is due at the first moment after the gap; one that occurs twice is due the first time only.
+Expressions without a fixed hour ("every 30 minutes") follow real time instead. (These are the rules of Debian's cron
+and of `cronsim`.)
 """
 
 from __future__ import annotations
@@ -10,12 +11,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import UTC, datetime, time, timedelta
 from functools import lru_cache
-from zoneinfo import ZoneInfo, available_timezones
+from typing import Final
+from zoneinfo import ZoneInfo
 
 from cronsim import CronSim, CronSimError
 
 from sprag.service.faults import Code
+from sprag.service.languages import recorded
+from sprag.service.schedules.occurrences import Occurrences
 
+#: Short forms of cron expressions.
+ALIASES: Final = {
+    "@hourly": "0 * * * *",
+    "@daily": "0 0 * * *",
+    "@midnight": "0 0 * * *",
+    "@weekly": "0 0 * * 0",
+    "@monthly": "0 0 1 * *",
+    "@yearly": "0 0 1 1 *",
+    "@annually": "0 0 1 1 *",
+}
 #: Most missed due times that are counted; the report then reads "this many or more".
 MOST_COUNTED = 1000
 
@@ -26,12 +40,6 @@ class TimingError(ValueError):
     def __init__(self, code: Code, message: str) -> None:
         super().__init__(message)
         self.code: Code = code
-
-
-@lru_cache(maxsize=1)
-def zones() -> frozenset[str]:
-    """The names of all time zones."""
-    return frozenset(available_timezones())
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,21 +55,14 @@ class Timing:
         if self.cron is None:
             assert self.at is not None
             return self.at if self.at > moment else None
-        return self._step(moment, reverse=False)
+        return _occurrences(self.cron, self.zone).after(moment)
 
     def latest_until(self, moment: datetime) -> datetime | None:
         """The last due time not later than ``moment`` (UTC)."""
         if self.cron is None:
             assert self.at is not None
             return self.at if self.at <= moment else None
-        return self._step(moment + timedelta(seconds=1), reverse=True)
-
-    def _step(self, moment: datetime, *, reverse: bool) -> datetime | None:
-        try:
-            found = next(CronSim(str(self.cron), moment.astimezone(ZoneInfo(self.zone)), reverse))
-        except StopIteration:
-            return None
-        return found.astimezone(UTC)
+        return _occurrences(self.cron, self.zone).until(moment)
 
     def missed(self, first: datetime, last: datetime) -> int:
         """Due times from ``first`` on and before ``last``, counted up to `MOST_COUNTED`."""
@@ -75,11 +76,24 @@ class Timing:
         return count
 
 
+@lru_cache(maxsize=1000)
+def _occurrences(cron: str, zone: str) -> Occurrences:
+    return Occurrences(_five_fields(cron), zone)
+
+
+def _five_fields(expression: str) -> str:
+    """The expression with its five fields, where it is a short form such as ``@daily``."""
+    return ALIASES.get(expression, expression)
+
+
 def check_cron(expression: str) -> None:
-    """Raise TimingError when ``expression`` is not a cron expression of five fields that is due some day."""
+    """Raise TimingError when ``expression`` is neither a short form nor a cron expression that is due some day."""
+    expression = _five_fields(expression.strip())
     if len(expression.split()) != 5:
         raise TimingError(
-            "invalid-time", "a cron expression has five fields: minute, hour, day of the month, month, day of the week"
+            "invalid-time",
+            "a cron expression has five fields: minute, hour, day of the month, month, day of the week; or it is one "
+            f"of {', '.join(ALIASES)}",
         )
     try:
         next(CronSim(expression, datetime(2024, 1, 1, tzinfo=UTC)))
@@ -88,6 +102,19 @@ def check_cron(expression: str) -> None:
         raise TimingError("invalid-time", text[:1].lower() + text[1:]) from None
     except StopIteration:
         raise TimingError("invalid-time", "is never due") from None
+
+
+def local_time(moment: datetime, zone: str) -> str:
+    """The time on the wall clock of ``zone`` with its offset: ``2027-01-31T22:00:00+01:00``."""
+    return moment.astimezone(ZoneInfo(zone)).isoformat()
+
+
+def wall_clock(moment: datetime, zone: str) -> str:
+    """The time on the wall clock of ``zone`` for people: ``2027-01-31 22:00 CET (Europe/Berlin)``."""
+    local = moment.astimezone(ZoneInfo(zone))
+    short = local.strftime("%Z")
+    # Zones without letters of their own are called by their offset, such as "+03".
+    return f"{local:%Y-%m-%d %H:%M} {short}{'' if short == zone else f' ({zone})'}"
 
 
 def read_moment(text: str, zone: str) -> datetime:
@@ -136,7 +163,7 @@ class Window:
         return next(opening for opening in openings if opening >= begin) < end
 
     def __str__(self) -> str:
-        return f"{self.begin:%H:%M} to {self.end:%H:%M} ({self.zone})"
+        return recorded.WINDOW.format(begin=f"{self.begin:%H:%M}", end=f"{self.end:%H:%M}", zone=self.zone)
 
 
 def read_time_of_day(text: str) -> time:

@@ -1,0 +1,126 @@
+"""What became of a due time of a schedule: its result, how much of its study is done, and a sentence about both."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from datetime import datetime
+from enum import StrEnum
+from typing import Any, Final
+
+from sprag.service.languages import N_, gettext, ngettext
+from sprag.service.languages.recorded import said
+
+
+class Result(StrEnum):
+    """What became of a due time. The first four may still change."""
+
+    WAITING = "waiting"
+    QUEUED = "queued"
+    RUNNING = "running"
+    HELD = "held"
+    FINISHED = "finished"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+    DEADLINE = "deadline"
+    DELETED = "deleted"
+    REFUSED = "refused"
+    SKIPPED = "skipped"
+    MISSED = "missed"
+
+    @property
+    def final(self) -> bool:
+        """Whether the run is over."""
+        return self not in {Result.WAITING, Result.QUEUED, Result.RUNNING, Result.HELD}
+
+
+_SENTENCES: Final = {
+    Result.WAITING: N_("Its study is about to be submitted"),
+    Result.QUEUED: N_("Its study waits for workers"),
+    Result.RUNNING: N_("Its study is running"),
+    Result.HELD: N_("Its study is paused"),
+    Result.FINISHED: N_("Finished"),
+    Result.FAILED: N_("Failed"),
+    Result.CANCELLED: N_("Cancelled"),
+    Result.DEADLINE: N_("Ended by its deadline"),
+    Result.DELETED: N_("Its study was deleted"),
+    Result.REFUSED: N_("No study was submitted"),
+    Result.SKIPPED: N_("Skipped"),
+    Result.MISSED: N_("Missed"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of a due time.
+
+    Attributes
+    ----------
+    study, name : id and name of its study; None and "" where there is none
+    cases, done, ok : numbers of its cases, of those with an ending, and of those that ended ok
+    endings, flags : numbers of cases by ending other than ok, and by flag; known when the run is over
+    coverage : the complete part of a study that is run coarse to fine; known when the run is over
+    reason : why it is held, failed, or has no study
+    missed : due times just before that were not run
+    ended_at : end of its study, or of the run without one
+    seconds : from the first chunk of its study to its end
+    """
+
+    result: Result
+    study: str | None = None
+    name: str = ""
+    cases: int = 0
+    done: int = 0
+    ok: int = 0
+    endings: dict[str, int] = field(default_factory=dict)
+    flags: dict[str, int] = field(default_factory=dict)
+    coverage: str | None = None
+    reason: str | None = None
+    missed: int = 0
+    ended_at: datetime | None = None
+    seconds: float | None = None
+
+    @property
+    def trouble(self) -> bool:
+        """Whether somebody should look: the run did not end as planned, some cases failed, or due times were missed."""
+        planned = self.result in {Result.FINISHED, Result.DEADLINE} or not self.result.final
+        return not planned or self.ok < self.done or self.missed > 0
+
+    @property
+    def sentence(self) -> str:
+        """The outcome in one or two sentences."""
+        numbers = {"cases": self.cases, "done": self.done, "ok": self.ok}
+        shown = {name: f"{number:,}" for name, number in numbers.items()}
+        first = gettext(_SENTENCES[self.result])
+        if self.study is None or self.result is Result.FAILED:
+            first += f": {said(self.reason)}" if self.reason else ""
+        elif self.result is Result.FINISHED and self.ok == self.cases:
+            first += ": " + gettext("all {cases} cases ended ok", **shown)
+        else:
+            first += ": " + gettext("{done} of {cases} cases are done, and {ok} of them ended ok", **shown)
+        parts = [first]
+        if self.result is Result.HELD and self.reason:
+            parts.append(gettext("It is held: {reason}", reason=said(self.reason)))
+        if self.coverage and self.result is not Result.FINISHED:
+            parts.append(gettext("Of the order from coarse to fine, {coverage}", coverage=said(self.coverage)))
+        if self.missed:
+            parts.append(
+                ngettext(
+                    "{count} due time before it was not run",
+                    "{count} due times before it were not run",
+                    self.missed,
+                    count=f"{self.missed:,}",
+                )
+            )
+        return " ".join(part if part.endswith(".") else f"{part}." for part in parts)
+
+    def to_json(self) -> dict[str, Any]:
+        """The outcome as `of_json` reads it."""
+        ended = None if self.ended_at is None else self.ended_at.isoformat()
+        return {**asdict(self), "result": self.result.value, "ended_at": ended}
+
+    @classmethod
+    def of_json(cls, data: dict[str, Any]) -> Outcome:
+        """The outcome that `to_json` wrote."""
+        ended = data["ended_at"]
+        own = {"result": Result(data["result"]), "ended_at": None if ended is None else datetime.fromisoformat(ended)}
+        return cls(**{**data, **own})

@@ -1,0 +1,107 @@
+"""To whom a schedule reports, and when."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any, Final
+
+from sprag.service.delivery import is_mail_address, origin_of
+from sprag.service.spec.report import Report
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from sprag.service.delivery import Delivery
+
+MOST_RECIPIENTS: Final = 10
+LONGEST_WEBHOOK: Final = 500
+EMAIL_ALLOWED: Final = f'a list of at most {MOST_RECIPIENTS} different addresses, such as ["dora@example.com"]'
+WEBHOOK_ALLOWED: Final = f"an address of http or https without user and fragment, at most {LONGEST_WEBHOOK} characters"
+
+
+class ReportWhen(StrEnum):
+    """After which runs a schedule reports."""
+
+    ALWAYS = "always"
+    TROUBLE = "trouble"
+
+
+@dataclass(frozen=True, slots=True)
+class ReportTo:
+    """Recipients of mail, the address of a webhook, and after which runs they get a report."""
+
+    email: tuple[str, ...] = ()
+    webhook: str | None = None
+    when: ReportWhen = ReportWhen.ALWAYS
+
+    @property
+    def targets(self) -> tuple[tuple[str, str], ...]:
+        """Channel and target of every report of a run."""
+        webhooks = () if self.webhook is None else (("webhook", self.webhook),)
+        return (*(("email", address) for address in self.email), *webhooks)
+
+    def to_json(self) -> dict[str, Any]:
+        """The fields as `read_report_to` reads them."""
+        return {"report_email": list(self.email), "report_webhook": self.webhook, "report_when": self.when.value}
+
+
+def read_report_to(report: Report, found: Mapping[str, Any], when: str | None) -> ReportTo:
+    """Recipients and webhook of the fields ``found``; faults are noted."""
+    email, webhook = found.get("report_email", []), found.get("report_webhook")
+    if not isinstance(email, list):
+        report.fault("/report_email", "wrong-type", "must be a list of addresses", email, allowed=EMAIL_ALLOWED)
+        email = []
+    elif len(email) > MOST_RECIPIENTS:
+        report.fault("/report_email", "too-many", f"has {len(email)} addresses", allowed=EMAIL_ALLOWED)
+        email = []
+    for number, address in enumerate(email):
+        where = f"/report_email/{number}"
+        if not isinstance(address, str) or not is_mail_address(address):
+            report.fault(where, "invalid-text", "is not a mail address", address, allowed=EMAIL_ALLOWED)
+        elif address in email[:number]:
+            report.fault(where, "repeated", "is given twice", address, allowed=EMAIL_ALLOWED)
+    if webhook is not None and not (
+        isinstance(webhook, str) and len(webhook) <= LONGEST_WEBHOOK and origin_of(webhook) is not None
+    ):
+        report.fault(
+            "/report_webhook", "invalid-text", "is not the address of a webhook", webhook, allowed=WEBHOOK_ALLOWED
+        )
+    if report.faults:
+        return ReportTo()
+    return ReportTo(tuple(email), webhook, ReportWhen(when or ReportWhen.ALWAYS))
+
+
+def require_deliverable(wanted: ReportTo, delivery: Delivery) -> None:
+    """Raise SpecError for recipients and webhooks that the administrator has not allowed.
+
+    Whoever may create a schedule must not reach any address from the network of the service.
+    """
+    report = Report(wanted.to_json())
+    if wanted.email and delivery.mail_server is None:
+        report.fault("/report_email", "conflict", "no mail is sent here", allowed="[], until SPRAG_SMTP_URL is set")
+    for number, address in enumerate(wanted.email):
+        if not mail_allowed(address, delivery):
+            allowed = f"addresses of {', '.join(delivery.domains)} (SPRAG_MAIL_DOMAINS)"
+            report.fault(
+                f"/report_email/{number}",
+                "invalid-choice",
+                "has a domain to which no reports go",
+                address,
+                allowed=allowed,
+            )
+    if wanted.webhook is not None and origin_of(wanted.webhook) not in delivery.origins:
+        known = ", ".join(delivery.origins) or "none"
+        report.fault(
+            "/report_webhook",
+            "invalid-choice",
+            "has an origin to which no webhooks go",
+            wanted.webhook,
+            allowed=f"addresses at {known} (SPRAG_WEBHOOK_ORIGINS)",
+        )
+    report.raise_if_any()
+
+
+def mail_allowed(address: str, delivery: Delivery) -> bool:
+    """Whether reports may go to that address."""
+    return not delivery.domains or address.rpartition("@")[2].lower() in delivery.domains
