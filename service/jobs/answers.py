@@ -6,58 +6,45 @@ reading and writing them takes seconds during which nobody else would be answere
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
+from sprag.service.jobs.reading import reading_of
 from sprag.service.json_text import numbers, to_bytes
 from sprag.service.results import exports
 from sprag.service.results.calibration import calibration_csv, calibration_json
-from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.directions import in_words
 from sprag.service.results.figures.calibration import calibration_figure
 from sprag.service.results.figures.front import front_figure, history_figure
+from sprag.service.results.figures.read import read_figure, read_map
 from sprag.service.results.fronts import front_csv, front_json
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.pictures.maps import draw_map as draw_map_picture
 from sprag.service.results.refined import not_joined
 from sprag.service.results.regimes import kind_columns
+from sprag.service.results.stored_curves import drawn_curves, stored_curves, stored_map
 from sprag.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from sprag.service.answers.calibration import CalibrationReport
     from sprag.service.jobs.checks import Library
     from sprag.service.results.curves import Curve, CurveQuery, Curves, Map
+    from sprag.service.results.reading import Choice
 
-#: Further motions of each case that a picture marks.
-_MOST_FURTHER: Final = 4
 #: Numbers of curves or a map that are read and written in about ten milliseconds.
 FEW: Final = 20_000
 
 
 def curves_of(library: Library, study_id: str, query: CurveQuery) -> Curves:
-    """The curves of a study; raises StudyNotFoundError, and SelectionError as `select` does."""
-    study = library.store.study(study_id)
-    selection = select(study, models.study_results(study), query)
-    return draw(selection, partial(library.store.rows_for_cases, study_id, number=query.number))
+    """The curves of a study; raises as `stored_curves` does."""
+    return stored_curves(library.store, study_id, query)
 
 
 def curves_drawn(library: Library, study_id: str, query: CurveQuery) -> Curves:
-    """The same for a picture: with the other motions of cases that have several, where the most frequent are drawn."""
-    curves, study = curves_of(library, study_id, query), library.store.study(study_id)
-    further: list[Curve] = []
-    if query.number == 0 and models.numbered_by(study.model, models.variant_of(study)) is not None:
-        for number in range(1, _MOST_FURTHER + 1):
-            found = curves_of(library, study_id, replace(query, number=number)).curves
-            known = [curve for curve in found if any(np.isfinite(y).any() for y in curve.y.values())]
-            if not known:
-                break
-            further += known
-    return replace(curves, further=tuple(further))
+    """The same for a picture, as of `drawn_curves`."""
+    return drawn_curves(library.store, study_id, query)
 
 
 def curves_json(library: Library, study_id: str, query: CurveQuery) -> bytes:
@@ -65,7 +52,7 @@ def curves_json(library: Library, study_id: str, query: CurveQuery) -> bytes:
     return to_bytes({"study": study_id, **curves_of(library, study_id, query).to_json()})
 
 
-def curves_csv(library: Library, study_id: str, query: CurveQuery) -> bytes:
+def curves_csv(library: Library, study_id: str, query: CurveQuery, choice: Choice) -> bytes:
     """Every point of every curve as one row: fixed parameters, case, x, results, regime and its order, ending.
 
     Of refined curves also the results that are not interpolated up to the next point, of a sweep whether the motion
@@ -89,7 +76,8 @@ def curves_csv(library: Library, study_id: str, query: CurveQuery) -> bytes:
         }
         for name, part in parts.items():
             columns.setdefault(name, []).extend(part)
-    return exports.table_csv(list(columns), list(columns.values()))
+    units = {**curves.selection.units, **{info.name: info.unit for info in curves.selection.results}}
+    return exports.read_table(columns, units, reading_of(library.store, study_id, choice).units)
 
 
 def _jumped(curve: Curve) -> dict[str, list[Any]]:
@@ -110,16 +98,17 @@ def _not_joined(curve: Curve, names: list[str]) -> dict[str, list[Any]]:
     return {"not_joined": texts}
 
 
-def curves_picture(library: Library, study_id: str, query: CurveQuery, title: str, form: pictures.Picture) -> bytes:
+def curves_picture(
+    library: Library, study_id: str, query: CurveQuery, choice: Choice, title: str, form: pictures.Picture
+) -> bytes:
     """The curves as a picture."""
-    return pictures.draw_curves(curves_drawn(library, study_id, query), title, form)
+    reading = reading_of(library.store, study_id, choice)
+    return pictures.draw_curves(curves_drawn(library, study_id, query), title, form, reading)
 
 
 def map_of(library: Library, study_id: str, query: CurveQuery) -> Map:
-    """The map of the one result of ``query`` over its x and its one axis of by; raises as `curves_of` does."""
-    study = library.store.study(study_id)
-    fetch = partial(library.store.rows_for_cases, study_id, number=query.number)
-    return draw_map(study, models.study_results(study), query.x, query.by[0], query.y[0], query.at, fetch)
+    """A map; raises as `stored_map` does."""
+    return stored_map(library.store, study_id, query)
 
 
 def map_json(library: Library, study_id: str, query: CurveQuery) -> bytes:
@@ -127,7 +116,7 @@ def map_json(library: Library, study_id: str, query: CurveQuery) -> bytes:
     return to_bytes({"study": study_id, **map_of(library, study_id, query).to_json()})
 
 
-def map_csv(library: Library, study_id: str, query: CurveQuery) -> bytes:
+def map_csv(library: Library, study_id: str, query: CurveQuery, choice: Choice) -> bytes:
     """Every point of the map as one row: fixed parameters, y, x, case, result, regime and its order, ending."""
     drawn = map_of(library, study_id, query)
     across, points = len(drawn.x_values), drawn.values.size
@@ -144,17 +133,34 @@ def map_csv(library: Library, study_id: str, query: CurveQuery) -> bytes:
         },
         "ending": list(chain.from_iterable(drawn.endings)),
     }
-    return exports.table_csv(list(columns), list(columns.values()))
+    (x_unit, y_unit), result = drawn.units, drawn.result
+    units = {**drawn.at_units, drawn.x: x_unit, drawn.y: y_unit, result.name: result.unit}
+    return exports.read_table(columns, units, reading_of(library.store, study_id, choice).units)
 
 
-def map_picture(library: Library, study_id: str, query: CurveQuery, title: str, form: pictures.Picture) -> bytes:
-    """The map as a picture."""
-    return draw_map_picture(map_of(library, study_id, query), title, form)
+def map_picture(
+    library: Library,
+    study_id: str,
+    query: CurveQuery,
+    choice: Choice,
+    title: str,
+    form: pictures.Picture,
+    *,
+    contours: bool = False,
+) -> bytes:
+    """The map as a picture: colours, or lines of equal value."""
+    reading = reading_of(library.store, study_id, choice)
+    return draw_map_picture(read_map(map_of(library, study_id, query), reading), title, form, contours=contours)
 
 
 def calibration_as_json(library: Library, study_id: str) -> bytes:
     """The calibration as JSON text."""
-    return to_bytes(calibration_json(study_id, library.calibrations.of(study_id)))
+    return to_bytes(calibration_report(library, study_id))
+
+
+def calibration_report(library: Library, study_id: str) -> CalibrationReport:
+    """The calibration as an answer whose sentences are phrases."""
+    return calibration_json(study_id, library.calibrations.of(study_id))
 
 
 def calibration_as_csv(library: Library, study_id: str) -> bytes:
@@ -162,9 +168,10 @@ def calibration_as_csv(library: Library, study_id: str) -> bytes:
     return calibration_csv(library.calibrations.of(study_id))
 
 
-def calibration_picture(library: Library, study_id: str, title: str, form: pictures.Picture) -> bytes:
+def calibration_picture(library: Library, study_id: str, choice: Choice, title: str, form: pictures.Picture) -> bytes:
     """The measured points on the fitted curves, and the residuals, as a picture."""
-    return pictures.draw_figure(calibration_figure(library.calibrations.of(study_id)), title, form)
+    figure = calibration_figure(library.calibrations.of(study_id))
+    return pictures.draw_figure(read_figure(figure, reading_of(library.store, study_id, choice)), title, form)
 
 
 def front_as_json(library: Library, study_id: str, exact: bool, limit: int) -> bytes:
@@ -182,15 +189,18 @@ def front_picture(
     study_id: str,
     exact: bool,
     axes: tuple[str | None, str | None],
+    choice: Choice,
     title: str,
     form: pictures.Picture,
 ) -> bytes:
     """The designs over two quantities as a picture."""
     found = library.fronts.of(study_id, exact=exact)
     pictures.check_size("designs", len(found.numbers), pictures.MAX_PICTURE_POINTS)
-    return pictures.draw_figure(front_figure(found, *axes), title, form)
+    figure = read_figure(front_figure(found, *axes), reading_of(library.store, study_id, choice))
+    return pictures.draw_figure(figure, title, form)
 
 
-def search_picture(library: Library, study_id: str, title: str, form: pictures.Picture) -> bytes:
+def search_picture(library: Library, study_id: str, choice: Choice, title: str, form: pictures.Picture) -> bytes:
     """How a search has come to its designs as a picture."""
-    return pictures.draw_figure(history_figure(library.fronts.of(study_id, exact=False)), title, form)
+    figure = history_figure(library.fronts.of(study_id, exact=False))
+    return pictures.draw_figure(read_figure(figure, reading_of(library.store, study_id, choice)), title, form)

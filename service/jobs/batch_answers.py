@@ -6,8 +6,10 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
 
+from sprag.service.jobs.reading import reading_of
 from sprag.service.json_text import to_bytes
 from sprag.service.results.defaults import drawn_results
+from sprag.service.results.figures.read import read_figure, read_map
 from sprag.service.results.figures.ribbons import ribbon_figure, ribbon_map, yield_figure, yield_map
 from sprag.service.results.pictures.curves import draw_figure
 from sprag.service.results.pictures.maps import draw_map
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from sprag.service.answers.tolerances import RibbonReport, YieldReport
     from sprag.service.jobs.checks import Library
     from sprag.service.results.pictures.curves import Picture
+    from sprag.service.results.reading import Choice
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,21 +80,23 @@ def yield_as_csv(library: Library, study_id: str, query: YieldQuery) -> bytes:
 
 
 def ribbon_picture(
-    library: Library, study_id: str, query: RibbonQuery, mapped: bool, title: str, form: Picture
+    library: Library, study_id: str, query: RibbonQuery, mapped: bool, choice: Choice, title: str, form: Picture
 ) -> bytes:
     """The ribbons as a picture, or a map of the first quantile of the query."""
-    found = ribbon_of(library, study_id, query)
+    found, reading = ribbon_of(library, study_id, query), reading_of(library.store, study_id, choice)
     if mapped:
-        return draw_map(ribbon_map(found, query.quantiles[0]), title, form)
-    return draw_figure(ribbon_figure(found), title, form)
+        return draw_map(read_map(ribbon_map(found, query.quantiles[0]), reading), title, form)
+    return draw_figure(read_figure(ribbon_figure(found), reading), title, form)
 
 
-def yield_picture(library: Library, study_id: str, query: YieldQuery, mapped: bool, title: str, form: Picture) -> bytes:
+def yield_picture(
+    library: Library, study_id: str, query: YieldQuery, mapped: bool, choice: Choice, title: str, form: Picture
+) -> bytes:
     """The yields as a picture: over the places, or as a map."""
-    found = yield_of(library, study_id, query)
+    found, reading = yield_of(library, study_id, query), reading_of(library.store, study_id, choice)
     if mapped:
-        return draw_map(yield_map(found), title, form)
-    return draw_figure(yield_figure(found), title, form)
+        return draw_map(read_map(yield_map(found), reading), title, form)
+    return draw_figure(read_figure(yield_figure(found), reading), title, form)
 
 
 def both(library: Library, study_id: str, ribbons: RibbonQuery, wanted: YieldQuery) -> tuple[RibbonReport, YieldReport]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from sprag.service.faults import FaultError, parameter_error
 from sprag.service.jobs.calibrations import Calibrations
-from sprag.service.jobs.explore import Columns
+from sprag.service.jobs.explore import Columns, selection_spec
 from sprag.service.jobs.fronts import Fronts
 from sprag.service.jobs.preview import preview_json
 from sprag.service.jobs.start_from import with_start
@@ -22,12 +22,15 @@ from sprag.service.results.fits import fit_json, read_fit
 from sprag.service.results.selection import locate_axes
 from sprag.service.schedules.fields import ScheduleFields, change_fields, read_fields
 from sprag.service.spec import units
+from sprag.service.spec.components import Component, read_components
 from sprag.service.spec.document import load_spec, parse_spec
 from sprag.service.spec.extend import parse_extended
+from sprag.service.spec.labels import StudyChange, read_change
 from sprag.service.spec.longer import longer_spec
 from sprag.service.spec.machine.shaft_check import compile_elsewhere
 from sprag.service.spec.narrow import narrowed_spec, swept_axis
 from sprag.service.spec.report import SpecError
+from sprag.service.spec.saved_views import View, ViewChange, read_view, read_view_change
 from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.pool.child_process import uncounted
@@ -36,6 +39,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from datetime import datetime
 
+    from sprag.service.results.explore import ExploreQuery
     from sprag.service.spec.text import Format
     from sprag.worker.chunking import Chunking
 
@@ -65,7 +69,7 @@ class Library:
         self.calibrations = Calibrations(store)
 
     def __reduce__(self) -> tuple[Callable[[str, Chunking], Library], tuple[str, Chunking]]:
-        return _library, (self.store.session.url.render_as_string(hide_password=False), self.store.chunking)
+        return _library, (self.store.session.url.render_as_string(hide_password=False), self.store.base_chunking)
 
 
 @lru_cache(maxsize=1)
@@ -86,6 +90,11 @@ def preview(library: Library, content: bytes, form: Format, finish: datetime | N
     parsed = parse_spec(with_start(store, load_spec(content, form)))
     left = None if finish is None else (finish - now).total_seconds()
     return to_bytes(preview_json(parsed, store.chunking, store.reusable(parsed.study), left))
+
+
+def components(content: bytes, form: Format) -> list[Component]:
+    """The components in a request's body; raises SpecError."""
+    return read_components(load_spec(content, form))
 
 
 def new_study(
@@ -168,6 +177,13 @@ def narrowed_study(
     return submission(parsed, store, now, given=given)
 
 
+def selected_study(
+    library: Library, study_id: str, query: ExploreQuery, now: datetime, given: Mapping[str, object]
+) -> Submission:
+    """The first cases of a selection as points; raises SelectionError, FaultError, SpecError and StudyNotFoundError."""
+    return submission(parse_spec(selection_spec(library, study_id, query)), library.store, now, given=given)
+
+
 def clutch_fit(content: bytes, form: Format) -> bytes:
     """The report of the fit described in a request's body, as JSON text; raises SpecError."""
     return to_bytes(fit_json(read_fit(load_spec(content, form))))
@@ -178,6 +194,21 @@ def schedule_body(
 ) -> ScheduleFields:
     """`schedule_fields` of the body of a request."""
     return schedule_fields(library, load_spec(content, form), now, old)
+
+
+def study_change(content: bytes, form: Format) -> StudyChange:
+    """The change of what people write about a study, as the body of a request has it; raises SpecError."""
+    return read_change(load_spec(content, form))
+
+
+def saved_view(content: bytes, form: Format) -> View:
+    """The view in a request's body; raises SpecError."""
+    return read_view(load_spec(content, form))
+
+
+def saved_view_change(content: bytes, form: Format, page: str) -> ViewChange:
+    """The change of a view of ``page`` in a request's body; raises SpecError."""
+    return read_view_change(load_spec(content, form), page)
 
 
 def body_hash(content: bytes, form: Format) -> str:

@@ -13,15 +13,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sprag.service import logs
+from sprag.service.delivery import Delivery
+from sprag.service.jobs.chores import Chores
 from sprag.service.jobs.housekeeping import Housekeeping
 from sprag.service.jobs.maintenance import Maintenance, MaintenancePlan
+from sprag.service.jobs.reports.reporter import Reporter
+from sprag.service.jobs.reports.watchdog import Watchdog
 from sprag.service.jobs.scheduler import Scheduler
 from sprag.service.logs import LogFormat
 from sprag.service.storage.errors import DatabaseError
+from sprag.service.storage.lock import DispatcherLock
 from sprag.service.storage.part import SILENT_SECONDS, SystemClock
 from sprag.service.storage.readiness import LOCKED_SECONDS
-from sprag.service.storage.session import file_of, lock_of
+from sprag.service.storage.session import file_of
 from sprag.service.storage.store import Store
+from sprag.service.storage.users import Quota, quota_of
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import Dispatcher
@@ -34,7 +40,7 @@ if TYPE_CHECKING:
     from types import FrameType
 
     from sprag.service.settings import Settings
-    from sprag.service.storage.lock import OneHolder
+    from sprag.service.storage.server_lock import ServerLock
     from sprag.worker.ports import Executor
 
 _LOG = logging.getLogger(__name__)
@@ -58,12 +64,17 @@ class WorkerSettings:
     log_format: LogFormat = "text"
     #: Where chunks run (`Settings.executor`).
     executor: str = "pool"
+    #: Of the users whose schedules submit studies.
+    quota: Quota = field(default_factory=Quota)
+    #: How the reports of schedules leave.
+    delivery: Delivery = field(default_factory=Delivery)
 
 
 def worker_settings(settings: Settings) -> WorkerSettings:
     """The part of ``settings`` that a dispatcher needs."""
     folder = Path(settings.backup_folder).expanduser().absolute() if settings.backup_folder else None
-    plan = MaintenancePlan(folder, settings.backup_keep, settings.keep_days, settings.nightly_at, settings.zone)
+    nightly = (settings.nightly_at, settings.zone)
+    plan = MaintenancePlan(folder, settings.backup_keep, settings.keep_days, *nightly, settings.audit_days)
     return WorkerSettings(
         settings.database_url,
         settings.pool_processes,
@@ -72,6 +83,8 @@ def worker_settings(settings: Settings) -> WorkerSettings:
         plan,
         settings.log_format,
         settings.executor,
+        quota_of(settings),
+        settings.reports,
     )
 
 
@@ -129,23 +142,29 @@ def run_dispatcher(
     renewed: Callable[[WorkerSettings], Executor] = renewed_pool,
     take_over: bool = False,
 ) -> None:
-    """Run every study of the database until ``stopping()``; wait as a standby while another dispatcher is active.
+    """Run the studies of the database until ``stopping()``.
 
-    With ``take_over`` it does not wait: the other dispatcher can no longer store anything and ends when it notices. A
-    hung one on this host is killed.
+    On a server it shares them with the other dispatchers. Of a file, it waits as a standby while another dispatcher is
+    active. With ``take_over`` it does not wait: the other one can no longer store anything and ends when it notices; a
+    hung one on this host is killed. On a server ``take_over`` ends those that have not responded for `HUNG_SECONDS`.
 
     Raises StoreError (EpochLostError when another dispatcher took over) and ExecutorError, each with one sentence.
     """
     chunking = Chunking(settings.chunk_cases, settings.processes, settings.chunk_timeout)
     with Store.open(settings.database_url, chunking=chunking) as store:
         store.require_sound()
-        scheduler, maintenance = Scheduler(store), Maintenance(store, _possible(store, settings.maintenance, say))
-        housekeeping = Housekeeping(store)
-        lock = lock_of(store.session, owner_name())
+        store.default_quota = settings.quota
+        lock = lock_of(store)
+        maintenance = Maintenance(store, _possible(store, settings.maintenance, say))
+        reports = [Reporter(store, settings.delivery)] if settings.delivery.wanted else []
+        chores = Chores(lock, [Scheduler(store), maintenance, Housekeeping(store, Watchdog(store).look), *reports])
         try:
             if take_over:
-                _take_over(store, lock, say)
-            elif not _stand_by(store, lock, stopping, say):
+                if isinstance(lock, DispatcherLock):
+                    _take_over(store, lock, say)
+                else:
+                    _end_silent(store, lock, say)
+            if not _stand_by(store, lock, stopping, say):
                 return
             say(f"worker with {settings.processes} processes is working on {store.session.location}")
             dispatcher = Dispatcher(
@@ -156,14 +175,10 @@ def run_dispatcher(
                 renew=lambda: renewed(settings),
                 news=store.session.news(),
             )
-            scheduler.start()
-            maintenance.start()
-            housekeeping.start()
+            chores.start()
             dispatcher.run(stopping)
         finally:
-            scheduler.stop()
-            maintenance.stop()
-            housekeeping.stop()
+            chores.stop()
             lock.release()
 
 
@@ -175,7 +190,32 @@ def _possible(store: Store, plan: MaintenancePlan, say: Callable[[str], None]) -
     return replace(plan, folder=None)
 
 
-def _stand_by(store: Store, lock: OneHolder, stopping: Callable[[], bool], say: Callable[[str], None]) -> bool:
+def lock_of(store: Store) -> DispatcherLock | ServerLock:
+    """What makes this process a dispatcher of the database: the lock of its file, or its presence on the server."""
+    if not store.session.on_server:
+        return DispatcherLock(store.session.path)
+    store.presence = lock = store.session.server_lock(owner_name())
+    return lock
+
+
+def _end_silent(store: Store, lock: ServerLock, say: Callable[[str], None]) -> None:
+    """End the dispatchers on a server that do not respond, and a transaction that blocks all others."""
+    if not store.session.can_write(LOCKED_SECONDS) and lock.end_writer():
+        say("a hung transaction that blocked all others was ended")
+    now = store.clock.now()
+    silent = [
+        record
+        for record in store.dispatchers()
+        if record.ended_at is None and (now - record.heartbeat_at).total_seconds() > HUNG_SECONDS
+    ]
+    lock.end([record.epoch for record in silent])
+    for record in silent:
+        say(f"process {record.owner} did not respond and was ended; its studies are taken over")
+
+
+def _stand_by(
+    store: Store, lock: DispatcherLock | ServerLock, stopping: Callable[[], bool], say: Callable[[str], None]
+) -> bool:
     """Wait for the lock; False when ``stopping()`` came first. A holder that no longer responds is reported once."""
     if lock.take():
         return True
@@ -194,14 +234,14 @@ def _stand_by(store: Store, lock: OneHolder, stopping: Callable[[], bool], say: 
     return True
 
 
-def _take_over(store: Store, lock: OneHolder, say: Callable[[str], None]) -> None:
+def _take_over(store: Store, lock: DispatcherLock, say: Callable[[str], None]) -> None:
     """Take the lock from its holder. A hung holder is ended, because its transaction may block all others."""
     if lock.take():
         return
     holder = lock.holder()
     hung = (store.silence() or 0.0) > HUNG_SECONDS or not store.session.can_write(LOCKED_SECONDS)
     if hung and lock.end_holder():
-        say(f"{'the transaction of ' if store.session.on_server else ''}process {holder} hung and was ended")
+        say(f"process {holder} hung and was ended")
     lock.seize()
 
 

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Final
 from sprag.service.storage.errors import StoreError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from sprag.service.storage.store import Store
 
 _LOG = logging.getLogger("sprag.housekeeping")
@@ -19,27 +21,30 @@ LOOK_SECONDS: Final = 30.0
 
 
 class Housekeeping(threading.Thread):
-    """Removes deleted studies promptly, in turns with other writers, until `stop`.
+    """Removes deleted studies that cannot be restored, promptly and in turns with other writers, until `stop`.
+
+    Each of ``also`` is called each time and once more at the end; what fails is logged.
 
     What another process deleted but did not live to remove is removed by the next dispatcher that starts.
     """
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Store, *also: Callable[[], None]) -> None:
         super().__init__(name="sprag-housekeeping", daemon=True)
         self._store = store
+        self._also = also
         self._ending = threading.Event()
         self._failed = False
 
     def run(self) -> None:
-        """Remove deleted studies at the start, after each deletion, and periodically."""
+        """Remove them at the start, after each deletion, and periodically."""
         self.purge()
         while not self._ending.is_set():
             deleted = self._store.deleted.wait(LOOK_SECONDS)
+            self._do_also()
             if self._ending.is_set():
                 return
-            if deleted or self._failed:
-                self.purge()
-            else:
+            self.purge()
+            if not (deleted or self._failed):
                 self.checkpoint()
 
     def stop(self) -> None:
@@ -62,6 +67,15 @@ class Housekeeping(threading.Thread):
         except StoreError as error:
             self._failed = True
             _LOG.warning("Deleted studies will be removed later: %s", error)
+
+    def _do_also(self) -> None:
+        for each in self._also:
+            try:
+                each()
+            except StoreError as error:
+                _LOG.warning("Part of the housekeeping is done later: %s", error)
+            except Exception:
+                _LOG.exception("Part of the housekeeping failed and is tried again later")
 
     def checkpoint(self) -> None:
         """Checkpoint the write-ahead log, so that the database file alone is nearly up to date."""

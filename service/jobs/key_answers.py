@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sprag.service.jobs.answers import FEW
+from sprag.service.jobs.reading import reading_of
 from sprag.service.json_text import to_bytes
 from sprag.service.results.figures.answers import answers_figure
+from sprag.service.results.figures.read import read_figure
 from sprag.service.results.key_answer_words import answers_csv, report
 from sprag.service.results.key_answers import answers_query, find_answers
 from sprag.service.results.pictures import curves as pictures
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
     from sprag.service.jobs.checks import Library
     from sprag.service.results.curves import CurveQuery
     from sprag.service.results.key_answers import StudyAnswers
+    from sprag.service.results.reading import Choice
 
 
 def answers_of(library: Library, study_id: str, chosen: CurveQuery | None, point: str | None) -> StudyAnswers:
@@ -52,17 +55,27 @@ def answers_as_json(library: Library, study_id: str, chosen: CurveQuery | None, 
     return to_bytes(report(study_id, library.store.study(study_id), answers_of(library, study_id, chosen, point)))
 
 
-def answers_as_csv(library: Library, study_id: str, chosen: CurveQuery | None, point: str | None) -> bytes:
+def answers_as_csv(
+    library: Library, study_id: str, chosen: CurveQuery | None, point: str | None, choice: Choice
+) -> bytes:
     """The answers as a table."""
-    return answers_csv(library.store.study(study_id), answers_of(library, study_id, chosen, point))
+    reading = reading_of(library.store, study_id, choice)
+    return answers_csv(library.store.study(study_id), answers_of(library, study_id, chosen, point), reading)
 
 
 def answers_picture(
-    library: Library, study_id: str, chosen: CurveQuery | None, point: str | None, title: str, form: pictures.Picture
+    library: Library,
+    study_id: str,
+    chosen: CurveQuery | None,
+    point: str | None,
+    choice: Choice,
+    title: str,
+    form: pictures.Picture,
 ) -> bytes:
     """The curves of the main results with their answers marked, as a picture."""
     found = answers_of(library, study_id, chosen, point)
     if found.drawn is None:
         raise refused("format", "not-used", "there is no curve to draw", form, allowed="json or csv")
     pictures.require_drawable([found.drawn])
-    return pictures.draw_figure(answers_figure(found, by_unit=True), title, form)
+    figure = read_figure(answers_figure(found, 2), reading_of(library.store, study_id, choice))
+    return pictures.draw_figure(figure, title, form)

@@ -12,12 +12,19 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.jobs.dispatching import STANDBY_SECONDS, StopFlag, WorkerSettings, owner_name, pool, renewed_pool
+from sprag.service.jobs.dispatching import (
+    STANDBY_SECONDS,
+    StopFlag,
+    WorkerSettings,
+    lock_of,
+    owner_name,
+    pool,
+    renewed_pool,
+)
 from sprag.service.stale_files import marked, sweep
 from sprag.service.storage.owners import run_owner
 from sprag.service.storage.part import SystemClock
 from sprag.service.storage.room import GOES_ON
-from sprag.service.storage.session import lock_of
 from sprag.service.storage.store import Store
 from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import Dispatcher
@@ -97,16 +104,17 @@ def run_here(
             record = store.create_study(spec, study, warnings=warnings, fresh=fresh, finish_by=finish_by)
             settings = WorkerSettings(url, processes, chunk_timeout, executor=setting)
             watch = _Watch(store, record.id, on_progress, interrupted)
-            lock = lock_of(store.session, owner_name())
+            lock = lock_of(store)
             owner = run_owner(owner_name(), record.id)
             try:
                 while not watch.ended():
                     if lock.take():
                         runner = executor or (pool(settings) if processes else InlineExecutor())
                         renew = None if executor or not processes else partial(renewed_pool, settings)
-                        Dispatcher(store, runner, SystemClock(), owner=owner, only=record.number, renew=renew).run(
-                            watch.ended
-                        )
+                        news = store.session.news()
+                        Dispatcher(
+                            store, runner, SystemClock(), owner=owner, only=record.number, renew=renew, news=news
+                        ).run(watch.ended)
                     else:
                         time.sleep(STANDBY_SECONDS)
             except (KeyboardInterrupt, ExecutorError) as error:

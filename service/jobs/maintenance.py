@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import re
+import socket
 import threading
 from collections.abc import Callable
 from contextlib import suppress
@@ -16,6 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from sprag.service.actor import Actor, Door, act_as
 from sprag.service.schedules.times import Timing, read_time_of_day
 from sprag.service.stale_files import sweep
 from sprag.service.storage.clock_watch import ClockWatch
@@ -31,30 +33,30 @@ _LOG = logging.getLogger("sprag.maintenance")
 #: Seconds between two checks of the clock, and before a failed task is retried.
 LOOK_SECONDS = 20.0
 AGAIN = timedelta(minutes=10)
+#: For so long the reports of schedules are kept after they were sent or given up.
+REPORTS_KEPT: Final = timedelta(days=90)
 _NAME: Final = re.compile(r"sprag-(\d{8}T\d{6}Z)\.sqlite3")
 _STAMP: Final = "%Y%m%dT%H%M%SZ"
 
 
 @dataclass(frozen=True, slots=True)
 class MaintenancePlan:
-    """Folder of the backups (None: no backups) and how many to keep; days to keep ended studies (0: for ever); time."""
+    """Folder of the backups (None: no backups) and how many to keep; days to keep ended studies (0: for ever); time;
+    days to keep the audit log (0: for ever).
+    """
 
     folder: Path | None = None
     keep: int = 14
     study_days: int = 0
     time: str = "02:30"
     zone: str = "UTC"
+    audit_days: int = 0
 
     @property
     def timing(self) -> Timing:
         """Every night at the time."""
         at = read_time_of_day(self.time)
         return Timing(f"{at.minute} {at.hour} * * *", None, self.zone)
-
-    @property
-    def wanted(self) -> bool:
-        """Whether any task is enabled."""
-        return self.folder is not None or self.study_days > 0
 
 
 def backups(folder: Path) -> list[tuple[datetime, Path]]:
@@ -93,10 +95,13 @@ class Maintenance(threading.Thread):
         self._watch = watch or ClockWatch(store)
         self._ending = threading.Event()
         self._tasks: list[_Task] = []
+        self._tasks.append(_Task("deletion of old reports", self._prune_reports))
         if plan.folder is not None:
             self._tasks.append(_Task("backup", partial(self._back_up, plan.folder)))
         if plan.study_days:
             self._tasks.append(_Task("deletion of old studies", self._prune))
+        if plan.audit_days:
+            self._tasks.append(_Task("deletion of old rows of the audit log", self._prune_audit))
 
     def run(self) -> None:
         """Run until stopped; watch the clock even where nothing else is enabled. Missed tasks are done immediately."""
@@ -112,7 +117,10 @@ class Maintenance(threading.Thread):
 
     def look(self) -> None:
         """Run the due tasks independently; failures are logged and retried later."""
-        now = self._store.clock.now()
+        with act_as(Actor(Door.SERVICE, "maintenance", socket.gethostname())):
+            self._look(self._store.clock.now())
+
+    def _look(self, now: datetime) -> None:
         due = self._plan.timing.latest_until(now)
         assert due is not None, "a time of day comes every day"
         try:
@@ -159,3 +167,13 @@ class Maintenance(threading.Thread):
         if gone:
             _LOG.info("Deleted studies that ended more than %d days ago: %s.", self._plan.study_days, ", ".join(gone))
         return True
+
+    def _prune_audit(self, now: datetime, _due: datetime, believed: bool) -> bool:
+        if believed:
+            self._store.prune_audit(now - timedelta(days=self._plan.audit_days))
+        return believed
+
+    def _prune_reports(self, now: datetime, _due: datetime, believed: bool) -> bool:
+        if believed:
+            self._store.prune_reports(now - REPORTS_KEPT)
+        return believed

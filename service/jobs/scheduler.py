@@ -7,95 +7,93 @@ time, and the study is submitted under a key of schedule and due time, so a sche
 from __future__ import annotations
 
 import logging
-import threading
+import socket
+from contextlib import suppress
 from datetime import timedelta
 from typing import TYPE_CHECKING
 
-from sprag.service.storage.errors import StoreError
+from sprag.service.actor import Actor, Door, act_as
+from sprag.service.jobs.nights import conclude_runs
+from sprag.service.jobs.polling import PollingThread
+from sprag.service.languages import recorded
+from sprag.service.schedules.policies import Overlap, due_times
+from sprag.service.storage.errors import StudyNotFoundError
+from sprag.service.storage.part import moment
+from sprag.worker.states import TransitionError
 
 if TYPE_CHECKING:
     from datetime import datetime
 
     from sprag.service.storage.records import StudyRecord
-    from sprag.service.storage.schedules import OpenRun, ScheduleRecord
+    from sprag.service.storage.schedule_runs import OpenRun, ScheduleRecord
     from sprag.service.storage.store import Store
+    from sprag.service.storage.windows import BoundStudy
 
 _LOG = logging.getLogger("sprag.schedules")
 
-#: Seconds between two checks for due schedules.
-LOOK_SECONDS = 1.0
 #: Seconds between two attempts at a run that was refused for a temporary reason, and the time limit of the attempts.
 RETRY_SECONDS = 30.0
 GRACE = timedelta(hours=12)
 #: Seconds between two checks for schedules that a fast clock has postponed.
 RECOVERY_SECONDS = 30.0
-#: Temporary problems: not enough disk space, a full queue, no process available.
-_TRANSIENT = frozenset({"storage-full", "queue-full", "unavailable"})
+#: Temporary problems: not enough disk space, a full queue, a quota, no process available.
+_TRANSIENT = frozenset({"storage-full", "queue-full", "quota-exceeded", "unavailable"})
 
 
-class Scheduler(threading.Thread):
+class Scheduler(PollingThread):
     """Checks the schedules of a store every second, by the store's clock, until `stop`."""
 
+    look_seconds = 1.0
+
     def __init__(self, store: Store) -> None:
-        super().__init__(name="sprag-scheduler", daemon=True)
+        super().__init__(_LOG, "the schedules")
         self._store = store
-        self._ending = threading.Event()
         self._next_recovery = float("-inf")
         #: By schedule and due time: the time (monotonic, s) before which a refused run is not tried again.
         self._next_try: dict[tuple[int, int], float] = {}
 
-    def run(self) -> None:
-        """Run until stopped. Database errors are logged once and waited out."""
-        trouble = None
-        while not self._ending.wait(LOOK_SECONDS):
-            try:
-                self.look()
-                trouble = None
-            except StoreError as error:
-                if str(error) != trouble:
-                    trouble = str(error)
-                    _LOG.error("The schedules cannot be updated: %s", error)
-            except Exception:
-                _LOG.exception("Updating the schedules failed; it is retried")
-                self._ending.wait(60.0)
-
-    def stop(self) -> None:
-        """Stop the thread; returns when it has ended."""
-        self._ending.set()
-        if self.is_alive():
-            self.join()
-
     def look(self) -> None:
-        """One check: submit what is due, and apply the windows."""
+        """One check: submit what is due, apply the windows, and keep the outcomes of what is over."""
+        if not self._store.has_schedules():  # as in most databases; then one question each second, instead of four
+            return
         now = self._store.clock.now()
         if self._store.clock.monotonic() >= self._next_recovery:
             self._next_recovery = self._store.clock.monotonic() + RECOVERY_SECONDS
             for schedule in self._store.recover_schedules(now):
                 _LOG.warning("The clock was put back: the schedule %s is due at its next time again.", schedule)
         for record in self._store.due_schedules(now):
-            self._take(record)
+            with act_as(_actor(record.id, record.owner)):
+                self._take(record)
         for run in self._store.open_runs():
-            if _is_over(run, now):
-                self._give_up(run)
-            elif self._store.clock.monotonic() >= self._next_try.get((run.schedule, run.due), 0.0):
-                self._submit(run)
+            with act_as(_actor(run.id, run.owner)):
+                if _is_over(run, now):
+                    self._give_up(run)
+                elif self._store.clock.monotonic() >= self._next_try.get((run.schedule, run.due), 0.0):
+                    self._submit(run)
         for study in self._store.bound_studies():
-            if study.window is None or study.window.open_at(now):
-                if study.held:
-                    self._store.let_in(study.number)
-                continue
-            reason = f"outside its window, {study.window}; it continues by itself"
-            if study.state.going or (study.held and study.reason != reason):
-                self._store.hold_for_window(study.number, reason)
+            with act_as(_actor(study.schedule)):
+                self._apply_window(study, now)
+        conclude_runs(self._store)
+
+    def _apply_window(self, study: BoundStudy, now: datetime) -> None:
+        if study.window is None or study.window.open_at(now):
+            if study.held:
+                self._store.let_in(study.number)
+            return
+        reason = recorded.OUTSIDE_WINDOW.format(window=study.window)
+        if study.state.going or (study.held and study.reason != reason):
+            self._store.hold_for_window(study.number, reason)
 
     def _take(self, record: ScheduleRecord) -> None:
-        """Take up the latest due time; earlier missed ones are only counted."""
-        now, timing = self._store.clock.now(), record.fields.timing
+        """Take up the due times that its policies select; the other missed ones are only counted."""
+        now, fields = self._store.clock.now(), record.fields
         assert record.next_due is not None
-        due = max(timing.latest_until(now) or record.next_due, record.next_due)
-        missed = timing.missed(record.next_due, due)
-        if self._store.take_due(record, due, missed, timing.next_after(now)) and missed:
-            _LOG.warning("The schedule %s was missed %d times before %s.", record.id, missed, due.isoformat())
+        dues = due_times(fields.timing, fields.policies, record.next_due, now)
+        if not self._store.take_due(record, dues, fields.next_due(now), now):
+            return
+        missed = dues[0].missed + sum(each.too_late for each in dues)
+        if missed:
+            _LOG.warning("The schedule %s was missed %d times until %s.", record.id, missed, dues[0].due.isoformat())
 
     def _put_off(self, run: OpenRun, problem: str) -> None:
         """Retry a run later that was refused for a temporary reason."""
@@ -118,6 +116,8 @@ class Scheduler(threading.Thread):
         if known is not None:  # the submitting process died before recording it; the schedule may have changed since
             self._close(run, known)
             return
+        if not self._may_overlap(run):
+            return
         try:
             parsed = parse_spec(run.fields.spec)
             if run.fields.name:
@@ -129,18 +129,33 @@ class Scheduler(threading.Thread):
         except (SpecError, FaultError) as error:
             now, end = self._store.clock.now(), _grace_end(run)
             if isinstance(error, FaultError) and error.code in _TRANSIENT and now < end:
-                self._put_off(run, f"{error}{_again_until(end)}")
+                self._put_off(run, recorded.TRIED_AGAIN.format(problem=error, time=_time(end)))
                 return
             self._refuse(run, str(error))
             return
         self._close(run, study)
 
+    def _may_overlap(self, run: OpenRun) -> bool:
+        """Apply the policy for earlier studies that have not ended; False where the run is skipped."""
+        overlap = run.fields.policies.overlap
+        earlier = [] if overlap is Overlap.QUEUE else self._store.earlier_studies(run)
+        if earlier and overlap is Overlap.SKIP:
+            _LOG.warning("The schedule %s was due and is skipped: study %s has not ended.", run.id, earlier[-1])
+            self._next_try.pop((run.schedule, run.due), None)
+            self._store.close_run(run, problem=recorded.EARLIER.format(study=earlier[-1]), skipped=True)
+            return False
+        for study in earlier:
+            _LOG.warning("The schedule %s was due: its earlier study %s is cancelled.", run.id, study)
+            with suppress(StudyNotFoundError, TransitionError):  # it was deleted, or ended, in the meantime
+                self._store.cancel_study(study)
+        return True
+
     def _give_up(self, run: OpenRun) -> None:
         """Refuse a run whose deadline passed before it could be retried: no worker was running, or the reason
         persisted.
         """
-        why = (run.problem or "").removesuffix(_again_until(_grace_end(run)))
-        self._refuse(run, why or "Its deadline passed before it could be submitted.")
+        why = (run.problem or "").removesuffix(recorded.TRIED_AGAIN.format(problem="", time=_time(_grace_end(run))))
+        self._refuse(run, why or recorded.NOT_IN_TIME)
 
     def _refuse(self, run: OpenRun, problem: str) -> None:
         _LOG.error("The schedule %s was due, but its study was not submitted: %s", run.id, problem)
@@ -153,6 +168,11 @@ class Scheduler(threading.Thread):
         _LOG.info("The schedule %s was due: study %s.", run.id, study.id)
 
 
+def _actor(schedule_id: str, owner: str | None = None) -> Actor:
+    """A schedule as the one who acts; its studies belong to ``owner``."""
+    return Actor(Door.SCHEDULE, schedule_id, socket.gethostname(), user=owner)
+
+
 def _finish_of(run: OpenRun) -> datetime | None:
     """The deadline of a run; None where it has none."""
     from sprag.service.schedules.deadline import run_finish_at
@@ -162,18 +182,26 @@ def _finish_of(run: OpenRun) -> datetime | None:
 
 
 def _is_over(run: OpenRun, now: datetime) -> bool:
-    """Whether it is too late to submit a run: after its deadline, or after the grace time of a refused run."""
+    """Whether it is too late to submit a run: after its deadline, its misfire grace, or the grace time of a refused
+    run.
+    """
     finish = _finish_of(run)
-    return (finish is not None and finish <= now) or (run.problem is not None and _grace_end(run) <= now)
+    policies = run.fields.policies
+    # What is retried was taken up in time.
+    delay = policies.longest_delay if run.problem is None else policies.grace
+    late = delay is not None and now - moment(run.due) > delay
+    return late or (finish is not None and finish <= now) or (run.problem is not None and _grace_end(run) <= now)
 
 
-def _again_until(end: datetime) -> str:
-    return f" It is tried again until {end.isoformat(timespec='seconds')}."
+def _time(end: datetime) -> str:
+    return end.isoformat(timespec="seconds")
 
 
 def _grace_end(run: OpenRun) -> datetime:
-    """Until when a run that is refused for a temporary reason is retried: its deadline, the next due time, or
-    `GRACE`.
+    """Until when a run that is refused for a temporary reason is retried: its deadline, the end of its misfire
+    grace, the next due time, or `GRACE`.
     """
-    ends = (run.begun_at + GRACE, _finish_of(run), run.fields.timing.next_after(run.begun_at))
+    delay = run.fields.policies.grace
+    late = None if delay is None else moment(run.due) + delay
+    ends = (run.begun_at + GRACE, _finish_of(run), late, run.fields.timing.next_after(run.begun_at))
     return min(end for end in ends if end is not None)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from sprag.service.faults import FaultError
 from sprag.service.jobs.preview import estimated_bytes, estimated_seconds
+from sprag.service.languages import recorded
 from sprag.service.schedules.deadline import finish_warnings
 from sprag.service.storage.room import RESERVE_BYTES
 from sprag.service.storage.study_row import study_row
@@ -71,10 +72,11 @@ def submission(
         to_run = most_cases(parsed.study) - (0 if fresh else store.reusable(parsed.study))
         seconds = estimated_seconds(parsed.study, store.chunking, to_run)
         warnings += finish_warnings(parsed.study, seconds, (finish_by - now).total_seconds())
+    size = estimated_bytes(parsed.study)
     return Submission(
-        study_row(parsed.spec, parsed.study, store.chunking, warnings),
+        {**study_row(parsed.spec, parsed.study, store.chunking, warnings), "estimated_bytes": size},
         hash_of(asked),
-        estimated_bytes(parsed.study),
+        size,
         fresh,
         finish_by,
     )
@@ -103,7 +105,7 @@ def take_in(store: Store, made: Submission, idempotency_key: str | None = None, 
     if known is not None:
         return known
     if store.waiting_studies() >= MAX_WAITING_STUDIES:
-        raise FaultError("queue-full", f"{MAX_WAITING_STUDIES:,} studies have not ended yet.")
+        raise FaultError("queue-full", recorded.MANY_STUDIES.format(count=f"{MAX_WAITING_STUDIES:,}"))
     _require_room(store, made.bytes)
     return store.insert_study(
         made.row,
@@ -121,7 +123,7 @@ def _require_room(store: Store, needed: int) -> None:
     if needed > left:
         raise FaultError(
             "storage-full",
-            f"The results would take about {_size(needed)}; the database has room for {_size(left)} more.",
+            recorded.NO_ROOM_FOR_RESULTS.format(size=_size(needed), room=_size(left)),
         )
 
 

@@ -75,6 +75,19 @@ def test_what_is_deleted_is_removed_in_the_background(store: Store) -> None:
     assert not keeping.is_alive()
 
 
+def test_a_task_that_fails_stops_neither_the_others_nor_the_thread(
+    store: Store, caplog: pytest.LogCaptureFixture
+) -> None:
+    done = threading.Event()
+    keeping = Housekeeping(store, lambda: 1 // 0, done.set)  # type: ignore[arg-type,return-value]
+    keeping.start()
+    store.deleted.set()
+    assert done.wait(SECONDS)
+    assert keeping.is_alive()
+    keeping.stop()
+    assert "ZeroDivisionError" in caplog.text
+
+
 def test_a_purge_that_fails_is_tried_again(
     store: Store, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

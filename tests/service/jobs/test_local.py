@@ -171,7 +171,7 @@ def test_a_standby_tells_of_a_silent_worker_and_one_that_takes_over_does_not_wai
         assert f"process {os.getpid()} has not responded" in said[1]
         run_dispatcher(settings, lambda: True, say=said.append, executor=inline, take_over=True)
         with pytest.raises(EpochLostError):
-            store.heartbeat(epoch)
+            store.heartbeat(epoch, fakes.report())
         lock.release()
 
 

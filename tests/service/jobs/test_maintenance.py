@@ -174,9 +174,7 @@ def test_the_plan_follows_from_the_settings(settings: Settings, tmp_path: Path) 
     changed = settings.model_copy(update={"backup_folder": folder, "keep_days": 7, "zone": "Europe/Berlin"})
     plan = worker_settings(changed).maintenance
     assert plan == MaintenancePlan(tmp_path, 14, 7, "02:30", "Europe/Berlin")
-    assert plan.wanted
     assert plan.timing.next_after(datetime(2026, 7, 1, tzinfo=UTC)) == datetime(2026, 7, 1, 0, 30, tzinfo=UTC)
-    assert not worker_settings(settings).maintenance.wanted
 
 
 def test_the_thread_ends_when_it_is_told(store: Store, tmp_path: Path) -> None:

@@ -49,11 +49,11 @@ class Ticking(fakes.HandClock):
 
 @pytest.fixture
 def clock(service: Service) -> Iterator[fakes.HandClock]:
-    before = service.store.clock, service.store.chunking
+    before = service.store.clock, service.store.base_chunking
     service.store.clock = clock = Ticking()
-    service.store.chunking = Chunking(cases=2)
+    service.store.base_chunking = Chunking(cases=2)
     yield clock
-    service.store.clock, service.store.chunking = before
+    service.store.clock, service.store.base_chunking = before
 
 
 def nine_loads() -> dict[str, Any]:
@@ -87,6 +87,12 @@ def dispatch(service: Service, clock: fakes.HandClock, chunks: int) -> None:
     [
         ("8 h", NOW + timedelta(hours=8)),
         (" 90 min ", NOW + timedelta(minutes=90)),
+        ("2 days", NOW + timedelta(days=2)),
+        ("1.5 d", NOW + timedelta(hours=36)),
+        ("2 weeks", NOW + timedelta(weeks=2)),
+        ("1w", NOW + timedelta(weeks=1)),
+        ("0,5 доби", NOW + timedelta(hours=12)),
+        ("8 год", NOW + timedelta(hours=8)),
         ("2026-03-02T06:00+01:00", datetime(2026, 3, 2, 5, tzinfo=UTC)),
         ("2026-03-02T06:00:00Z", datetime(2026, 3, 2, 6, tzinfo=UTC)),
     ],
@@ -107,6 +113,11 @@ def test_a_time_with_its_offset_or_a_duration_is_a_deadline(text: str, expected:
         ("-8 h", "out-of-range"),
         ("0 h", "out-of-range"),
         ("9000 h", "out-of-range"),
+        ("367 days", "out-of-range"),
+        ("0 weeks", "out-of-range"),
+        ("2 months", "invalid-time"),
+        ("2 W", "invalid-time"),
+        ("1 day 2 h", "invalid-time"),
         ("1e999 h", "invalid-time"),
         ("8", "invalid-time"),
         ("8 kg", "invalid-time"),
@@ -190,7 +201,7 @@ def test_preview_and_study_say_when_the_time_will_hardly_do(service: Service, cl
         {"path": "shaft.load", "linspace": [0, 1, 2000]},
         {"path": "excitation.frequency", "linspace": ["16 Hz", "35 Hz", 1000]},
     ]
-    service.store.chunking = Chunking()
+    service.store.base_chunking = Chunking()
     seconds = service.http.post(f"{STUDIES}:preview", json=spec).json()["estimated_seconds"]
     assert seconds > 20.0
     found = service.http.post(f"{STUDIES}:preview", json=spec, params={"finish_by": f"{seconds / 4:.3f} s"}).json()

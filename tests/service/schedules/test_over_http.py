@@ -94,6 +94,16 @@ def test_the_same_key_keeps_a_schedule_once(service: Service, clock: Clock) -> N
         ({"cron": "0 1 * * *", "window": "22:00-06:00"}, "/window"),
         ({"cron": "0 1 * * *", "priority": 1e9}, "/priority"),
         ({"cron": "0 1 * * *", "fresh": 1}, "/fresh"),
+        ({"cron": "@never"}, "/cron"),
+        ({"cron": "0 1 * * *", "overlap": "both"}, "/overlap"),
+        ({"cron": "0 1 * * *", "overlap": None}, "/overlap"),
+        ({"cron": "0 1 * * *", "catch_up": 3}, "/catch_up"),
+        ({"cron": "0 1 * * *", "misfire_grace": "soon"}, "/misfire_grace"),
+        ({"cron": "0 1 * * *", "misfire_grace": "1 ms"}, "/misfire_grace"),
+        ({"cron": "0 1 * * *", "misfire_grace": 60}, "/misfire_grace"),
+        ({"cron": "0 1 * * *", "paused_until": "2025-01-01T00:00"}, "/paused_until"),
+        ({"cron": "0 1 * * *", "paused_until": "later"}, "/paused_until"),
+        ({"at": "2026-01-01T02:00", "paused_until": "2026-01-01T02:01"}, "/paused_until"),
         ({"cron": "0 1 * * *", "name": ["x"]}, "/name"),
         ({"cron": "0 1 * * *", "name": "a\r\nb"}, "/name"),
         ({"cron": "0 1 * * *", "name": ""}, "/name"),
@@ -140,8 +150,8 @@ def test_a_schedule_is_kept_changed_and_deleted_by_the_pages(service: Service, c
     assert (kept.fields.spec, kept.fields.name) == (SPEC, "<b>by form</b>")
     listed = service.http.get("/schedules").text
     assert "&lt;b&gt;by form" in listed
-    assert "22:00 to 06:00" in listed
-    assert "2026-01-01 22:00:00 UTC" in listed
+    assert "22:00–06:00" in listed
+    assert "2026-01-01 22:00 UTC" in listed
     assert 'value="22:00"' in service.http.get(f"/schedules/{kept.id}").text
     change = fill_in(source="", when="at", at="2026-01-05T07:30", zone="Europe/Berlin", fresh="on", priority="-2")
     assert service.http.post(f"/schedules/{kept.id}", data=change).status_code == 303
@@ -152,8 +162,8 @@ def test_a_schedule_is_kept_changed_and_deleted_by_the_pages(service: Service, c
     Scheduler(service.store).look()
     assert ">its study</a>" in service.http.get("/schedules").text
     assert service.http.post(f"/schedules/{kept.id}", data={**change, "name": "later"}).status_code == 303
-    service.http.post(f"/schedules/{kept.id}/disable")
-    assert "disabled" in service.http.get("/schedules").text
+    service.http.post(f"/schedules/{kept.id}/pause")
+    assert "paused" in service.http.get("/schedules").text
     assert service.http.post(f"/schedules/{kept.id}/explode").status_code == 404
     assert service.http.post(f"/schedules/{kept.id}/delete").status_code == 303
     assert service.store.list_schedules() == ()
@@ -171,6 +181,9 @@ def test_a_schedule_is_kept_changed_and_deleted_by_the_pages(service: Service, c
         ({"window_begin": "22:00"}, "window_begin"),
         ({"priority": "high"}, "priority"),
         ({"name": "n" * 201}, "name"),
+        ({"overlap": "both"}, "overlap"),
+        ({"misfire_grace": "soon"}, "misfire_grace"),
+        ({"paused_until": "2020-01-01T00:00"}, "paused_until"),
     ],
 )
 def test_the_form_tells_what_is_wrong_beside_the_field(service: Service, given: dict[str, str], field: str) -> None:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Any
 
 import pytest
+import sqlalchemy as sa
 
 from sprag.service.http.app import chunking
-from sprag.service.jobs import scheduler as module
 from sprag.service.jobs.scheduler import Scheduler
 from sprag.service.schedules.fields import ScheduleFields, read_fields
+from sprag.service.schedules.policies import DueTime
 from sprag.service.storage.errors import DatabaseBusyError, ScheduleNotFoundError
-from sprag.service.storage.schedules import RunState
+from sprag.service.storage.schedule_runs import RunState
 from sprag.service.storage.store import Store
 from sprag.worker.states import StudyState
 from tests.service.conftest import Service
@@ -56,6 +58,26 @@ def test_a_cron_schedule_submits_a_study_whenever_it_is_due(service: Service, cl
     assert [run.due.day for run in store.schedule_runs(kept.id)] == [2, 1]
 
 
+def test_a_look_asks_one_question_where_there_are_no_schedules(service: Service, clock: Clock) -> None:
+    statements: list[str] = []
+
+    def note(_connection: Any, _cursor: Any, statement: str, *_: Any) -> None:
+        if not statement.startswith("BEGIN"):
+            statements.append(statement)
+
+    look = Scheduler(service.store).look
+    sa.event.listen(sa.Engine, "before_cursor_execute", note)
+    try:
+        look()
+        assert len(statements) == 1, statements
+    finally:
+        sa.event.remove(sa.Engine, "before_cursor_execute", note)
+    service.store.create_schedule(fields(cron="0 22 * * *", zone="Europe/Berlin", name="nightly"))
+    clock.set("2026-01-01T21:00")
+    look()
+    assert names(service.store) == ["nightly"]
+
+
 def test_missed_times_become_one_run(service: Service, clock: Clock) -> None:
     kept = service.store.create_schedule(fields(cron="0 * * * *"))
     clock.set("2026-01-01T05:20")
@@ -89,7 +111,7 @@ def test_two_schedulers_at_once_submit_one_study(settings: Settings, clock: Cloc
             faults: list[BaseException] = []
 
             def look(store: Store, gate: threading.Barrier = gate, faults: list[BaseException] = faults) -> None:
-                gate.wait(30)
+                gate.wait(600)
                 try:
                     Scheduler(store).look()
                 except BaseException as fault:
@@ -99,7 +121,7 @@ def test_two_schedulers_at_once_submit_one_study(settings: Settings, clock: Cloc
             for thread in threads:
                 thread.start()
             for thread in threads:
-                thread.join(60)
+                thread.join(600)
             assert faults == []
         assert sorted(names(one)) == sorted(["0", "1", "2", "3"] * 5)
 
@@ -124,8 +146,8 @@ def test_who_saw_it_due_before_another_took_it_takes_nothing(service: Service, c
     clock.set("2026-01-01T01:00")
     (seen,) = store.due_schedules(clock.now())
     due, following = clock.now(), clock.now() + timedelta(hours=1)
-    assert store.take_due(seen, due, 0, following)
-    assert not store.take_due(seen, due, 0, following)
+    assert store.take_due(seen, [DueTime(due)], following, due)
+    assert not store.take_due(seen, [DueTime(due)], following, due)
     assert len(store.open_runs()) == 1
 
 
@@ -276,7 +298,7 @@ def test_a_study_of_a_schedule_can_be_deleted(service: Service, clock: Clock) ->
 def test_the_thread_looks_again_after_trouble(
     service: Service, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(module, "LOOK_SECONDS", 0.001)
+    monkeypatch.setattr(Scheduler, "look_seconds", 0.001)
     looked = threading.Semaphore(0)
 
     class Troubled(Scheduler):
@@ -290,4 +312,18 @@ def test_the_thread_looks_again_after_trouble(
         assert looked.acquire(timeout=600)
     scheduler.stop()
     assert not scheduler.is_alive()
-    assert caplog.messages == ["The schedules cannot be updated: the database is busy"]
+    assert caplog.messages == ["Looking at the schedules failed: the database is busy"]
+
+
+def test_a_time_that_passes_between_its_check_and_its_storage_is_run(service: Service, clock: Clock) -> None:
+    checked, other = fields(at="2026-01-01T02:00"), fields(at="2026-01-01T02:30")
+    clock.set("2026-01-01T03:00")
+    kept = service.store.create_schedule(checked)
+    look = Scheduler(service.store).look
+    look()
+    service.store.change_schedule(kept.id, other)
+    look()
+    service.store.change_schedule(kept.id, replace(other, priority=3))
+    look()
+    assert [run.due.minute for run in service.store.schedule_runs(kept.id)] == [30, 0]
+    assert len(names(service.store)) == 2

@@ -114,7 +114,7 @@ def test_a_moment_that_there_is_not_is_refused(text: str, code: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "cron", ["", "x", "0 22 * *", "* * * * * *", "0 25 * * *", "61 * * * *", "0 0 31 2 *", "@daily", "0 0 * * 8-9"]
+    "cron", ["", "x", "0 22 * *", "* * * * * *", "0 25 * * *", "61 * * * *", "0 0 31 2 *", "@reboot", "0 0 * * 8-9"]
 )
 def test_expressions_that_are_none_are_refused(cron: str) -> None:
     with pytest.raises(TimingError):

@@ -1,0 +1,84 @@
+"""What schedules did lately: due times with their outcomes, those that need attention first."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import timedelta
+from typing import TYPE_CHECKING, Final
+
+from sprag.service.answers import filled
+from sprag.service.answers.schedules import Night, NightRun, RunOutcome, SentReport
+from sprag.service.delivery import origin_of
+from sprag.service.jobs.reports.watchdog import late_json, late_runs
+from sprag.service.json_text import timestamp
+from sprag.service.schedules.times import local_time
+from sprag.service.storage.errors import StudyNotFoundError
+from sprag.worker import models
+
+if TYPE_CHECKING:
+    from sprag.service.schedules.outcomes import Outcome
+    from sprag.service.storage.reports import ReportRecord
+    from sprag.service.storage.store import Store
+
+#: Hours that are looked back on by default, and at most.
+HOURS: Final = 24
+MOST_HOURS: Final = 24 * 31
+#: Most due times in an answer, the latest ones.
+MOST_RUNS: Final = 1000
+
+
+def whole_outcome(store: Store, outcome: Outcome) -> Outcome:
+    """The outcome of a run that is over, with the endings, flags and coverage of its study; raises StoreError."""
+    if outcome.study is None:
+        return outcome
+    try:
+        _, progress = store.look(outcome.study)
+        kinds = store.kinds(outcome.study)
+    except StudyNotFoundError:  # it was deleted in the meantime
+        return outcome
+    return replace(
+        outcome,
+        endings={name: count for name, count in progress.endings.items() if name != "ok"},
+        flags={name: count for name, count in kinds.flags.items() if name not in models.REGIME_SENTENCES},
+        coverage=None if progress.covered is None else str(progress.covered),
+    )
+
+
+def conclude_runs(store: Store) -> int:
+    """Keep the outcomes of the due times that are over by now; returns how many."""
+    return sum(store.conclude_run(run, whole_outcome(store, run.outcome)) for run in store.ended_runs())
+
+
+def outcome_json(outcome: Outcome) -> RunOutcome:
+    """An outcome for answers."""
+    return filled(RunOutcome, outcome)
+
+
+def report_json(report: ReportRecord) -> SentReport:
+    """A report for answers; the path of a webhook can be a secret of its receiver."""
+    target = origin_of(report.target) or "" if report.channel == "webhook" else report.target
+    return filled(SentReport, report, target=target)
+
+
+def night(store: Store, hours: float = HOURS) -> Night:
+    """The due times of the last ``hours``: first those that need attention, each group latest first."""
+    until = store.clock.now()
+    since = until - timedelta(hours=hours)
+    found, sent = store.runs_between(since, until, MOST_RUNS), store.reports_between(since, until)
+    runs = [
+        filled(
+            NightRun,
+            run,
+            due_local=local_time(run.due, run.zone),
+            outcome=outcome_json(run.outcome),
+            reports=[report_json(report) for report in sent.get((run.schedule, run.due), ())],
+        )
+        for run in sorted(found, key=lambda run: not run.outcome.trouble)
+    ]
+    return {
+        "since": timestamp(since),
+        "until": timestamp(until),
+        "trouble": sum(run.outcome.trouble for run in found),
+        "late": [late_json(late) for late in late_runs(store)],
+        "runs": runs,
+    }

@@ -1,0 +1,15 @@
+"""How somebody reads a stored study."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sprag.service.results.reading import Choice, Reading, reading_for
+
+if TYPE_CHECKING:
+    from sprag.service.storage.store import Store
+
+
+def reading_of(store: Store, study_id: str, choice: Choice) -> Reading:
+    """The reading of a choice; raises StudyNotFoundError, and SelectionError for units that cannot be shown."""
+    return reading_for(store.study(study_id), store.spec(study_id), choice)

@@ -1,0 +1,38 @@
+"""The picture of a report: the first figure that was put into it, or the first curve of the study's page."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Final
+
+from sprag.service.results.chosen_figures import chosen_figures
+from sprag.service.results.curve_cases import draw, select
+from sprag.service.results.defaults import main_query
+from sprag.service.results.pictures.curves import draw_curves
+from sprag.service.results.quantities import TYPED
+from sprag.service.results.reading import Choice, reading_for
+from sprag.worker import models
+
+if TYPE_CHECKING:
+    from sprag.service.storage.store import Store
+
+_AS_TYPED: Final = Choice(TYPED)
+
+
+def small_curve(store: Store, study_id: str) -> bytes | None:
+    """The figure or the curve as PNG; None for a study in which nothing varies.
+
+    Raises StudyNotFoundError, and SelectionError for curves that cannot be drawn.
+    """
+    study = store.study(study_id)
+    infos = models.study_results(study)
+    chosen = next((figure for figure in chosen_figures(store, study_id, _AS_TYPED) if figure.shown is not None), None)
+    if chosen is not None:
+        return chosen.draw("png", chosen.name)
+    query = main_query(study, infos)
+    if query is None:
+        return None
+    fetch = partial(store.rows_for_cases, study_id)
+    drawn = draw(select(study, infos, replace(query, y=query.y[:1])), fetch)
+    return draw_curves(drawn, "", "png", reading_for(study, store.spec(study_id), _AS_TYPED))

@@ -1,0 +1,92 @@
+"""The reporter: sends the reports that wait, with retries, beside a dispatcher and beside the service."""
+
+from __future__ import annotations
+
+import logging
+import socket
+from datetime import timedelta
+from typing import TYPE_CHECKING, Final
+
+from sprag.service.actor import Actor, Door, act_as
+from sprag.service.jobs.polling import PollingThread
+from sprag.service.jobs.reports.channels import DeliveryError, send_mail, send_webhook
+from sprag.service.jobs.reports.message import mail, webhook_body
+from sprag.service.languages import language
+
+if TYPE_CHECKING:
+    import ssl
+
+    from sprag.service.delivery import Delivery
+    from sprag.service.storage.reports import Claimed
+    from sprag.service.storage.store import Store
+
+_LOG = logging.getLogger("sprag.reports")
+
+#: The first and the longest pause before a report is tried again; each is twice the one before.
+FIRST_PAUSE: Final = timedelta(minutes=1)
+LONGEST_PAUSE: Final = timedelta(hours=1)
+#: A report that is older than this is not tried again.
+GIVEN_UP_AFTER: Final = timedelta(days=3)
+
+
+class Reporter(PollingThread):
+    """Sends reports until `stop`. Any number of them may run on one database."""
+
+    look_seconds = 5.0
+    # One that is cut off is sent again after its claim.
+    stop_seconds = 5.0
+
+    def __init__(self, store: Store, delivery: Delivery, context: ssl.SSLContext | None = None) -> None:
+        super().__init__(_LOG, "the reports")
+        self._store = store
+        self._delivery = delivery
+        self._context = context
+
+    def look(self) -> None:
+        """Send every report that is due to be sent."""
+        with act_as(Actor(Door.SERVICE, "reports", socket.gethostname())):
+            while not self._ending.is_set() and (report := self._store.claim_report()) is not None:
+                self._send(report)
+
+    def _send(self, report: Claimed) -> None:
+        try:
+            if report.channel == "email":
+                message = mail(report, self._delivery, self._store.clock.now(), self._curve(report))
+                send_mail(message, self._delivery, self._context)
+            else:
+                body = webhook_body(report, self._delivery)
+                send_webhook(report, body, self._delivery, self._store.clock.now())
+        except DeliveryError as error:
+            self._failed(report, error)
+            return
+        except Exception:  # one report must not keep the others from being sent
+            _LOG.exception("The report %s cannot be made", report.id)
+            self._failed(report, DeliveryError("The report cannot be made; the log says why."))
+            return
+        self._store.report_sent(report)
+        _LOG.info("The report %s of the schedule %s was sent by %s.", report.id, report.schedule, report.channel)
+
+    def _failed(self, report: Claimed, error: DeliveryError) -> None:
+        now = self._store.clock.now()
+        # Two to the power of twenty minutes is longer than any report is kept.
+        pause = min(FIRST_PAUSE * 2 ** min(report.attempts - 1, 20), LONGEST_PAUSE)
+        again = None if error.permanent or now + pause - report.created_at > GIVEN_UP_AFTER else now + pause
+        self._store.report_failed(report, str(error), again)
+        if again is None:
+            _LOG.error("The report %s of the schedule %s is given up: %s", report.id, report.schedule, error)
+        elif report.attempts == 1:
+            _LOG.warning("The report %s of the schedule %s is tried again: %s", report.id, report.schedule, error)
+
+    def _curve(self, report: Claimed) -> bytes | None:
+        """The curve of the study; None where there is none, or it cannot be drawn."""
+        study, outcome = report.content.get("study"), report.content.get("outcome")
+        if study is None or outcome is None or not outcome["ok"]:
+            return None
+        from sprag.service.jobs.reports.curve import small_curve
+
+        try:
+            with language(self._delivery.language):
+                return small_curve(self._store, study)
+        except Exception as error:  # a report without its picture is better than none
+            _LOG.warning("The report %s has no curve: %s", report.id, error)
+            return None

@@ -1,0 +1,98 @@
+"""The watchdog: says when nothing has run although a schedule was due."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import TYPE_CHECKING, Final
+
+from sprag.service.answers import filled
+from sprag.service.answers.schedules import LateRun as LateRunAnswer
+from sprag.service.languages import recorded
+from sprag.service.results.phrases import Phrase
+from sprag.service.schedules.times import local_time, wall_clock
+
+if TYPE_CHECKING:
+    from datetime import datetime
+
+    from sprag.service.storage.late_runs import ExpectedRun
+    from sprag.service.storage.store import Store
+
+_LOG = logging.getLogger("sprag.watchdog")
+
+#: A due time that nobody takes up for so long is late; so is a study that should run while no worker has responded.
+LATE: Final = timedelta(minutes=15)
+#: A study that should run is late when no chunk of any study has been finished for so long: longer than a chunk that
+#: hangs lives by default.
+STALLED: Final = timedelta(hours=2)
+
+
+@dataclass(frozen=True, slots=True)
+class LateRun:
+    """A due time at which nothing has run although it should, and why, as far as it is known."""
+
+    run: ExpectedRun
+    sentence: str
+
+
+def late_runs(store: Store) -> list[LateRun]:
+    """Due times at which nothing has run although it should; raises StoreError."""
+    now = store.clock.now()
+    expected = store.expected_runs(now - LATE)
+    if not expected:
+        return []
+    silence = store.silence()
+    silent = silence is None or silence > LATE.total_seconds()
+    stalled = not silent and not store.chunk_finished_since(now - STALLED)
+    found = []
+    for run in expected:
+        why = _why(run, now, silent, stalled)
+        if why is not None:
+            due = wall_clock(run.due, run.zone)
+            found.append(LateRun(run, Phrase(recorded.NOTHING_RAN, due=due, why=why)))
+    return found
+
+
+def _why(run: ExpectedRun, now: datetime, silent: bool, stalled: bool) -> Phrase | None:
+    """Why nothing has run; None where nothing speaks against it."""
+    if not run.taken:
+        return Phrase(recorded.NOT_TAKEN_SILENT if silent else recorded.NOT_TAKEN)
+    if run.study is None:
+        problem = _clause(run.problem) if run.problem else Phrase(recorded.NO_WORKER)
+        return Phrase(recorded.NOT_SUBMITTED, problem=problem)
+    if silent:
+        return Phrase(recorded.WAITS_SILENT)
+    if run.problem:
+        return Phrase(recorded.WAITS, problem=_clause(run.problem))
+    if stalled and now - run.since > STALLED:
+        return Phrase(recorded.WAITS_STALLED)
+    return None
+
+
+def _clause(text: str) -> str:
+    return recorded.said(text).removesuffix(".")
+
+
+def late_json(late: LateRun) -> LateRunAnswer:
+    """A late run for answers."""
+    run = late.run
+    return filled(LateRunAnswer, run, schedule=run.id, due_local=local_time(run.due, run.zone), sentence=late.sentence)
+
+
+class Watchdog:
+    """Looks for late runs; each gets a line in the log and the alarms of its schedule, once."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._known: set[tuple[str, datetime]] = set()
+
+    def look(self) -> None:
+        """One look; raises StoreError."""
+        found = late_runs(self._store)
+        known = {(late.run.id, late.run.due) for late in found}
+        for late in found:
+            if (late.run.id, late.run.due) not in self._known:
+                _LOG.error("The schedule %s is late. %s", late.run.id, late.sentence)
+                self._store.add_alarm(late.run, late.sentence)
+        self._known = known

@@ -1,0 +1,30 @@
+"""Saving and changing views: a figure of a report must be one that its study has."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from sprag.service.results.chosen_figures import require_figure
+
+if TYPE_CHECKING:
+    from sprag.service.spec.saved_views import View, ViewChange
+    from sprag.service.storage.saved_views import SavedView
+    from sprag.service.storage.store import Store
+
+
+def save_view(store: Store, view: View) -> SavedView:
+    """Save a view; raises as the store does, and SelectionError for a figure that the study does not have."""
+    if view.in_report and view.study is not None:
+        require_figure(store.study(view.study), view)
+    return store.save_view(view)
+
+
+def change_view(store: Store, view_id: str, change: ViewChange) -> SavedView:
+    """Change a view; raises as the store does, and SelectionError for a figure that the study does not have."""
+    old = store.saved_view(view_id).view
+    in_report = change.place is not None or (old.in_report if change.in_report is None else change.in_report)
+    if in_report and old.study is not None and not (old.in_report and change.query is None):
+        query = old.query if change.query is None else change.query
+        require_figure(store.study(old.study), replace(old, query=query))
+    return store.change_view(view_id, change)

@@ -1,0 +1,69 @@
+"""Mails of schedules in the language that the service is set to; webhooks are English."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+import pytest
+from pydantic import ValidationError
+
+from sprag.service import languages
+from sprag.service.answers import filled
+from sprag.service.answers.schedules import RunOutcome
+from sprag.service.delivery import Delivery, DeliverySettings
+from sprag.service.jobs.reports.message import mail, webhook_body
+from sprag.service.languages import recorded
+from sprag.service.schedules.outcomes import Outcome, Result
+from sprag.service.storage.reports import Claimed
+from sprag.worker.order import Coverage
+
+NIGHT = datetime(2026, 11, 23, 1, tzinfo=UTC)
+OUTCOME = Outcome(Result.FINISHED, "st_1", "Feeder", 1200, 1200, 1197, {"chatter": 3}, ended_at=NIGHT)
+
+
+def report(outcome: Outcome) -> Claimed:
+    content = {
+        "schedule": "sc_1", "name": "Живильник", "due": NIGHT.isoformat(), "zone": "UTC", "study": outcome.study,
+        "outcome": filled(RunOutcome, outcome, ended_at=NIGHT.isoformat()),
+        "known": {"reason": outcome.reason, "missed": outcome.missed},
+    }  # fmt: skip
+    return Claimed(1, "rp_1", "sc_1", "email", "dora@example.com", content, 1, NIGHT, NIGHT)
+
+
+def test_a_mail_is_in_the_language_of_the_service() -> None:
+    made = mail(report(OUTCOME), Delivery(sender="sprag@example.com", language="uk"), NIGHT, None)
+    assert made["Subject"] == "Sprag: потрібна увага: Живильник: завершене, 1,197 з 1,200 випадків ok"
+    text, page = (made.get_body((kind,)) for kind in ("plain", "html"))
+    assert text is not None
+    assert page is not None
+    lines = text.get_content().splitlines()
+    assert lines[0] == "Закінчено: готово 1,200 з 1,200 випадків, з них 1,197 завершилися ok."
+    assert "Завершення «деренчання»: 3 випадки" in lines
+    assert OUTCOME.sentence not in text.get_content()
+    assert '<html lang="uk">' in page.get_content()
+    assert ">Дослідження</a>" in page.get_content()
+    assert languages.current() == languages.ENGLISH
+
+
+def test_a_mail_says_reasons_and_coverage_in_the_language_of_the_service() -> None:
+    coverage = str(Coverage(1, 3, 4, (2, 2)))
+    outcome = Outcome(Result.DEADLINE, "st_1", "Feeder", 9, 5, 5, coverage=coverage, ended_at=NIGHT)
+    refused = Outcome(Result.REFUSED, reason=recorded.NOT_IN_TIME)
+    delivery = Delivery(sender="sprag@example.com", language="uk")
+    bodies = [mail(report(each), delivery, NIGHT, None).get_body(("plain",)) for each in (outcome, refused)]
+    late, never = (body.get_content() for body in bodies if body is not None)
+    assert "Покриття: прохід 1 з 3 завершено, сітка з 2 x 2 значень" in late.splitlines()
+    assert "Жоден обчислювач не працював, доки не минув кінцевий строк" in never
+
+
+def test_mails_are_english_unless_they_are_set_otherwise_and_webhooks_always() -> None:
+    english = mail(report(OUTCOME), Delivery(sender="sprag@example.com"), NIGHT, None)
+    assert english["Subject"] == "Sprag: needs attention: Живильник: finished, 1,197 of 1,200 cases ok"
+    bodies = [webhook_body(report(OUTCOME), Delivery(language=code)) for code in ("en", "uk")]
+    assert bodies[0] == bodies[1]
+
+
+def test_the_setting_takes_known_languages_only() -> None:
+    assert DeliverySettings(mail_language="uk").delivery("http://127.0.0.1").language == "uk"
+    with pytest.raises(ValidationError, match="allowed: en, uk"):
+        DeliverySettings(mail_language="tlh")
