@@ -1,0 +1,42 @@
+"""Texts of the form for a new study that its tables have: labels, help and choices of fields."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from sprag.service.results.wording import words
+from sprag.service.spec.components import CHARACTERISTIC, CHARACTERISTICS
+from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN
+from sprag.service.spec.draws.described import DISTRIBUTION, DRAWS
+from sprag.service.spec.machine.shaft import MEAN_SPEED_IS
+from sprag.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, FLYWHEEL, MOTOR, STAGE
+from sprag.service.spec.machine.shaft_parts import (
+    FORMS,
+    INDICATOR_OVER,
+    INTERPOLATION,
+    MECHANISM_CHOICES,
+    OPERATION_CHOICES,
+    PHI_C,
+)
+from sprag.service.spec.plan import goal, refine
+from sprag.worker import models
+
+
+def form_values() -> Iterator[str]:
+    """Labels and help of the fields of the form for a new study."""
+    yield from (words(name) for name in (CHARACTERISTIC, *FORMS))
+    yield from map(words, CHARACTERISTICS)
+    machine = (*MECHANISM_CHOICES.values(), OPERATION_CHOICES)
+    drive = (MEAN_SPEED_IS, BALANCE, BALANCE_SIDE, FLYWHEEL, MOTOR, STAGE, INDICATOR_OVER, INTERPOLATION, PHI_C)
+    plan = (*goal.SEARCH.values(), refine.RESULTS, refine.ERROR, refine.START, refine.FINEST, refine.MOST)
+    entries = (*SETTLED_RUN.values(), DURATION, *ANY_RUN.values(), *FIT.values(), *DRAWS.values(), *plan, *drive)
+    for entry in (*entries, *(entry for choices in machine for entry in choices.values())):
+        name = words(getattr(entry, "name", ""))
+        texts = [word if word != value else words(word) for value, word in getattr(entry, "choices", ())]
+        yield from filter(None, (getattr(entry, "label", ""), name, entry.help, *texts))
+    yield from (words(name).lower() for name in DISTRIBUTION.values)
+    yield from (words(kind) for kind in MECHANISM_CHOICES)
+    for name in models.model_names():
+        yield from models.model_of(name).presentation.sections.values()
+        for parameter in models.parameter_catalogue(name):
+            yield from (words(name) for name in parameter.path.split(".") if name not in ("K", "N"))
