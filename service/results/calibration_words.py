@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.results.wording import percent
+from sprag.service.results.phrases import Amount, Name, Part, Phrase, joined, plural
 from sprag.service.spec.catalogue import unit_of
 
 if TYPE_CHECKING:
@@ -24,6 +25,17 @@ _ENDED: Final = 0.25
 _MOST_POINTS: Final = 5
 
 
+@dataclass(frozen=True, slots=True)
+class _Quantity(Amount):
+    """An amount that English sentences write in plain characters, as files do."""
+
+    form: str = ".4g"
+
+    def __str__(self) -> str:
+        text = format(self.value, self.form)
+        return text if self.unit == "1" else f"{text} {self.unit}"
+
+
 def sentences(found: Calibration) -> list[str]:
     """What should be known before the values are used."""
     known = found.answer
@@ -39,27 +51,40 @@ def sentences(found: Calibration) -> list[str]:
     ]
 
 
-def _scatter(found: Calibration, known: Answer) -> Iterator[str]:
+def _scatter(found: Calibration, known: Answer) -> Iterator[Phrase]:
     plan = found.plan
     _, columns = plan.places
     for column, one in enumerate(plan.measured):
         if not one.sigma:
             sigma = float(known.sigma[columns == column][0])
-            unit = found.infos[one.result].unit
-            yield f"The standard deviation of {one.result} follows from the residuals: {_quantity(sigma, unit)}."
+            yield Phrase(
+                "The standard deviation of {name} follows from the residuals: {sigma}.",
+                name=Name(one.result, within=True),
+                sigma=_Quantity(sigma, found.infos[one.result].unit, 4),
+            )
     if not plan.known_sigma or known.freedom < 1:
         return
-    told = f"Chi-square is {known.chi_square:.3g} for {known.freedom} degrees of freedom"
+    values: dict[str, Part] = {"value": _Quantity(known.chi_square, "1", 3, form=".3g"), "freedom": known.freedom}
     if plan.loss != "linear":
-        yield f"{told}, outliers included."
+        yield Phrase("Chi-square is {value} for {freedom} degrees of freedom, outliers included.", **values)
         return
     above = _chi_square_above(known.chi_square, known.freedom)
     if above < _CHANCE:
-        yield f"{told}: the points are farther off than sigma explains; the intervals are too narrow."
+        yield Phrase(
+            "Chi-square is {value} for {freedom} degrees of freedom: the points are farther off than sigma explains; "
+            "the intervals are too narrow.",
+            **values,
+        )
     elif above > 1.0 - _CHANCE:
-        yield f"{told}: the points scatter less than sigma; the intervals are too wide."
+        yield Phrase(
+            "Chi-square is {value} for {freedom} degrees of freedom: the points scatter less than sigma; the intervals "
+            "are too wide.",
+            **values,
+        )
     else:
-        yield f"{told}: the points scatter as sigma says."
+        yield Phrase(
+            "Chi-square is {value} for {freedom} degrees of freedom: the points scatter as sigma says.", **values
+        )
 
 
 def _chi_square_above(value: float, freedom: int) -> float:
@@ -68,72 +93,96 @@ def _chi_square_above(value: float, freedom: int) -> float:
     return float(gammaincc(0.5 * freedom, 0.5 * value))
 
 
-def _direction(found: Calibration, one: Direction) -> str:
-    names = [found.names[place] for place in one.parameters]
-    changes = " and ".join(
-        f"{name} by {_quantity(change, unit_of(found.study, name), signed=True)}"
-        for name, change in zip(names, one.changes, strict=True)
-    )
+def _direction(found: Calibration, one: Direction) -> Phrase:
+    paths = [found.names[place] for place in one.parameters]
+    names = [Name(path, within=True) for path in paths]
     if len(names) == 1:
-        return f"These points do not determine {names[0]}."
+        return Phrase("These points do not determine {name}.", name=names[0])
+    changes = [
+        Phrase("{name} by {change}", name=name, change=_Quantity(change, unit_of(found.study, path), 3, form="+.3g"))
+        for path, name, change in zip(paths, names, one.changes, strict=True)
+    ]
+    parts = {"names": _listed(names), "changes": _listed(changes)}
     if one.undetermined:
-        return f"These points cannot separate {_listed(names)}: changing {changes} changes hardly any of them."
-    return f"These points hardly separate {_listed(names)}: changing {changes} is within their scatter."
+        return Phrase("These points cannot separate {names}: changing {changes} changes hardly any of them.", **parts)
+    return Phrase("These points hardly separate {names}: changing {changes} is within their scatter.", **parts)
 
 
-def _bounds(found: Calibration, known: Answer) -> Iterator[str]:
+def _bounds(found: Calibration, known: Answer) -> Iterator[Phrase]:
     if known.at_bounds is None:
         return
-    for one, name, (low, high) in zip(found.plan.unknown, found.names, known.at_bounds.tolist(), strict=True):
-        unit = unit_of(found.study, name)
-        ends = [_quantity(end, unit) for end, reached in ((one.low, low), (one.high, high)) if reached]
-        if ends:
-            which = "the end" if len(ends) == 1 else "both ends"
-            yield f"The interval of {name} reaches {which} of its range ({', '.join(ends)}); a wider one may change it."
+    for one, path, (low, high) in zip(found.plan.unknown, found.names, known.at_bounds.tolist(), strict=True):
+        unit, name = unit_of(found.study, path), Name(path, within=True)
+        ends = [_Quantity(end, unit, 4) for end, reached in ((one.low, low), (one.high, high)) if reached]
+        if len(ends) == 1:
+            yield Phrase(
+                "The interval of {name} reaches the end of its range ({end}); a wider one may change it.",
+                name=name,
+                end=ends[0],
+            )
+        elif ends:
+            yield Phrase(
+                "The interval of {name} reaches both ends of its range ({low}, {high}); a wider one may change it.",
+                name=name,
+                low=ends[0],
+                high=ends[1],
+            )
 
 
-def _points(found: Calibration, known: Answer) -> Iterator[str]:
+def _points(found: Calibration, known: Answer) -> Iterator[Phrase]:
     failed = int(np.count_nonzero(known.failed))
     if failed:
-        yield f"{failed} of {found.plan.count} measured values have no result at the fitted values and are left out."
+        yield Phrase(
+            "{count} of {total} measured values have no result at the fitted values and are left out.",
+            count=failed,
+            total=found.plan.count,
+        )
     residuals = np.where(known.failed, 0.0, known.residuals)
     far = [index for index in np.argsort(-np.abs(residuals)).tolist() if abs(residuals[index]) > _FAR]
     for index in far[:_MOST_POINTS]:
-        yield f"Measured value {index + 1} is {abs(residuals[index]):.1f} standard deviations off the fit."
+        yield Phrase(
+            "Measured value {number} is {count} standard deviations off the fit.",
+            number=index + 1,
+            count=_Quantity(round(abs(residuals[index]), 1), "1", form=".1f"),
+        )
     if len(far) > _MOST_POINTS:
-        yield f"{len(far) - _MOST_POINTS} further values are more than {_FAR:g} standard deviations off."
-
-
-def _refits(found: Calibration, known: Answer) -> Iterator[str]:
-    if not found.summary["complete"]:
-        yield "The calibration has not run to its end."
-    ended = known.refits - found.converged
-    if known.refits and ended > _ENDED * known.refits:
-        yield (
-            f"{ended} of {known.refits} refits ended before they converged, as the results are not smooth: the "
-            "intervals are rough."
+        yield plural(
+            "{count} further value is more than {limit} standard deviations off.",
+            "{count} further values are more than {limit} standard deviations off.",
+            len(far) - _MOST_POINTS,
+            limit=_Quantity(_FAR, "1", form="g"),
         )
 
 
-def _next(found: Calibration, known: Answer) -> Iterator[str]:
+def _refits(found: Calibration, known: Answer) -> Iterator[Phrase]:
+    if not found.summary["complete"]:
+        yield Phrase("The calibration has not run to its end.")
+    ended = known.refits - found.converged
+    if known.refits and ended > _ENDED * known.refits:
+        yield Phrase(
+            "{count} of {total} refits ended before they converged, as the results are not smooth: the intervals are "
+            "rough.",
+            count=ended,
+            total=known.refits,
+        )
+
+
+def _next(found: Calibration, known: Answer) -> Iterator[Phrase]:
     one = known.next
     if one is None:
         return
     best = int(np.argmax(one.narrower))
-    at = ", ".join(
-        f"{path} = {_quantity(value, unit_of(found.study, path))}"
+    at = [
+        Phrase("{name} = {value}", name=Name(path, within=True), value=_Quantity(value, unit_of(found.study, path), 4))
         for path, value in zip(found.plan.paths_at, one.condition, strict=True)
+    ]
+    yield Phrase(
+        "A further measurement says most at {condition}: the interval of {name} would become {share} % narrower.",
+        condition=joined(", ", at),
+        name=Name(found.names[best], within=True),
+        share=_Quantity(100.0 * float(one.narrower[best]), "1", 2, form=".2g"),
     )
-    yield (
-        f"A further measurement says most at {at}: the interval of {found.names[best]} would become "
-        f"{percent(one.narrower[best])} narrower."
-    )
 
 
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-
-
-def _quantity(value: float, unit: str, *, signed: bool = False) -> str:
-    text = f"{value:+.3g}" if signed else f"{value:.4g}"
-    return text if unit == "1" else f"{text} {unit}"
+def _listed(parts: Sequence[Part]) -> Phrase:
+    return Phrase("{first} and {last}", first=joined(", ", parts[:-1]), last=parts[-1])

@@ -144,8 +144,8 @@ class Curves:
 class Map:
     """One result over two axes; ``values``, ``endings`` and ``cases`` have the shape (y values, x values).
 
-    ``names`` and ``held`` are for display, as in `Selection`; ``units`` and ``names`` belong to x and y. A refined map
-    has the values in the middles of even squares, which are no cases.
+    ``names``, ``held`` and ``title`` (of the result, by default its name) are for display, as in `Selection`; ``units``
+    and ``names`` belong to x and y. A refined map has the values in the middles of even squares, which are no cases.
     """
 
     x: str
@@ -164,6 +164,7 @@ class Map:
     regimes: list[list[str | None]] | None = None
     orders: list[list[int | None]] | None = None
     refined: RefinedMap | None = None
+    title: str = ""
 
     def to_json(self) -> MapData:
         """The map as JSON data; ``z.values[j][i]`` belongs to ``y.values[j]`` and ``x.values[i]``."""

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.results.curves import CurveQuery
+from sprag.service.results.phrases import Name, Part, Phrase, joined, plural
 from sprag.service.results.refined import curve_plan, families
 from sprag.service.results.refined_maps import map_plan, squares
-from sprag.service.results.selection import axis_name, held_text, refused
+from sprag.service.results.selection import axis_name, held_text, refused, value_of
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 from sprag.worker.models import NO_PARAMETERS
@@ -156,17 +157,26 @@ def drawn_numbers(study: Study, query: CurveQuery) -> int:
     return math.prod(of[path] or len(axis) for path, axis in axes) * len(query.y)
 
 
-def caption(study: Study, query: CurveQuery) -> str:
+def caption(study: Study, query: CurveQuery) -> Phrase:
     """A caption of the curves of ``query``: a sentence without its full stop."""
     some = Counter(path for path, _ in query.of)
-    by = ", ".join(
-        (f"of {some[path]} values of " if path in some else "") + _with_unit(study, path) for path in query.by
+    by = joined(", ", (_family(study, path, some[path]) for path in query.by))
+    held = [held_text(study, path, value_of(path, value, unit_of(study, path))) for path, value in query.at]
+    names = joined(", ", (Name(name, within=place > 0) for place, name in enumerate(query.y)))
+    x = _within(study, query.x)
+    first = (
+        Phrase("{names} against {x}, a curve for each {by}", names=names, x=x, by=by)
+        if by
+        else Phrase("{names} against {x}", names=names, x=x)
     )
-    held = [held_text(study, path, float(value)) for path, value in query.at]
-    first = f"{', '.join(query.y)} against {_with_unit(study, query.x)}" + (f", a curve for each {by}" if by else "")
-    return "; ".join([first, *held])
+    return joined("; ", [first, *held])
 
 
-def _with_unit(study: Study, path: str) -> str:
-    unit = unit_of(study, path)
-    return axis_name(study, path) + ("" if unit == "1" else f" ({unit})")
+def _family(study: Study, path: str, count: int) -> Part:
+    """What tells curves apart: a parameter, or so many values of it."""
+    name = _within(study, path)
+    return plural("of {count} value of {name}", "of {count} values of {name}", count, name=name) if count else name
+
+
+def _within(study: Study, path: str) -> Name:
+    return Name(axis_name(study, path), within=True)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from sprag.service.spec.catalogue import unit_of
+from sprag.worker import models
 from sprag.worker.sweeps import SWEEP, direction
 
 if TYPE_CHECKING:
@@ -30,6 +32,12 @@ def ends_in_words(axis: AxisInfo) -> tuple[Value, Value]:
 def case_values(study: Study, case: int) -> dict[str, Value]:
     """The parameters that a case has for itself."""
     return in_words(study.case_parameters(case))
+
+
+def case_units(study: Study) -> dict[str, str]:
+    """SI unit of each of those parameters except the direction of a sweep, and of each number among the results."""
+    units = {path: unit_of(study, path) for path in study.column_paths if path != SWEEP}
+    return units | {info.name: info.unit for info in models.study_results(study) if info.kind != "category"}
 
 
 def value_columns(

@@ -12,7 +12,7 @@ import numpy as np
 from sprag.service.answers.explore import Exploration, ExploredCase, Histogram
 from sprag.service.results import exports
 from sprag.service.results.directions import case_values
-from sprag.service.results.selection import listed, own_paths, refused, value_of
+from sprag.service.results.selection import listed, locate_axes, own_paths, refused, value_of
 from sprag.service.spec.catalogue import result_of, unit_of
 from sprag.service.spec.report import did_you_mean
 from sprag.service.spec.units import plain_signs
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from sprag.service.results.reading import Reading
     from sprag.service.storage.columns import RowColumns
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
@@ -34,6 +35,8 @@ MOST_RANGES, MOST_SHOWN = 40, 12
 ROWS: Final = 50
 BINS: Final = 24
 
+#: What every case can be sorted by.
+_ALWAYS: Final = ("case", "ending")
 _FORM: Final = re.compile(r"\s*([A-Za-z][\w.]*)\s*(>=|<=|≥|≤)\s*(.+?)\s*")
 
 
@@ -41,9 +44,10 @@ _FORM: Final = re.compile(r"\s*([A-Za-z][\w.]*)\s*(>=|<=|≥|≤)\s*(.+?)\s*")
 class ExploreQuery:
     """Which cases: ``where`` are texts such as ``shaft.load <= 2 N*m``, all of which must hold.
 
-    ``ending``, ``regime`` and ``flag`` keep one kind, "" any. Rows are ordered by ``sort``, a parameter, a result or
-    "case", with "-" before it from the largest down; cases without the number come last. ``show`` are the quantities of
-    histograms and rows, by default the axes and the model's own columns.
+    ``at`` holds axes at a value: pairs of path and text. ``ending``, ``regime`` and ``flag`` keep one kind, "" any.
+    Rows are ordered by ``sort``, a parameter, a result, "case" or "ending", with "-" before it from the largest down;
+    cases without the number come last, and equal ones in the order of their numbers. Only those ``after`` a case are
+    ordered. ``show`` are the quantities of histograms and rows, by default the axes and the model's own columns.
     """
 
     where: tuple[str, ...] = ()
@@ -53,6 +57,16 @@ class ExploreQuery:
     sort: str = "case"
     limit: int = ROWS
     show: tuple[str, ...] = ()
+    at: tuple[tuple[str, str], ...] = ()
+    after: After | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class After:
+    """The last case of the rows before, and the value (SI; NaN: none) by which it was sorted."""
+
+    value: float
+    case: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,10 +80,14 @@ class Range:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A question whose names and values have been checked; ``results`` are those that it needs."""
+    """A question whose names and values have been checked; ``results`` are those that it needs.
+
+    ``fixed`` are axes that are held, by their place, and the index of the value.
+    """
 
     query: ExploreQuery
     ranges: tuple[Range, ...]
+    fixed: dict[int, int]
     shown: tuple[str, ...]
     sort: str
     descending: bool
@@ -87,6 +105,8 @@ class Explored:
     selected : bool array, shape (known,)
     order : int64 array
         Places of the first rows in their order, at most as many as asked for.
+    keys : float64 array, shape (known,)
+        What they are sorted by.
     values : columns of the shown quantities over all finished cases
     """
 
@@ -96,12 +116,18 @@ class Explored:
     known: int
     selected: NDArray[np.bool_]
     order: NDArray[np.int64]
+    keys: NDArray[np.float64]
     values: dict[str, NDArray[np.float64]] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
         """Number of selected cases."""
         return int(np.count_nonzero(self.selected))
+
+    @property
+    def infos(self) -> tuple[ResultInfo, ...]:
+        """All results of the study."""
+        return tuple(models.study_results(self.study))
 
 
 def plan_of(study: Study, query: ExploreQuery) -> Plan:
@@ -118,8 +144,9 @@ def plan_of(study: Study, query: ExploreQuery) -> Plan:
         raise refused("regime", "invalid-choice", "is not a regime", query.regime, allowed=allowed)
     _kind("ending", query.ending, models.endings_of(study.model))
     _kind("flag", query.flag, models.flags_of(study.model))
+    fixed = {axis: index for axis, (_, index) in locate_axes(study, query.at).items()}
     descending, sort = query.sort.startswith("-"), query.sort.removeprefix("-") or "case"
-    if sort != "case":
+    if sort not in _ALWAYS:
         _require(study, infos, "sort", sort)
     shown = tuple(dict.fromkeys(query.show)) or usual_quantities(study, infos)
     for name in shown:
@@ -127,7 +154,7 @@ def plan_of(study: Study, query: ExploreQuery) -> Plan:
     named = dict.fromkeys([*shown, *(one.name for one in ranges), sort])
     needed = [name for name in named if result_of(infos, name)]
     needed += [regime.name] if regime is not None and regime.name not in needed else []
-    return Plan(query, ranges, shown, sort, descending, regime, tuple(needed))
+    return Plan(query, ranges, fixed, shown, sort, descending, regime, tuple(needed))
 
 
 def usual_quantities(study: Study, infos: Sequence[ResultInfo]) -> tuple[str, ...]:
@@ -155,6 +182,9 @@ def explore(study: Study, plan: Plan, rows: RowColumns) -> Explored:
         values = every.get(one.name, empty)
         selected &= values >= one.limit if one.at_least else values <= one.limit
     query = plan.query
+    if plan.fixed:
+        held = study.cases_at({study.axes[i].paths[0]: study.axes[i].value(index) for i, index in plan.fixed.items()})
+        selected &= np.isin(rows.cases, held)
     kept = [
         (not query.ending or ending == query.ending) and (not query.flag or query.flag in flags.split(","))
         for ending, flags in rows.kinds
@@ -164,15 +194,42 @@ def explore(study: Study, plan: Plan, rows: RowColumns) -> Explored:
     if query.regime and plan.regime is not None:
         selected &= rows.values[plan.regime.name] == plan.regime.categories.index(query.regime)
     places = np.flatnonzero(selected).astype(np.int64)
-    keys = rows.cases.astype(np.float64) if plan.sort == "case" else every.get(plan.sort, empty)
-    order = _first(places, keys, plan.query.limit, descending=plan.descending)
-    return Explored(study, plan, rows, known, selected, order, {name: every.get(name, empty) for name in plan.shown})
+    if plan.sort == "ending":
+        # By all endings there are: those of the finished cases become more while a reader turns pages.
+        ranks = {ending: float(rank) for rank, ending in enumerate(sorted(models.ENDING_SENTENCES))}
+        keys = np.array([ranks[ending] for ending, _ in rows.kinds])[rows.kind] if known else empty
+    else:
+        keys = rows.cases.astype(np.float64) if plan.sort == "case" else every.get(plan.sort, empty)
+    if query.after is not None:
+        places = _beyond(places, keys, rows.cases, query.after, descending=plan.descending)
+    order = _first(places, keys, query.limit, descending=plan.descending)
+    shown = {name: every.get(name, empty) for name in plan.shown}
+    return Explored(study, plan, rows, known, selected, order, keys, shown)
+
+
+def _upwards(keys: NDArray[np.float64], *, descending: bool) -> NDArray[np.float64]:
+    """Keys by which rows are sorted upwards, NaN last."""
+    return np.where(np.isnan(keys), np.inf, -keys if descending else keys)
+
+
+def _beyond(
+    places: NDArray[np.int64],
+    keys: NDArray[np.float64],
+    cases: NDArray[np.int64],
+    after: After,
+    *,
+    descending: bool,
+) -> NDArray[np.int64]:
+    """Those of ``places`` that come after a case in their order."""
+    own = _upwards(keys[places], descending=descending)
+    last = _upwards(np.array([after.value]), descending=descending)[0]
+    beyond: NDArray[np.int64] = places[(own > last) | ((own == last) & (cases[places] > after.case))]
+    return beyond
 
 
 def _first(places: NDArray[np.int64], keys: NDArray[np.float64], count: int, *, descending: bool) -> NDArray[np.int64]:
     """The first ``count`` of ``places`` in the order of their keys; NaN last, equal keys in their own order."""
-    own = keys[places] if places.size else keys[:0]
-    own = np.where(np.isnan(own), np.inf, -own if descending else own)
+    own = _upwards(keys[places] if places.size else keys[:0], descending=descending)
     if count < places.size:
         limit = np.partition(own, count - 1)[count - 1]
         below = np.flatnonzero(own < limit)
@@ -219,7 +276,8 @@ def histogram(values: NDArray[np.float64], selected: NDArray[np.bool_], bins: in
         return None
     low, high = float(values[known].min()), float(values[known].max())
     every, edges = np.histogram(values[known], bins=bins, range=(low, high) if high > low else None)
-    own, _ = np.histogram(values[known & selected], bins=edges)
+    # Equal intervals by their ends, not as a list of edges: that would be searched for each value.
+    own, _ = np.histogram(values[known & selected], bins=bins, range=(edges[0], edges[-1]))
     return {"edges": edges.tolist(), "all": every.tolist(), "selected": own.tolist()}
 
 
@@ -258,8 +316,8 @@ def explored_rows(study: Study, found: Explored) -> Iterator[ExploredCase]:
         }
 
 
-def explored_csv(study: Study, found: Explored) -> bytes:
-    """The first rows in their order as a table, SI."""
+def explored_csv(study: Study, found: Explored, reading: Reading) -> bytes:
+    """The first rows in their order as a table, in a reader's units."""
     rows = list(explored_rows(study, found))
     names = ("case", "ending", "regime") if found.plan.regime is not None else ("case", "ending")
     columns = {name: [row[name] for row in rows] for name in names}  # type: ignore[literal-required]
@@ -269,4 +327,4 @@ def explored_csv(study: Study, found: Explored) -> bytes:
     for name in found.plan.shown:
         if name not in study.column_paths:
             columns[name] = [row["results"][name] for row in rows]
-    return exports.table_csv(list(columns), list(columns.values()))
+    return exports.read_table(columns, quantities(study), reading.units)

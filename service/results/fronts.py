@@ -95,7 +95,7 @@ def goal_of(study: Study) -> GoalPlan:
 
 
 def designs_of(study: Study, rounds: list[RoundRecord], fetch: Fetch, *, exact: bool = False) -> Designs:
-    """All designs of ``study``, ranked.
+    """All designs of ``study`` but those that serve the derivatives of the polish only, ranked.
 
     Parameters
     ----------
@@ -116,7 +116,8 @@ def designs_of(study: Study, rounds: list[RoundRecord], fetch: Fetch, *, exact: 
     whole = range(study.cases - study.cases % each)
     columns = fetch(np.arange(whole.stop, dtype=np.int64), list(plan.results))
     endings = np.array([ending or WorkerEnding.CANCELLED for ending in columns.endings], dtype=object)
-    known = (endings != WorkerEnding.CANCELLED).reshape(-1, each).all(axis=1)
+    ended = (endings != WorkerEnding.CANCELLED).reshape(-1, each).all(axis=1)
+    known = ended & ~_for_derivatives(rounds, len(ended), each)
     kept = np.repeat(known, each)
     values = {name: column[kept] for name, column in columns.values.items()}
     rows = Rows(study.points(whole)[kept], endings[kept] == models.OK, values)
@@ -136,8 +137,16 @@ def designs_of(study: Study, rounds: list[RoundRecord], fetch: Fetch, *, exact: 
         order=np.lexsort((numbers_, goal, found.rank)),
         rounds=rounds,
         round=np.searchsorted([record.cases.start for record in rounds], found.cases[:, 0], side="right") - 1,
-        pending=int(np.count_nonzero(~known)),
+        pending=int(np.count_nonzero(~ended)),
     )
+
+
+def _for_derivatives(rounds: Sequence[RoundRecord], designs: int, each: int) -> NDArray[np.bool_]:
+    """Which designs the polish ran for its derivatives only: those of its first round."""
+    first = next((one.cases for one in rounds if one.summary.get("phase") == "polish"), range(0))
+    marked = np.zeros(designs, dtype=np.bool_)
+    marked[first.start // each : first.stop // each] = True
+    return marked
 
 
 def _infos(study: Study, plan: GoalPlan) -> dict[str, ResultInfo]:
@@ -241,14 +250,14 @@ def history(rounds: Sequence[RoundRecord]) -> list[Generation]:
 def front_csv(found: Designs, limit: int = DESIGNS) -> bytes:
     """A row for each design, at most ``limit``: SI numbers, those of several operating points by their number."""
     plan, points = found.plan, range(1, len(found.plan.at) + 1)
-    told = ("round", "phase", "rank", "feasible", "failed", "exact", "violation", "miss")
-    header = ["design", "case", *told, *(one.paths[0] for one in plan.vary)]
+    columns = ("round", "phase", "rank", "feasible", "failed", "exact", "violation", "miss")
+    header = ["design", "case", *columns, *(one.paths[0] for one in plan.vary)]
     header += [f"{plan.over}.{goal.name}" for goal in plan.best if len(points) > 1]
     header += [name if len(points) == 1 else f"{name}.{number}" for name in found.values for number in points]
     rows: list[list[Any]] = []
     for position in found.order[:limit].tolist():
         design = cast("dict[str, Any]", design_json(found, position))
-        row = [design["design"], design["cases"][0], *(design[name] for name in told), *design["variables"].values()]
+        row = [design["design"], design["cases"][0], *(design[name] for name in columns), *design["variables"].values()]
         row += design["goals"].values() if len(points) > 1 else ()
         rows.append([*row, *chain.from_iterable(design["results"].values())])
     return exports.table_csv(header, zip(*rows, strict=True) if rows else [[] for _ in header])

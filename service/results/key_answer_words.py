@@ -2,74 +2,83 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.answers.key import AnswerReport, AnswerValue, CurveAnswer, OverallAnswer
 from sprag.service.results import exports
 from sprag.service.results.directions import case_values, in_words
+from sprag.service.results.phrases import Amount, Name, Phrase, joined, plural, term
 from sprag.service.results.selection import axis_name
-from sprag.service.results.wording import number, unit_text, words
+from sprag.service.results.wording import percent
 from sprag.service.spec.catalogue import unit_of
+from sprag.worker.sweeps import SWEEP, direction
 
 if TYPE_CHECKING:
     from sprag.service.results.key_answers import CurveAnswers, Found, StudyAnswers
+    from sprag.service.results.reading import Reading
     from sprag.worker.study import Study
 
 _EXTREMES: Final = ("largest", "smallest")
 
 
-def quantity(value: float, unit: str) -> str:
-    """A number with its unit."""
-    return f"{number(value)} {unit_text(unit)}".strip()
-
-
-def note_of(found: Found, x_unit: str) -> str:
+def note_of(found: Found, x_unit: str) -> Phrase:
     """How far an answer can be trusted, or why there is none: a few words."""
     if found.why is not None:
         return _missing(found, x_unit)
-    parts = [part for part in (_how(found, x_unit), _interval(found)) if part]
+    parts: list[str] = [part for part in (_how(found, x_unit), _interval(found)) if part]
     if found.regime is not None and found.regime != "periodic":
-        parts.append(found.regime)
-    parts += [name.replace("_", " ") for name in found.flags if name != found.regime]
-    return "; ".join(parts)
+        parts.append(term(found.regime))
+    parts += [term(name) for name in found.flags if name != found.regime]
+    return joined("; ", parts)
 
 
-def _missing(found: Found, x_unit: str) -> str:
-    x = None if found.x is None else quantity(found.x, x_unit)
-    between = f"{number(found.low)} and {quantity(found.high, x_unit)}" if found.low is not None and found.high else ""
-    return {
-        "no-case": "no case there" if x is None else f"no case at {x}",
-        "outside": "0 in all cases" if x is None else f"{x} is outside the cases",
-        "not-joined": f"not interpolated: the motion changes between {between}",
-        "no-result": "no case has this result",
-    }[found.why or "no-result"]
+def _missing(found: Found, x_unit: str) -> Phrase:
+    why = found.why or "no-result"
+    if why == "not-joined":
+        return Phrase("not interpolated: the motion changes between {places}", places=_between(found, x_unit))
+    if why == "no-result":
+        return Phrase("no case has this result")
+    if found.x is None:
+        return Phrase("no case there") if why == "no-case" else Phrase("0 in all cases")
+    x = Amount(found.x, x_unit)
+    return Phrase("no case at {x}", x=x) if why == "no-case" else Phrase("{x} is outside the cases", x=x)
 
 
-def _how(found: Found, x_unit: str) -> str:
+def _between(found: Found, x_unit: str) -> Phrase:
+    """The neighbours of a place; "" where they are not known."""
+    if found.low is None or found.high is None:
+        return Phrase("")
+    return Phrase("{low} and {high}", low=Amount(found.low, x_unit, bare=True), high=Amount(found.high, x_unit))
+
+
+def _how(found: Found, x_unit: str) -> Phrase:
     kind, there = found.answer.kind, found.there or 0.0
     if kind == "until_zero":
         if found.above:
-            return f"more: there the {words(found.info.name).lower()} is still {quantity(there, found.info.unit)}"
-        return f"0 in the case at {quantity(found.high or 0.0, x_unit)}"
+            name, value = Name(found.info.name, within=True), Amount(there, found.info.unit)
+            return Phrase("more: there the {name} is still {value}", name=name, value=value)
+        return Phrase("0 in the case at {x}", x=Amount(found.high or 0.0, x_unit))
     if kind in _EXTREMES:
-        among = f"{kind} of {number(found.cases)} cases"
+        among = (
+            plural("largest of {count} case", "largest of {count} cases", found.cases)
+            if kind == "largest"
+            else plural("smallest of {count} case", "smallest of {count} cases", found.cases)
+        )
         if found.edge:
-            return f"{among}, at the end of the axis"
-        if found.low is not None and found.high is not None:
-            return f"{among}; neighbours at {number(found.low)} and {quantity(found.high, x_unit)}"
-        return among
-    if found.interpolated and found.low is not None and found.high is not None:
-        return f"interpolated between the cases at {number(found.low)} and {quantity(found.high, x_unit)}"
-    return ""
+            return Phrase("{among}, at the end of the axis", among=among)
+        between = _between(found, x_unit)
+        return Phrase("{among}; neighbours at {places}", among=among, places=between) if between else among
+    between = _between(found, x_unit) if found.interpolated else Phrase("")
+    return Phrase("interpolated between the cases at {places}", places=between) if between else Phrase("")
 
 
-def _interval(found: Found) -> str:
+def _interval(found: Found) -> Phrase:
     if found.half_width:
-        return f"± {quantity(found.half_width, found.info.unit)} (95 %)"
+        return Phrase("± {width} (95 %)", width=Amount(found.half_width, found.info.unit))
     if found.error is not None:
-        return f"curve within {100.0 * found.error:.2g} % of its range"
-    return ""
+        return Phrase("curve within {share} of its range", share=percent(found.error))
+    return Phrase("")
 
 
 def report(study_id: str, study: Study, found: StudyAnswers) -> AnswerReport:
@@ -130,10 +139,10 @@ def _overall(study: Study, found: Found) -> OverallAnswer:
     return {**answer_json(found, "1"), "parameters": parameters}
 
 
-def answers_csv(study: Study, found: StudyAnswers) -> bytes:
-    """A row for each answer of each curve, SI."""
+def answers_csv(study: Study, found: StudyAnswers, reading: Reading) -> bytes:
+    """A row for each answer of each curve, in a reader's units: of the value that in the column ``unit``."""
     columns: dict[str, list[Any]] = {}
-    rows = list(_rows(study, found))
+    rows = list(_rows(study, found, reading))
     for row in rows:
         for name in row:
             columns.setdefault(name, [])
@@ -143,34 +152,69 @@ def answers_csv(study: Study, found: StudyAnswers) -> bytes:
     return exports.table_csv(list(columns), list(columns.values()))
 
 
-def _rows(study: Study, found: StudyAnswers) -> Iterator[dict[str, Any]]:
-    names = ("name", "result", "unit", "value", "x", "low", "high", "above", "edge", "interpolated", "regime", "note")
+def _rows(study: Study, found: StudyAnswers, reading: Reading) -> Iterator[dict[str, Any]]:
     for one in found.curves:
         for part, items in (("curve", one.answers), ("working point", one.working_point)):
             for item in items:
-                told: dict[str, Any] = {**answer_json(item, found.unit)}
-                yield {"of": part, **in_words({**one.line.by, **one.line.at}), **{name: told[name] for name in names}}
+                place = in_words({**one.line.by, **one.line.at})
+                yield {"of": part, **_place(study, place, reading), **_shown(item, found.unit, reading)}
     for item in found.overall:
-        told = {**answer_json(item, "1")}
         place = {} if item.case is None else case_values(study, item.case)
-        yield {"of": "all cases", **place, **{name: told[name] for name in names}}
+        yield {"of": "all cases", **_place(study, place, reading), **_shown(item, "1", reading)}
 
 
-def curve_name(one: CurveAnswers, study: Study) -> str:
+def _place(study: Study, values: Mapping[str, Any], reading: Reading) -> dict[str, Any]:
+    """The parameters of a row; the name of one that is not in SI says its unit."""
+    found = {}
+    for path, value in values.items():
+        si = unit_of(study, path)
+        found[path if reading.unit(si) == si else f"{path} [{reading.unit(si)}]"] = reading.value(value, si)
+    return found
+
+
+def _shown(item: Found, x_unit: str, reading: Reading) -> dict[str, Any]:
+    """The other columns of a row."""
+    fields: dict[str, Any] = {**answer_json(item, x_unit)}
+    return {
+        **{name: fields[name] for name in ("name", "result")},
+        "unit": reading.unit(item.unit),
+        "value": reading.value(item.value, item.unit),
+        **{name: reading.value(fields[name], x_unit) for name in ("x", "low", "high")},
+        **({} if reading.unit(x_unit) == x_unit else {"unit of x": reading.unit(x_unit)}),
+        **{name: fields[name] for name in ("above", "edge", "interpolated", "regime")},
+        "note": note_of(item, x_unit).said(reading),
+    }
+
+
+def said_title(title: str, reading: Reading) -> str:
+    """The title of an answer for a reader: a phrase, or a text of the model."""
+    return reading.say(title if isinstance(title, Phrase) else Phrase(title))
+
+
+def curve_name(one: CurveAnswers, study: Study) -> Phrase:
     """What distinguishes a curve of a family, for people; "" for a single one."""
-    from sprag.service.results.sweeps import value_text
-
-    return ", ".join(
-        f"{value_text(path, value)} {unit_text(unit_of(study, path))}".strip() for path, value in one.line.by.items()
+    return joined(
+        ", ",
+        (
+            term(direction(value)) if path == SWEEP else Amount(value, unit_of(study, path))
+            for path, value in one.line.by.items()
+        ),
     )
 
 
-def place_text(study: Study, case: int) -> str:
+def place_text(study: Study, case: int) -> Phrase:
     """The parameters of a case, for people."""
     values = case_values(study, case)
     shown = [path for axis in study.axes for path in axis.paths[:1]] or list(values)
-    return ", ".join(
-        f"{axis_name(study, path)} = {value if isinstance(value, str) else quantity(value, unit_of(study, path))}"
-        for path in shown
-        if (value := values.get(path)) is not None
+    return joined(
+        ", ",
+        (
+            Phrase(
+                "{name} = {value}",
+                name=Name(axis_name(study, path), within=True),
+                value=term(value) if isinstance(value, str) else Amount(value, unit_of(study, path)),
+            )
+            for path in shown
+            if (value := values.get(path)) is not None
+        ),
     )

@@ -13,10 +13,12 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
+from sprag.service.languages import N_
 from sprag.service.results.curve_cases import draw, select
 from sprag.service.results.curves import Curve, Line
 from sprag.service.results.defaults import drawn_results, main_query, main_results, usual_value
 from sprag.service.results.joined import joined_points
+from sprag.service.results.phrases import Name, Phrase
 from sprag.service.results.refined import curve_plan
 from sprag.service.results.selection import refused, value_of
 from sprag.service.spec.catalogue import unit_of
@@ -123,10 +125,15 @@ def answers_of_model(study: Study, infos: Sequence[ResultInfo]) -> tuple[Answer,
     named = tuple(one for one in models.presentation_of(study).answers if one.result in names)
     if named:
         return named
-    kinds: tuple[Literal["largest", "smallest"], ...] = ("largest", "smallest")
+    kinds: tuple[tuple[Literal["largest", "smallest"], str], ...] = (
+        ("largest", N_("Largest {name}")),
+        ("smallest", N_("Smallest {name}")),
+    )
     drawn = [name for name in drawn_results(study, infos) if name in names][:2]
     return tuple(
-        Answer(f"{kind}_{name}", f"{kind.capitalize()} {name}", name, kind) for name in drawn for kind in kinds
+        Answer(f"{kind}_{name}", Phrase(text, name=Name(name, within=True)), name, kind)
+        for name in drawn
+        for kind, text in kinds
     )
 
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sprag.service.languages import N_
+from sprag.service.results.phrases import Name, Phrase, joined, plural
 from sprag.service.results.wording import percent
 from sprag.worker import models
 from sprag.worker.planning.refine import Curve as Refined
@@ -120,23 +122,40 @@ def sentence(plan: RefinePlan, curves: Sequence[Refined], names: Iterable[str]) 
     count = sum(map(_apart, broken))
     within = sum(jump["high"] - jump["low"] for jumps in broken for jump in jumps)
     share = within / sum(float(np.ptp(curve.x)) for curve in curves if len(curve.x)) if count else 0.0
-    outside = f" outside {count} jump{'s' if count > 1 else ''} ({percent(share)} of the axis)" if count else ""
+    outside = (
+        plural(
+            "outside {count} jump ({share} of the axis)",
+            "outside {count} jumps ({share} of the axis)",
+            count,
+            share=percent(share),
+        )
+        if count
+        else Phrase("")
+    )
     every = [curve.errors[name] for curve in curves for name in asked if np.isfinite(curve.values[name]).any()]
     error = None if None in every or not every else max(error for error in every if error is not None)
     passed = all(curve.passed for curve in curves)
-    told = reached(plan.error, error, outside, passed=passed)
+    text = reached(plan.error, error, outside, passed=passed)
     others = [name for name in drawn if name not in asked]
-    return f"{told} No error was asked for {', '.join(others)}." if others else told
+    names = joined(", ", (Name(name, within=True) for name in others))
+    return Phrase("{text} No error was asked for {names}.", text=text, names=names) if others else text
 
 
-def reached(asked: float, error: float | None, outside: str, *, passed: bool) -> str:
-    """Whether a requested error is reached, for people; ``outside`` is " outside 2 jumps", or "" without jumps."""
+def reached(asked: float, error: float | None, outside: Phrase, *, passed: bool) -> Phrase:
+    """Whether a requested error is reached, for people; ``outside`` is "outside 2 jumps", or "" without jumps."""
+    wanted = percent(asked)
     if error is None:
-        return f"The error is not known yet; {percent(asked)} of the range is asked."
+        return Phrase("The error is not known yet; {asked} of the range is asked.", asked=wanted)
+    now = percent(error)
     if passed and error <= asked:
-        comma = "," if outside else ""
-        return f"Within {percent(asked)} of the range, as asked{comma}{outside} (estimate: {percent(error)})."
-    return f"Not reached: {percent(error)} of the range now{outside}, {percent(asked)} asked."
+        if outside:
+            text = N_("Within {asked} of the range, as asked, {outside} (estimate: {error}).")
+            return Phrase(text, asked=wanted, outside=outside, error=now)
+        return Phrase("Within {asked} of the range, as asked (estimate: {error}).", asked=wanted, error=now)
+    if outside:
+        text = N_("Not reached: {error} of the range now {outside}, {asked} asked.")
+        return Phrase(text, asked=wanted, outside=outside, error=now)
+    return Phrase("Not reached: {error} of the range now, {asked} asked.", asked=wanted, error=now)
 
 
 def _apart(jumps: Sequence[Jump]) -> int:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.results.curves import Fetch, Map, not_run
+from sprag.service.results.phrases import Phrase
 from sprag.service.results.refined import reached, refine_plan
 from sprag.service.results.selection import axis_name, held_texts, listed, locate_axes, numeric_results, refused
 from sprag.service.results.wording import percent
@@ -59,9 +60,10 @@ class RefinedMap:
     cases: NDArray[np.int64]
 
     @property
-    def sentence(self) -> str:
+    def sentence(self) -> Phrase:
         """How right the map is, for people."""
-        outside = f" outside jumps ({percent(self.jumps_share)} of the map)" if self.jumps_share else ""
+        share = percent(self.jumps_share)
+        outside = Phrase("outside jumps ({share} of the map)", share=share) if self.jumps_share else Phrase("")
         return reached(self.asked, self.error, outside, passed=self.passed)
 
 

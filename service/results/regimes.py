@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.service.results.phrases import Phrase, joined, plural, term
+from sprag.worker.models import REGIME_SENTENCES
+
 if TYPE_CHECKING:
     from sprag.worker.models import ResultInfo
 
@@ -31,6 +34,19 @@ class Mark:
     colour: str
     symbol: str
     marker: str
+
+
+def motion_sentence(regime: str, order: int | None) -> Phrase:
+    """Description of a motion by its regime and the order of its orbit (None: it has none)."""
+    if regime != "periodic" or order is None:
+        return Phrase(REGIME_SENTENCES[regime])
+    if order == 1:
+        return Phrase("The motion repeats after one excitation period, and disturbances of it die away.")
+    return plural(
+        "The motion repeats after {count} excitation period, and disturbances of it die away.",
+        "The motion repeats after {count} excitation periods, and disturbances of it die away.",
+        order,
+    )
 
 
 #: Colours that are distinguishable with any kind of colour vision, and shapes that replace them in grey.
@@ -91,6 +107,6 @@ def regimes_of(lists: Iterable[Sequence[str | None] | None]) -> list[str]:
     return [name for name in MARKS if name in occurring]
 
 
-def counted(counts: Mapping[str, int]) -> str:
+def counted(counts: Mapping[str, int]) -> Phrase:
     """The number of cases by regime, in words: ``486 periodic, 24 irregular``."""
-    return ", ".join(f"{count:,} {name}" for name, count in counts.items())
+    return joined(", ", (Phrase("{count} {regime}", count=count, regime=term(name)) for name, count in counts.items()))

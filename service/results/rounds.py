@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.results.wording import counted, percent
+from sprag.service.languages import N_, decimal
+from sprag.service.results.phrases import Phrase, joined, plural
+from sprag.service.results.wording import percent
 from sprag.worker.planning.calibrate.plan import CALIBRATE
 from sprag.worker.planning.goals.plan import GOAL
+from sprag.worker.states import StudyState
 
 if TYPE_CHECKING:
     from sprag.service.answers.studies import Round, Rounds
     from sprag.service.storage.records import RoundProgress, RoundRecord
 
 
-def rounds_json(rounds: RoundProgress) -> Rounds:
-    """Where a study stands, in short."""
-    state = {name: value for name, value in rounds.latest.summary.items() if not isinstance(value, dict | list)}
+def rounds_json(rounds: RoundProgress, state: StudyState) -> Rounds:
+    """Where a study stands that is in this state, in short."""
+    reached = {name: value for name, value in rounds.latest.summary.items() if not isinstance(value, dict | list)}
     return {
         "round": _number(rounds),
         "most": _most(rounds),
         "most_cases": rounds.most_cases,
-        "sentence": sentence(rounds),
-        "state": state,
+        "sentence": sentence(rounds, state),
+        "state": reached,
     }
 
 
@@ -36,17 +39,28 @@ def round_json(record: RoundRecord) -> Round:
     }
 
 
-def sentence(rounds: RoundProgress) -> str:
-    """For people: "round 3 of at most 12, error now 2.1 %, asked 1 %", "generation 12 of 60, 240 feasible"."""
+def sentence(rounds: RoundProgress, state: StudyState) -> Phrase:
+    """For people: "round 3 of at most 12, error now 2.1 %, asked 1 %", "generation 12 of 60, 240 feasible"; of a queued
+    study "waiting for round 1 of at most 12".
+    """
+    where, *reached = _parts(rounds)
+    if state is not StudyState.QUEUED:
+        return joined(", ", [where, *reached])
+    waiting = Phrase("waiting for {where}", where=where)
+    return joined(", ", [waiting, *(reached if rounds.latest.round else [])])
+
+
+def _parts(rounds: RoundProgress) -> list[Phrase]:
+    """Which round it is, then what the rounds have reached."""
     if rounds.latest.summary.get("kind") == GOAL:
-        return ", ".join(_search(rounds.latest.summary))
+        return _search(rounds.latest.summary)
     if rounds.latest.summary.get("kind") == CALIBRATE:
-        return ", ".join(_calibration(_number(rounds), rounds.latest.summary))
-    told = [f"round {_number(rounds)} of at most {_most(rounds)}"]
-    if not rounds.latest.cases:
-        told = [counted(_number(rounds), "round")]
+        return _calibration(_number(rounds), rounds.latest.summary)
+    first = Phrase("round {round} of at most {most}", round=_number(rounds), most=_most(rounds))
     ended = not rounds.latest.cases
-    return ", ".join([*told, *_state(rounds.latest.summary, ended=ended)])
+    if ended:
+        first = plural("{count} round", "{count} rounds", _number(rounds))
+    return [first, *_state(rounds.latest.summary, ended=ended)]
 
 
 def _number(rounds: RoundProgress) -> int:
@@ -59,36 +73,63 @@ def _most(rounds: RoundProgress) -> int:
     return max(rounds.most, _number(rounds))
 
 
-def _state(summary: dict[str, Any], *, ended: bool) -> list[str]:
+def _state(summary: dict[str, Any], *, ended: bool) -> list[Phrase]:
     """What a summary says of the requested error."""
     asked, error = summary.get("asked"), summary.get("error")
     if asked is None:
         return []
-    when = ("", "") if ended else (" yet", " now")
-    now = f"error not known{when[0]}" if error is None else f"error{when[1]} {percent(error)}"
-    missed = ["not reached with the cases allowed"] if ended and not summary.get("passed", True) else []
-    return [now, f"asked {percent(asked)}", *missed]
+    if error is None:
+        now = Phrase("error not known") if ended else Phrase("error not known yet")
+    else:
+        text = N_("error {error}") if ended else N_("error now {error}")
+        now = Phrase(text, error=percent(error))
+    missed = [Phrase("not reached with the cases allowed")] if ended and not summary.get("passed", True) else []
+    return [now, Phrase("asked {error}", error=percent(asked)), *missed]
 
 
-def _calibration(number: int, summary: dict[str, Any]) -> list[str]:
+#: What a calibration is at.
+_PHASES: Final = {
+    "scan": Phrase("scan"),
+    "fit": Phrase("fit"),
+    "intervals": Phrase("refits for the intervals"),
+    "curve": Phrase("fitted curve"),
+}
+
+
+def _calibration(number: int, summary: dict[str, Any]) -> list[Phrase]:
     """What a calibration is at: "round 5", "fit", "chi-square 21.3 of 26 degrees of freedom"."""
-    phases = {"scan": "scan", "fit": "fit", "intervals": "refits for the intervals", "curve": "fitted curve"}
-    phase = "calibrated" if summary["complete"] else "ended before all was run"
-    ended = summary["phase"] == "ended"
-    told = [counted(number, "round"), phase] if ended else [f"round {number}", phases[summary["phase"]]]
+    phase = Phrase("calibrated") if summary["complete"] else Phrase("ended before all was run")
+    parts = [plural("{count} round", "{count} rounds", number), phase]
+    if summary["phase"] != "ended":
+        parts = [Phrase("round {round}", round=number), _PHASES[summary["phase"]]]
     square = summary["chi_square"]
-    freedom = summary["freedom"]
-    return [*told, *([f"chi-square {square:.3g} for {freedom} degrees of freedom"] if square is not None else [])]
+    if square is not None:
+        freedom = summary["freedom"]
+        parts.append(
+            plural(
+                "chi-square {value} for {count} degree of freedom",
+                "chi-square {value} for {count} degrees of freedom",
+                freedom,
+                value=decimal(f"{square:.3g}"),
+            )
+        )
+    return parts
 
 
-def _search(summary: dict[str, Any]) -> list[str]:
+def _search(summary: dict[str, Any]) -> list[Phrase]:
     """What a search for designs has reached: "generation 12 of 60", "240 feasible", "best 0.84"."""
     generation, generations, feasible = summary["generation"], summary["generations"], summary["feasible"]
-    told = [f"generation {generation + 1} of {generations}"]
+    parts = [Phrase("generation {number} of {most}", number=generation + 1, most=generations)]
     if summary["phase"] != "search":
-        ended = counted(generation, "generation")
-        told = [ended] if summary["phase"] == "ended" else [ended, "polish of equalities"]
-    best = [f"{value:.3g}" for value in summary["best"] if value is not None]
+        parts = [plural("{count} generation", "{count} generations", generation)]
+        parts += [] if summary["phase"] == "ended" else [Phrase("polish of equalities")]
+    best = " / ".join(decimal(f"{value:.3g}") for value in summary["best"] if value is not None)
     exact = (summary["polish"] or {}).get("met", 0)
-    told.append(f"{feasible:,} feasible" if feasible else "none feasible")
-    return [*told, *([f"{exact:,} exact"] * bool(exact)), *([f"best {' and '.join(best)}"] * bool(best))]
+    parts.append(Phrase("{count} feasible", count=feasible) if feasible else Phrase("none feasible"))
+    if exact:
+        parts.append(Phrase("{count} exact", count=exact))
+    if best:
+        parts.append(
+            Phrase("best of the exact {values}", values=best) if exact else Phrase("best {values}", values=best)
+        )
+    return parts

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sprag.service.faults import Code, Fault, FaultError, ParameterFault, shown
+from sprag.service.results.phrases import Amount, Name, Phrase, term
 from sprag.service.spec.catalogue import result_of, unit_of, unknown_result
 from sprag.service.spec.report import did_you_mean, quantity_text
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
@@ -119,15 +120,14 @@ def axis_name(study: Study, path: str) -> str:
     return " = ".join(dict.fromkeys((path, *tied)))
 
 
-def held_text(study: Study, path: str, value: float) -> str:
+def held_text(study: Study, path: str, value: float) -> Phrase:
     """A parameter held at ``value`` (SI) for display: ``excitation.frequency = 25 Hz``."""
     if path == SWEEP:
-        return f"{SWEEP} {direction(value)}"
-    unit = unit_of(study, path)
-    return f"{axis_name(study, path)} = {value:.6g}" + ("" if unit == "1" else f" {unit}")
+        return Phrase("{name} {direction}", name=Name(SWEEP, within=True), direction=term(direction(value)))
+    return Phrase("{name} = {value}", name=Name(axis_name(study, path)), value=Amount(value, unit_of(study, path), 6))
 
 
-def held_texts(study: Study, at: Mapping[str, float]) -> tuple[str, ...]:
+def held_texts(study: Study, at: Mapping[str, float]) -> tuple[Phrase, ...]:
     """The fixed axes, then the constant parameters of the operating point."""
     point, varying = models.presentation_of(study).operating_point, study.axis_paths
     always = [path for path in point if path in study.base and path not in varying]

@@ -21,6 +21,7 @@ from sprag.service.answers.results import AxisEffect, PairEffect, ResultSensitiv
 from sprag.service.faults import Fault
 from sprag.service.json_text import numbers
 from sprag.service.results.curves import Fetch
+from sprag.service.results.phrases import Phrase, plural
 from sprag.service.results.regimes import UNSETTLED, counted, kind_columns, kinds_of
 from sprag.service.results.selection import SelectionError, axis_name, numeric_results, refused
 from sprag.service.results.sensitivity_design import (
@@ -155,12 +156,23 @@ def _settled_only(y: Numbers, regimes: list[str | None] | None, notes: list[str]
     names = np.array([name or "" for name in regimes])
     unsettled = (names == UNSETTLED) & np.isfinite(y)
     if unsettled.any():
-        notes.append(f"{int(unsettled.sum())} unsettled cases are left out: their results do not show settled motion")
+        notes.append(
+            plural(
+                "{count} unsettled case is left out: its results do not show settled motion",
+                "{count} unsettled cases are left out: their results do not show settled motion",
+                int(unsettled.sum()),
+            )
+        )
     y = np.where(unsettled, np.nan, y)
     counts = Counter(names[np.isfinite(y)].tolist())
     if len(counts) > 1:
-        told = counted(dict(counts.most_common()))
-        notes.append(f"cases of different regimes are combined ({told}): part of the variance lies between regimes")
+        text = counted(dict(counts.most_common()))
+        notes.append(
+            Phrase(
+                "cases of different regimes are combined ({regimes}): part of the variance lies between regimes",
+                regimes=text,
+            )
+        )
     return y
 
 
@@ -182,11 +194,19 @@ def _of_result(
     positions = [study.axes.index(axis) for axis in varying]
     every = study.indices(range(study.cases))
     columns = np.stack([axis.array[every[at]] for axis, at in zip(varying, positions, strict=True)], axis=1)
-    notes = [f"{missing} cases without this result are left out"] if missing else []
+    notes: list[str] = []
+    if missing:
+        notes.append(
+            plural(
+                "{count} case without this result is left out",
+                "{count} cases without this result are left out",
+                missing,
+            )
+        )
     method: Method = "none"
     indices, pairs = nothing(len(varying))
     if not cases:
-        notes = ["no case has this result"]
+        notes = [Phrase("no case has this result")]
     elif study.combine == "grid" and not missing:
         method = "grid"
         indices, pairs = grid_indices(y.reshape(study.shape), positions)
@@ -208,15 +228,15 @@ def _of_result(
     else:
         notes.append(why_no_shares(columns, known, [axis_name(study, axis.paths[0]) for axis in varying]))
     if mean is not None and variance is not None and variance <= (1e-13 * mean) ** 2:
-        notes.append("the result is the same in every case")
+        notes.append(Phrase("the result is the same in every case"))
         indices, pairs = nothing(len(varying))
     drawn = sample is not None
     effects = tuple(
         Effect(axis.paths, unit_of(study, axis.paths[0]), *_main_effect(axis, column[known], values, drawn=drawn), own)
         for axis, column, own in zip(varying, columns.T, indices, strict=True)
     )
-    told = (*kinds, *notes)
-    return Sensitivity(info, method, cases, missing, mean, variance, effects, tuple(pairs), told)
+    remarks = (*kinds, *notes)
+    return Sensitivity(info, method, cases, missing, mean, variance, effects, tuple(pairs), remarks)
 
 
 def _main_effect(axis: Axis, column: Numbers, y: Numbers, *, drawn: bool) -> tuple[Numbers, Numbers]:
@@ -242,4 +262,5 @@ def _main_effect(axis: Axis, column: Numbers, y: Numbers, *, drawn: bool) -> tup
 def _too_few(x: Numbers) -> str:
     """The sentence about too few cases of a sample, shape (cases, axes); "" where they suffice or are not a sample."""
     few = len(x) < LEAST_CASES and going_together(x) is None and all(scattered(column) for column in x.T)
-    return f"too few cases for indices: {len(x)}, and {LEAST_CASES} are needed" if few else ""
+    needed = Phrase("too few cases for indices: {count}, and {least} are needed", count=len(x), least=LEAST_CASES)
+    return needed if few else ""

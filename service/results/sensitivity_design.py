@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.service.results.phrases import Name, Phrase
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -85,14 +87,25 @@ def why_no_shares(columns: Numbers, known: NDArray[np.bool_], names: list[str]) 
     tied = going_together(columns)
     if tied is not None:
         first, second = (names[at] for at in tied)
-        return f"{first} and {second} were varied together: the cases cannot separate their effects"
+        return Phrase(
+            "{first} and {second} were varied together: the cases cannot separate their effects",
+            first=Name(first),
+            second=Name(second),
+        )
     points, cases = math.prod(np.unique(column).size for column in columns.T), int(known.sum())
-    reason = "the cases are neither a complete grid nor a sample"
     if all(scattered(column) for column in columns[known].T):
-        reason += ": their axes are not independent of each other"
-    elif cases < points and cases >= _LEAST_GRID * points:
-        reason += f": {points - cases} of {points} are missing"
-    return f"{reason}; main effects are means over the available cases"
+        return Phrase(
+            "the cases are neither a complete grid nor a sample: their axes are not independent of each other; main "
+            "effects are means over the available cases"
+        )
+    if cases < points and cases >= _LEAST_GRID * points:
+        return Phrase(
+            "the cases are neither a complete grid nor a sample: {count} of {total} are missing; main effects are "
+            "means over the available cases",
+            count=points - cases,
+            total=points,
+        )
+    return Phrase("the cases are neither a complete grid nor a sample; main effects are means over the available cases")
 
 
 def _ranks(columns: Numbers) -> Numbers:

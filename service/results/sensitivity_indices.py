@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.results.phrases import Phrase
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -86,9 +88,9 @@ def saltelli_indices(y: Numbers, base: int, dimensions: int, notes: list[str], *
 
     cases = 2 * dimensions + 2 if second_order else dimensions + 2
     blocks = y.reshape(base, cases)
-    whole = _whole(blocks, "points of the design", notes)
+    whole = _whole(blocks, notes)
     if whole.sum() * cases < LEAST_CASES:
-        notes.append("too few cases for indices")
+        notes.append(Phrase("too few cases for indices"))
         return nothing(dimensions)
     with _quiet():
         found = sobol.analyze(
@@ -109,9 +111,15 @@ def morris_indices(x: Numbers, y: Numbers, levels: int, notes: list[str]) -> Fou
 
     dimensions = x.shape[1]
     blocks = y.reshape(-1, dimensions + 1)
-    whole = _whole(blocks, "trajectories", notes)
+    whole = _whole(blocks, notes, trajectories=True)
     if whole.sum() < LEAST_TRAJECTORIES:
-        notes.append(f"too few trajectories: {int(whole.sum())}, and {LEAST_TRAJECTORIES} are needed")
+        notes.append(
+            Phrase(
+                "too few trajectories: {count}, and {least} are needed",
+                count=int(whole.sum()),
+                least=LEAST_TRAJECTORIES,
+            )
+        )
         return nothing(dimensions)
     places = x.reshape(*blocks.shape, dimensions)[whole].reshape(-1, dimensions)
     with _quiet():
@@ -126,17 +134,22 @@ def sample_indices(x: Numbers, y: Numbers, notes: list[str]) -> Found:
     """First-order indices from a sample (`is_sample`), by SALib's random balance design."""
     from SALib.analyze import rbd_fast
 
-    notes.append("total indices need a full grid or a sample by the method saltelli")
+    notes.append(Phrase("total indices need a full grid or a sample by the method saltelli"))
     with _quiet():
         found = rbd_fast.analyze(_problem(x.shape[1]), x, y, M=max(2, min(10, (len(y) - 1) // 10)), seed=_SEED)
     return [Indices(_finite(found["S1"][i]), _finite(found["S1_conf"][i])) for i in range(x.shape[1])], []
 
 
-def _whole(blocks: Numbers, what: str, notes: list[str]) -> NDArray[np.bool_]:
+def _whole(blocks: Numbers, notes: list[str], *, trajectories: bool = False) -> NDArray[np.bool_]:
     """Which rows of ``blocks`` have no missing number; others are noted."""
     whole = np.isfinite(blocks).all(axis=1)
     if not whole.all():
-        notes.append(f"{int((~whole).sum())} of {len(blocks)} {what} are left out with all their cases")
+        counts = {"count": int((~whole).sum()), "total": len(blocks)}
+        notes.append(
+            Phrase("{count} of {total} trajectories are left out with all their cases", **counts)
+            if trajectories
+            else Phrase("{count} of {total} points of the design are left out with all their cases", **counts)
+        )
     return np.asarray(whole)
 
 

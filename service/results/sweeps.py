@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.results.wording import number, unit_text
+from sprag.service.results.phrases import Amount, Name, Part, Phrase, joined, plural, term
+from sprag.service.results.wording import percent
 from sprag.worker.models import JUMPED
 from sprag.worker.sweeps import DOWN, SWEEP, direction
 
@@ -30,9 +31,15 @@ def swept_along(study: Study, path: str) -> bool:
     return axis is not None and axis == study.axis_of(path)
 
 
-def value_text(path: str, value: float) -> str:
-    """The value of a parameter that tells curves apart, for display."""
-    return direction(value) if path == SWEEP else number(value)
+def values_text(values: Mapping[str, float], units: Mapping[str, str]) -> Phrase:
+    """The values (SI) of the parameters that tell curves apart, without their units."""
+    return joined(
+        ", ",
+        (
+            term(direction(value)) if path == SWEEP else Amount(value, units[path], bare=True)
+            for path, value in values.items()
+        ),
+    )
 
 
 def direction_texts(study: Study, case: int) -> dict[str, str]:
@@ -86,13 +93,15 @@ def hysteresis(curves: Curves) -> str:
     if not curves.selection.swept:
         return ""
     name, x = curves.selection.results[0].name, curves.selection.x
-    unit = unit_text(curves.selection.units[x])
+    unit = curves.selection.units[x]
     widths = [jump["high"] - jump["low"] for curve in curves.curves for jump in curve.jumps or ()]
-    within = f"within {number(max(widths, default=0.0))}{f' {unit}' if unit else ''}"
-    jumps = {0: "no jumps", 1: f"1 jump, {within}"}.get(len(widths), f"{len(widths)} jumps, each {within}")
+    jumps = Phrase("no jumps")
+    if widths:
+        width = Amount(max(widths), unit)
+        jumps = plural("{count} jump, within {width}", "{count} jumps, each within {width}", len(widths), width=width)
     pairs = _pairs(curves)
     if not pairs:
-        return f"Along the sweep {jumps}."
+        return Phrase("Along the sweep {jumps}.", jumps=jumps)
     largest, at, wide = 0.0, 0.0, list[tuple[float, float]]()
     for up, down in pairs:
         both = np.array([up.y[name], down.y[name]])
@@ -105,14 +114,31 @@ def hysteresis(curves: Curves) -> str:
             largest, at = float(off[place]), up.line.x[place]
         wide += _intervals(np.asarray(up.line.x), off > _DIFFERENT)
     if not wide:
-        return f"Up and down agree within {100.0 * _DIFFERENT:g} % of the range of {name}; {jumps}."
-    named = [number(low) if low == high else f"{number(low)} to {number(high)}" for low, high in sorted(set(wide))]
-    more = f" and {len(named) - _NAMED} more" if len(named) > _NAMED else ""
-    where = ", ".join(named[:_NAMED]) + (f" {unit}" if unit else "") + more
-    return (
-        f"Hysteresis: up and down differ at {where}, by up to {100.0 * largest:.2g} % of the range of {name} "
-        f"(at {number(at)}{f' {unit}' if unit else ''}); {jumps}."
+        return Phrase(
+            "Up and down agree within {share} of the range of {name}; {jumps}.",
+            share=percent(_DIFFERENT),
+            name=Name(name, within=True),
+            jumps=jumps,
+        )
+    named = [_interval(low, high, unit) for low, high in sorted(set(wide))]
+    places: Part = joined(", ", named[:_NAMED])
+    if len(named) > _NAMED:
+        places = plural("{places} and {count} more", "{places} and {count} more", len(named) - _NAMED, places=places)
+    return Phrase(
+        "Hysteresis: up and down differ at {places}, by up to {share} of the range of {name} (at {at}); {jumps}.",
+        places=places,
+        share=percent(largest),
+        name=Name(name, within=True),
+        at=Amount(at, unit),
+        jumps=jumps,
     )
+
+
+def _interval(low: float, high: float, unit: str) -> Phrase:
+    """An interval of x, or a single place."""
+    if low == high:
+        return Phrase("{x}", x=Amount(low, unit))
+    return Phrase("{low} to {high}", low=Amount(low, unit, bare=True), high=Amount(high, unit))
 
 
 def _intervals(x: NDArray[np.float64], off: NDArray[np.bool_]) -> list[tuple[float, float]]:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from sprag.service.faults import parameter_error
 from sprag.service.json_text import numbers, to_bytes
 from sprag.service.results.directions import case_values
-from sprag.service.results.exports import table_csv
+from sprag.service.results.exports import read_table
+from sprag.service.results.quantities import Units
 from sprag.service.spec.units import PERIOD_NAMES, QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
 from sprag.worker.models.starts import motion_of
@@ -97,8 +98,10 @@ def timed_values(made: Trajectory) -> TimedValues:
     }
 
 
-def trajectory_csv(made: Trajectory) -> bytes:
-    """The values as CSV: time or angle, every variable, every state."""
-    header = [made.along, *made.names, *(f"{name}.state" for name in made.states)]
-    columns = [made.times.tolist(), *(made.values[:, i].tolist() for i in range(len(made.names)))]
-    return table_csv(header, [*columns, *made.states.values()])
+def trajectory_csv(made: Trajectory, units: Units | None = None) -> bytes:
+    """The values as CSV in a reader's units, by default SI: time or angle, every variable, every state."""
+    columns = {made.along: made.times.tolist()}
+    columns |= {name: made.values[:, index].tolist() for index, name in enumerate(made.names)}
+    columns |= {f"{name}.state": states for name, states in made.states.items()}
+    si = {made.along: "s" if made.along == "time" else "rad", **dict(zip(made.names, made.units, strict=True))}
+    return read_table(columns, si, units or Units())

@@ -8,17 +8,27 @@ from typing import Final
 
 from markupsafe import Markup
 
+from sprag.service.languages import ENGLISH, N_, current, decimal, gettext, grouped, ngettext, pgettext
 from sprag.worker import models
+from sprag.worker.models.vocabulary import words
+
+__all__ = ["counted", "duration", "number", "percent", "symbol", "unit_text", "words"]
 
 #: Narrow no-break space, the thousands separator of ISO 80000.
 _THIN: Final = "\N{NARROW NO-BREAK SPACE}"
 _RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+#: A name of a unit; words of a sentence around it have none in the catalogues.
+_UNIT: Final = re.compile(r"[A-Za-z]+\d?")
 #: Significant digits of numbers on pages; files and the API have all digits.
 _DIGITS: Final = 5
 _GREEK: Final = {
     "alpha": "α", "beta": "β", "chi": "χ", "delta": "δ", "eta": "η", "lambda": "λ", "nu": "ν", "phi": "φ", "rho": "ρ",
     "w": "ω",
 }  # fmt: skip
+
+
+#: What `counted` counts.
+NOUNS: Final = ("case", "drive", "generation", "result", "round", "run", "strobe")
 
 
 def number(value: float | str | None, digits: int = _DIGITS) -> str:
@@ -38,8 +48,8 @@ def number(value: float | str | None, digits: int = _DIGITS) -> str:
     if 1e3 <= abs(rounded) < 1e7 and (exponent or ("." not in text and abs(value) >= 1e4)):
         return _grouped(rounded)
     if not exponent:
-        return text
-    return f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}"
+        return decimal(text)
+    return f"{decimal(mantissa)}·10{str(int(exponent)).translate(_RAISED)}"
 
 
 def _grouped(value: float) -> str:
@@ -50,7 +60,10 @@ def unit_text(unit: str | None) -> str:
     """``kg*m^2`` as ``kg·m²``; nothing for a number without a unit."""
     if unit in (None, "1"):
         return ""
-    raised = re.sub(r"\^(-?\d+)", lambda found: found[1].translate(_RAISED), str(unit))
+    named = str(unit)
+    if current() != ENGLISH:
+        named = _UNIT.sub(lambda found: pgettext("unit", found[0]), pgettext("unit", named))
+    raised = re.sub(r"\^(-?\d+)", lambda found: found[1].translate(_RAISED), named)
     return raised.replace("*", "·")
 
 
@@ -63,18 +76,24 @@ def symbol(text: str) -> Markup:
     return Markup("<i>{}</i>{}").format(base, Markup("<sub>{}</sub>").format(index) if index else "")
 
 
-def words(name: str) -> str:
-    """``shaft.speed.mean`` as ``Shaft speed mean``."""
-    text = name.replace(".", " ").replace("_", " ").strip()
-    text = re.sub(r"^pendulums (\d+)", r"pendulum \1", text)
-    return text[:1].upper() + text[1:] if text[:1].isascii() else text
-
-
 def counted(value: int, noun: str) -> str:
-    """How many there are: "1 drive", "1,000 drives"; the plural has an s."""
-    return f"{value:,} {noun}{'' if value == 1 else 's'}"
+    """How many there are: "1 drive", "1,000 drives"; ``noun`` is one of `NOUNS`, whose plural has an s."""
+    one, many = f"{{n}} {noun}", f"{{n}} {noun}s"
+    return ngettext(one, many, value, n=grouped(value))
 
 
 def percent(share: float) -> str:
     """A share for display."""
-    return f"{100.0 * share:.2g} %"
+    return decimal(f"{100.0 * share:.2g} %")
+
+
+def duration(seconds: float) -> str:
+    """A rough duration in a suitable unit, two digits: ``40 s``, ``3 min``, ``2.5 h``."""
+    if seconds < 1.0:
+        return gettext("less than 1 s")
+    for limit, divisor, unit in ((100.0, 1.0, N_("s")), (6000.0, 60.0, N_("min")), (172800.0, 3600.0, N_("h"))):
+        if seconds < limit:
+            rounded = float(f"{seconds / divisor:.2g}")
+            return f"{decimal(f'{rounded:g}')} {gettext(unit)}"
+    days = float(f"{seconds / 86400.0:.2g}")
+    return ngettext("{n} day", "{n} days", days, n=decimal(f"{days:g}"))

@@ -12,9 +12,26 @@ from typing import Final, cast
 
 from sprag.service.formats import Format
 from sprag.service.results.exports.source import Source, stored
-from sprag.service.results.exports.text import csv_pieces, escape, json_pieces, row_json, rows_json, table_csv
+from sprag.service.results.exports.text import (
+    csv_pieces,
+    json_pieces,
+    read_table,
+    row_json,
+    rows_json,
+    table_csv,
+)
 
-__all__ = ["Source", "csv_pieces", "escape", "export", "json_pieces", "row_json", "rows_json", "stored", "table_csv"]
+__all__ = [
+    "Source",
+    "csv_pieces",
+    "export",
+    "json_pieces",
+    "read_table",
+    "row_json",
+    "rows_json",
+    "stored",
+    "table_csv",
+]
 
 #: Module and function that write each format; only the libraries of the requested one are loaded.
 _WRITERS: Final[dict[Format, tuple[str, str]]] = {

@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import pyarrow as pa
 
-from sprag.service.results.directions import value_columns
 from sprag.service.results.exports.inputs import column_description
 from sprag.service.results.exports.source import machine
-from sprag.service.spec.catalogue import unit_of
 from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
@@ -62,7 +60,7 @@ def schema(source: Source) -> pa.Schema:
             path,
             pa.string() if path == SWEEP else pa.float64(),
             nullable=False,
-            metadata={"unit": unit_of(study, path), "description": column_description(study, path)},
+            metadata={"unit": source.unit(path), "description": column_description(study, path)},
         )
         for path in study.column_paths
     ]
@@ -84,7 +82,7 @@ def schema(source: Source) -> pa.Schema:
 def batch(source: Source, block: RowBlock, made: pa.Schema) -> pa.RecordBatch:
     """The cases of a block as a batch of `schema`; NaN becomes null."""
     flags = [text.split(",") if text else [] for text in block.flags]
-    arrays = [pa.array(block.cases), *map(pa.array, value_columns(source.study, block.cases).values())]
+    arrays = [pa.array(block.cases), *map(pa.array, source.parameters(block.cases).values())]
     arrays += [pa.array(block.endings, pa.string()), pa.array(flags, made.field("flags").type)]
     for index, info in enumerate(source.infos):
         column = np.ascontiguousarray(block.values[:, index])
@@ -102,6 +100,7 @@ def parquet_pieces(source: Source) -> Iterator[bytes]:
     """A Parquet file, a piece for each group of rows."""
     import pyarrow.parquet as pq
 
+    source = source.in_units()
     made, sink = schema(source), _Pieces()
     held: list[pa.RecordBatch] = []
     with pq.ParquetWriter(sink, made, compression="zstd", use_dictionary=_repeating(source)) as writer:
@@ -124,6 +123,7 @@ def _repeating(source: Source) -> list[str]:
 
 def arrow_pieces(source: Source) -> Iterator[bytes]:
     """An Arrow IPC stream, a piece for each block."""
+    source = source.in_units()
     made, sink = schema(source), _Pieces()
     with pa.ipc.new_stream(sink, made) as writer:
         for block in source.blocks:

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
+from sprag.service.languages import N_
 from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.machine.registry import part_of
 from sprag.worker.models.parameters import parameter_of
@@ -54,8 +55,8 @@ def description_of(study: Study, path: str) -> str:
 
 def column_description(study: Study, path: str) -> str:
     """The same for a column of values, with the formula of a derived parameter."""
-    told, formula = description_of(study, path), study.derive.get(path)
-    return told if formula is None else f"{told}; derived: {formula}".removeprefix("; ")
+    text, formula = description_of(study, path), study.derive.get(path)
+    return text if formula is None else f"{text}; derived: {formula}".removeprefix("; ")
 
 
 def inputs(study: Study, spec: Mapping[str, Any]) -> tuple[Input, ...]:
@@ -127,7 +128,7 @@ def _origin(spec: Mapping[str, Any], path: str) -> Origin:
 
 def _run_text(name: str, value: object) -> str:
     if value is None:
-        return "the last third"
+        return N_("the last third")
     if isinstance(value, Mapping):  # starts
         ranges = "; ".join(f"{path} {_text(ends)}" for path, ends in value["ranges"].items())
         return f"{value['count']}, seed {value['seed']}: {ranges}"

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.formats import NAME_ATTRIBUTE
 from sprag.service.results.exports.inputs import column_description, description_of
 from sprag.service.results.exports.source import machine
 from sprag.service.results.exports.spool import spooled
@@ -35,6 +36,11 @@ _LEVEL: Final = 1
 _AT_ONCE: Final = 16 * 2**20
 
 
+def cf_name(name: str) -> str:
+    """The name of a path or result in the file: letters, digits and underscores (CF 2.3)."""
+    return name.replace(".", "_")
+
+
 def netcdf_pieces(source: Source) -> Iterator[bytes]:
     """The file in pieces. It is built on disk, a few results at a time, to limit memory."""
     return spooled(partial(_write, source))
@@ -54,7 +60,7 @@ def _write(source: Source, folder: Path) -> Path:
     for first in range(0, len(source.infos), at_once):
         columns = {}
         for index, info in enumerate(source.infos[first : first + at_once], first):
-            columns[info.name] = column = grid.variable(*_variable(info, rows.column(index)))
+            columns[cf_name(info.name)] = column = grid.variable(*_variable(info, rows.column(index)))
             # The coordinates are in the file already; xarray names them only for variables written together with them.
             if grid.labels:
                 column.attrs["coordinates"] = " ".join(grid.labels)
@@ -67,7 +73,7 @@ class _Grid:
 
     Attributes
     ----------
-    dims : names of the dimensions: the first path of each axis of a grid; ``case`` where axes are zipped
+    dims : names in the file of the dimensions: the first path of each axis of a grid; ``case`` where axes are zipped
     shape : their lengths
     labels : coordinates that are not dimensions: the case number in a grid, further paths of tied axes, drawn and
         derived paths
@@ -76,13 +82,13 @@ class _Grid:
     def __init__(self, study: Study) -> None:
         self._study = study
         self._together = study.combine != "grid"
-        self.dims = (_CASE,) if self._together else tuple(axis.paths[0] for axis in study.axes)
+        self.dims = (_CASE,) if self._together else tuple(cf_name(axis.paths[0]) for axis in study.axes)
         self.shape = study.shape or ((1,) if self._together else ())
         self._orders = [slice(None)] if self._together else [_order(axis) for axis in study.axes]
         paths = study.axis_paths if self._together else [path for axis in study.axes for path in axis.paths[1:]]
         drawn = [] if study.spread is None else [path for path in study.spread.paths if path not in study.axis_paths]
         self._drawn = drawn
-        self.labels = [*([] if self._together else [_CASE]), *paths, *drawn, *study.derive]
+        self.labels = [*([] if self._together else [_CASE]), *map(cf_name, (*paths, *drawn, *study.derive))]
 
     def place(self, column: NDArray[Any]) -> NDArray[Any]:
         """A column in the order of cases as an array over the dimensions."""
@@ -111,22 +117,18 @@ class _Grid:
         for index, axis in enumerate(study.axes):
             dimension, order = (0, slice(None)) if self._together else (index, self._orders[index])
             for path in axis.paths:
-                attributes: dict[str, Any] = {
-                    "units": unit_of(study, path),
-                    "long_name": description_of(study, path) or path,
-                }
+                attributes = _attributes(path, unit_of(study, path), description_of(study, path))
                 if path == SWEEP:
                     attributes |= {"flag_values": [float(UP), float(DOWN)], "flag_meanings": " ".join(DIRECTIONS)}
-                found[path] = xr.Variable(self.dims[dimension], axis.array[order], attributes, unfilled)
+                found[cf_name(path)] = xr.Variable(self.dims[dimension], axis.array[order], attributes, unfilled)
         for path in self._drawn:
             position, values = study.varied(path) or (0, np.empty(0))
             dimension, order = (0, slice(None)) if self._together else (position, self._orders[position])
-            attributes = {"units": unit_of(study, path), "long_name": description_of(study, path) or path}
-            found[path] = xr.Variable(self.dims[dimension], values[order], attributes, unfilled)
+            attributes = _attributes(path, unit_of(study, path), description_of(study, path))
+            found[cf_name(path)] = xr.Variable(self.dims[dimension], values[order], attributes, unfilled)
         for path, column in self._derived().items():
-            found[path] = self.variable(
-                column, {"units": unit_of(study, path), "long_name": column_description(study, path) or path}
-            )
+            attributes = _attributes(path, unit_of(study, path), column_description(study, path))
+            found[cf_name(path)] = self.variable(column, attributes)
         numbers = self.variable(
             np.arange(study.cases, dtype=np.int64), {"units": "1", "long_name": "number of the case"}
         )
@@ -150,9 +152,14 @@ def _about(source: Source) -> dict[str, Any]:
         "Conventions": _CONVENTIONS,
         "title": study.name or "parameter study",
         "history": f"written by Sprag {version('sprag')}",
-        **{name: str(value) for name, value in source.about.items()},
+        **{name: part if isinstance(part, str) else json.dumps(part) for name, part in source.about.items()},
         **{name: part if isinstance(part, str) else json.dumps(part) for name, part in machine(source).items()},
     }
+
+
+def _attributes(name: str, unit: str, meaning: str) -> dict[str, Any]:
+    """The attributes of a number, among them its name outside of the file."""
+    return {NAME_ATTRIBUTE: name, "units": unit, "long_name": meaning or name}
 
 
 def _ending_attributes() -> dict[str, Any]:
@@ -174,8 +181,9 @@ def _flag_attributes() -> dict[str, Any]:
 def _variable(info: ResultInfo, column: NDArray[np.float64]) -> tuple[NDArray[Any], dict[str, Any]]:
     """Values and attributes of a result; a category becomes codes, the first of which means none."""
     if info.kind != "category":
-        return column, {"units": info.unit, "long_name": info.description}
+        return column, _attributes(info.name, info.unit, info.description)
     attributes = {
+        NAME_ATTRIBUTE: info.name,
         "long_name": info.description,
         "flag_values": np.arange(len(info.categories), dtype=np.int8),
         "flag_meanings": " ".join(info.categories),

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
+from sprag.service.results.directions import value_columns
 from sprag.service.results.exports.inputs import choices, defaults
+from sprag.service.results.quantities import SI, Units, units_for
+from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.fields import TOLERANCE_FIELDS
 from sprag.worker import models
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from sprag.service.formats import Header
     from sprag.service.storage.records import RowBlock, StudyRecord
     from sprag.service.storage.store import Store
     from sprag.worker.models import ResultInfo
@@ -27,6 +35,8 @@ class Source:
     """The source of an export: a study, the description of its results, and its rows in order of cases.
 
     ``spec`` is the user's own, which contains the non-numeric inputs: kinds, formulas, tables, measured points.
+    Tables are written in ``units``; the description of the machine is in SI. ``header`` says what heads the columns of
+    CSV.
     """
 
     study: Study
@@ -34,12 +44,53 @@ class Source:
     blocks: Iterable[RowBlock]
     about: dict[str, Any]
     spec: Mapping[str, Any] = field(default_factory=dict)
+    units: Units = field(default_factory=Units)
+    header: Header = "names"
+
+    def in_units(self) -> Source:
+        """The source with results in the reader's units."""
+        if not self.units.chosen:
+            return self
+        infos = tuple(replace(info, unit=self.units.unit(info.unit)) for info in self.infos)
+        return replace(self, infos=infos, blocks=map(self._block, self.blocks))
+
+    def _block(self, block: RowBlock) -> RowBlock:
+        columns = [self.units.values(block.values[:, place], info.unit) for place, info in enumerate(self.infos)]
+        return replace(block, values=np.stack(columns, axis=1) if columns else block.values)
+
+    def parameters(self, cases: NDArray[np.int64]) -> dict[str, list[float] | list[str]]:
+        """The parameters of cases in the reader's units: a list for each of the study's column paths."""
+        columns = value_columns(self.study, cases)
+        chosen = {path: unit_of(self.study, path) for path in columns if unit_of(self.study, path) in self.units.chosen}
+        return columns | {path: self.units.values(np.array(columns[path]), si).tolist() for path, si in chosen.items()}
+
+    def unit(self, path: str) -> str:
+        """The unit of a parameter's column."""
+        return self.units.unit(unit_of(self.study, path))
 
 
-def stored(store: Store, record: StudyRecord, study: Study) -> Source:
-    """The rows of a study of the database."""
-    about = {"study": record.id, "name": record.name, "model": record.model, "engine_version": record.engine_version}
-    return Source(study, models.study_results(study), store.iter_rows(record.id), about, store.spec(record.id))
+def stored(store: Store, record: StudyRecord, study: Study, units: str = SI, header: Header = "names") -> Source:
+    """The rows of a study of the database; raises SelectionError for ``units`` that cannot be shown."""
+    origins = store.origins(record.id)
+    about: dict[str, Any] = {
+        "study": record.id,
+        "name": record.name,
+        "model": record.model,
+        "engine_version": record.engine_version,
+        "computed_by": [asdict(origin) for origin in origins],
+    }
+    if len({origin.fingerprint for origin in origins} - {None}) > 1 and (by := store.cases_by_fingerprint(record.id)):
+        about["cases_by_fingerprint"] = [asdict(item) for item in by]
+    spec = store.spec(record.id)
+    return Source(
+        study,
+        models.study_results(study),
+        store.iter_rows(record.id),
+        about,
+        spec,
+        units_for(study, spec, units),
+        header,
+    )
 
 
 def machine(source: Source) -> dict[str, Any]:

@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from sprag.service.json_text import to_bytes
 from sprag.service.results.directions import value_columns
 from sprag.service.results.exports.source import machine
 from sprag.service.spec.catalogue import unit_of
+from sprag.service.spec.csv_text import escape
 
 if TYPE_CHECKING:
     from sprag.service.answers import Value
     from sprag.service.answers.results import Case
     from sprag.service.results.exports.source import Source
+    from sprag.service.results.quantities import Units
     from sprag.service.storage.records import CaseRow, RowBlock
     from sprag.worker.study import Study
 
 #: Spreadsheets interpret cells that begin with these characters as formulas.
-_FORMULA_STARTS: Final = ("=", "+", "-", "@", "\t", "\r")
 
 
 def row_json(row: CaseRow, parameters: dict[str, Value]) -> Case:
@@ -75,12 +76,21 @@ def json_lines_pieces(source: Source) -> Iterator[bytes]:
 
 
 def csv_pieces(source: Source) -> Iterator[bytes]:
-    """Header ``case, axis paths, derived paths, ending, flags, result names``; empty cells for missing values."""
-    study = source.study
-    paths = study.column_paths
-    yield csv_lines([["case", *paths, "ending", "flags", *(info.name for info in source.infos)]])
-    for block in source.blocks:
-        columns = value_columns(study, block.cases).values()
+    """Header ``case, axis paths, derived paths, ending, flags, result names``; empty cells for missing values.
+
+    A column that is not in SI has its unit: ``shaft.speed.mean [rpm]``; with ``header`` "units" every one that has one.
+    """
+    paths = source.study.column_paths
+    shown = source.in_units()
+    every = source.header == "units"
+    named = [_headed(path, source.unit(path), "1" if every else unit_of(source.study, path)) for path in paths]
+    results = [
+        _headed(own.name, own.unit, "1" if every else si.unit)
+        for own, si in zip(shown.infos, source.infos, strict=True)
+    ]
+    yield csv_lines([["case", *named, "ending", "flags", *results]])
+    for block in shown.blocks:
+        columns = source.parameters(block.cases).values()
         parameters = zip(*columns, strict=True) if paths else iter(lambda: (), None)
         lines = (
             [row.case, *map(_cell, values), row.ending, ";".join(row.flags), *map(_cell, row.results.values())]
@@ -95,6 +105,21 @@ def table_csv(header: Iterable[str], columns: Iterable[Iterable[object]]) -> byt
     return csv_lines(_with_header(list(header), rows))
 
 
+def read_table(columns: Mapping[str, Sequence[Any]], si: Mapping[str, str], units: Units) -> bytes:
+    """A small table as CSV in a reader's ``units``; ``si`` are those of its columns.
+
+    A column whose numbers are not SI says so: ``shaft.speed.mean [rpm]``.
+    """
+    shown = {name: si.get(name, "1") for name in columns}
+    header = [_headed(name, units.unit(unit), unit) for name, unit in shown.items()]
+    return table_csv(header, [[units.cell(value, unit) for value in columns[name]] for name, unit in shown.items()])
+
+
+def _headed(name: str, unit: str, known: str) -> str:
+    """The head of a column, with its unit where that is not the known one."""
+    return name if unit in (known, "") else f"{name} [{unit}]"
+
+
 def _with_header(header: list[str], rows: Iterable[list[Any]]) -> Iterator[list[Any]]:
     yield header
     yield from rows
@@ -104,11 +129,6 @@ def _cell(value: object) -> str:
     if value is None or value != value:  # noqa: PLR0124 - NaN
         return ""
     return repr(value) if isinstance(value, float) else escape(str(value)) if isinstance(value, str) else str(value)
-
-
-def escape(text: str) -> str:
-    """Escape text that a spreadsheet would interpret as a formula."""
-    return "'" + text if text.startswith(_FORMULA_STARTS) else text
 
 
 def csv_lines(rows: Iterable[Iterable[object]]) -> bytes:

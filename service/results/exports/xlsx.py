@@ -1,38 +1,85 @@
-"""Rows as a spreadsheet: a sheet of typed cells with a row of units under the names, and a sheet of inputs."""
+"""Rows as a spreadsheet: a table of typed cells with filters below a row of units, and a sheet of inputs."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import xlsxwriter
+from xlsxwriter.utility import xl_range
 from xlsxwriter.worksheet import Worksheet
 
-from sprag.service.results.directions import value_columns
 from sprag.service.results.exports.inputs import inputs, run_inputs
 from sprag.service.results.exports.source import given_texts
 from sprag.service.results.exports.spool import spooled
-from sprag.service.spec.catalogue import unit_of
 
 if TYPE_CHECKING:
     from sprag.service.results.exports.source import Source
     from sprag.service.storage.records import RowBlock
 
-#: Rows of a sheet, including those of names and units; further cases continue on another sheet.
+#: Rows of a sheet, including those of units and names; further cases continue on another sheet.
 SHEET_ROWS: Final = 1_048_576
 _HEAD_ROWS: Final = 2
 _LONGEST_TEXT: Final = 32_767
+#: Widths in characters: of a number as spreadsheets show it at first, of the button of a filter, and the largest one.
+_NUMBER, _BUTTON, _WIDEST = 12, 4, 60
 
 
 class _ExactSheet(Worksheet):  # type: ignore[misc]
-    """A sheet whose numbers have all their digits: the library writes 16, and a double may need 17."""
+    """A sheet written row by row, whose numbers have all their digits: the library writes 16, and a double may need 17.
+
+    Attributes
+    ----------
+    widths : characters of the longest text of each column
+    """
 
     def _xml_number_element(self, number: float, attributes: Any = ()) -> None:
         cell = "".join(f' {key}="{value}"' for key, value in attributes)
         self.fh.write(f"<c{cell}><v>{number!r}</v></c>")
+
+    def begin(self, columns: int) -> None:
+        """Prepare for that many columns."""
+        self.widths = [_NUMBER] * columns
+
+    def write_cells(self, row: int, cells: Sequence[Any], style: Any = None) -> None:
+        """Write texts as texts, never as formulas, and numbers as numbers; missing numbers stay empty."""
+        for column, cell in enumerate(cells):
+            if isinstance(cell, str):
+                if cell:
+                    self.write_string(row, column, cell[:_LONGEST_TEXT], style)
+                    self.widths[column] = max(self.widths[column], len(cell))
+            elif cell is not None and not math.isnan(cell):
+                self.write_number(row, column, cell, style)
+
+    def fit(self) -> None:
+        """Make each column as wide as its texts."""
+        for column, width in enumerate(self.widths):
+            self.set_column(column, column, min(width + 1, _WIDEST))
+
+    def name_columns(self, row: int, names: Sequence[str], table: str) -> None:
+        """Begin a table with filters, whose head is this row; `end_table` says where it ends.
+
+        The library makes no tables of sheets that are written row by row, because it would write the head again, and it
+        keeps every cell of a table. The head is written here, and the table is at first a single row.
+        """
+        self.constant_memory = False
+        columns = [{"header": name} for name in names]
+        options = {"name": table, "columns": columns, "style": "Table Style Light 1"}
+        if self.add_table(row, 0, row + 1, len(names) - 1, options):
+            raise ValueError(f"the columns of {table} do not make a table")  # two have one name
+        del self.table[row]
+        self.constant_memory = True
+        self.write_cells(row, names)
+        self.widths = [max(width, len(name) + _BUTTON) for width, name in zip(self.widths, names, strict=True)]
+
+    def end_table(self, first: int, last: int) -> None:
+        """The table has the rows from its head to the last one; without any it keeps an empty one."""
+        (table,) = self.tables
+        cells = xl_range(first, 0, max(last, first + 1), len(table["columns"]) - 1)
+        table.update({"range": cells, "a_range": cells, "autofilter": cells})
 
 
 def xlsx_pieces(source: Source) -> Iterator[bytes]:
@@ -44,42 +91,45 @@ def _write(source: Source, folder: Path, sheet_rows: int = SHEET_ROWS) -> Path:
     path = folder / "results.xlsx"
     options = {"constant_memory": True, "tmpdir": str(folder), "use_zip64": True, "strings_to_urls": False}
     with xlsxwriter.Workbook(str(path), options) as book:
-        title = book.add_format({"bold": True, "bottom": 1})
         unit = book.add_format({"italic": True, "font_color": "#666666"})
-        _cases(book, source, title, unit, sheet_rows)
-        _inputs(book, source, title)
+        _cases(book, source, unit, sheet_rows)
+        _inputs(book, source, book.add_format({"bold": True, "bottom": 1}))
     return path
 
 
-def _cases(book: Any, source: Source, title: Any, unit: Any, sheet_rows: int) -> None:
-    study = source.study
+def _cases(book: Any, source: Source, unit: Any, sheet_rows: int) -> None:
+    study, source = source.study, source.in_units()
     names = ["case", *study.column_paths, "ending", "flags", *(info.name for info in source.infos)]
-    units = ["", *(unit_of(study, path) for path in study.column_paths), "", "", *(i.unit for i in source.infos)]
-    number, sheet, row = 0, None, sheet_rows
+    units = ["", *(source.unit(path) for path in study.column_paths), "", "", *(i.unit for i in source.infos)]
+    number, row = 1, _HEAD_ROWS
+    sheet = _sheet(book, number, names, units, unit)
     for block in source.blocks:
         for cells in _rows(source, block):
             if row >= sheet_rows:
-                number += 1
-                sheet, row = _sheet(book, number, names, units, title, unit), _HEAD_ROWS
-            _write_row(sheet, row, cells)
+                _finish(sheet, row)
+                number, row = number + 1, _HEAD_ROWS
+                sheet = _sheet(book, number, names, units, unit)
+            sheet.write_cells(row, cells)
             row += 1
-    if sheet is None:
-        _sheet(book, 1, names, units, title, unit)
+    _finish(sheet, row)
 
 
-def _sheet(book: Any, number: int, names: list[str], units: list[str], title: Any, unit: Any) -> Any:
-    sheet = book.add_worksheet("cases" if number == 1 else f"cases {number}", _ExactSheet)
+def _sheet(book: Any, number: int, names: list[str], units: list[str], unit: Any) -> _ExactSheet:
+    sheet: _ExactSheet = book.add_worksheet("cases" if number == 1 else f"cases {number}", _ExactSheet)
+    sheet.begin(len(names))
     sheet.freeze_panes(_HEAD_ROWS, 1)
-    sheet.set_column(0, len(names) - 1, 14)
-    for column, name in enumerate(names):
-        sheet.write_string(0, column, name, title)
-    for column, text in enumerate(units):
-        sheet.write_string(1, column, text, unit)
+    sheet.write_cells(0, units, unit)
+    sheet.name_columns(1, names, "cases" if number == 1 else f"cases_{number}")
     return sheet
 
 
+def _finish(sheet: _ExactSheet, rows: int) -> None:
+    sheet.end_table(_HEAD_ROWS - 1, rows - 1)
+    sheet.fit()
+
+
 def _rows(source: Source, block: RowBlock) -> Iterator[list[Any]]:
-    parameters = value_columns(source.study, block.cases).values()
+    parameters = source.parameters(block.cases).values()
     values = block.values.tolist()
     named = [index for index, info in enumerate(source.infos) if info.kind == "category"]
     for index, case in enumerate(block.cases.tolist()):
@@ -94,35 +144,20 @@ def _rows(source: Source, block: RowBlock) -> Iterator[list[Any]]:
         ]
 
 
-def _write_row(sheet: Any, row: int, cells: list[Any]) -> None:
-    """Write texts as texts, never as formulas, and numbers as numbers; missing numbers stay empty."""
-    for column, cell in enumerate(cells):
-        if isinstance(cell, str):
-            if cell:
-                sheet.write_string(row, column, cell)
-        elif not math.isnan(cell):
-            sheet.write_number(row, column, cell)
-
-
 def _inputs(book: Any, source: Source, title: Any) -> None:
-    sheet = book.add_worksheet("inputs", _ExactSheet)
-    sheet.set_column(0, 0, 36)
-    sheet.set_column(1, 2, 18)
-    sheet.set_column(3, 3, 40)
+    sheet: _ExactSheet = book.add_worksheet("inputs", _ExactSheet)
+    sheet.begin(5)
     row = 0
 
     def line(*cells: object, style: Any = None) -> None:
         nonlocal row
-        for column, cell in enumerate(cells):
-            if isinstance(cell, float | int):
-                sheet.write_number(row, column, cell, style)
-            elif cell is not None:
-                sheet.write_string(row, column, str(cell)[:_LONGEST_TEXT], style)
+        sheet.write_cells(row, [cell if isinstance(cell, float | int) else str(cell or "") for cell in cells], style)
         row += 1
 
     line("study", style=title)
     for name, value in source.about.items():
-        line(name, value)
+        for item in value if isinstance(value, list) else [value]:
+            line(name, *(item.values() if isinstance(item, dict) else [item]))
     line()
     if run := run_inputs(source.study, source.spec):
         line("run", "", "", "", "origin", style=title)
@@ -141,3 +176,4 @@ def _inputs(book: Any, source: Source, title: Any) -> None:
     line("result", "", "unit", "meaning", style=title)
     for info in source.infos:
         line(info.name, "", info.unit, info.description)
+    sheet.fit()

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sprag.service.results.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag.service.results.phrases import Amount, Phrase, joined, plural
 from sprag.service.results.wording import number
 
 if TYPE_CHECKING:
@@ -29,16 +30,19 @@ def basin_figure(made: Basin, paths: tuple[str, str], units: tuple[str, str]) ->
             Line(_label(made, regime), across[inside], along[inside], colour, max(regime, 0), str(regime), joined=False)
         )
     x, y = (Quantity(path, unit) for path, unit in zip(paths, units, strict=True))
-    counts = f"{len(made.values)} {'regime' if len(made.values) == 1 else 'regimes'} from {made.members.size:,} starts"
+    starts = number(made.members.size)
+    counts = plural(
+        "{count} regime from {starts} starts", "{count} regimes from {starts} starts", len(made.values), starts=starts
+    )
     return Figure(x, (Panel(y, tuple(lines)),), family=(Quantity(counts, "1"),))
 
 
 def _label(made: Basin, regime: int) -> str:
     """Share, mean speed and order of a regime."""
     if regime < 0:
-        return "not ended ok"
+        return Phrase("not ended ok")
     row = dict(zip(made.names, made.values[regime].tolist(), strict=True))
     order = row["regime.order"]
-    periods = "without an orbit" if np.isnan(order) else f"order {order:.0f}"
+    periods = Phrase("without an orbit") if np.isnan(order) else Phrase("order {order}", order=int(order))
     share = f"{number(100.0 * row['regime.share'], 3)} %"
-    return f"{regime}: {share}, {number(row['shaft.speed.mean'], 4)} rad/s, {periods}"
+    return joined(", ", (f"{regime}: {share}", Amount(row["shaft.speed.mean"], "rad/s", 4), periods))

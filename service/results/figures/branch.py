@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.results.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag.service.results.phrases import Amount, Phrase, joined, plural, term
 from sprag.service.results.selection import axis_name
-from sprag.service.results.wording import number, unit_text
 from sprag.service.spec.catalogue import unit_of
 
 if TYPE_CHECKING:
@@ -44,19 +44,19 @@ def branch_figure(made: CaseBranch, study: Study, along: Along, result: str, own
     column = made.names.index(result)
     y = Quantity(result, made.units[column])
     if not made.order:
-        return Figure(x, (Panel(y, (), x=x),), note=f"There is no branch: {made.note}")
+        return Figure(x, (Panel(y, (), x=x),), note=Phrase("There is no branch: {why}", why=made.note))
     values = made.values[:, column]
     full = stable_segments(made)
     lines = [
-        Line("stable", *_part(made.parameters, values, full), _STABLE, 0, key="stable"),
-        Line("unstable", *_part(made.parameters, values, ~full), _UNSTABLE, 1, key="unstable"),
+        Line(Phrase("stable"), *_part(made.parameters, values, full), _STABLE, 0, key="stable"),
+        Line(Phrase("unstable"), *_part(made.parameters, values, ~full), _UNSTABLE, 1, key="unstable"),
     ]
     lines = [line for line in lines if line.x.size]
     if own is not None and own.x.size:
-        lines.append(Line("cases of the study", own.x, own.y, _OWN, 2, key="2", cases=own.cases, joined=False))
+        lines.append(Line(Phrase("cases of the study"), own.x, own.y, _OWN, 2, key="2", cases=own.cases, joined=False))
     lines += _marks(made, values, x.unit)
-    turn = "one excitation period" if made.order == 1 else f"{made.order} excitation periods"
-    return Figure(x, (Panel(y, tuple(lines), x=x),), heading=f"orbits of {turn}", below=_below(made))
+    heading = plural("orbits of {count} excitation period", "orbits of {count} excitation periods", made.order)
+    return Figure(x, (Panel(y, tuple(lines), x=x),), heading=heading, below=_below(made))
 
 
 def stable_segments(made: CaseBranch) -> NDArray[np.bool_]:
@@ -96,7 +96,7 @@ def _marks(made: CaseBranch, values: NDArray[np.float64], unit: str) -> list[Lin
     else:
         groups = {}
         for special in made.specials:
-            groups.setdefault(special.kind, []).append(special)
+            groups.setdefault(term(special.kind), []).append(special)
     lines = []
     for name, members in groups.items():
         places = [special.index for special in members]
@@ -108,14 +108,20 @@ def _marks(made: CaseBranch, values: NDArray[np.float64], unit: str) -> list[Lin
 
 def special_text(special: SpecialPoint, unit: str) -> str:
     """A special point in words: its kind, its place, and of a grazing what changes."""
-    shown = unit_text(unit)
-    text = f"{special.kind} at {number(special.parameter, 8)}{f' {shown}' if shown else ''}"
-    changes = ", ".join(
-        f"{contact.part} {contact.state.replace('_', ' ')} {contact.before} → {contact.after}"
+    text = Phrase("{kind} at {place}", kind=term(special.kind), place=Amount(special.parameter, unit, 8))
+    changes = [
+        Phrase(
+            "{part} {state} {before} → {after}",
+            part=contact.part,
+            state=term(contact.state),
+            before=str(contact.before),
+            after=str(contact.after),
+        )
         for contact in special.contacts
-    )
-    return f"{text}: {changes}" if changes else text
+    ]
+    return joined(": ", (text, joined(", ", changes))) if changes else text
 
 
 def _below(made: CaseBranch) -> str:
-    return f"The branch begins at {made.ends[0]} and ends at {made.ends[1]}." if made.ends[0] else ""
+    begin, end = map(Phrase, made.ends)
+    return Phrase("The branch begins at {begin} and ends at {end}.", begin=begin, end=end) if made.ends[0] else ""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.results.figures.figure import Figure, Line, Panel, Quantity, line_colours
+from sprag.service.results.phrases import Phrase, joined
 from sprag.service.results.wording import number
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker.planning.calibrate.candidates import along, groups
@@ -18,23 +19,25 @@ if TYPE_CHECKING:
 
     from sprag.service.results.calibration import Calibration
 
-_NOTHING: Final = "The first fit has not ended yet."
+_NOTHING: Final = Phrase("The first fit has not ended yet.")
 #: Dashes of a fitted curve, and of the ends of its intervals.
 _SOLID, _DOTTED = 0, 2
 
 
-def calibration_figure(found: Calibration) -> Figure:
+def calibration_figure(found: Calibration, columns: int = 2) -> Figure:
     """For each measured result a panel with the points, the fit and its 95 % intervals, and one with the residuals."""
     plan = found.plan
     x = along(plan)
-    across = Quantity("measured value", "1") if x is None else _quantity(found, plan.paths_at[x])
+    across = Quantity(Phrase("measured value"), "1") if x is None else _quantity(found, plan.paths_at[x])
     panels: list[Panel] = []
     for column, name in enumerate(plan.results):
         info = found.infos[name]
         panels.append(Panel(Quantity(name, info.unit), tuple(_fit_lines(found, column)), x=across))
-        panels.append(Panel(Quantity("residual", "standard deviations"), tuple(_residuals(found, column)), x=across))
+        panels.append(
+            Panel(Quantity(Phrase("residual"), "standard deviations"), tuple(_residuals(found, column)), x=across)
+        )
     family = tuple(_quantity(found, path) for index, path in enumerate(plan.paths_at) if index != x)
-    return Figure(across, tuple(panels), columns=2, family=family, note="" if found.answer else _NOTHING)
+    return Figure(across, tuple(panels), columns=columns, family=family, note="" if found.answer else _NOTHING)
 
 
 def _quantity(found: Calibration, path: str) -> Quantity:
@@ -60,6 +63,11 @@ def _curves(found: Calibration, column: int) -> Iterator[tuple[int, str, str, ND
         yield curve, name, colour, rows
 
 
+def _named(what: Phrase, curve: str) -> Phrase:
+    """A line of a curve: its values first."""
+    return joined(" ", (curve, what)) if curve else what
+
+
 def _fit_lines(found: Calibration, column: int) -> Iterator[Line]:
     known, x = found.answer, along(found.plan)
     values, _ = groups(found.plan)
@@ -68,12 +76,20 @@ def _fit_lines(found: Calibration, column: int) -> Iterator[Line]:
         if known is not None and known.curve is not None and known.others is not None and x is not None:
             own = np.flatnonzero((np.delete(known.others, x, axis=1) == values[curve]).all(axis=1))
             places = known.others[own, x]
-            yield Line(f"{name} fit".strip(), places, known.curve[own, column], colour, _SOLID, key, listed=column == 0)
+            yield Line(
+                _named(Phrase("fit"), name),
+                places,
+                known.curve[own, column],
+                colour,
+                _SOLID,
+                key,
+                listed=column == 0,
+            )
             ends = () if known.ribbon is None else known.ribbon[own, column].T
             for end in ends:
                 yield Line("95 %", places, end, colour, _DOTTED, key, listed=False)
         yield Line(
-            f"{name} measured".strip(), _places(found, rows), found.plan.values[rows], colour, key=key,
+            _named(Phrase("measured"), name), _places(found, rows), found.plan.values[rows], colour, key=key,
             listed=column == 0, joined=False,
         )  # fmt: skip
 
@@ -83,6 +99,6 @@ def _residuals(found: Calibration, column: int) -> Iterator[Line]:
     for curve, name, colour, rows in _curves(found, column):
         values = np.full(len(rows), np.nan) if known is None else known.residuals[rows]
         yield Line(
-            f"{name} measured".strip(), _places(found, rows), values, colour, key=str(curve), listed=False,
+            _named(Phrase("measured"), name), _places(found, rows), values, colour, key=str(curve), listed=False,
             joined=False,
         )  # fmt: skip

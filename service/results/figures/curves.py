@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -10,13 +10,13 @@ import numpy as np
 from sprag.service.results.figures.figure import Band, Figure, Line, Marks, Panel, Quantity, line_colours
 from sprag.service.results.figures.orders import TITLE, order_map, strip_of
 from sprag.service.results.joined import joined_points
+from sprag.service.results.phrases import Amount, Name, Phrase, joined, term
 from sprag.service.results.refined import jumps_of, sentence
 from sprag.service.results.regimes import DOUBTFUL, MARKED, regimes_of
-from sprag.service.results.sweeps import hysteresis, value_text, without_direction
-from sprag.service.results.wording import number, unit_text
+from sprag.service.results.sweeps import hysteresis, values_text, without_direction
 from sprag.worker.codes import PENDING
 from sprag.worker.models import WorkerEnding
-from sprag.worker.sweeps import DIRECTIONS, SWEEP
+from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
     from sprag.service.results.curves import Curve, Curves, Map
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 #: wide picture.
 _MOST_POINTS: Final = 24_000
 #: Name of the points of other motions than those that the lines are of.
-OTHER_MOTIONS: Final = "other motions of the same cases"
+OTHER_MOTIONS: Final = Phrase("other motions of the same cases")
 _LEAST_POINTS: Final = 400
 _LINE_POINTS: Final = 6_000
 
 
-def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1, *, by_unit: bool = False) -> Figure:
+def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1) -> Figure:
     """Curves of one study, or of several that are overlaid: a panel for each result.
 
     Parameters
@@ -40,8 +40,6 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1, *, by_u
         All with the same x and the same results; one study alone has the label "".
     columns : int
         Panels side by side.
-    by_unit : bool
-        A panel for each unit instead; the dashes of the lines tell its results apart.
     """
     chosen = drawn[0][1].selection
     x = Quantity(chosen.names[chosen.x], chosen.units[chosen.x])
@@ -49,20 +47,18 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1, *, by_u
     family = tuple(Quantity(chosen.names[path], chosen.units[path]) for path in chosen.lines[0].by)
     occurring = tuple(regimes_of(curve.regimes for _, curve in lines))
     regimes = occurring if len(occurring) > 1 or set(occurring) & set(MARKED) else ()
-    groups: dict[str, list[ResultInfo]] = {}
-    for info in chosen.results:
-        groups.setdefault(info.unit if by_unit else info.name, []).append(info)
     labels = [label for label, _ in drawn]
     panels = []
-    for index, infos in enumerate(groups.values()):
-        y = Quantity(infos[0].name if len(infos) == 1 else "", infos[0].unit)
-        parts = (*_lines(lines, labels, infos, listed=index == 0), *_further(drawn, infos, listed=index == 0))
-        directions = [f", {word}" for word in DIRECTIONS] if _both(lines) else [""]
-        styles = tuple(f"{info.name}{word}" for info in infos for word in directions) if len(infos) > 1 else ()
+    for index, info in enumerate(chosen.results):
+        y, infos = Quantity(info.name, info.unit), (info,)
+        parts = (
+            *_lines(lines, labels, infos, chosen.units, listed=index == 0),
+            *_further(drawn, infos, listed=index == 0),
+        )
         bands = tuple(_bands(lines, infos)) if len(drawn) == 1 else ()
-        panels.append(Panel(y, parts, tuple(_marks(lines, infos, regimes)), styles, bands=bands))
+        panels.append(Panel(y, parts, tuple(_marks(lines, infos, regimes)), bands=bands))
     most = min(max(_MOST_POINTS // len(lines), _LEAST_POINTS), _LINE_POINTS)
-    spans, looks = strip_of(drawn[0][1].curves) if len(drawn) == 1 else ({}, {})
+    spans, looks = strip_of(drawn[0][1].curves, chosen.units) if len(drawn) == 1 else ({}, {})
     return Figure(
         x,
         tuple(panels),
@@ -113,21 +109,26 @@ def _colours(lines: Sequence[tuple[int, Curve]]) -> list[str]:
 
 
 def _lines(
-    lines: Sequence[tuple[int, Curve]], labels: Sequence[str], infos: Sequence[ResultInfo], *, listed: bool
+    lines: Sequence[tuple[int, Curve]],
+    labels: Sequence[str],
+    infos: Sequence[ResultInfo],
+    units: Mapping[str, str],
+    *,
+    listed: bool,
 ) -> Iterator[Line]:
     both = _both(lines)
     for index, ((study, curve), colour) in enumerate(zip(lines, _colours(lines), strict=True)):
         down = int({**curve.line.at, **curve.line.by}.get(SWEEP, 0.0))
         run = curve.run()
         x = np.asarray(curve.line.x)[run]
-        values = ", ".join(value_text(path, value) for path, value in curve.line.by.items())
+        values = values_text(curve.line.by, units)
         for place, info in enumerate(infos):
             yield Line(
                 values or labels[study],
                 x,
                 curve.y[info.name][run],
                 colour,
-                style=place * (1 + both) + down if both or len(infos) > 1 else study,
+                style=down if both else study,
                 key=str(index),
                 heading=labels[study] if values else "",
                 listed=listed and place == 0,
@@ -187,21 +188,25 @@ def _nothing(drawn: Sequence[tuple[str, Curves]]) -> str:
         return ""
     chosen = drawn[0][1].selection
     at = curves[0].line.at if curves else {}
-    held = [f"{axis_name} = {number(value)} {unit_text(chosen.units[axis_name])}" for axis_name, value in at.items()]
-    cases = (
-        f"case at {', '.join(text.strip() for text in held)}" if held and len(drawn) == 1 else "case that is drawn here"
-    )
+    held = [
+        Phrase("{name} = {value}", name=Name(path, within=True), value=Amount(value, chosen.units[path]))
+        for path, value in at.items()
+    ]
+    known = held and len(drawn) == 1
+    cases = Phrase("case at {place}", place=joined(", ", held)) if known else Phrase("case that is drawn here")
     endings = {ending for curve in curves for ending in curve.endings}
     if endings <= {PENDING, WorkerEnding.CANCELLED}:
-        return f"No {cases} {'is done yet' if PENDING in endings else 'was run before the study was cancelled'}."
-    others = ", ".join(sorted(endings - {PENDING, WorkerEnding.CANCELLED}))
-    return f"No {cases} has a result; they ended with: {others}."
+        if PENDING in endings:
+            return Phrase("No {case} is done yet.", case=cases)
+        return Phrase("No {case} was run before the study was cancelled.", case=cases)
+    others = joined(", ", map(term, sorted(endings - {PENDING, WorkerEnding.CANCELLED})))
+    return Phrase("No {case} has a result; they ended with: {endings}.", case=cases, endings=others)
 
 
 def map_quantities(drawn: Map) -> tuple[Quantity, Quantity, Quantity]:
     """The quantities of the axes of a map, and of its colours."""
     (x, y), (x_unit, y_unit) = drawn.names, drawn.units
-    return Quantity(x, x_unit), Quantity(y, y_unit), Quantity(drawn.result.name, drawn.result.unit)
+    return Quantity(x, x_unit), Quantity(y, y_unit), Quantity(drawn.title or drawn.result.name, drawn.result.unit)
 
 
 def doubtful_marks(drawn: Map) -> Iterator[Marks]:

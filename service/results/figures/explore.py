@@ -8,6 +8,7 @@ import numpy as np
 
 from sprag.service.results.explore import quantities
 from sprag.service.results.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag.service.results.phrases import Phrase, plural
 from sprag.service.results.selection import listed, refused
 
 if TYPE_CHECKING:
@@ -39,9 +40,9 @@ def explore_figure(found: Explored, x: str = "", y: str = "") -> Figure:
     top = np.zeros(found.known, dtype=np.bool_)
     top[found.order] = True
     kinds = (
-        ("other cases", _OTHERS, known & ~found.selected),
-        ("selected", PALETTE[0], known & found.selected & ~top),
-        ("first in the table", PALETTE[1], known & top),
+        (Phrase("other cases"), _OTHERS, known & ~found.selected),
+        (Phrase("selected"), PALETTE[0], known & found.selected & ~top),
+        (Phrase("first in the table"), PALETTE[1], known & top),
     )
     lines = []
     left_out = 0
@@ -51,8 +52,16 @@ def explore_figure(found: Explored, x: str = "", y: str = "") -> Figure:
         if places.size:
             cases = found.rows.cases[places]
             lines.append(Line(name, xs[places], ys[places], colour, index, str(index), cases=cases, joined=False))
-    note = "" if lines else "No case has both numbers."
-    below = f"{left_out:,} further cases are left out of this picture." if left_out else ""
+    note = "" if lines else Phrase("No case has both numbers.")
+    below = (
+        plural(
+            "{count} further case is left out of this picture.",
+            "{count} further cases are left out of this picture.",
+            left_out,
+        )
+        if left_out
+        else ""
+    )
     return Figure(across, (Panel(up, tuple(lines), x=across),), note=note, below=below, most=3 * _MOST)
 
 

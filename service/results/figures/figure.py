@@ -9,12 +9,14 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.service.results.phrases import Phrase
+
 #: Colours that are distinguishable with any kind of colour vision (after Okabe and Ito), on light and dark backgrounds.
 PALETTE: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f6fc4", "#8c6d31")
 #: Colour of what stands for the whole of other lines, or is drawn for reference only.
 NEUTRAL: Final = "#7a7f87"
 #: What bands are, for the legend.
-BANDS: Final = "jump, not interpolated"
+BANDS: Final = Phrase("jump, not interpolated")
 #: Look of a state for which its model defines none.
 OTHER_LOOK: Final = ("#999999", "+", "+++")
 
@@ -100,10 +102,10 @@ class Fill:
 #: What a note marks: an extreme of a line, or the working point on it.
 NoteKind = Literal["largest", "smallest", "point"]
 #: What notes are, for the legend.
-NOTES: Final[dict[NoteKind, str]] = {
-    "largest": "largest of its curve",
-    "smallest": "smallest of its curve",
-    "point": "working point",
+NOTES: Final[dict[NoteKind, Phrase]] = {
+    "largest": Phrase("largest of its curve"),
+    "smallest": Phrase("smallest of its curve"),
+    "point": Phrase("working point"),
 }
 
 
@@ -121,7 +123,7 @@ class Note:
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One plot. ``styles`` explains the dashes where they distinguish results.
+    """One plot.
 
     ``x`` is the quantity of its own x axis; without one, the panel has the x axis of the figure.
     ``bands`` are the jumps of its curves, ``fills`` areas between two lines, ``notes`` points read off its lines.
@@ -130,7 +132,6 @@ class Panel:
     y: Quantity
     lines: tuple[Line, ...]
     marks: tuple[Marks, ...] = ()
-    styles: tuple[str, ...] = ()
     x: Quantity | None = None
     bands: tuple[Band, ...] = ()
     fills: tuple[Fill, ...] = ()
@@ -165,7 +166,7 @@ class Figure:
     regimes: tuple[str, ...] = ()
     held: tuple[str, ...] = ()
     spans: Mapping[str, tuple[tuple[str, float, float], ...]] = field(default_factory=dict)
-    states: str = "States"
+    states: str = Phrase("States")
     looks: Mapping[str, tuple[str, str, str]] = field(default_factory=dict)
     motion: bool = False
     heading: str = ""

@@ -8,6 +8,7 @@ import numpy as np
 
 from sprag.service.results.figures.figure import PALETTE, Figure, Line, Panel, Quantity
 from sprag.service.results.fronts import history
+from sprag.service.results.phrases import Name, Phrase, plural
 from sprag.service.results.selection import refused
 from sprag.service.spec.catalogue import unit_of
 
@@ -22,7 +23,7 @@ NUMBER: Final = "design"
 _OUTSIDE: Final = "#b0b8c4"
 #: Feasible designs from which on the picture is fitted to them.
 _FEW: Final = 5
-_NOTHING: Final = "No design has its results yet."
+_NOTHING: Final = Phrase("No design has its results yet.")
 
 
 def quantities(found: Designs) -> dict[str, tuple[str, NDArray[np.float64]]]:
@@ -62,9 +63,9 @@ def front_figure(found: Designs, x: str | None = None, y: str | None = None) -> 
     near = ranked.feasible | (_near(xs, ranked.feasible) & _near(ys, ranked.feasible))
     far = int(np.count_nonzero(~near & ~ranked.failed))
     kinds = (
-        ("outside the limits", _OUTSIDE, ~ranked.feasible & near),
-        ("feasible", PALETTE[0], ranked.feasible & ~best),
-        ("front", PALETTE[1], best),
+        (Phrase("outside the limits"), _OUTSIDE, ~ranked.feasible & near),
+        (Phrase("feasible"), PALETTE[0], ranked.feasible & ~best),
+        (Phrase("front"), PALETTE[1], best),
     )
     cases = ranked.cases[:, 0]
     lines = tuple(
@@ -74,7 +75,15 @@ def front_figure(found: Designs, x: str | None = None, y: str | None = None) -> 
     )
     across = Quantity(first, x_unit)
     note = "" if len(found.numbers) else _NOTHING
-    below = f"{far:,} designs outside the limits lie beyond the edges." if far else ""
+    below = (
+        plural(
+            "{count} design outside the limits lies beyond the edges.",
+            "{count} designs outside the limits lie beyond the edges.",
+            far,
+        )
+        if far
+        else ""
+    )
     panel = Panel(Quantity(second, y_unit), lines, x=across)
     return Figure(across, (panel,), note=note, below=below, most=20_000)
 
@@ -91,17 +100,22 @@ def _near(values: NDArray[np.float64], feasible: NDArray[np.bool_]) -> NDArray[n
 def history_figure(found: Designs, columns: int = 2) -> Figure:
     """The best value of each goal, the hypervolume, and feasible designs over the generations; only what is known."""
     after = [item for item in history(found.rounds) if item["phase"] != "polish" or item["generation"]]
-    last = {item["generation"]: item for item in after}
-    at = np.array(sorted(last), dtype=np.float64)
-    rows = [last[int(generation)] for generation in at]
-    across = Quantity("generation", "1")
+    # Of each generation what it had reached itself: the polish asks for the same best values more strictly.
+    first = {item["generation"]: item for item in reversed(after)}
+    at = np.array(sorted(first), dtype=np.float64)
+    rows = [first[int(generation)] for generation in at]
+    across = Quantity(Phrase("generation"), "1")
     found_values: list[tuple[str, str, list[float | None]]] = [
-        (f"best {goal.name}", found.infos[goal.name].unit, [row["best"][index] for row in rows])
+        (
+            Phrase("best {result}", result=Name(goal.name, within=True)),
+            found.infos[goal.name].unit,
+            [row["best"][index] for row in rows],
+        )
         for index, goal in enumerate(found.plan.best)
     ]
-    found_values.append(("hypervolume", "1", [row["hypervolume"] for row in rows]))
+    found_values.append((Phrase("hypervolume"), "1", [row["hypervolume"] for row in rows]))
     drawn = [one for one in found_values if any(value is not None for value in one[2])]
-    drawn.append(("feasible designs", "1", [float(row["feasible"]) for row in rows]))
+    drawn.append((Phrase("feasible designs"), "1", [float(row["feasible"]) for row in rows]))
     panels = tuple(
         Panel(
             Quantity(name, unit),
@@ -110,4 +124,4 @@ def history_figure(found: Designs, columns: int = 2) -> Figure:
         )
         for name, unit, values in drawn
     )
-    return Figure(across, panels, columns, note="" if rows else "No generation has ended yet.")
+    return Figure(across, panels, columns, note="" if rows else Phrase("No generation has ended yet."))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.results.figures.figure import NEUTRAL, PALETTE, Figure, Line, Panel, Quantity
+from sprag.service.results.phrases import Phrase, joined, part_label
 from sprag.service.results.wording import words
 
 if TYPE_CHECKING:
@@ -35,13 +36,13 @@ def motion_figure(
         listed = len(panel.lines) + len(beside) + len(held) > 1 or not angle
         lines = [
             Line(
-                label,
+                part_label(label),
                 _along(made.times, angle=angle),
                 made.values[:, made.names.index(name)],
                 PALETTE[place % len(PALETTE)],
                 place,
                 key=f"{panel.title} {label}" if angle else panel.title,
-                heading="" if angle else words(panel.title),
+                heading="" if angle else Phrase(words(panel.title)),
                 listed=listed,
             )
             for place, (name, label) in enumerate(panel.lines)
@@ -51,10 +52,10 @@ def motion_figure(
             lines += _held_lines(name, other, panel, shown, PALETTE[-1 - place])
         panels.append(Panel(Quantity(panel.title, panel.unit), tuple(lines)))
     return Figure(
-        Quantity("φ, angle of the shaft", "°") if angle else Quantity("time", "s"),
+        Quantity(Phrase("φ, angle of the shaft"), "°") if angle else Quantity(Phrase("time"), "s"),
         tuple(panels),
         columns=columns if angle else 1,
-        spans={words(name): tuple(_spans(made, list(states))) for name, states in made.states.items()},
+        spans={part_label(words(name)): tuple(_spans(made, list(states))) for name, states in made.states.items()},
         looks=shown.states,
         motion=True,
         most=_MOST_POINTS,
@@ -69,7 +70,7 @@ def _reference_line(reference: Reference, title: str, *, angle: bool) -> Line:
     """A level, an angle or a sum beside the variables of a panel."""
     x = _along(reference.x, angle=angle)
     key = f"{title} {reference.label}"
-    return Line(reference.label, x, reference.y, NEUTRAL, reference.style, key=key, wide=reference.wide)
+    return Line(part_label(reference.label), x, reference.y, NEUTRAL, reference.style, key=key, wide=reference.wide)
 
 
 def _held_lines(name: str, made: Trajectory, panel: Described, shown: Presentation, colour: str) -> list[Line]:
@@ -77,9 +78,19 @@ def _held_lines(name: str, made: Trajectory, panel: Described, shown: Presentati
     x = _along(made.times, angle=made.along == "angle")
     wholes = [reference for reference in shown.references(made).get(panel.title, ()) if reference.wide]
     if wholes:
-        return [Line(f"{name}: {whole.label}", x, whole.y, colour, 3, key=f"{panel.title} {name}") for whole in wholes]
+        return [
+            Line(joined(": ", (name, part_label(whole.label))), x, whole.y, colour, 3, key=f"{panel.title} {name}")
+            for whole in wholes
+        ]
     return [
-        Line(f"{name}: {label}", x, made.values[:, made.names.index(variable)], colour, place, key=f"{name} {label}")
+        Line(
+            joined(": ", (name, part_label(label))),
+            x,
+            made.values[:, made.names.index(variable)],
+            colour,
+            place,
+            key=f"{name} {label}",
+        )
         for place, (variable, label) in enumerate(panel.lines)
     ]
 
@@ -98,7 +109,7 @@ def phase_figure(made: Trajectory, shown: Presentation) -> Figure:
     step = max(made.times.size // _MOST_POINTS, 1)
     lines = tuple(
         Line(
-            label,
+            part_label(label),
             made.values[::step, made.names.index(angle)],
             made.values[::step, made.names.index(speed)],
             PALETTE[index % len(PALETTE)],
@@ -107,4 +118,4 @@ def phase_figure(made: Trajectory, shown: Presentation) -> Figure:
         )
         for index, (angle, speed, label) in enumerate(shown.phases(made.names))
     )
-    return Figure(Quantity("angle", "rad"), (Panel(Quantity("speed", "rad/s"), lines),))
+    return Figure(Quantity(Phrase("angle"), "rad"), (Panel(Quantity(Phrase("speed"), "rad/s"), lines),))

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.service.results.phrases import Phrase, plural, shown, term
 from sprag.service.results.regimes import MARKS, ORDER
-from sprag.service.results.sweeps import value_text
+from sprag.service.results.sweeps import values_text
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,7 +23,7 @@ Look = tuple[str, str, str]
 Span = tuple[str, float, float]
 
 #: What the colours mean, alone and with those of regimes.
-TITLE: Final = "Motion repeats after"
+TITLE: Final = Phrase("Motion repeats after")
 #: Rows of a strip; more cannot be read. A map shows them.
 MOST_ROWS: Final = 8
 #: Red, green and blue of the fewest, of some and of many periods: a hue for each sequence of doubled periods that
@@ -71,6 +72,12 @@ def motion_name(regime: str | None, order: int | None) -> str | None:
     return "1 period" if order == 1 else f"{order} periods"
 
 
+def motion_text(name: str) -> str:
+    """The name of `motion_name`, or of a state, for the reader."""
+    order = name.partition(" ")[0]
+    return shown(plural("{count} period", "{count} periods", int(order)) if order.isdigit() else term(name))
+
+
 def looks_of(names: Iterable[str | None]) -> dict[str, Look]:
     """Colour and two patterns of each name that occurs: the fewest periods first, then the regimes."""
     occurring = {name for name in names if name is not None}
@@ -88,8 +95,10 @@ def _order_look(order: int) -> Look:
     return "#" + "".join(f"{part:02x}" for part in parts), *patterns
 
 
-def strip_of(curves: Sequence[Curve]) -> tuple[dict[str, tuple[Span, ...]], dict[str, Look]]:
-    """A row for each curve, and the looks of what stands in it: runs of equal motions along x.
+def strip_of(curves: Sequence[Curve], units: Mapping[str, str]) -> tuple[dict[str, tuple[Span, ...]], dict[str, Look]]:
+    """A row for each curve, named by its values, and the looks of what stands in it: runs of equal motions along x.
+
+    ``units`` are those of the values.
 
     There is none where all motions repeat after one period, of too many curves, or where x does not ascend.
     """
@@ -100,8 +109,7 @@ def strip_of(curves: Sequence[Curve]) -> tuple[dict[str, tuple[Span, ...]], dict
         if curve.regimes is None or curve.orders is None or len(curves) > MOST_ROWS or np.any(np.diff(x) <= 0.0):
             return {}, {}
         names = [motion_name(curve.regimes[place], curve.orders[place]) for place in run.tolist()]
-        label = ", ".join(value_text(path, value) for path, value in curve.line.by.items())
-        rows[label] = tuple(_spans(names, edges(x) if x.size else x))
+        rows[values_text(curve.line.by, units)] = tuple(_spans(names, edges(x) if x.size else x))
     looks = looks_of(name for spans in rows.values() for name, _, _ in spans)
     return (rows, looks) if set(looks) - {"1 period"} else ({}, {})
 

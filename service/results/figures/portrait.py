@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.results.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.results.wording import counted
+from sprag.service.results.phrases import Phrase, part_label, plural, term
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ _MOST_POINTS: Final = 12_000
 _RING: Final = "#d55e00"
 #: Levels of an orbit that are drawn as lines.
 _LEVELS: Final = 40
-_PERIOD: Final = Quantity("excitation period", "1")
+_PERIOD: Final = Quantity(Phrase("excitation period"), "1")
 
 
 def portrait_figure(made: Portrait, shown: Presentation, columns: int = 2) -> Figure:
@@ -31,9 +31,13 @@ def portrait_figure(made: Portrait, shown: Presentation, columns: int = 2) -> Fi
     ``columns`` is 2 for panels side by side, 1 for one below the other.
     """
     title, unit, lines = _approach(made, shown)
-    plane = Panel(Quantity("speed", "rad/s"), tuple(_plane(made, shown)), x=Quantity("angle", "rad"))
+    plane = Panel(Quantity(Phrase("speed"), "rad/s"), tuple(_plane(made, shown)), x=Quantity(Phrase("angle"), "rad"))
     along = Panel(Quantity(title, unit), tuple(_along(made, lines)), x=_PERIOD)
-    note = "" if made.strobes.times.size else f"There are no strobes: the case ended with {made.ending}."
+    note = (
+        ""
+        if made.strobes.times.size
+        else Phrase("There are no strobes: the case ended with {ending}.", ending=term(made.ending))
+    )
     return Figure(
         _PERIOD, (plane, along), columns, heading=described(made), scale=_PERIOD.name, most=_MOST_POINTS, note=note
     )
@@ -47,9 +51,9 @@ def _plane(made: Portrait, shown: Presentation) -> Iterator[Line]:
         if made.order:
             x, y = _column(made.orbit, angle), _column(made.orbit, speed)
             kept = np.append(np.arange(0, x.size - 1, step), x.size - 1)
-            yield Line(label, x[kept], y[kept], PALETTE[index % len(PALETTE)], key=label)
+            yield Line(part_label(label), x[kept], y[kept], PALETTE[index % len(PALETTE)], key=label)
         yield Line(
-            label,
+            part_label(label),
             _column(made.strobes, angle),
             _column(made.strobes, speed),
             PALETTE[index % len(PALETTE)],
@@ -61,7 +65,7 @@ def _plane(made: Portrait, shown: Presentation) -> Iterator[Line]:
         )
         if made.order:
             x, y = (_column(made.orbit, variable)[: -1 : made.points] for variable in (angle, speed))
-            name = f"{label}: strobe of the orbit"
+            name = Phrase("{part}: strobe of the orbit", part=part_label(label))
             yield Line(name, x, y, _RING, index, key=label, listed=False, joined=False, ring=True)
 
 
@@ -73,9 +77,18 @@ def _along(made: Portrait, lines: list[tuple[str, str]]) -> Iterator[Line]:
             levels = np.unique(_column(made.orbit, name)[: -1 : made.points])[:_LEVELS]
             x = np.tile([periods[0], periods[-1], periods[-1]], levels.size)
             y = np.stack([levels, levels, np.full(levels.size, np.nan)], axis=1).reshape(-1)
-            yield Line(f"{label}: level of the orbit", x, y, _RING, 1, listed=False)
+            yield Line(Phrase("{part}: level of the orbit", part=part_label(label)), x, y, _RING, 1, listed=False)
         colour = PALETTE[index % len(PALETTE)]
-        yield Line(label, periods, _column(made.strobes, name), colour, index, key=label, listed=False, joined=False)
+        yield Line(
+            part_label(label),
+            periods,
+            _column(made.strobes, name),
+            colour,
+            index,
+            key=label,
+            listed=False,
+            joined=False,
+        )
 
 
 def _column(made: Trajectory, name: str) -> NDArray[np.float64]:
@@ -99,16 +112,27 @@ def _approach(made: Portrait, shown: Presentation) -> tuple[str, str, list[tuple
     The speed of the shaft; where it never turns, the angles of the pendulums.
     """
     if np.any(_column(made.strobes, "shaft.speed") != 0.0):
-        return "speed of the shaft at the strobe", "rad/s", [("shaft.speed", "Shaft")]
-    return "angle at the strobe", "rad", [(angle, label) for angle, _, label in shown.phases(made.strobes.names)]
+        return Phrase("speed of the shaft at the strobe"), "rad/s", [("shaft.speed", "Shaft")]
+    return (
+        Phrase("angle at the strobe"),
+        "rad",
+        [(angle, label) for angle, _, label in shown.phases(made.strobes.names)],
+    )
 
 
 def described(made: Portrait) -> str:
     """A sentence that describes the figure."""
-    strobes = counted(made.strobes.times.size, "strobe")
+    strobes = plural("{count} strobe", "{count} strobes", made.strobes.times.size)
     if made.order:
-        turn = "one excitation period" if made.order == 1 else f"{made.order} excitation periods"
-        return f"{made.regime}: {strobes} on the way to an orbit of {turn}"
+        return plural(
+            "{regime}: {strobes} on the way to an orbit of {count} excitation period",
+            "{regime}: {strobes} on the way to an orbit of {count} excitation periods",
+            made.order,
+            regime=term(made.regime),
+            strobes=strobes,
+        )
     if made.ending != models.OK:
-        return f"{strobes}; the run ended with {made.ending}"
-    return f"{made.regime}: {strobes}, no orbit" if made.regime else f"{strobes} of a run of a given time"
+        return Phrase("{strobes}; the run ended with {ending}", strobes=strobes, ending=term(made.ending))
+    if made.regime:
+        return Phrase("{regime}: {strobes}, no orbit", regime=term(made.regime), strobes=strobes)
+    return Phrase("{strobes} of a run of a given time", strobes=strobes)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from sprag.service.results.curves import Map
 from sprag.service.results.figures.figure import Figure, Fill, Line, Panel, Quantity, line_colours
+from sprag.service.results.phrases import Name, Phrase, joined, plural
 from sprag.service.results.selection import refused
+from sprag.service.results.sweeps import values_text
 from sprag.service.results.tolerances.written import percent
-from sprag.service.results.wording import counted, number
 from sprag.worker.models import ResultInfo
 
 if TYPE_CHECKING:
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
     Numbers = NDArray[np.float64]
 
-_NOTHING: Final = "No drive has this result yet."
+_NOTHING: Final = Phrase("No drive has this result yet.")
 #: Dashes of the nominal drive, and of quantiles other than that in the middle.
 _NOMINAL: Final = 1
 _OTHERS: Final = 2
@@ -68,10 +70,19 @@ def _legend(found: Ribbon) -> str:
     """What band and lines are."""
     low, high = percent(found.probabilities[0]), percent(found.probabilities[-1])
     middle = percent(found.probabilities[_middle(found)])
-    drives = counted(found.places.study.drives, "drive")
+    drives = plural("{count} drive", "{count} drives", found.places.study.drives)
     failed = max(int(one.failed.max(initial=0)) for one in found.lines)
-    told = f"Solid: {middle} quantile of {drives}; band: {low} to {high}; dashed: the nominal drive."
-    return told + (f" Drives without a result (failed or unsettled) at a place: up to {failed:,}." if failed else "")
+    label = Phrase(
+        "Solid: {middle} quantile of {drives}; band: {low} to {high}; dashed: the nominal drive.",
+        middle=middle,
+        drives=drives,
+        low=low,
+        high=high,
+    )
+    if not failed:
+        return label
+    without = Phrase("Drives without a result (failed or unsettled) at a place: up to {count}.", count=failed)
+    return joined(" ", (label, without))
 
 
 def _middle(found: Ribbon) -> int:
@@ -80,7 +91,7 @@ def _middle(found: Ribbon) -> int:
 
 def _lines(found: Ribbon, one: RibbonLine, name: str, colour: str, key: str, *, listed: bool) -> Iterator[Line]:
     spread, x = one.spreads[name], np.array(one.line.x)
-    values = ", ".join(map(number, one.line.by.values()))
+    values = values_text(one.line.by, found.places.units)
     middle = _middle(found)
     for index, probability in enumerate(found.probabilities):
         own = index == middle
@@ -90,15 +101,17 @@ def _lines(found: Ribbon, one: RibbonLine, name: str, colour: str, key: str, *, 
             yield Line(
                 text, x, spread.quantiles.values[index], colour, style, key, listed=listed and (own or not values)
             )
+    named = Phrase("{curve} nominal", curve=values) if values else Phrase("nominal")
     yield Line(
-        f"{values} nominal".strip(), x, spread.nominal, colour, _NOMINAL, key, listed=listed and not values,
+        named, x, spread.nominal, colour, _NOMINAL, key, listed=listed and not values,
         cases=one.line.cases,
     )  # fmt: skip
 
 
 def _fill(found: Ribbon, one: RibbonLine, name: str, colour: str, key: str, *, listed: bool) -> Fill:
     values = one.spreads[name].quantiles.values
-    text = f"{percent(found.probabilities[0])} to {percent(found.probabilities[-1])}"
+    low, high = percent(found.probabilities[0]), percent(found.probabilities[-1])
+    text = Phrase("{low} to {high}", low=low, high=high)
     return Fill(text, np.array(one.line.x), values[0], values[-1], colour, key, listed=listed and not one.line.by)
 
 
@@ -112,10 +125,18 @@ def _distributions(found: Ribbon, columns: int) -> Figure:
         values = np.full(shares.size, np.nan) if spread.distribution is None else spread.distribution
         nominal = np.repeat(spread.nominal, 2)
         lines = (
-            Line("drives", values, shares, line_colours(1)[0], key="0", listed=index == 0),
-            Line("nominal drive", nominal, np.array([0.0, 1.0]), line_colours(2)[1], _NOMINAL, "1", listed=index == 0),
+            Line(Phrase("drives"), values, shares, line_colours(1)[0], key="0", listed=index == 0),
+            Line(
+                Phrase("nominal drive"),
+                nominal,
+                np.array([0.0, 1.0]),
+                line_colours(2)[1],
+                _NOMINAL,
+                "1",
+                listed=index == 0,
+            ),
         )
-        panels.append(Panel(Quantity("share of drives below", "1"), lines, x=Quantity(info.name, info.unit)))
+        panels.append(Panel(Quantity(Phrase("share of drives below"), "1"), lines, x=Quantity(info.name, info.unit)))
     known = any(np.isfinite(spread.quantiles.values).any() for spread in one.spreads.values())
     return Figure(
         panels[0].x or Quantity("", "1"), tuple(panels), columns, held=found.places.held, note="" if known else _NOTHING
@@ -130,20 +151,22 @@ def yield_figure(found: Yield) -> Figure:
     colours = line_colours(len(found.lines))
     lines, fills = [], []
     for at, (one, colour) in enumerate(zip(found.lines, colours, strict=True)):
-        x, text = np.array(one.line.x), ", ".join(map(number, one.line.by.values()))
+        x, text = np.array(one.line.x), values_text(one.line.by, places.units)
         share = one.each
-        fills.append(Fill("95 % interval", x, 100.0 * share.low, 100.0 * share.high, colour, str(at), listed=not text))
-        lines.append(Line(text or "yield", x, 100.0 * share.value, colour, key=str(at), cases=one.line.cases))
+        fills.append(
+            Fill(Phrase("95 % interval"), x, 100.0 * share.low, 100.0 * share.high, colour, str(at), listed=not text)
+        )
+        lines.append(Line(text or Phrase("yield"), x, 100.0 * share.value, colour, key=str(at), cases=one.line.cases))
     known = any(np.isfinite(one.each.value).any() for one in found.lines)
-    panel = Panel(Quantity("yield", "%"), tuple(lines), fills=tuple(fills))
-    wanted = " and ".join(condition.text for condition in found.conditions)
+    panel = Panel(Quantity(Phrase("yield"), "%"), tuple(lines), fills=tuple(fills))
+    wanted = ", ".join(condition.text for condition in found.conditions)
     return Figure(
         Quantity(places.names[places.x], places.units[places.x]),
         (panel,),
         family=_family(places),
         held=places.held,
         note="" if known else _NOTHING,
-        below=f"Drives of {places.study.drives:,} with {wanted}.",
+        below=Phrase("Drives of {count} with {conditions}.", count=places.study.drives, conditions=wanted),
     )
 
 
@@ -153,8 +176,8 @@ def ribbon_map(found: Ribbon, probability: float) -> Map:
         raise refused("y", "too-many", "a map shows one result", [info.name for info in found.results])
     info, index = found.results[0], found.probabilities.index(probability)
     values = [one.spreads[info.name].quantiles.values[index] for one in found.lines]
-    shown = ResultInfo(f"{info.name}, {percent(probability)} quantile", info.unit, info.description)
-    return _map(found.places, shown, np.array(values))
+    label = Phrase("{name}, {share} quantile", name=Name(info.name), share=percent(probability))
+    return replace(_map(found.places, info, np.array(values)), title=label)
 
 
 def yield_map(found: Yield) -> Map:

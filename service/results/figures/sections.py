@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.results.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag.service.results.phrases import Name, Phrase, joined, part_label, term
 from sprag.service.results.regimes import MARKS
 from sprag.service.results.selection import axis_name
 from sprag.service.results.wording import number
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
 
 #: Most points of a figure.
 _MOST: Final = 40_000
-_REPEATS, _OTHERS = "periodic: strobes of one turn", "irregular or unsettled: last strobes"
+_REPEATS = Phrase("periodic: strobes of one turn")
+_OTHERS = Phrase("irregular or unsettled: last strobes")
 
 
 def diagram_figure(made: CaseSections, study: Study, asked: Sampling, variable: str) -> Figure:
@@ -39,27 +41,36 @@ def diagram_figure(made: CaseSections, study: Study, asked: Sampling, variable: 
         if kept.any():
             across = np.broadcast_to(asked.values[:, None], values.shape)[kept]
             lines.append(Line(label, across, values[kept], colour, len(lines), key=label, joined=False))
-    panel = Panel(Quantity(f"{variable} at the strobe", made.units[column]), tuple(lines), x=x)
-    note = "" if lines else "There are no strobes: no case ended ok."
+    panel = Panel(
+        Quantity(Phrase("{variable} at the strobe", variable=Name(variable)), made.units[column]), tuple(lines), x=x
+    )
+    note = "" if lines else Phrase("There are no strobes: no case ended ok.")
     return Figure(x, (panel,), heading=_heading(asked), most=_MOST, note=note)
 
 
 def section_figure(made: CaseSections, study: Study, asked: Sampling) -> Figure:
     """The strobes of one case in the plane of angle and speed of each pendulum."""
     lines = tuple(_planes(made, study))
-    panel = Panel(Quantity("speed", "rad/s"), lines, x=Quantity("angle", "rad"))
+    panel = Panel(Quantity(Phrase("speed"), "rad/s"), lines, x=Quantity(Phrase("angle"), "rad"))
     order = int(made.orders[0])
-    turns = f"an orbit of order {order}" if order else made.regimes[0] or "no motion"
-    note = "" if any(line.x.size for line in lines) else "There are no strobes: the case did not end ok."
-    return Figure(Quantity("angle", "rad"), (panel,), heading=f"{_heading(asked)}: {turns}", most=_MOST, note=note)
+    regime = term(made.regimes[0]) if made.regimes[0] else Phrase("no motion")
+    turns = Phrase("an orbit of order {order}", order=order) if order else regime
+    note = "" if any(line.x.size for line in lines) else Phrase("There are no strobes: the case did not end ok.")
+    return Figure(
+        Quantity(Phrase("angle"), "rad"),
+        (panel,),
+        heading=joined(": ", (_heading(asked), turns)),
+        most=_MOST,
+        note=note,
+    )
 
 
 def _planes(made: CaseSections, study: Study) -> Iterator[Line]:
     values = made.values[0][~np.isnan(made.values[0, :, 0])]
     for index, (angle, speed, label) in enumerate(models.presentation_of(study).phases(made.names)):
         x, y = values[:, made.names.index(angle)], values[:, made.names.index(speed)]
-        yield Line(label, x, y, PALETTE[index % len(PALETTE)], index, key=label, joined=False)
+        yield Line(part_label(label), x, y, PALETTE[index % len(PALETTE)], index, key=label, joined=False)
 
 
-def _heading(asked: Sampling) -> str:
-    return f"strobes at the phase {number(360.0 * asked.phase, 6)}° of the excitation"
+def _heading(asked: Sampling) -> Phrase:
+    return Phrase("strobes at the phase {angle}° of the excitation", angle=number(360.0 * asked.phase, 6))

@@ -7,24 +7,28 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.results.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag.service.results.phrases import Phrase
 
 if TYPE_CHECKING:
     from sprag.worker.models.transients import Transient
 
 #: Title, unit and lines (variable, label) of each panel.
 _PANELS: Final = (
-    ("speed", "rad/s", (("omega", "speed"),)),
-    ("torque", "N*m", (("drive_torque", "drive"), ("resisting_torque", "resistance"))),
-    ("kinetic energy", "J", (("energy", "kinetic energy"),)),
+    (Phrase("speed"), "rad/s", (("omega", Phrase("speed")),)),
+    (Phrase("torque"), "N*m", (("drive_torque", Phrase("drive")), ("resisting_torque", Phrase("resistance")))),
+    (Phrase("kinetic energy"), "J", (("energy", Phrase("kinetic energy")),)),
 )
-_MEANS: Final = (("before.omega.mean", "mean before"), ("after.omega.mean", "mean of the steady cycle"))
+_MEANS: Final = (
+    ("before.omega.mean", Phrase("mean before")),
+    ("after.omega.mean", Phrase("mean of the steady cycle")),
+)
 
 
 def transient_figure(made: Transient) -> Figure:
     """Speed with the means of the steady cycles, torques, and energy, over time."""
-    x, times = Quantity("time", "s"), made.motion.times
+    x, times = Quantity(Phrase("time"), "s"), made.motion.times
     if not times.size:
-        return Figure(x, (Panel(Quantity("speed", "rad/s"), (), x=x),), note=made.cause)
+        return Figure(x, (Panel(Quantity(Phrase("speed"), "rad/s"), (), x=x),), note=made.cause)
     panels = []
     for title, unit, lines in _PANELS:
         drawn = [

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Final
 
 from sprag.service.results.figures.figure import Figure, Line, Panel, Quantity
 from sprag.service.results.figures.motion import motion_figure
+from sprag.service.results.phrases import Phrase
 
 if TYPE_CHECKING:
     from sprag.worker.models import Presentation, Trajectory
 
 #: Panels of a motion that are drawn.
 _PANELS: Final = ("speed", "torque")
-_PERIOD: Final = Quantity("excitation period", "1")
+_PERIOD: Final = Quantity(Phrase("excitation period"), "1")
 #: Colour and number of the dash of the lines that are held for comparison.
 _HELD: Final = ("#8493a5", 2)
 
@@ -47,4 +48,4 @@ def _with_held(panel: Panel, held: Figure) -> Panel:
 
 def _pale(line: Line) -> Line:
     colour, style = _HELD
-    return replace(line, name=f"{line.name}, held", colour=colour, style=style + line.style)
+    return replace(line, name=Phrase("{line}, held", line=line.name), colour=colour, style=style + line.style)

@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 from sprag.service.results.figures.basin import basin_figure
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.motion import motion_figure
+from sprag.service.results.figures.orders import motion_text
 from sprag.service.results.figures.portrait import portrait_figure
+from sprag.service.results.figures.read import read_figure
 from sprag.service.results.pictures.legends import (
     COLUMNS,
     NOTE_MARKERS,
@@ -22,10 +24,9 @@ from sprag.service.results.pictures.legends import (
     explain_studies,
     handle,
 )
-from sprag.service.results.pictures.text import load_matplotlib, quantity_label, writable
+from sprag.service.results.pictures.text import load_matplotlib, quantity_label, use_decimal_mark, writable
 from sprag.service.results.regimes import MARKS
 from sprag.service.results.selection import refused
-from sprag.service.results.wording import words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from sprag.service.results.curves import Curves
     from sprag.service.results.figures.figure import Figure as Described
     from sprag.service.results.figures.figure import Line, Marks, Note, Panel
+    from sprag.service.results.reading import Reading
     from sprag.worker.models import Basin, Portrait, Presentation, Trajectory
 
 Picture = Literal["svg", "png", "pdf"]
@@ -66,26 +68,27 @@ _METADATA: Final[dict[Picture, dict[str, str | None]]] = {
 }
 
 
-def draw_curves(curves: Curves, title: str, picture: Picture) -> bytes:
-    """Curves as a picture: a plot for each unit, one below the other; missing points are left out.
+def draw_curves(curves: Curves, title: str, picture: Picture, reading: Reading) -> bytes:
+    """Curves as a picture: a plot for each result as on pages, two in a row; missing points are left out.
 
     Raises SelectionError when there are more curves or points than one picture can show.
     """
     require_drawable([curves])
-    return draw_figure(curves_figure([("", curves)], by_unit=True), title, picture)
+    return draw_figure(read_figure(curves_figure([("", curves)], 2), reading), title, picture)
 
 
-def draw_compare(drawn: Sequence[tuple[str, Curves]], picture: Picture) -> bytes:
+def draw_compare(drawn: Sequence[tuple[str, Curves]], reading: Reading, picture: Picture) -> bytes:
     """Curves of several studies with their names, a plot for each result; raises SelectionError as
     `draw_curves` does.
     """
     require_drawable([curves for _, curves in drawn])
-    return draw_figure(curves_figure(drawn), "", picture)
+    return draw_figure(read_figure(curves_figure(drawn), reading), "", picture)
 
 
 def draw_motion(
     made: Trajectory,
     shown: Presentation,
+    reading: Reading,
     title: str,
     held: Sequence[tuple[str, Trajectory]],
     at: float | None,
@@ -94,17 +97,19 @@ def draw_motion(
     """The motion of one case, beside others with their names: its variables, and below them the states of the parts of
     the machine. A line marks the place ``at`` (time in s, angle in degrees).
     """
-    return draw_figure(replace(motion_figure(made, shown, held), at=at), title, picture)
+    return draw_figure(read_figure(replace(motion_figure(made, shown, held), at=at), reading), title, picture)
 
 
-def draw_portrait(made: Portrait, shown: Presentation, title: str, picture: Picture) -> bytes:
+def draw_portrait(made: Portrait, shown: Presentation, reading: Reading, title: str, picture: Picture) -> bytes:
     """Orbit and strobes of one case, beside the strobes period by period."""
-    return draw_figure(portrait_figure(made, shown), title, picture)
+    return draw_figure(read_figure(portrait_figure(made, shown), reading), title, picture)
 
 
-def draw_basin(made: Basin, paths: tuple[str, str], units: tuple[str, str], title: str, picture: Picture) -> bytes:
+def draw_basin(
+    made: Basin, paths: tuple[str, str], units: tuple[str, str], reading: Reading, title: str, picture: Picture
+) -> bytes:
     """To which regime one case comes from each start of a grid."""
-    return draw_figure(basin_figure(made, paths, units), title, picture)
+    return draw_figure(read_figure(basin_figure(made, paths, units), reading), title, picture)
 
 
 def require_drawable(drawn: Sequence[Curves]) -> None:
@@ -171,12 +176,12 @@ def render(paint: Callable[[Figure], None], picture: Picture, size: tuple[float,
     with painting():
         figure = Figure(figsize=size, layout="constrained")
         paint(figure)
+        use_decimal_mark(figure)
         figure.savefig(buffer, format=picture, dpi=120, metadata=_METADATA[picture])
     return buffer.getvalue()
 
 
 def _paint_panel(figure: Figure, axes: Axes, panel: Panel, drawn: Described) -> None:
-    from matplotlib.lines import Line2D
 
     shaded = None
     for band in panel.bands:
@@ -204,12 +209,6 @@ def _paint_panel(figure: Figure, axes: Axes, panel: Panel, drawn: Described) -> 
         axes.axvline(drawn.at, color="0.35", linewidth=0.9)
     if drawn.motion and len(panel.lines) > 1:
         _legend_above(axes, columns=5)
-    if panel.styles:
-        handles = [
-            Line2D([], [], color="0.3", linestyle=style, marker=marker, markersize=3.0, label=name)
-            for name, (style, marker) in zip(panel.styles, STYLES * len(panel.styles), strict=False)
-        ]
-        _legend_above(axes, columns=3, handles=handles)
 
 
 def _legend_above(axes: Axes, columns: int, **entries: Any) -> None:
@@ -280,10 +279,8 @@ def _paint_states(axes: Axes, drawn: Described) -> None:
             axes.broken_barh([(begin, end - begin)], (row - 0.4, 0.8), **styles[state])
     axes.set_yticks(range(len(drawn.spans)), list(drawn.spans))
     axes.grid(visible=False)
-    # What regimes look like is told with their marks.
-    listed = [
-        Patch(label=words(state).lower(), **style) for state, style in styles.items() if state not in drawn.regimes
-    ]
+    # What regimes look like is explained with their marks.
+    listed = [Patch(label=motion_text(state), **style) for state, style in styles.items() if state not in drawn.regimes]
     if not listed:
         return
     axes.legend(

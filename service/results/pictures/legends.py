@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, Literal
 
 from sprag.service.results.figures.figure import BANDS, NOTES, PALETTE, shortened
+from sprag.service.results.figures.orders import motion_text
+from sprag.service.results.phrases import shown
 from sprag.service.results.pictures.text import quantity_label, writable
 from sprag.service.results.regimes import MARKS
 
@@ -55,16 +57,23 @@ def handle(line: Line) -> Artist:
 
 
 def explain(figure: Figure, plots: list[Axes], drawn: Described) -> None:
-    """Explain the colours beside the plots: in a legend, or in a colour bar where there are many curves."""
-    if not drawn.family:
+    """Explain the colours beside the plots: in a legend, or in a colour bar where there are many curves.
+
+    As on pages, one line alone needs none, and panels with axes of their own have their own.
+    """
+    if not drawn.family and (len(drawn.listed) < 2 or drawn.apart):
         return
+    from matplotlib.patches import Patch
+
     meaning = ",\n".join(quantity_label(quantity).replace(" = ", " =\n") for quantity in drawn.family)
     lines = drawn.listed
     texts = [line.name for line in lines]
     if len(texts) <= len(PALETTE):
+        fills = [fill for panel in drawn.panels for fill in panel.fills if fill.listed]
         figure.legend(
-            [handle(line) for line in lines], texts, title=meaning, loc="outside right upper",
-            fontsize=8, title_fontsize=8,
+            [*(Patch(color=fill.colour, alpha=0.2, linewidth=0.0) for fill in fills), *map(handle, lines)],
+            [*(fill.name for fill in fills), *texts],
+            title=meaning or None, loc="outside right upper", fontsize=8, title_fontsize=8,
         )  # fmt: skip
         return
     from matplotlib.cm import ScalarMappable
@@ -120,15 +129,15 @@ def explain_regimes(
 
     looks = [(name, MARKS[name]) for name in regimes]
     handles: list[Artist] = [
-        Line2D([], [], color=look.colour, marker=look.marker, markersize=5.0, linestyle="none", label=name)
+        Line2D([], [], color=look.colour, marker=look.marker, markersize=5.0, linestyle="none", label=motion_text(name))
         for name, look in looks
     ]
     if jumps:
-        handles.append(Patch(facecolor="#777777", alpha=0.4, label=BANDS))
+        handles.append(Patch(facecolor="#777777", alpha=0.4, label=shown(BANDS)))
     handles += [
         Line2D(
-            [], [], color="#555555", marker=NOTE_MARKERS[kind], markersize=6.0, linestyle="none", label=NOTES[kind],
-            markerfacecolor="none" if kind == "point" else None,
+            [], [], color="#555555", marker=NOTE_MARKERS[kind], markersize=6.0, linestyle="none",
+            label=shown(NOTES[kind]), markerfacecolor="none" if kind == "point" else None,
         )
         for kind in notes
     ]  # fmt: skip

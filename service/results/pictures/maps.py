@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from sprag.service.results.figures.curves import doubtful_marks, map_quantities
-from sprag.service.results.figures.orders import TITLE, OrderMap, map_edges, order_map
+from sprag.service.results.figures.orders import TITLE, OrderMap, map_edges, motion_text, order_map
+from sprag.service.results.phrases import Phrase, plural, shown
 from sprag.service.results.pictures.curves import (
     MAX_PICTURE_POINTS,
     Picture,
@@ -21,6 +22,8 @@ from sprag.service.results.pictures.text import quantity_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.contour import QuadContourSet
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
@@ -32,13 +35,16 @@ _MARKED_POINTS: Final = 600
 _REFINED_POINTS: Final = 5_000
 
 
-def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
-    """A map as a picture: colours over two axes, cases without a result left blank; SelectionError when too large."""
+def draw_map(drawn: Map, title: str, picture: Picture, *, contours: bool = False) -> bytes:
+    """A map as a picture: colours over two axes, or lines of equal value with their numbers.
+
+    Cases without a result are left blank. Raises SelectionError when it is too large.
+    """
     check_size("points", drawn.values.size, MAX_PICTURE_POINTS)
-    return render(lambda figure: paint_map(figure, drawn, title), picture, (8.0, 6.0))
+    return render(lambda figure: paint_map(figure, drawn, title, contours=contours), picture, (8.0, 6.0))
 
 
-def paint_map(figure: Figure, drawn: Map, title: str) -> None:
+def paint_map(figure: Figure, drawn: Map, title: str, *, contours: bool = False) -> None:
     """Paint the map of `draw_map`."""
     drawn = drawn.run()
     x, y, z = map_quantities(drawn)
@@ -46,7 +52,12 @@ def paint_map(figure: Figure, drawn: Map, title: str) -> None:
     axes = figure.subplots()
     borders = map_edges(drawn)
     if orders is None:
-        mesh = axes.pcolormesh(*borders, np.ma.masked_invalid(drawn.values), cmap="viridis")
+        fields = np.ma.masked_invalid(drawn.values)
+        mesh: ScalarMappable = (
+            _paint_contours(axes, drawn, fields)
+            if contours and _has_levels(fields)
+            else axes.pcolormesh(*borders, fields, cmap="viridis")
+        )
         figure.colorbar(mesh, label=quantity_label(z))
     else:
         _paint_orders(axes, borders, orders)
@@ -64,11 +75,26 @@ def paint_map(figure: Figure, drawn: Map, title: str) -> None:
     axes.set_ylabel(quantity_label(y))
     doubtful = list(doubtful_marks(drawn))
     paint_marks(axes, doubtful, clipped=False)
-    below = "" if drawn.refined is None else drawn.refined.sentence
+    below = "" if drawn.refined is None else shown(drawn.refined.sentence)
     explain_regimes(figure, [marks.regime for marks in doubtful], below=below)
     missing = int(np.isnan(drawn.values if orders is None else orders.places).sum())
-    grey = "grey: not interpolated" if drawn.refined else f"grey: {missing} cases without a result"
-    head(figure, title, (*drawn.held, grey) if missing else drawn.held)
+    grey = plural("grey: {count} case without a result", "grey: {count} cases without a result", missing)
+    grey = Phrase("grey: not interpolated") if drawn.refined else grey
+    head(figure, title, (*drawn.held, shown(grey)) if missing else drawn.held)
+
+
+def _has_levels(values: np.ma.MaskedArray[Any, np.dtype[np.float64]]) -> bool:
+    """Whether there are lines of equal value."""
+    return min(values.shape) > 1 and values.count() > 0 and bool(values.max() > values.min())
+
+
+def _paint_contours(axes: Axes, drawn: Map, values: np.ma.MaskedArray[Any, np.dtype[np.float64]]) -> QuadContourSet:
+    """Colours between lines of equal value, and the numbers of these."""
+    places = (np.asarray(drawn.x_values), np.asarray(drawn.y_values), values)
+    filled = axes.contourf(*places, cmap="viridis")
+    lines = axes.contour(*places, levels=filled.levels, colors="0.25", linewidths=0.8)
+    axes.clabel(lines, fontsize=8)
+    return filled
 
 
 def _paint_orders(axes: Axes, borders: tuple[NDArray[np.float64], NDArray[np.float64]], orders: OrderMap) -> None:
@@ -82,8 +108,8 @@ def _paint_orders(axes: Axes, borders: tuple[NDArray[np.float64], NDArray[np.flo
     )
     mesh.set_edgecolor("face")
     axes.legend(
-        handles=[Patch(facecolor=colour, label=name) for name, (colour, _, _) in orders.looks.items()],
-        title=TITLE,
+        handles=[Patch(facecolor=colour, label=motion_text(name)) for name, (colour, _, _) in orders.looks.items()],
+        title=shown(TITLE),
         fontsize=8,
         title_fontsize=8,
         loc="center left",

@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.service.languages import _
 from sprag.service.results.pictures.curves import Picture, check_size, head, render
 from sprag.service.results.pictures.text import axis_label
+from sprag.service.results.wording import number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from sprag.service.results.reading import Reading
     from sprag.service.results.sensitivity import Sensitivity
     from sprag.service.results.sensitivity_indices import Pair
 
@@ -25,42 +28,51 @@ MOST_PAIRS: Final = 6
 _LEAST_SHARE: Final = 0.005
 #: Characters of a line of notes that fit into the width of a picture.
 _NOTE_WIDTH: Final = 110
+#: Characters of a label that stands along the height of a panel.
+_LABEL_HEIGHT: Final = 28
 
 
-def draw_sensitivity(found: Sequence[Sensitivity], title: str, picture: Picture) -> bytes:
-    """A row of two plots for each result; raises SelectionError when there are more than one picture can show."""
+def draw_sensitivity(found: Sequence[Sensitivity], title: str, reading: Reading, picture: Picture) -> bytes:
+    """A row of two plots for each result, as somebody reads it.
+
+    Raises SelectionError when there are more than one picture can show.
+    """
     check_size("results", len(found), MOST_RESULTS, "y")
     axes = max(len(item.effects) + len(_largest(item)) for item in found)
-    return render(partial(_paint, found, title), picture, (10.0, 0.8 + len(found) * max(2.6, 1.0 + 0.45 * axes)))
+    height = 0.8 + len(found) * max(2.6, 1.0 + 0.45 * axes)
+    return render(partial(_paint, found, title, reading), picture, (10.0, height))
 
 
-def _paint(found: Sequence[Sensitivity], title: str, figure: Figure) -> None:
+def _paint(found: Sequence[Sensitivity], title: str, reading: Reading, figure: Figure) -> None:
     plots = figure.subplots(len(found), 2, squeeze=False, width_ratios=(3, 4))
     for (bars, lines), item in zip(plots, found, strict=True):
-        _bars(bars, item)
-        _lines(lines, item)
-    notes = dict.fromkeys(note for item in found for note in item.notes)
+        _bars(bars, item, reading)
+        _lines(lines, item, reading)
+    notes = dict.fromkeys(reading.say(note) for item in found for note in item.notes)
     head(figure, title, tuple("\n".join(textwrap.wrap(note, _NOTE_WIDTH)) for note in notes))
 
 
-def _bars(axes: Axes, item: Sensitivity) -> None:
+def _bars(axes: Axes, item: Sensitivity, reading: Reading) -> None:
     """The indices of every axis; below them those of the strongest pairs."""
     pairs = _largest(item)
-    names = ["\n".join(effect.paths[:2]) for effect in item.effects]
-    names += [f"{item.effects[pair.first].paths[0]}\nwith {item.effects[pair.second].paths[0]}" for pair in pairs]
+    names = ["\n".join(map(reading.caption, effect.paths[:2])) for effect in item.effects]
+    for pair in pairs:
+        first, second = (reading.caption(item.effects[place].paths[0]) for place in (pair.first, pair.second))
+        names.append(f"{first}\n× {second}")
     every = [effect.indices for effect in item.effects]
+    size = partial(reading.value, si=item.info.unit)
     blank: list[tuple[float | None, float | None]] = [(None, None)] * len(pairs)
     bars: tuple[tuple[str, list[tuple[float | None, float | None]], float], ...]
     if item.method == "morris":
         bars = (
-            ("mu*, mean of absolute effects", [(own.mu_star, own.mu_star_error) for own in every], -0.2),
-            ("sigma, their standard deviation", [(own.sigma, None) for own in every], 0.2),
+            (_("mu*, mean of absolute effects"), [(size(own.mu_star), size(own.mu_star_error)) for own in every], -0.2),
+            (_("sigma, their standard deviation"), [(size(own.sigma), None) for own in every], 0.2),
         )
     else:
         bars = (
-            ("first order", [*((own.first_order, own.first_order_error) for own in every), *blank], -0.2),
-            ("total", [*((own.total, own.total_error) for own in every), *blank], 0.2),
-            ("second order", [*[(None, None)] * len(every), *((pair.index, pair.error) for pair in pairs)], 0.0),
+            (_("first order"), [*((own.first_order, own.first_order_error) for own in every), *blank], -0.2),
+            (_("total"), [*((own.total, own.total_error) for own in every), *blank], 0.2),
+            (_("second order"), [*[(None, None)] * len(every), *((pair.index, pair.error) for pair in pairs)], 0.0),
         )
     places = np.arange(len(names))
     for index, (name, values, offset) in enumerate(bars):
@@ -76,13 +88,13 @@ def _bars(axes: Axes, item: Sensitivity) -> None:
         )
     axes.set_yticks(places, names, fontsize=8)
     axes.invert_yaxis()
-    what = "elementary effects on" if item.method == "morris" else "share of the variance of"
-    unit = item.info.unit if item.method == "morris" else "1"
-    axes.set_xlabel(f"{what} {axis_label(item.info.name, unit)}")
+    what = _("elementary effects on {result}") if item.method == "morris" else _("share of the variance of {result}")
+    unit = reading.unit(item.info.unit) if item.method == "morris" else "1"
+    axes.set_xlabel(what.format(result=axis_label(reading.within(item.info.name), unit)))
     if axes.has_data():
         axes.legend(fontsize=8, loc="best")
     else:
-        _tell(axes, "no shares of the variance" if item.cases else "no case has this result")
+        _tell(axes, _("no shares of the variance") if item.cases else _("no case has this result"))
 
 
 def _largest(item: Sensitivity) -> list[Pair]:
@@ -91,22 +103,24 @@ def _largest(item: Sensitivity) -> list[Pair]:
     return sorted(known, key=lambda pair: -abs(pair.index or 0.0))[:MOST_PAIRS]
 
 
-def _lines(axes: Axes, item: Sensitivity) -> None:
+def _lines(axes: Axes, item: Sensitivity, reading: Reading) -> None:
     """Every axis from its least to its largest value, so that axes of different units share one plot."""
     for index, effect in enumerate(item.effects):
         if not np.isfinite(effect.means).any():
             continue
         low, high = effect.values.min(), effect.values.max()
         place = (effect.values - low) / (high - low) if high > low else np.zeros(effect.values.size)
-        unit = "" if effect.unit == "1" else f" {effect.unit}"
-        text = f"{effect.paths[0]}: {low:.4g} .. {high:.4g}{unit}"
-        axes.plot(place, effect.means, marker="o", markersize=3.0, color=f"C{index}", label=text)
-    axes.set_xlabel("axis, from its least to its largest value")
-    axes.set_ylabel(f"mean of {axis_label(item.info.name, item.info.unit)}")
+        ends = f"{number(reading.value(low, effect.unit), 4)} … {reading.quantity(high, effect.unit, 4)}"
+        text = f"{reading.caption(effect.paths[0])}: {ends}"
+        means = reading.units.values(effect.means, item.info.unit)
+        axes.plot(place, means, marker="o", markersize=3.0, color=f"C{index}", label=text)
+    axes.set_xlabel(_("axis, from its least to its largest value"))
+    label = axis_label(reading.within(item.info.name), reading.unit(item.info.unit))
+    axes.set_ylabel("\n".join(textwrap.wrap(_("mean of {result}", result=label), _LABEL_HEIGHT)))
     if axes.has_data():
         axes.legend(fontsize=8, loc="best")
     else:
-        _tell(axes, "no case has this result")
+        _tell(axes, _("no case has this result"))
 
 
 def _tell(axes: Axes, sentence: str) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from sprag.service.results.calibration import calibration_of
 from sprag.service.results.figures.calibration import calibration_figure
+from sprag.service.results.phrases import Amount, Name, Phrase, joined
 from sprag.service.results.report.drives import DrivesPart
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker.planning.calibrate.plan import CALIBRATE
@@ -25,7 +26,7 @@ def calibration_part(study: Study, rounds: list[RoundRecord], fetch: Fetch) -> D
         return None
     found = calibration_of(study, rounds, fetch)
     if found.answer is None:
-        return DrivesPart(None, ("The first fit has not ended yet.",))
+        return DrivesPart(None, (Phrase("The first fit has not ended yet."),))
     return DrivesPart(calibration_figure(found), (*_values(found), *found.sentences))
 
 
@@ -34,8 +35,9 @@ def _values(found: Calibration) -> Iterator[str]:
     assert known is not None
     for index, name in enumerate(found.names):
         unit = unit_of(found.study, name)
-        text = f"{name} = {known.values[index]:.6g}" + ("" if unit == "1" else f" {unit}")
-        if known.intervals is not None:
-            low, high = known.intervals[index]
-            text += f" (95 % interval {low:.6g} to {high:.6g})"
-        yield f"{text}."
+        value = Phrase("{name} = {value}", name=Name(name), value=Amount(known.values[index], unit, 6))
+        if known.intervals is None:
+            yield joined("", (value, "."))
+            continue
+        low, high = (Amount(end, unit, 6, bare=True) for end in known.intervals[index])
+        yield Phrase("{value} (95 % interval {low} to {high}).", value=value, low=low, high=high)

@@ -10,24 +10,40 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.languages import _
+from sprag.service.results.chosen_figures import ChosenFigure, chosen_figures
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import Curves, Fetch, Map
-from sprag.service.results.defaults import main_query
+from sprag.service.results.defaults import caption, drawn_results, main_query, varying_axes
 from sprag.service.results.directions import ends_in_words
-from sprag.service.results.exports.inputs import Input, inputs, run_inputs
+from sprag.service.results.exports.inputs import Input, inputs
 from sprag.service.results.exports.source import given_texts
+from sprag.service.results.figures.answers import answers_figure
+from sprag.service.results.figures.clutch import clutch_figure
+from sprag.service.results.key_answer_words import curve_name, note_of, said_title
+from sprag.service.results.key_answers import answers_query, find_answers
+from sprag.service.results.phrases import model_title, shown
 from sprag.service.results.pictures.curves import require_drawable
+from sprag.service.results.pictures.sensitivity import MOST_RESULTS
+from sprag.service.results.quantities import TYPED
+from sprag.service.results.reading import Choice, Reading, reading_for
 from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.regimes import counted
 from sprag.service.results.report.calibration import calibration_part
 from sprag.service.results.report.drives import DrivesPart, drives_part
+from sprag.service.results.report.facts import facts_of
 from sprag.service.results.rounds import sentence
 from sprag.service.results.selection import SelectionError
+from sprag.service.results.sensitivity import Sensitivity, sensitivity
+from sprag.service.results.shown_inputs import run_settings
 from sprag.service.spec.catalogue import axes_json
 from sprag.worker import models
 
 if TYPE_CHECKING:
-    from sprag.service.storage.records import RowBlock, StudyRecord
+    from sprag.service.results.curves import CurveQuery
+    from sprag.service.results.figures.figure import Figure
+    from sprag.service.results.key_answers import StudyAnswers
+    from sprag.service.storage.records import Kinds, RowBlock, StudyRecord
     from sprag.service.storage.store import Store
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
@@ -37,6 +53,8 @@ _HALF_WIDTH: Final = ".half_width"
 _RESULTS_A_PICTURE: Final = 3
 _MOST_PICTURES: Final = 24
 _LONGEST_GIVEN: Final = 1000
+#: How a document for people is read unless something else is asked for.
+AS_TYPED: Final = Choice(TYPED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,13 +83,18 @@ class Range:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """The content of a report."""
+    """The content of a report, in SI and code names; ``reading`` says how it is read.
+
+    ``main`` are the curves of the answers, with these marked on them; ``answers`` the rows of their table. ``figures``
+    are those that somebody chose for the report, in the place of ``main`` and of the maps.
+    """
 
     title: str
+    study: Study
     facts: tuple[tuple[str, str], ...]
     warnings: tuple[str, ...]
     axes: tuple[AxisRow, ...]
-    run: tuple[Input, ...]
+    run: list[tuple[str, str, Input]]
     endings: tuple[tuple[str, int, str], ...]
     inputs: tuple[Input, ...]
     given: dict[str, str]
@@ -80,27 +103,56 @@ class Report:
     maps: tuple[Map, ...]
     note: str
     drives: DrivesPart | None
+    reading: Reading
+    main: Figure | None
+    main_caption: str
+    answers: tuple[tuple[str, ...], ...]
+    clutch: Figure | None
+    kinds: tuple[tuple[str, int, str], ...]
     calibration: DrivesPart | None = None
+    figures: tuple[ChosenFigure, ...] = ()
+    effects: tuple[Sensitivity, ...] = ()
 
 
-def report_of(store: Store, study_id: str) -> Report:
-    """The report of a stored study; raises StudyNotFoundError."""
+def report_of(
+    store: Store,
+    study_id: str,
+    choice: Choice = AS_TYPED,
+    chosen: CurveQuery | None = None,
+    point: str | None = None,
+    *,
+    saved: bool = True,
+) -> Report:
+    """The report of a stored study, with the figures that are ``saved`` with the study for it; without them, or where
+    there are none, with the ``chosen`` curves, by default those of its page.
+
+    Its answers are those of the chosen curves, and at the working ``point`` as typed.
+
+    Raises StudyNotFoundError, and SelectionError for curves, points and units that the study does not have.
+    """
     record, progress = store.look(study_id)
+    spec, study = store.spec(study_id), store.study(study_id)
     report = make_report(
         record,
-        store.study(study_id),
+        study,
         progress.endings,
         store.iter_rows(study_id),
         partial(store.rows_for_cases, study_id),
-        store.spec(study_id),
-        store.kinds(study_id).regimes,
+        spec,
+        store.kinds(study_id),
+        reading_for(study, spec, choice),
+        chosen,
+        chosen_figures(store, study_id, choice) if saved else (),
+        point,
     )
+    origins = "; ".join(origin.sentence for origin in store.origins(study_id))
+    report = replace(report, facts=(*report.facts, (_("computed by"), origins or _("no host yet"))))
     if progress.rounds is None:
         return report
-    study, rows = store.study(study_id), partial(store.rows_for_cases, study_id)
+    rows = partial(store.rows_for_cases, study_id)
     return replace(
         report,
-        facts=(*report.facts, ("rounds", sentence(progress.rounds))),
+        facts=(*report.facts, (_("rounds"), report.reading.say(sentence(progress.rounds, record.state)))),
         calibration=calibration_part(study, store.rounds(study_id), rows),
     )
 
@@ -112,55 +164,118 @@ def make_report(
     blocks: Iterable[RowBlock],
     fetch: Fetch,
     spec: Mapping[str, Any],
-    regimes: Mapping[str, int],
+    kinds: Kinds,
+    reading: Reading,
+    chosen: CurveQuery | None = None,
+    figures: tuple[ChosenFigure, ...] = (),
+    point: str | None = None,
 ) -> Report:
-    """The report of a study in its current state; reads all its rows once. ``spec`` is the user's own.
-
-    ``regimes`` counts the cases of each regime, the most frequent first.
-    """
+    """The report of a study in its current state; reads all its rows once. ``spec`` is the user's own."""
     infos = models.study_results(study)
-    pictures, note = _pictures(study, infos, fetch)
+    every = ranges(infos, blocks)
+    found = _answers_of(study, infos, chosen, point, fetch)
+    drawn = None if found is None or figures else found.drawn
+    already = [name for figure in figures for name in figure.results]
+    already += [] if drawn is None else [info.name for info in drawn.selection.results]
+    pictures, note = _pictures(study, infos, frozenset(already), fetch)
+    main = None if found is None or drawn is None else answers_figure(found, 2)
     return Report(
-        record.name or record.model,
-        _facts(record, study) + ((("motions", counted(regimes)),) if regimes else ()),
+        record.name or model_title(record.model),
+        study,
+        facts_of(record, study, spec) + (((_("motions"), shown(counted(kinds.regimes))),) if kinds.regimes else ()),
         record.warnings,
-        tuple(AxisRow(", ".join(a["paths"]), a["unit"], a["values"], *ends_in_words(a)) for a in axes_json(study)),
-        run_inputs(study, spec),
-        tuple((name, count, models.ENDING_SENTENCES.get(name, "")) for name, count in endings.items()),
+        tuple(AxisRow(" = ".join(a["paths"]), a["unit"], a["values"], *ends_in_words(a)) for a in axes_json(study)),
+        run_settings(study, spec, reading),
+        tuple((name, count, _(models.ENDING_SENTENCES.get(name, ""))) for name, count in endings.items()),
         inputs(study, spec),
         {path: _shortened(text) for path, text in given_texts(spec).items()},
-        ranges(infos, blocks),
+        every,
         pictures,
-        _maps(study, infos, fetch),
+        () if figures else _maps(study, infos, fetch),
         note,
         drives_part(study, infos, fetch),
+        reading,
+        main,
+        "" if found is None or found.query is None else caption(study, found.query).said(reading),
+        () if found is None else tuple(_answer_rows(found, study, reading)),
+        clutch_figure(study, spec, _largest_windup(every)),
+        (*_kind_rows(kinds.regimes, models.REGIME_SENTENCES), *_flag_rows(study, kinds)),
+        figures=figures,
+        effects=_effects(study, infos, spec, fetch),
     )
+
+
+def _answers_of(
+    study: Study, infos: tuple[ResultInfo, ...], chosen: CurveQuery | None, point: str | None, fetch: Fetch
+) -> StudyAnswers | None:
+    """The answers of the chosen curves, otherwise of those that the page shows first; None where they lie on none.
+
+    Raises SelectionError for chosen curves and for a working point that cannot be shown.
+    """
+    query = answers_query(study, infos, chosen)
+    if query is None and study.cases > 1 and not point:
+        return None
+    try:
+        found = find_answers(study, infos, query if chosen is None else chosen, point, fetch)
+        if found.drawn is not None:
+            require_drawable([found.drawn])
+    except SelectionError:
+        if chosen is not None or point:
+            raise
+        return None
+    return found
+
+
+def _effects(
+    study: Study, infos: tuple[ResultInfo, ...], spec: Mapping[str, Any], fetch: Fetch
+) -> tuple[Sensitivity, ...]:
+    """What the results of the page "Sensitivity" depend on; none where a single axis varies, which is all of it."""
+    if len(varying_axes(study)) < 2 or study.plan is not None:
+        return ()
+    try:
+        found = sensitivity(study, spec, drawn_results(study, infos)[:MOST_RESULTS], fetch)
+    except SelectionError:  # too large a study
+        return ()
+    return tuple(item for item in found if item.cases)
+
+
+def _answer_rows(found: StudyAnswers, study: Study, reading: Reading) -> Iterator[tuple[str, ...]]:
+    """Title, value, place and note of each answer; a row with the curve before those of each of several."""
+    for one in found.curves:
+        name = curve_name(one, study).said(reading)
+        if name and len(found.curves) > 1:
+            yield (_("Curve {name}", name=name), "", "", "")
+        for item in (*one.answers, *one.working_point):
+            title = item.answer.title
+            title = reading.say_name(title) if title == item.answer.result else said_title(title, reading)
+            sign = "> " if item.above and item.value is not None else ""
+            value = "–" if item.value is None else sign + reading.quantity(item.value, item.unit)
+            place = "" if item.x is None else reading.quantity(item.x, found.unit)
+            yield (title, value, place, note_of(item, found.unit).said(reading))
+
+
+def _largest_windup(every: Sequence[Range]) -> float:
+    """The largest windup of a clutch in any case (rad); 0 where none is known."""
+    return max((row.largest or 0.0 for row in every if row.info.name.endswith("windup.max")), default=0.0)
+
+
+def _kind_rows(counts: Mapping[str, int], meanings: Mapping[str, str]) -> Iterator[tuple[str, int, str]]:
+    return ((name, count, _(meanings.get(name, ""))) for name, count in counts.items())
+
+
+def _flag_rows(study: Study, kinds: Kinds) -> Iterator[tuple[str, int, str]]:
+    """The flags; those of regimes stand with the regimes."""
+    flags = {name: count for name, count in kinds.flags.items() if name not in models.REGIME_SENTENCES}
+    return _kind_rows(flags, models.flags_of(study.model))
 
 
 def _shortened(text: str) -> str:
     """Truncate a long table; the exports contain all of it."""
-    return text if len(text) <= _LONGEST_GIVEN else f"{text[:_LONGEST_GIVEN]} ... ({len(text)} characters in all)"
-
-
-def _facts(record: StudyRecord, study: Study) -> tuple[tuple[str, str], ...]:
-    ended = record.finished_at
     return (
-        ("study", record.id),
-        ("model", record.model),
-        ("state", f"{record.state.value}: {record.state.sentence}"),
-        ("cases", f"{record.cases:,}, of which {record.done:,} are done and {record.ok:,} ended ok"),
-        ("axes", _combined(study)),
-        ("submitted", f"{record.created_at:%Y-%m-%d %H:%M} UTC"),
-        ("ended", "not yet" if ended is None else f"{ended:%Y-%m-%d %H:%M} UTC"),
-        ("engine", record.engine_version),
-        ("hash of the physics", record.physics_hash),
+        text
+        if len(text) <= _LONGEST_GIVEN
+        else _("{text} ... ({count} characters in all)", text=text[:_LONGEST_GIVEN], count=len(text))
     )
-
-
-def _combined(study: Study) -> str:
-    if study.plan is not None:
-        return "cases chosen in rounds"
-    return {"grid": "every combination", "zip": "side by side"}[study.combine] if study.axes else "none"
 
 
 def ranges(infos: Sequence[ResultInfo], blocks: Iterable[RowBlock]) -> tuple[Range, ...]:
@@ -194,20 +309,25 @@ def ranges(infos: Sequence[ResultInfo], blocks: Iterable[RowBlock]) -> tuple[Ran
     return tuple(Range(*row) if row[1] else Range(row[0], 0, None, None, None, None, None) for row in found)
 
 
-def _pictures(study: Study, infos: tuple[ResultInfo, ...], fetch: Fetch) -> tuple[tuple[Curves, ...], str]:
-    """The study's main curve for each group of related results; or why there is none."""
+def _pictures(
+    study: Study, infos: tuple[ResultInfo, ...], already: frozenset[str], fetch: Fetch
+) -> tuple[tuple[Curves, ...], str]:
+    """The study's main curve for each group of related results but those ``already`` drawn; or why there is none."""
     query = main_query(study, infos)
     if query is None:
-        return (), "Nothing varies in this study, so there is no curve."
+        return (), _("Nothing varies in this study, so there is no curve.")
     if map_plan(study) is not None:
         return (), ""
-    groups = list(_groups(infos, models.presentation_of(study).checks))
+    shown = models.presentation_of(study)
+    groups = list(_groups([info for info in infos if info.name not in already], shown.checks))
+    if not groups:
+        return (), ""
     chosen = [info for group in groups for info in group]
     try:
         whole = draw(select(study, infos, replace(query, y=tuple(info.name for info in chosen))), fetch)
         require_drawable([_part(whole, groups[0])])
     except SelectionError as error:
-        return (), f"There are no curves here: {error}."
+        return (), _("There are no curves here: {why}.", why=error)
     return tuple(_part(whole, group) for group in groups), ""
 
 

@@ -3,66 +3,41 @@
 from __future__ import annotations
 
 import base64
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, StrictUndefined
 
-from sprag.service.results.pictures.curves import draw_curves, draw_figure
-from sprag.service.results.pictures.maps import draw_map
+from sprag.service.languages import _, current
 
 if TYPE_CHECKING:
-    from sprag.service.results.curves import Curves, Map
-    from sprag.service.results.figures.figure import Figure
-    from sprag.service.results.report.content import Report
+    from pathlib import Path
+
+    from sprag.service.results.report.document import Document
 
 
-@lru_cache(maxsize=1)
-def _template() -> Template:
+def html_report(document: Document, folder: Path | None, logo: tuple[str, bytes] | None) -> bytes:
+    """The page. ``folder`` may have a template of the office's own; ``logo`` is a media type and a picture."""
+    package = PackageLoader("sprag.service.results.report")
     environment = Environment(
-        loader=PackageLoader("sprag.service.results.report"),
+        loader=package if folder is None else ChoiceLoader([FileSystemLoader(folder), package]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["number"] = number_text
-    environment.filters["input"] = input_text
-    environment.filters["picture"] = _picture
-    environment.filters["figure"] = _figure
-    environment.filters["map_picture"] = _map
-    return environment.get_template("report.html")
+    environment.filters["embedded"] = embedded
+    mark = None if logo is None else embedded(logo[1], logo[0])
+    template = environment.get_template("report.html")
+    text = template.render(document=document, logo=mark, language=current(), page=page_numbers(), _=_)
+    return text.encode("utf-8")
 
 
-def number_text(value: float | None) -> str:
-    """A number for display, a dash for none."""
-    return "–" if value is None else f"{value:.6g}"
+def page_numbers() -> tuple[str, str, str]:
+    """What stands before the number of a page, between it and the number of pages, and after that."""
+    before, between, after = _("Page {page} of {pages}", page="\0", pages="\0").split("\0")
+    return before, between, after
 
 
-def input_text(value: float | str | None) -> str:
-    """An input for display: a number, or the name of a choice."""
-    return value if isinstance(value, str) else number_text(value)
-
-
-def _picture(curves: Curves) -> str:
-    """The curves as an image embedded in the page."""
-    return _embedded(draw_curves(curves, "", "svg"))
-
-
-def _map(drawn: Map) -> str:
-    """A map as an image embedded in the page."""
-    return _embedded(draw_map(drawn, "", "svg"))
-
-
-def _figure(figure: Figure) -> str:
-    """A described figure as an image embedded in the page."""
-    return _embedded(draw_figure(figure, "", "svg"))
-
-
-def _embedded(svg: bytes) -> str:
-    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")
-
-
-def html_report(report: Report) -> bytes:
-    """The page."""
-    return _template().render(report=report).encode("utf-8")
+def embedded(picture: bytes, media_type: str = "image/svg+xml") -> str:
+    """A picture as an address that contains it."""
+    return f"data:{media_type};base64,{base64.b64encode(picture).decode('ascii')}"

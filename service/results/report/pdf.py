@@ -1,128 +1,105 @@
-"""The report as a PDF of several pages through matplotlib: text first, then a page for each picture."""
+"""The report as a tagged PDF, typeset by Typst from a template, which an office can replace by its own."""
 
 from __future__ import annotations
 
-import io
-import textwrap
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Final
+import json
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from functools import partial
+from importlib.resources import as_file, files
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, Final, cast
 
-from sprag.service.results.figures.curves import curves_figure
-from sprag.service.results.pictures.curves import paint_figure, painting
-from sprag.service.results.pictures.maps import paint_map
-from sprag.service.results.pictures.text import load_matplotlib, writable
-from sprag.service.results.report.html import input_text, number_text
+from sprag.service.extras import naming_extra
+from sprag.service.faults import FaultError
+from sprag.service.languages import _, current
+from sprag.service.results.report.document import Document, Image, Section, Table
+from sprag.service.results.report.html import page_numbers
 
 if TYPE_CHECKING:
-    from matplotlib.backends.backend_pdf import PdfPages
-    from matplotlib.figure import Figure
+    from sprag.service.results.report.document import Block
 
-    from sprag.service.results.exports.inputs import Input
-    from sprag.service.results.report.content import Report
-
-_A4: Final = (8.27, 11.69)
-_LINES: Final = 66
-_WIDTH: Final = 96
-#: No dates, so that two reports of one study have the same bytes.
-_METADATA: Final = {"CreationDate": None, "Creator": "Sprag", "Producer": "Sprag"}
+TEMPLATE: Final = "report.typ"
+#: The conformance asked for: PDF for everybody, with tags, a title, a language and descriptions of pictures.
+_STANDARD: Final = "ua-1"
+_UNPRINTABLE: Final = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
+_ENDINGS: Final = {"image/svg+xml": "svg", "image/png": "png"}
 
 
-def pdf_report(report: Report) -> bytes:
-    """The document: the same bytes for the same study."""
-    load_matplotlib()
-    from matplotlib.backends.backend_pdf import PdfPages
+def pdf_report(document: Document, folder: Path | None, logo: tuple[str, bytes] | None) -> bytes:
+    """The document: the same bytes for the same study and template, where its fonts have all characters.
 
-    buffer = io.BytesIO()
-    with painting(), PdfPages(buffer, metadata={**_METADATA, "Title": report.title}) as pages:
-        lines = list(_lines(report))
-        for start in range(0, len(lines), _LINES):
-            _text_page(pages, report.title if start == 0 else "", lines[start : start + _LINES])
-        for curves in report.pictures:
-            figure = _figure()
-            paint_figure(figure, curves_figure([("", curves)], by_unit=True), "")
-            pages.savefig(figure)
-        for drawn in report.maps:
-            figure = _figure()
-            paint_map(figure, drawn, "")
-            pages.savefig(figure)
-        for part in (report.drives, report.calibration):
-            if part is not None and part.figure is not None:
-                figure = _figure()
-                paint_figure(figure, part.figure, "")
-                pages.savefig(figure)
-    return buffer.getvalue()
-
-
-def _figure() -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(_A4[1], _A4[0]), layout="constrained")
-
-
-def _text_page(pages: PdfPages, title: str, lines: Sequence[str]) -> None:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=_A4)
-    figure.text(0.08, 0.955, writable(title), fontsize=14, va="top")
-    figure.text(
-        0.08, 0.925, writable("\n".join(lines), "monospace"), fontsize=8, va="top", family="monospace", linespacing=1.35
-    )
-    pages.savefig(figure)  # type: ignore[no-untyped-call]
-
-
-def _lines(report: Report) -> Iterator[str]:
-    for name, text in report.facts:
-        yield from _wrapped(f"{name:20} {text}", 21)
-    yield from _section("Warnings", [f"- {text}" for text in report.warnings])
-    yield from _section(
-        "How the cases ended", [f"{count:>10,}  {name:16} {meaning}" for name, count, meaning in report.endings]
-    )
-    yield from _section(
-        "What varies",
-        [
-            f"{axis.paths} ({axis.unit}): {axis.values} values, {input_text(axis.first)} .. {input_text(axis.last)}"
-            for axis in report.axes
-        ],
-    )
-    yield from _section("Calibration", () if report.calibration is None else report.calibration.sentences)
-    yield from _section("Drives", () if report.drives is None else report.drives.sentences)
-    yield from _section("Run", [f"{item.path:20} {item.value}{_mark(item)}" for item in report.run])
-    head = f"{'':34} {'unit':12} {'least':>12} {'mean':>12} {'largest':>12} {'cases':>9}"
-    ranges = [
-        f"{row.info.name:34} {row.info.unit:12} {number_text(row.least):>12} {number_text(row.mean):>12} "
-        f"{number_text(row.largest):>12} {row.known:>9}"
-        for row in report.ranges
-    ]
-    yield from _section("Ranges of the results", [head, *ranges])
-    yield from _section(
-        "Inputs",
-        [
-            f"{item.path:34} {'varies' if item.varies else input_text(item.value):>12} {item.unit:12} "
-            f"{item.description}{_mark(item)}"
-            for item in report.inputs
-        ],
-    )
-    yield from _section("Machine and run as given", [f"{path:40} {text}" for path, text in report.given.items()])
-    if report.note:
-        yield from _section("Curves", [report.note])
+    Raises
+    ------
+    MissingExtraError
+        Without the extra `report`.
+    FaultError
+        When the office's own template is wrong.
+    """
+    with naming_extra("A report as PDF", "report"):
+        import typst
+    with TemporaryDirectory(prefix="sprag-report-") as name:
+        place = Path(name)
+        own = None if folder is None else folder / TEMPLATE
+        if own is not None and own.is_file():
+            shutil.copytree(own.parent, place, dirs_exist_ok=True)
+        else:
+            with as_file(files("sprag.service.results.report") / "templates" / TEMPLATE) as template:
+                shutil.copy(template, place / TEMPLATE)
+        data: dict[str, Any] = {
+            "title": document.title,
+            "particulars": document.particulars,
+            "sections": list(_sections(document.sections, place)),
+            "logo": None,
+            "language": current(),
+            "words": {"author": _("Author"), "logo": _("Logo"), "page": page_numbers()},
+        }
+        if logo is not None:
+            data["logo"] = f"logo.{_ENDINGS[logo[0]]}"
+            (place / data["logo"]).write_bytes(logo[1])
+        (place / "report.json").write_text(json.dumps(_printable(data), ensure_ascii=False), encoding="utf-8")
+        fonts = [] if folder is None else [str(folder)]
+        compiled: Callable[..., bytes] = partial(
+            cast("Any", typst.compile), str(place / TEMPLATE), root=name, format="pdf", timestamp=0, font_paths=fonts
+        )
+        try:
+            try:
+                made = compiled(pdf_standards=_STANDARD, ignore_system_fonts=True)
+            except typst.TypstError:
+                # The standard refuses characters that the fonts lack: the fonts of the system may have them.
+                made = compiled(ignore_system_fonts=False)
+        except typst.TypstError as error:
+            raise FaultError("unavailable", f"The report cannot be typeset: {error}") from error
+    return made
 
 
-def _mark(item: Input) -> str:
-    """The mark of an input that the user did not give."""
-    return f" ({item.origin})" if item.origin in ("default", "fitted", "derived") else ""
+def _printable(data: Any) -> Any:
+    """The data with a sign for every character that no font has."""
+    if isinstance(data, str):
+        return _UNPRINTABLE.sub("?", data)
+    if isinstance(data, dict):
+        return {name: _printable(value) for name, value in data.items()}
+    return [_printable(item) for item in data] if isinstance(data, list | tuple) else data
 
 
-def _section(title: str, lines: Sequence[str]) -> Iterator[str]:
-    if not lines:
-        return
-    yield ""
-    yield title
-    yield "-" * len(title)
-    for line in lines:
-        yield from _wrapped(line, 4)
+def _sections(sections: tuple[Section, ...], place: Path) -> Iterator[dict[str, Any]]:
+    """The sections as plain data; pictures are files beside it."""
+    count = 0
+    for section in sections:
+        blocks = []
+        for block in section.blocks:
+            if isinstance(block, Image):
+                count += 1
+                (place / f"picture-{count}.svg").write_bytes(block.svg)
+            blocks.append(_plain(block, f"picture-{count}.svg"))
+        yield {"title": section.title, "blocks": blocks}
 
 
-def _wrapped(line: str, indent: int) -> list[str]:
-    return textwrap.wrap(
-        line, _WIDTH, subsequent_indent=" " * indent, drop_whitespace=False, replace_whitespace=False
-    ) or [""]
+def _plain(block: Block, file: str) -> dict[str, Any]:
+    if isinstance(block, Image):
+        return {"kind": block.kind, "file": file, "caption": block.caption, "alt": block.alt, "wide": block.wide}
+    if isinstance(block, Table):
+        return {"kind": block.kind, "heads": block.heads, "rows": block.rows, "numbers": block.numbers}
+    return {"kind": block.kind, "text": block.text, "warning": block.warning}

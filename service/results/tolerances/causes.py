@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.service.languages import N_
+from sprag.service.results.phrases import Name, Phrase, joined
 from sprag.service.results.tolerances.shares import LEAST_DRIVES, Share, shares
 
 if TYPE_CHECKING:
@@ -67,25 +69,28 @@ def variance_causes(study: Study, values: Numbers) -> Causes:
     nothing: tuple[None, ...] = (None,) * len(spread.tolerances)
     if found is None:
         enough = int(known.sum())
-        short = f"shares need {LEAST_DRIVES} drives with results, {enough} have them"
-        note = short if enough < LEAST_DRIVES else "all drives have the same result"
+        note = Phrase("there is no variance: all drives have the same value")
+        if enough < LEAST_DRIVES:
+            text = N_("shares need {least} drives with results, {count} have them")
+            note = Phrase(text, least=LEAST_DRIVES, count=enough)
         return Causes(nothing, None, note)
     own = tuple(None if name in tied else share for name, share in zip(spread.names, found, strict=True))
     notes = []
     if tied:
-        notes.append(f"{', '.join(sorted(tied))} are correlated: they have no shares of their own")
+        names = joined(", ", (Name(name, within=True) for name in sorted(tied)))
+        notes.append(Phrase("{names} are correlated: they have no shares of their own", names=names))
     if missing:
-        notes.append(f"drives without results, left out of the shares: {missing:,}")
+        notes.append(Phrase("drives without results, left out of the shares: {count}", count=missing))
     # Estimates of shares that are 0 scatter around it; added up they would count as interactions.
     rest = None if tied else max(1.0 - sum(max(share.value, 0.0) for share in found), 0.0)
-    return Causes(own, rest, "; ".join(notes))
+    return Causes(own, rest, joined("; ", notes))
 
 
 def correlated(study: Study) -> set[str]:
     """Names of the tolerances that are drawn together with others."""
     if study.spread is None:
         return set()
-    told = {path for item in study.spread.about.get("correlations", ()) for path in item["between"]}
-    among = re.compile("|".join(re.escape(path).replace(r"\*", r"[^.]+") for path in told) or "(?!)")
+    correlated = {path for item in study.spread.about.get("correlations", ()) for path in item["between"]}
+    among = re.compile("|".join(re.escape(path).replace(r"\*", r"[^.]+") for path in correlated) or "(?!)")
     every = study.spread.tolerances
     return {one.name for one in every if any(among.fullmatch(path) for path in (one.name, *one.paths))}

@@ -12,11 +12,13 @@ import numpy as np
 from sprag.service.results.selection import listed, numeric_results, refused
 from sprag.service.spec.catalogue import result_of
 from sprag.service.spec.units import QuantityError, parse_quantity, plain_signs, split_quantity, to_float
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag.worker.models import ResultInfo
+    from sprag.worker.study import Study
 
     Numbers = NDArray[np.float64]
 
@@ -28,9 +30,16 @@ MOST: Final = 16
 _FORM: Final = re.compile(r"\s*([A-Za-z][\w.]*)\s*(>=|<=|=|≥|≤)\s*(.+?)\s*")
 _SIGNS: Final = {">=": "at_least", "≥": "at_least", "<=": "at_most", "≤": "at_most", "=": "is"}
 _SHOWN: Final = {"at_least": "≥", "at_most": "≤", "is": "="}
-_PART: Final = re.compile(r"(.+?)\s*%\s*of\s+nominal")
+_PART: Final = re.compile(r"(.+?)\s*%\s*(?:of\s+(?:the\s+)?)?nominal")
 
 Kind = Literal["at_least", "at_most", "is"]
+
+
+def first_condition(study: Study, result: str) -> str:
+    """The condition on a result with which a page begins: a tenth worse than the nominal drive at most."""
+    answers = models.presentation_of(study).answers
+    small = any(answer.result == result and answer.kind == "smallest" for answer in answers)
+    return f"{result} <= 110 % of nominal" if small else f"{result} >= 90 % of nominal"
 
 
 @dataclass(frozen=True, slots=True)

@@ -167,13 +167,13 @@ def yield_json(study_id: str, found: Yield) -> YieldReport:
 def condition_json(condition: Condition) -> ConditionInfo:
     """One condition."""
     info, limit = condition.info, condition.limit
-    told = str(info.cell(limit)) if info.kind == "category" else limit
+    shown = str(info.cell(limit)) if info.kind == "category" else limit
     return {
         "text": condition.text,
         "result": info.name,
         "unit": info.unit,
         "kind": condition.kind,
-        "limit": told,
+        "limit": shown,
         "of_nominal": condition.of_nominal,
     }
 

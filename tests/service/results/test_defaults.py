@@ -76,8 +76,8 @@ def test_a_further_axis_is_held_at_the_value_of_the_base(spec: dict[str, Any]) -
     study = parse_spec({**spec, "axes": axes}).study
     assert drawn_numbers(study, query) == 10
     assert caption(study, query) == (
-        "shaft.speed.mean against shaft.load (N*m), "
-        "a curve for each excitation.amplitude_x = excitation.amplitude_y (m); excitation.frequency = 25 Hz"
+        "shaft.speed.mean against shaft.load, "
+        "a curve for each excitation.amplitude_x = excitation.amplitude_y; excitation.frequency = 25 Hz"
     )
 
 

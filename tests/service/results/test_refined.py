@@ -23,6 +23,7 @@ from sprag.service.results.rounds import sentence
 from sprag.service.results.wording import percent
 from sprag.service.storage.records import RoundProgress, RoundRecord
 from sprag.worker import models
+from sprag.worker.states import StudyState
 from sprag.worker.study import Study
 from tests.service.conftest import API, Service
 from tests.service.refined_study import EFFICIENCY, JUMP, SPEC, SPEED, TORQUE, fetched, fill, study_of
@@ -216,10 +217,27 @@ def test_a_study_in_which_nothing_varies_has_no_first_curves(service: Service) -
 def test_a_sentence_says_when_the_bound_of_cases_ended_the_rounds() -> None:
     summary = {"kind": "refine", "asked": 0.01, "error": None, "passed": False}
     record = RoundRecord(1, range(3, 3), summary, datetime(2026, 1, 1, tzinfo=UTC))
-    assert sentence(RoundProgress(record, 5, 3)) == (
+    assert sentence(RoundProgress(record, 5, 3), StudyState.FINISHED) == (
         "1 round, error not known, asked 1 %, not reached with the cases allowed"
     )
     ended = RoundRecord(1, range(3, 3), {**summary, "error": 0.004, "passed": True}, record.planned_at)
-    assert sentence(RoundProgress(ended, 5, 3)) == "1 round, error 0.4 %, asked 1 %"
+    assert sentence(RoundProgress(ended, 5, 3), StudyState.FINISHED) == "1 round, error 0.4 %, asked 1 %"
     going = RoundRecord(1, range(3, 5), {**summary, "error": 0.021}, record.planned_at)
-    assert sentence(RoundProgress(going, 5, 9)) == "round 2 of at most 5, error now 2.1 %, asked 1 %"
+    assert (
+        sentence(RoundProgress(going, 5, 9), StudyState.RUNNING) == "round 2 of at most 5, error now 2.1 %, asked 1 %"
+    )
+
+
+def test_a_queued_study_waits_for_its_round() -> None:
+    summary = {"kind": "refine", "asked": 0.01, "error": None, "passed": False}
+    first = RoundRecord(0, range(3), summary, datetime(2026, 1, 1, tzinfo=UTC))
+    assert sentence(RoundProgress(first, 5, 9), StudyState.QUEUED) == "waiting for round 1 of at most 5"
+    assert (
+        sentence(RoundProgress(first, 5, 9), StudyState.RUNNING)
+        == "round 1 of at most 5, error not known yet, asked 1 %"
+    )
+    third = RoundRecord(2, range(5, 7), {**summary, "error": 0.021}, first.planned_at)
+    assert (
+        sentence(RoundProgress(third, 5, 9), StudyState.QUEUED)
+        == "waiting for round 3 of at most 5, error now 2.1 %, asked 1 %"
+    )

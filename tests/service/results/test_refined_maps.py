@@ -14,9 +14,9 @@ from sprag.service.results.curve_cases import draw_map
 from sprag.service.results.curves import Map
 from sprag.service.results.figures.orders import map_edges
 from sprag.service.results.pictures.maps import draw_map as paint_map
+from sprag.service.results.report import write_report
 from sprag.service.results.report.content import report_of
-from sprag.service.results.report.html import html_report
-from sprag.service.results.report.pdf import pdf_report
+from sprag.service.results.report.document import TitleBlock
 from sprag.service.results.selection import SelectionError
 from sprag.worker import models
 from sprag.worker.study import Study
@@ -122,10 +122,10 @@ def test_the_pages_and_files_of_a_service(service: Service, capsys: pytest.Captu
     assert report.note == ""
     expected = [(mass, name) for mass in (0.5, 0.4) for name in (SPEED, EFFICIENCY)]
     assert [(one.at[MASS], one.result.name) for one in report.maps] == expected
-    html = html_report(report).decode()
-    assert html.count('<img src="data:image/svg+xml') == len(report.maps)
-    assert f'alt="{SPEED} over {LOAD} and {FREQUENCY}"' in html
-    assert pdf_report(report).count(b"/Type /Page ") > len(report.maps)
+    html = write_report(report, TitleBlock(), "", "html").decode()
+    assert html.count(' over load torque and excitation frequency"') == len(report.maps)
+    assert 'alt="Mean shaft speed over load torque and excitation frequency"' in html
+    assert write_report(report, TitleBlock(), "", "pdf").startswith(b"%PDF")
     assert dict(report.facts)["rounds"] == service.get(f"/studies/{study_id}")["progress"]["rounds"]["sentence"]
     query = {"x": LOAD, "y": FREQUENCY, "z": EFFICIENCY, "at": f"{MASS}=0.4"}
     assert service.http.get(f"/studies/{study_id}/figures/map", params=query).json()["below"].startswith("Within 2 %")

@@ -14,6 +14,7 @@ from sprag.service.results.curves import CurveQuery, Curves
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.pictures.curves import draw_compare, draw_curves
 from sprag.service.results.pictures.maps import draw_map as paint_map
+from sprag.service.results.reading import Reading
 from sprag.service.results.regimes import MARKS, counted, regimes_of, stretches
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage.records import CaseColumns
@@ -21,6 +22,7 @@ from sprag.worker import models
 from sprag.worker.study import Study
 from tests.service.spec_sample import changed
 
+READING = Reading("vibration-drive")
 #: Periods after which the motion repeats, for each of `REGIMES`.
 ORDERS = [1.0, 2.0, 1.0, np.nan, 4.0, np.nan, np.nan, np.nan]
 REGIMES = ["coasting", "periodic", "periodic", "irregular", "periodic", "unsettled", "unsettled", None]
@@ -41,7 +43,10 @@ def test_a_line_joins_neighbours_of_one_regime_and_no_unsettled_point() -> None:
 
 def test_regimes_are_told_in_one_order_and_counted_in_words() -> None:
     assert regimes_of([REGIMES, None]) == ["periodic", "coasting", "irregular", "unsettled"]
-    assert counted({"periodic": 4860, "irregular": 24, "unsettled": 2}) == "4,860 periodic, 24 irregular, 2 unsettled"
+    assert (
+        counted({"periodic": 4860, "irregular": 24, "unsettled": 2})
+        == "4\N{NARROW NO-BREAK SPACE}860 periodic, 24 irregular, 2 unsettled"
+    )
     assert set(MARKS) | {"none"} == set(models.REGIME_SENTENCES)
 
 
@@ -86,11 +91,11 @@ def test_a_figure_breaks_lines_and_marks_regimes() -> None:
 
 
 def test_a_picture_names_the_regimes_that_occur() -> None:
-    with_marks = draw_curves(drawn(), "", "svg")
+    with_marks = draw_curves(drawn(), "", "svg", READING)
     plain = (replace(curve, regimes=["periodic"] * 8, orders=[1] * 8) for curve in drawn().curves)
     periodic = replace(drawn(), curves=tuple(plain))
     assert with_marks.count(MARKS["unsettled"].colour.encode()) > 0
-    assert MARKS["unsettled"].colour.encode() not in draw_curves(periodic, "", "svg")
+    assert MARKS["unsettled"].colour.encode() not in draw_curves(periodic, "", "svg", READING)
 
 
 def test_pictures_of_several_plots_have_room_for_plots_and_marks() -> None:
@@ -98,7 +103,8 @@ def test_pictures_of_several_plots_have_room_for_plots_and_marks() -> None:
     query = CurveQuery("shaft.load", ("shaft.speed.mean", "torque.mean"), ("excitation.frequency",))
     curves = draw(select(one, models.study_results(one), query), fetched)
     # A layout without room for its plots is a warning of matplotlib, and so an error here.
-    for picture in (draw_curves(curves, "A study", "svg"), draw_compare([("a", curves), ("b", curves)], "svg")):
+    both = [("a", curves), ("b", curves)]
+    for picture in (draw_curves(curves, "A study", "svg", READING), draw_compare(both, READING, "svg")):
         assert picture.count(b"<!-- unsettled -->") == 1
 
 

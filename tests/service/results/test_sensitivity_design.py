@@ -12,7 +12,10 @@ from SALib.analyze import rbd_fast
 from scipy.stats import qmc
 
 from sprag.service.cli.pictures import _show_effects
+from sprag.service.jobs.sensitivities import indices_csv
 from sprag.service.results.pictures.sensitivity import draw_sensitivity
+from sprag.service.results.quantities import Units
+from sprag.service.results.reading import CODES, Reading
 from sprag.service.results.sensitivity import Sensitivity
 from sprag.service.results.sensitivity_design import is_sample
 from tests.service.results.test_sensitivity import API, SPEED, effects, ranges
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
 
 A, B, C = "excitation.phase", "pendulums.0.initial_angle", "shaft.load"
 NONE = (None, None, None, None)
+CODE_NAMES = Reading("vibration-drive", names=CODES)
 
 
 def indices(found: Sensitivity) -> set[tuple[float | None, ...]]:
@@ -159,9 +163,9 @@ def test_nothing_known_is_told_in_a_sentence(capsys: pytest.CaptureFixture[str])
         found = effects({"axes": axes}, lambda _: np.nan)
         assert (found.method, found.cases, found.mean, indices(found)) == ("none", 0, None, {NONE})
         assert found.notes == ("no case has this result",)
-        svg = draw_sensitivity([found], "Title", "svg").decode()
+        svg = draw_sensitivity([found], "Title", CODE_NAMES, "svg").decode()
         assert svg.count("<!-- no case has this result -->") == 3  # both panels and the head
-        assert all(draw_sensitivity([found], "Title", form) for form in ("png", "pdf"))
+        assert all(draw_sensitivity([found], "Title", CODE_NAMES, form) for form in ("png", "pdf"))
     _show_effects(found.to_json())
     assert "note: no case has this result" in capsys.readouterr().err
 
@@ -176,3 +180,23 @@ def test_the_note_is_in_every_form(service: Service, spec: dict[str, Any]) -> No
     assert [row["notes"] for row in rows] == ["no case has this result"] * 2
     for form in ("svg", "png", "pdf"):
         assert service.http.get(f"{place}&format={form}").status_code == 200
+
+
+def test_files_are_in_the_units_and_names_of_the_reader(service: Service, spec: dict[str, Any]) -> None:
+    sample = {"sample": "morris", "count": 4, "ranges": ranges(0, 1)}
+    found = effects({"axes": [sample]}, lambda p: 2.0 * p[A] + p[B] ** 2)
+    readings = (Reading("vibration-drive", Units(chosen)) for chosen in ({}, {"rad/s": "rpm"}))
+    si, rpm = (list(csv.DictReader(io.StringIO(indices_csv([found], one).decode()))) for one in readings)
+    assert ({row["unit"] for row in si}, {row["unit"] for row in rpm}) == ({"rad/s"}, {"rpm"})
+    for name in ("mu", "mu_star", "sigma"):
+        expected = [float(row[name]) * 30.0 / np.pi for row in si]
+        assert [float(row[name]) for row in rpm] == pytest.approx(expected, rel=1e-12)
+    study_id = service.submit({**spec, "axes": [linspace(A, 0, 1, 3)]})
+    service.fill(study_id)
+    place = f"{API}/studies/{study_id}/sensitivity?y={SPEED}"
+    svg = service.http.get(f"{place}&format=svg&units=rpm").text
+    assert "mean shaft speed" in svg
+    assert "(rpm)" in svg
+    assert SPEED in service.http.get(f"{place}&format=svg&names=codes").text
+    page = service.http.get(f"/studies/{study_id}/sensitivity?y={SPEED}&units=rpm").text
+    assert f"sensitivity?y={SPEED}&amp;units=rpm&amp;format=csv" in page

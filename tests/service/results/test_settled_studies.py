@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -17,61 +16,13 @@ from anyio.from_thread import BlockingPortal
 
 from sprag.engine.vibration_drive.regimes import Regime
 from sprag.service.client import AsyncClient, Client
-from sprag.service.client.plain import ServiceClient
+from sprag.service.results.regimes import motion_sentence
 from sprag.worker import models
 from sprag.worker.models import ChunkResult, regime_info
-from sprag.worker.study import Study
-from tests.service.conftest import API, PortalTransport, Service, made_up
+from tests.service.conftest import API, PortalTransport, Service
+from tests.service.results.conftest import Linked
+from tests.service.results.settled import REGIMES, flagged, rows_of
 from tests.service.spec_sample import changed
-
-#: A case at a load, the same without one, and one whose motion is irregular: 25 Hz, 2 mm.
-SPEC: dict[str, Any] = changed(
-    {"/run": {"until": "settled"}, "/axes": [{"path": "shaft.load", "values": [0, 0.2, 0.7, 1.6]}]}
-)
-REGIMES = ["periodic", "irregular", None, "unsettled"]
-
-
-def rows_of(study: Study) -> ChunkResult:
-    """Made-up rows with the regimes of `REGIMES`; the case without one did not end ok."""
-    rows = made_up(study)
-    column = [info.name for info in models.study_results(study)].index("regime")
-    rows.values[:] = np.abs(np.random.default_rng(3).normal(size=rows.values.shape))
-    rows.values[:, column] = [0 if name is None else Regime[name.upper()] for name in REGIMES]
-    rows.values[:, column + 1] = [1 if name == "periodic" else np.nan for name in REGIMES]
-    rows.values[2] = np.nan
-    endings = ["ok" if name else "chatter" for name in REGIMES]
-    flags = [name if name in {"irregular", "unsettled"} else "" for name in map(str, REGIMES)]
-    return ChunkResult(0, endings, flags, rows.values)
-
-
-Linked = Callable[[str], None]
-
-
-@pytest.fixture
-def linked(service: Service, portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch) -> Linked:
-    """Lets the commands of a module of `sprag.service.cli` talk to the service of the test."""
-
-    def connected(*_: object) -> ServiceClient:
-        return ServiceClient("http://localhost", transport=PortalTransport(service.app, portal))
-
-    def link(module: str) -> None:
-        monkeypatch.setattr(f"sprag.service.cli.{module}.connection", connected)
-
-    return link
-
-
-@pytest.fixture
-def study_id(service: Service) -> str:
-    """A settled study whose rows are there."""
-    found = service.submit(SPEC)
-    record, study = service.store.get_study(found), service.store.study(found)
-    whole, epoch = rows_of(study), service.store.take_over("test")
-    for chunk in service.store.claim(epoch, service.store.open_chunks(record.number)):
-        part = slice(chunk.first, chunk.first + chunk.count)
-        result = ChunkResult(chunk.first, whole.endings[part], whole.flags[part], whole.values[part])
-        assert service.store.commit(epoch, chunk, result)
-    service.store.settle(epoch, record.number)
-    return found
 
 
 def file(service: Service, study_id: str, form: str, part: str = "results") -> httpx.Response:
@@ -227,48 +178,6 @@ def test_cases_are_filtered_by_regime(service: Service, study_id: str) -> None:
     assert 'name="regime"' not in service.http.get(f"/studies/{timed}/cases").text
 
 
-def test_unsettled_cases_are_run_longer(service: Service, study_id: str) -> None:
-    made = service.http.post(f"{API}/studies/{study_id}:longer")
-    assert made.status_code == 202, made.text
-    assert made.json()["cases"] == 1
-    old, new = service.store.study(study_id), service.store.study(made.json()["id"])
-    assert new.columns([0]) == old.columns([3])
-    assert new.run == old.run | {"at_most": 4000}
-    assert new.base == old.base
-    assert new.name == f"{old.name}, longer"
-
-
-def test_other_regimes_and_times_are_asked_for(service: Service, study_id: str) -> None:
-    query: dict[str, str] = {"regime": "irregular", "at_most": "20000"}
-    key = {"Idempotency-Key": "once"}
-    made = [service.http.post(f"{API}/studies/{study_id}:longer", params=query, headers=key).json() for _ in range(2)]
-    assert made[0]["id"] == made[1]["id"]
-    new = service.store.study(made[0]["id"])
-    assert (new.cases, new.run["at_most"]) == (1, 20_000)
-    assert new.case_parameters(0) == service.store.study(study_id).case_parameters(1)
-
-
-def test_what_cannot_be_run_longer_is_refused(service: Service, study_id: str) -> None:
-    timed = service.submit(changed({"/run": {"duration": "60 periods"}}))
-    for study, query in ((study_id, {"regime": "held"}), (timed, {}), (study_id, {"at_most": "99"})):
-        response = service.http.post(f"{API}/studies/{study}:longer", params=query)
-        assert response.status_code == 422
-        assert response.json()["errors"][0]["parameter"] in query or not query
-
-
-def flagged(service: Service, run: dict[str, Any]) -> str:
-    """A study of three runs of a given time, the second and third of which have not settled."""
-    found = service.submit(changed({"/run": run, "/axes": [{"path": "shaft.load", "values": [0.1, 0.2, 0.7]}]}))
-    record, rows = service.store.get_study(found), made_up(service.store.study(found))
-    flags, epoch = ["", "not_settled", "windup_out_of_data,not_settled"], service.store.take_over("test")
-    for chunk in service.store.claim(epoch, service.store.open_chunks(record.number)):
-        part = slice(chunk.first, chunk.first + chunk.count)
-        result = ChunkResult(chunk.first, rows.endings[part], flags[part], rows.values[part])
-        assert service.store.commit(epoch, chunk, result)
-    service.store.settle(epoch, record.number)
-    return found
-
-
 def test_cases_are_filtered_by_flag_and_flags_are_counted(service: Service, study_id: str) -> None:
     timed = flagged(service, {"duration": "60 periods"})
     cases = f"/studies/{timed}/cases"
@@ -288,38 +197,6 @@ def test_cases_are_filtered_by_flag_and_flags_are_counted(service: Service, stud
     both = {"flag": "unsettled", "regime": "unsettled"}
     assert [case["case"] for case in service.get(f"/studies/{study_id}/cases", **both)["cases"]] == [3]
     assert service.get(f"/studies/{study_id}/cases", flag="unsettled", regime="irregular")["cases"] == []
-
-
-@pytest.mark.parametrize(
-    ("run", "query", "longer"),
-    [
-        ({"duration": "60 periods"}, {}, {"duration": [240.0, "periods"], "window": None}),
-        (
-            {"duration": "60 periods", "window": ["30 periods", "50 periods"]},
-            {"at_most": 500},
-            {"duration": [500.0, "periods"], "window": [[480.0, "periods"], [500.0, "periods"]]},
-        ),
-        (
-            {"duration": "2 s", "window": ["1.5 s", "2 s"], "tolerance": 1e-8},
-            {},
-            {"duration": [8.0, "s"], "window": [[7.5, "s"], [8.0, "s"]], "tolerance": 1e-8},
-        ),
-        (
-            {"duration": "2 s", "window": ["1.5 s", "2 s"]}, {"at_most": 300},
-            {"duration": [300.0, "periods"], "window": None},
-        ),
-    ],
-)  # fmt: skip
-def test_runs_of_a_given_time_that_had_not_settled_are_run_longer(
-    service: Service, portal: Any, run: dict[str, Any], query: dict[str, int], longer: dict[str, Any]
-) -> None:
-    timed = flagged(service, run)
-    with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
-        new = service.store.study(client.study(timed).run_longer(**query).id)
-    assert new.columns([0, 1])["shaft.load"].tolist() == [0.2, 0.7]
-    assert new.run == {"tolerance": 1e-9, "reset": "contact"} | longer
-    refused = service.http.post(f"{API}/studies/{timed}:longer", params={"regime": "unsettled"})
-    assert refused.json()["errors"][0]["parameter"] == "regime"
 
 
 def test_clients_and_command_list_cases_by_ending_regime_and_flag(
@@ -350,49 +227,21 @@ def test_clients_and_command_list_cases_by_ending_regime_and_flag(
     assert "--result" in sprag("cases", study_id, "--result", "beauty").err
 
 
-def test_the_command_runs_longer_what_the_button_does(
-    service: Service, study_id: str, linked: Linked, sprag: Any
-) -> None:
-    timed = flagged(service, {"duration": "60 periods"})
-    linked("extend")
-    for study, at_most in ((study_id, 2000), (timed, 500)):
-        done = sprag("longer", study, "--at-most", at_most, "--json")
-        assert done.code == 0, done.err
-        new = service.store.study(done.data["id"])
-        assert new.run.get("at_most", new.run.get("duration")) in (2000, [500.0, "periods"])
-        assert new.cases == {study_id: 1, timed: 2}[study]
-    shown = [service.http.post(f"/studies/{timed}/longer/not_settled").headers["location"] for _ in range(2)]
-    assert shown[0] == shown[1]
-    assert f'action="/studies/{timed}/longer/not_settled"' in service.http.get(f"/studies/{timed}").text
-    assert service.http.post(f"/studies/{timed}/longer/windup_out_of_data").status_code == 404
-
-
 def test_sensitivity_leaves_out_unsettled_cases_and_tells_of_regimes(service: Service, study_id: str) -> None:
     (found,) = service.get(f"/studies/{study_id}/sensitivity", y="shaft.speed.mean")["results"]
     assert (found["cases"], found["missing"]) == (2, 2)
-    assert "1 unsettled cases are left out" in found["notes"][0]
+    assert "1 unsettled case is left out" in found["notes"][0]
     assert "1 periodic, 1 irregular" in found["notes"][1]
-
-
-def test_the_page_of_a_study_has_a_button_that_runs_cases_longer(service: Service, study_id: str) -> None:
-    address = f"/studies/{study_id}/longer/unsettled"
-    page = service.http.get(f"/studies/{study_id}").text
-    assert f'action="{address}"' in page
-    assert f'action="/studies/{study_id}/longer/periodic"' not in page
-    shown = [service.http.post(address).headers["location"] for _ in range(2)]
-    assert shown[0] == shown[1]
-    assert service.store.study(shown[0].rpartition("/")[2]).run["at_most"] == 4000
-    assert service.http.post(f"/studies/{study_id}/longer/held").status_code == 404
 
 
 def test_the_page_of_a_case_tells_its_motion(service: Service, study_id: str) -> None:
     pages = [service.http.get(f"/studies/{study_id}/cases/{case}").text for case in range(4)]
-    assert models.motion_sentence("periodic", 1) in pages[0]
+    assert motion_sentence("periodic", 1) in pages[0]
     assert "From its start it is settled after" in pages[0]
     assert models.REGIME_SENTENCES["irregular"] not in pages[0]
     for page, flag in ((pages[1], "irregular"), (pages[3], "unsettled")):
         assert page.count(f'<p class="warning"><span class="flag">{flag}</span>') == 1
-        assert models.motion_sentence("periodic", 1).partition(" after ")[0] not in page
+        assert motion_sentence("periodic", 1).partition(" after ")[0] not in page
     assert " ± " in pages[1]
 
 

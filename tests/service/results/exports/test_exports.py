@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 import openpyxl
 import pandas as pd
@@ -17,12 +17,14 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import xarray as xr
+from openpyxl.utils import get_column_letter
 
+from sprag.service.client.frames import grid_of
 from sprag.service.formats import FORMATS, MEDIA_TYPES, SUFFIXES, Format, format_of
 from sprag.service.results import exports
 from sprag.service.results.exports import Source, xlsx
 from sprag.service.storage.records import RowBlock
-from sprag.worker import models
+from sprag.worker import fingerprint, models
 from sprag.worker.study import Study
 from tests.service.conftest import made_up
 
@@ -45,9 +47,9 @@ class Filled:
     study: Study
     rows: ChunkResult
 
-    def file(self, form: str) -> bytes:
+    def file(self, form: str, **asked: str) -> bytes:
         """The bytes of all rows in a format."""
-        response = self.service.http.get(f"{API}/studies/{self.id}/results", params={"format": form})
+        response = self.service.http.get(f"{API}/studies/{self.id}/results", params={"format": form, **asked})
         assert response.status_code == 200, response.text
         assert response.headers["content-type"] == MEDIA_TYPES[form]  # type: ignore[index]
         assert f"{self.id}.{SUFFIXES[form][0]}" in response.headers["content-disposition"]  # type: ignore[index]
@@ -57,6 +59,13 @@ class Filled:
     def names(self) -> list[str]:
         """Result names."""
         return [info.name for info in models.study_results(self.study)]
+
+    @property
+    def computed_by(self) -> list[dict[str, Any]]:
+        """Where the rows come from: all of them from this process."""
+        chunks = len(range(0, self.study.cases, self.service.store.get_study(self.id).chunk_cases))
+        digest, cases = fingerprint.digest(), self.study.cases
+        return [{"host": None, "fingerprint": digest, "chunks": chunks, "cases": cases, "differs": None}]
 
     def column(self, name: str) -> NDArray[np.float64]:
         """A result as it was stored."""
@@ -94,7 +103,7 @@ def test_pandas_reads_every_table_back(filled: Filled) -> None:
     filled.same(pd.read_csv(io.BytesIO(filled.file("csv"))))
     filled.same(pd.read_parquet(io.BytesIO(filled.file("parquet"))))
     filled.same(pd.read_json(io.BytesIO(filled.file("jsonl")), lines=True, precise_float=True, dtype=False))
-    sheet = pd.read_excel(io.BytesIO(filled.file("xlsx")), sheet_name="cases", skiprows=[1], keep_default_na=False)
+    sheet = pd.read_excel(io.BytesIO(filled.file("xlsx")), sheet_name="cases", header=1, keep_default_na=False)
     filled.same(sheet.replace("", np.nan))
 
 
@@ -115,6 +124,7 @@ def test_parquet_and_arrow_tell_units_and_the_study(filled: Filled) -> None:
         assert table.schema.field("run.events").type == pa.int64()
         about = json.loads(table.schema.metadata[b"sprag"])
         assert about["study"] == filled.id
+        assert about["computed_by"] == filled.computed_by
         assert about["base"]["pendulums.0.mass"] == 0.5
         assert about["derive"] == {"shaft.inertia": "0.002 * (1 + shaft.load / 1.0)"}
         assert b"derived: 0.002" in table.schema.field("shaft.inertia").metadata[b"description"]
@@ -126,7 +136,7 @@ def test_parquet_and_arrow_tell_units_and_the_study(filled: Filled) -> None:
 def test_openpyxl_reads_typed_cells_units_and_inputs(filled: Filled) -> None:
     book = openpyxl.load_workbook(io.BytesIO(filled.file("xlsx")))
     rows = list(book["cases"].iter_rows(values_only=True))
-    names, units = rows[0], dict(zip(rows[0], rows[1], strict=True))
+    names, units = rows[1], dict(zip(rows[1], rows[0], strict=True))
     assert (units["shaft.load"], units["excitation.frequency"]) == ("N*m", "Hz")
     table = {name: [row[index] for row in rows[2:]] for index, name in enumerate(names)}
     filled.same(table)
@@ -143,19 +153,65 @@ def test_openpyxl_reads_typed_cells_units_and_inputs(filled: Filled) -> None:
     assert inputs["duration"][0] == "60 periods"
 
 
+def test_the_cases_of_a_spreadsheet_are_a_table_with_filters(filled: Filled) -> None:
+    sheet = openpyxl.load_workbook(io.BytesIO(filled.file("xlsx")))["cases"]
+    (table,) = sheet.tables.values()
+    corner = f"{get_column_letter(sheet.max_column)}{filled.study.cases + 2}"
+    assert (table.name, table.ref, table.autoFilter.ref) == ("cases", f"A2:{corner}", f"A2:{corner}")
+    heads = [cell.value for cell in sheet[2]]
+    assert table.column_names == heads
+    assert sheet.freeze_panes == "B3"
+    # Neighbours of one width stand as one entry.
+    wide = {n: entry.width for entry in sheet.column_dimensions.values() for n in range(entry.min, entry.max + 1)}
+    for index, head in enumerate(heads, 1):
+        longest = max(len(cell.value) for (cell,) in sheet.iter_rows(min_col=index, max_col=index, min_row=2)
+                      if isinstance(cell.value, str))  # fmt: skip
+        assert min(longest, 60) <= wide[index] <= 61, head
+        assert wide[index] >= min(len(head) + 4, 60), "room for the button of the filter"
+
+
+def test_the_table_of_a_study_without_rows_has_an_empty_row(service: Service) -> None:
+    content = service.http.get(f"{API}/studies/{service.submit()}/results?format=xlsx").content
+    (table,) = openpyxl.load_workbook(io.BytesIO(content))["cases"].tables.values()
+    assert re.fullmatch(r"A2:[A-Z]+3", table.ref)
+
+
+@pytest.mark.parametrize("units", [None, "rpm"])
+def test_the_header_of_csv_may_have_every_unit(filled: Filled, units: str | None) -> None:
+    asked = {"header": "units", **({} if units is None else {"units": units})}
+    heads = filled.file("csv", **asked).decode().partition("\n")[0].split(",")
+    speed = "rad/s" if units is None else units
+    assert {"case", "shaft.load [N*m]", "ending", "flags", "efficiency", f"shaft.speed.mean [{speed}]"} <= set(heads)
+    bare = filled.file("csv", header="names").decode().partition("\n")[0].split(",")
+    assert [head.partition(" [")[0] for head in heads] == bare
+    assert filled.file("csv") == filled.file("csv", header="names")
+
+
+@pytest.mark.parametrize(("form", "header"), [("xlsx", "units"), ("csv", "captions")])
+def test_a_header_that_a_file_does_not_have_is_refused(filled: Filled, form: str, header: str) -> None:
+    asked = {"format": form, "header": header}
+    refused = filled.service.http.get(f"{API}/studies/{filled.id}/results", params=asked)
+    assert refused.status_code == 422
+    (fault,) = refused.json()["errors"]
+    assert (fault["parameter"], fault["value"]) == ("header", header)
+    assert fault["allowed"]
+
+
 def test_a_spreadsheet_goes_on_on_a_further_sheet(filled: Filled, tmp_path: Path) -> None:
     blocks = filled.service.store.iter_rows(filled.id)
     source = Source(filled.study, models.study_results(filled.study), blocks, {})
     book = openpyxl.load_workbook(xlsx._write(source, tmp_path, sheet_rows=7))
     assert book.sheetnames == ["cases", "cases 2", "cases 3", "inputs"]
+    tables = [(table.name, table.ref) for sheet in book for table in sheet.tables.values()]
+    assert [(name, re.sub("[A-Z]", "", ref)) for name, ref in tables] == [
+        ("cases", "2:7"), ("cases_2", "2:7"), ("cases_3", "2:4"),
+    ]  # fmt: skip
     found = [row[0] for name in book.sheetnames[:3] for row in book[name].iter_rows(min_row=3, values_only=True)]
     assert found == list(range(12))
 
 
-def test_xarray_opens_a_labelled_grid(filled: Filled, tmp_path: Path) -> None:
-    path = tmp_path / "study.nc"
-    path.write_bytes(filled.file("netcdf"))
-    with xr.open_dataset(path, engine="h5netcdf") as grid:
+def test_the_client_opens_a_labelled_grid(filled: Filled) -> None:
+    with grid_of(filled.file("netcdf")) as grid:
         assert dict(grid.sizes) == {"shaft.load": 3, "excitation.amplitude_x": 2, "excitation.frequency": 2}
         assert grid["shaft.speed.mean"].attrs["units"] == "rad/s"
         assert grid["shaft.load"].attrs["units"] == "N*m"
@@ -205,8 +261,7 @@ def test_an_ending_and_a_flag_have_one_number_in_every_file(filled: Filled) -> N
         assert str(one[name].attrs) == str(other[name].attrs)
 
 
-def test_a_netcdf_file_keeps_the_rules_of_the_cf_conventions(service: Service, spec: dict[str, Any]) -> None:
-    """Rules 2.6, 3.1, 3.5, 4 and 5 of CF 1.11: what compliance-checker has errors for where they are broken."""
+def test_cases_move_with_coordinates_that_are_sorted(service: Service, spec: dict[str, Any]) -> None:
     spec["axes"] = [
         {"path": "shaft.load", "values": [0.1, 0.3, 0.02]},
         {"path": ["excitation.amplitude_x", "excitation.amplitude_y"], "values": ["3 mm", "1 mm"]},
@@ -214,7 +269,7 @@ def test_a_netcdf_file_keeps_the_rules_of_the_cf_conventions(service: Service, s
     study_id = service.submit(spec)
     rows = service.fill(study_id)
     content = io.BytesIO(service.http.get(f"{API}/studies/{study_id}/results?format=netcdf").content)
-    with xr.open_dataset(content, engine="h5netcdf") as grid:
+    with grid_of(content.getvalue()) as grid:
         # Coordinates only rise or only fall; the cases move with their labels.
         assert grid["shaft.load"].values.tolist() == [0.02, 0.1, 0.3]
         assert grid["excitation.amplitude_x"].values.tolist() == [3e-3, 1e-3]
@@ -222,40 +277,21 @@ def test_a_netcdf_file_keeps_the_rules_of_the_cf_conventions(service: Service, s
         assert decoded(grid["ending"]) == [rows.endings[case] for case in grid["case"].values.reshape(-1)]
         speed = grid["shaft.speed.mean"]
         np.testing.assert_array_equal(speed.values.reshape(-1), rows.values[[4, 5, 0, 1, 2, 3], 0])
-    with h5py.File(content) as file:
-        assert file.attrs["Conventions"] == "CF-1.11"
-        assert file.attrs["title"]
-        assert file.attrs["history"]
-        for name, variable in file.items():
-            assert variable.attrs["long_name"], name
-            if name in {"shaft.load", "excitation.amplitude_x", "excitation.amplitude_y"}:
-                assert "_FillValue" not in variable.attrs
-                continue
-            assert (variable.compression, variable.shuffle) == ("gzip", True), name
-            if name != "case":
-                assert set(variable.attrs["coordinates"].split()) == {"case", "excitation.amplitude_y"}
-        for name, kind in (("ending", "flag_values"), ("flags", "flag_masks")):
-            attributes = file[name].attrs
-            assert attributes[kind].dtype == file[name].dtype
-            assert len(attributes[kind]) == len(attributes["flag_meanings"].split())
 
 
 def test_a_study_of_one_case_is_a_grid_without_dimensions(service: Service, spec: dict[str, Any]) -> None:
     spec["axes"] = []
     study_id = service.submit(spec)
     rows = service.fill(study_id)
-    content = io.BytesIO(service.http.get(f"{API}/studies/{study_id}/results?format=netcdf").content)
-    with xr.open_dataset(content, engine="h5netcdf") as grid:
+    with grid_of(service.http.get(f"{API}/studies/{study_id}/results?format=netcdf").content) as grid:
         assert (dict(grid.sizes), int(grid["case"]), int(grid["ending"])) == ({}, 0, 0)
         assert float(grid["shaft.speed.mean"]) == rows.values[0, 0]
 
 
-def test_a_grid_that_is_not_finished_has_holes_where_cases_are_missing(service: Service, tmp_path: Path) -> None:
+def test_a_grid_that_is_not_finished_has_holes_where_cases_are_missing(service: Service) -> None:
     study_id = service.submit()
     rows = service.fill(study_id, range(1, 4))
-    path = tmp_path / "study.nc"
-    path.write_bytes(service.http.get(f"{API}/studies/{study_id}/results?format=netcdf").content)
-    with xr.open_dataset(path, engine="h5netcdf") as grid:
+    with grid_of(service.http.get(f"{API}/studies/{study_id}/results?format=netcdf").content) as grid:
         assert grid["ending"].values.reshape(-1).tolist() == [-1, -1, 0, 0, -1, -1, -1, -1, -1]
         speed = grid["shaft.speed.mean"].values.reshape(-1)
     expected = rows.values[:, 0].copy()
@@ -264,7 +300,7 @@ def test_a_grid_that_is_not_finished_has_holes_where_cases_are_missing(service: 
     np.testing.assert_array_equal(speed, expected)
 
 
-def test_axes_that_go_together_are_labels_of_the_cases(service: Service, spec: dict[str, Any], tmp_path: Path) -> None:
+def test_axes_that_go_together_are_labels_of_the_cases(service: Service, spec: dict[str, Any]) -> None:
     spec["combine"] = "zip"
     spec["axes"] = [
         {"path": "shaft.load", "values": LOADS},
@@ -272,9 +308,7 @@ def test_axes_that_go_together_are_labels_of_the_cases(service: Service, spec: d
     ]
     study_id = service.submit(spec)
     service.fill(study_id)
-    path = tmp_path / "study.nc"
-    path.write_bytes(service.http.get(f"{API}/studies/{study_id}/results?format=netcdf").content)
-    with xr.open_dataset(path, engine="h5netcdf") as grid:
+    with grid_of(service.http.get(f"{API}/studies/{study_id}/results?format=netcdf").content) as grid:
         assert grid["shaft.speed.mean"].dims == ("case",)
         assert grid["shaft.load"].values.tolist() == LOADS
         assert grid["excitation.frequency"].dims == ("case",)
@@ -324,3 +358,18 @@ def test_made_up_rows_need_all_digits(filled: Filled) -> None:
     values = made_up(filled.study).values
     known = values[np.isfinite(values)]
     assert any(float(f"{value:.16g}") != value for value in known.tolist())
+
+
+def test_every_description_of_the_study_tells_where_rows_come_from(filled: Filled) -> None:
+    digest = fingerprint.digest()
+    assert filled.service.get(f"/studies/{filled.id}")["computed_by"] == filled.computed_by
+    assert json.loads(filled.file("json"))["computed_by"] == filled.computed_by
+    sheet = openpyxl.load_workbook(io.BytesIO(filled.file("xlsx")))["inputs"]
+    rows = [row for row in sheet.iter_rows(values_only=True) if row[0] == "computed_by"]
+    assert [row[2] for row in rows] == [digest]
+    with xr.open_dataset(io.BytesIO(filled.file("netcdf"))) as grid:
+        assert json.loads(grid.attrs["computed_by"]) == filled.computed_by
+    page = filled.service.http.get(f"/studies/{filled.id}").text
+    assert f"copied from other studies, fingerprint {digest[:12]}: {filled.study.cases}" in page
+    report = filled.service.http.get(f"{API}/studies/{filled.id}/report", params={"format": "html"}).text
+    assert digest[:12] in report

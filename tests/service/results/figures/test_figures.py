@@ -8,12 +8,15 @@ import numpy as np
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
+from sprag.service import languages
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.results.curve_cases import draw, select
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.figure import PALETTE
 from sprag.service.results.figures.motion import motion_figure, phase_figure
+from sprag.service.results.figures.portrait import portrait_figure
+from sprag.service.results.phrases import shown as shown_text
 from sprag.service.results.pictures.curves import paint_figure, painting
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage.records import CaseColumns
@@ -59,4 +62,8 @@ def test_a_motion_is_drawn_over_its_states_and_as_a_portrait() -> None:
     assert [trace["name"] for trace in page["data"] if trace["type"] == "bar"] == ["held", "rotating"]
     assert {trace["xaxis"] for trace in page["data"] if trace["type"] == "scatter"} == {"x"}
     (orbit,) = phase_figure(made, shown).panels[0].lines
+    with languages.language("uk"):
+        portrait = portrait_figure(models.Portrait("", 1, made, made, 1, "ok"), shown)
+        assert {shown_text(line.name) for line in portrait.panels[0].lines} >= {"Маятник 0"}
+        assert {shown_text(line.name) for line in portrait.panels[1].lines} >= {"Вал"}
     assert (orbit.x.tolist(), orbit.y.tolist(), orbit.colour) == ([0.0, 8.0, 16.0], [1.0, 9.0, 17.0], PALETTE[0])

@@ -11,8 +11,10 @@ from matplotlib.figure import Figure
 
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import CurveQuery
+from sprag.service.results.figures.read import read_map
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.pictures import maps
+from sprag.service.results.reading import Reading
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage.records import CaseColumns
 from sprag.worker import models
@@ -48,7 +50,9 @@ def fetch(cases: NDArray[np.int64], names: Any) -> CaseColumns:
 def curves(spec: dict[str, Any], *y: str, by: tuple[str, ...] = (), at: tuple[tuple[str, str], ...] = ()) -> None:
     study = parse_spec(spec).study
     query = CurveQuery("shaft.load", y or (SPEED,), by, at)
-    pictures.draw_curves(draw(select(study, models.study_results(study), query), fetch), "A study", "svg")
+    pictures.draw_curves(
+        draw(select(study, models.study_results(study), query), fetch), "A study", "svg", Reading(study.model)
+    )
 
 
 def grid(spec: dict[str, Any], frequencies: int) -> dict[str, Any]:
@@ -66,7 +70,7 @@ def test_values_that_are_held_stand_above_the_picture(spec: dict[str, Any], figu
     curves(grid(spec, 16), at=(("excitation.amplitude_y", "2 mm"), ("excitation.frequency", "1500 rpm")))
     assert figures[0].get_suptitle().splitlines() == [
         "A study",
-        "excitation.amplitude_y = excitation.amplitude_x = 0.002 m; excitation.frequency = 25 Hz",
+        "Vertical amplitude = Horizontal amplitude = 0.002 m; Excitation frequency = 25 Hz",
     ]
 
 
@@ -77,16 +81,16 @@ def test_long_titles_are_broken_between_values(spec: dict[str, Any], figures: li
     first, *lines = figures[0].get_suptitle().splitlines()
     assert first == "A study"
     assert lines == [
-        "pendulums.0.mass = 1 kg; pendulums.0.inertia = 1 kg*m^2; pendulums.0.spring_rate = 1 N/m;",
-        "pendulums.0.damping = 1 N*m*s/rad; excitation.frequency = 25 Hz; excitation.amplitude_x = 0.002 m;",
-        "excitation.amplitude_y = 0.002 m",
+        "Mass, pendulum 0 = 1 kg; Inertia, pendulum 0 = 1 kg·m²; Spring rate, pendulum 0 = 1 N/m;",
+        "Damping, pendulum 0 = 1 N·m·s/rad; Excitation frequency = 25 Hz; Horizontal amplitude = 0.002 m;",
+        "Vertical amplitude = 0.002 m",
     ]
 
 
 def test_few_curves_have_a_legend_with_units(spec: dict[str, Any], figures: list[Figure]) -> None:
     curves(grid(spec, 2), by=("excitation.amplitude_x",), at=(("excitation.frequency", "20 Hz"),))
     (legend,) = figures[0].legends
-    assert legend.get_title().get_text().replace("\n", " ") == "excitation.amplitude_x = excitation.amplitude_y (m)"
+    assert legend.get_title().get_text().replace("\n", " ") == "Horizontal amplitude = Vertical amplitude (m)"
     assert [text.get_text() for text in legend.get_texts()] == ["0.001", "0.002"]
 
 
@@ -94,9 +98,9 @@ def test_each_of_many_curves_is_named(spec: dict[str, Any], figures: list[Figure
     curves(grid(spec, 16), by=("excitation.frequency",), at=(("excitation.amplitude_x", "1 mm"),))
     curves(grid(spec, 16), SPEED, "efficiency", by=("excitation.frequency", "excitation.amplitude_x"))
     one, two = (figure.axes[-1] for figure in figures)
-    assert one.get_ylabel() == "excitation.frequency (Hz)"
+    assert one.get_ylabel() == "Excitation frequency (Hz)"
     assert [text.get_text() for text in one.get_yticklabels()] == [str(frequency) for frequency in range(20, 36)]
-    assert "excitation.amplitude_x = excitation.amplitude_y (m)" in two.get_ylabel()
+    assert "Horizontal amplitude = Vertical amplitude (m)" in two.get_ylabel()
     assert [text.get_text() for text in two.get_yticklabels()][:2] == ["20, 0.001", "21, 0.001"]
 
 
@@ -105,9 +109,8 @@ def test_only_points_in_order_are_joined(spec: dict[str, Any], figures: list[Fig
     zipped = {"combine": "zip", "axes": [loads, {"path": "excitation.frequency", "values": [25, 16, 25, 16]}]}
     curves({**spec, **zipped}, SPEED, "shaft.speed.max")
     curves({**spec, **zipped}, by=("excitation.frequency",))
-    to_and_fro = figures[0].axes[0].lines
+    to_and_fro = [line for axes in figures[0].axes for line in axes.lines]
     assert [line.get_linestyle() for line in to_and_fro] == ["None", "None"]
-    assert len({line.get_marker() for line in to_and_fro}) == 2
     assert [line.get_linestyle() for line in figures[1].axes[0].lines] == ["-", "None"]
 
 
@@ -117,12 +120,13 @@ def test_a_map_ends_where_its_values_end(spec: dict[str, Any], figures: list[Fig
     infos = models.study_results(study)
     for y in ("excitation.frequency", "excitation.amplitude_x"):
         held = at if y == "excitation.frequency" else (("excitation.frequency", "20 Hz"),)
-        maps.draw_map(draw_map(study, infos, "shaft.load", y, SPEED, held, fetch), "A study", "png")
+        made = draw_map(study, infos, "shaft.load", y, SPEED, held, fetch)
+        maps.draw_map(read_map(made, Reading(study.model)), "A study", "png")
     axes, bar = figures[0].axes
     assert axes.collections[0].get_datalim(axes.transData).extents.tolist() == [0.0, 20.0, 1.6, 35.0]
-    assert figures[0].get_suptitle() == "A study\nexcitation.amplitude_x = excitation.amplitude_y = 0.002 m"
-    assert bar.get_ylabel() == "shaft.speed.mean (rad/s)"
-    assert figures[1].axes[0].get_ylabel() == "excitation.amplitude_x = excitation.amplitude_y (m)"
+    assert figures[0].get_suptitle() == "A study\nHorizontal amplitude = Vertical amplitude = 0.002 m"
+    assert bar.get_ylabel() == "Mean shaft speed (rad/s)"
+    assert figures[1].axes[0].get_ylabel() == "Horizontal amplitude = Vertical amplitude (m)"
 
 
 def test_cases_without_a_result_are_grey(spec: dict[str, Any], figures: list[Figure]) -> None:

@@ -84,6 +84,12 @@ def linear() -> Iterator[None]:
 
 
 @pytest.fixture
+def chunk_cases() -> int:
+    """Cases to a chunk; a study has thousands of cases, and two to a chunk would be ten seconds of commits."""
+    return 100
+
+
+@pytest.fixture
 def settings(settings: Settings) -> Settings:
     """Settings of a service whose database has the model's table."""
     create_table(settings, NAME)

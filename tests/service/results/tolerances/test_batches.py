@@ -11,6 +11,9 @@ import pytest
 from scipy.stats import norm
 
 from sprag.service.answers import tolerances as shapes
+from sprag.service.presets import preset_text
+from sprag.service.results.tolerances.conditions import first_condition
+from sprag.service.spec.document import load_spec, parse_spec
 from tests.service.conftest import API
 from tests.service.results.tolerances.conftest import DEVIATION, MEAN, SPEC, finish
 from tests.service.shapes import fits
@@ -47,6 +50,9 @@ def test_ribbons_are_those_of_the_closed_form(service: Service) -> None:
 
 def test_yield_is_that_of_the_closed_form(service: Service) -> None:
     study_id = finish(service, SPEC)
+    for short in ("speed>=90% nominal", "speed >= 90 % of the nominal"):
+        (read,) = service.get(f"/studies/{study_id}/yield", condition=short)["conditions"]
+        assert read["text"] == "speed ≥ 90 % of nominal"
     found = service.get(f"/studies/{study_id}/yield", condition=["speed >= 90 % of nominal", "speed<=65 m"], worst=3)
     fits(shapes.YieldReport, found)
     assert [item["text"] for item in found["conditions"]] == ["speed ≥ 90 % of nominal", "speed ≤ 65 m"]
@@ -139,6 +145,8 @@ def test_correlated_tolerances_have_no_shares(service: Service) -> None:
     # Var = 9 + 4 + 2 * 0.8 * 3 * 2 + 1.
     assert causes["shares"][2]["share"] == pytest.approx(1 / 23.6, abs=0.03)
     assert causes["note"] == "first, second are correlated: they have no shares of their own"
+    page = service.http.get(f"/studies/{study_id}/drives").text
+    assert "The first parameter, the second parameter are correlated: they have no shares of their own." in page
     assert causes["rest"] is None
 
 
@@ -166,9 +174,11 @@ def test_tables_and_pictures_show_the_same(service: Service) -> None:
     assert [float(row["yield"]) for row in rows] == shares
     assert [row["case"] for row in rows[5:6]] == [""]
     single = f"{place}/ribbon?at=load=4&at=grade=2"
-    for address in (ribbon, f"{ribbon}&map=true", yields, f"{yields}&map=true", single):
-        for form, start in (("svg", b"<?xml"), ("png", b"\x89PNG"), ("pdf", b"%PDF")):
-            assert service.http.get(f"{address}&format={form}").content.startswith(start), address
+    forms = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}
+    for form, start in forms.items():
+        assert service.http.get(f"{ribbon}&format={form}").content.startswith(start), form
+    for address in (f"{ribbon}&map=true", yields, f"{yields}&map=true", single):
+        assert service.http.get(f"{address}&format=svg").content.startswith(forms["svg"]), address
     assert service.http.get(f"{ribbon}&map=true&quantile=0.1&quantile=0.9").status_code == 422
 
 
@@ -200,7 +210,7 @@ def test_the_page_shows_ribbon_yield_and_the_worst_drives(service: Service) -> N
     asked = {"x": "load", "by": "grade", "quantile": "10 %; 0.9", "condition": "speed >= 50 m\r\nspeed <= 70 m"}
     text = service.http.get(f"{own}/drives", params=asked).text
     assert "10 %, 90 %" in text
-    assert "Grade = 2" in text
+    assert "The grade parameter = 2" in text
     ribbon = service.http.get(f"{own}/figures/ribbon", params=asked).json()
     fills = [trace for trace in ribbon["data"] if trace.get("fill") == "tonexty"]
     assert [len(trace["y"]) for trace in fills] == [5, 5]
@@ -215,8 +225,16 @@ def test_the_page_shows_ribbon_yield_and_the_worst_drives(service: Service) -> N
     assert '<img src="data:image/svg+xml;base64,' in report.partition("<h2>Drives</h2>")[2]
     both = service.get(f"{own}/yield", condition="speed >= 90 % of nominal")["lines"]
     for line in both:
-        told = f"grade = {line['by']['grade']:g}: {100 * line['all']['value']:.1f} % of 128 drives"
-        assert told in report
+        place = f"The grade parameter = {line['by']['grade']:g} m: "
+        assert f"<li>{place}<strong>" in text
+        assert f"{place}{100 * line['all']['value']:.1f} % of 128 drives" in report
     assert service.http.get(f"{API}{own}/report", params={"format": "pdf"}).content.startswith(b"%PDF")
     plain = service.submit({key: value for key, value in SPEC.items() if key not in ("tolerances", "drives", "seed")})
     assert service.http.get(f"/studies/{plain}/drives").status_code == 303
+
+
+def test_a_page_begins_with_the_side_of_the_nominal_drive_that_is_worse() -> None:
+    shaft = parse_spec(load_spec(preset_text("press")[1], "toml")).study
+    drive = parse_spec(load_spec(preset_text("one_pendulum")[1], "json")).study
+    assert first_condition(shaft, "irregularity") == "irregularity <= 110 % of nominal"
+    assert first_condition(drive, "efficiency") == "efficiency >= 90 % of nominal"

@@ -1,0 +1,149 @@
+"""Every input of a study as its page and report show it: parameters by part, choices, settings of the run."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final
+
+from sprag.service.languages import ENGLISH, N_, _, current, decimal, gettext, grouped, ngettext
+from sprag.service.results.exports.inputs import inputs as every_input
+from sprag.service.results.exports.inputs import run_inputs
+from sprag.service.results.phrases import lower_first
+from sprag.service.results.wording import number, unit_text, words
+from sprag.service.spec.catalogue import unit_of
+from sprag.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN
+from sprag.worker.models.parameters import parameter_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sprag.service.results.exports.inputs import Input
+    from sprag.service.results.reading import Reading
+    from sprag.worker.study import Study
+
+_RUN: Final = {entry.name: entry for entry in (*SETTLED_RUN.values(), DURATION, *ANY_RUN.values())}
+#: What parts of a machine are called that have a number.
+_NUMBERED: Final = {
+    "pendulums": N_("Pendulum {number}"), "parts": N_("Part {number}"), "stages": N_("Stage {number}"),
+    "steps": N_("Step {number}"),
+}  # fmt: skip
+_NUMBER: Final = re.compile(rf"({'|'.join(_NUMBERED)})\.(\d+)\.")
+_COUNT: Final = re.compile(r"(\d+) (period|revolution)s?")
+
+
+def inputs(study: Study, spec: Mapping[str, Any]) -> list[tuple[str, list[dict[str, Any]]]]:
+    """Every parameter of the base by section, with letter, value, unit and origin."""
+    sections: dict[str, list[dict[str, Any]]] = {}
+    for item in every_input(study, spec):
+        entry = parameter_of(study, item.path)
+        section, _dot, name = item.path.rpartition(".")
+        symbol = f"c_{int(name) + 1}" if name.isdigit() else "" if entry is None else entry.symbol
+        shown = item if item.origin == "derived" else replace(item, value=in_words(item))
+        sections.setdefault(section, []).append({"name": name, "symbol": symbol, "item": shown})
+    return [(_section(section), rows) for section, rows in sections.items()]
+
+
+def _section(path: str) -> str:
+    """What a part of a machine is called: ``Pendulum 0, clutch``."""
+    if not path:
+        return _("in general")
+    names: list[str] = []
+    for name in path.split("."):
+        if name.isdigit():
+            text = _NUMBERED.get(names.pop(), N_("No. {number}"))
+            names.append(_(text, number=name))
+        else:
+            names.append(name)
+    said = [gettext(words(name)) if name.islower() else name for name in names]
+    return ", ".join([said[0], *map(lower_first, said[1:])])
+
+
+def choice_name(item: Input) -> str:
+    """What a choice of the machine is called: ``How the resistance is given, part 0``."""
+    text = _(item.description) if item.description else _(words(item.path))
+    text = text[:1].upper() + text[1:]
+    numbered = _NUMBER.match(item.path)
+    return f"{text}, {lower_first(_(_NUMBERED[numbered[1]], number=numbered[2]))}" if numbered else text
+
+
+def in_words(item: Input) -> float | str | None:
+    """The value of an input: a choice in words, a count with its unit, a number as it is."""
+    if not isinstance(item.value, str) or current() == ENGLISH:
+        return item.value
+    if _COUNT.fullmatch(item.value):
+        return _counted(item.value)
+    parts = item.value.split(", ")
+    return ", ".join(gettext(part) if " " in part or part == "none" else _in_words(part) for part in parts)
+
+
+def _in_words(name: str) -> str:
+    return lower_first(gettext(words(name))) if re.fullmatch("[a-z_]+", name) else name
+
+
+def _counted(text: str) -> str:
+    """``60 periods``, ``1 revolution``; any other text as it is."""
+    found = _COUNT.fullmatch(text)
+    if found is None:
+        return text
+    count = int(found[1])
+    if found[2] == "period":
+        return ngettext("{n} period", "{n} periods", count, n=grouped(count))
+    return ngettext("{n} revolution", "{n} revolutions", count, n=grouped(count))
+
+
+def run_settings(study: Study, spec: Mapping[str, Any], reading: Reading) -> list[tuple[str, str, Input]]:
+    """The settings of the run: what each is called, its value as ``reading`` says, and the setting."""
+    found = []
+    for item in run_inputs(study, spec):
+        entry = _RUN.get(item.path)
+        value = str(item.value)
+        known = {} if entry is None else dict(entry.choices)
+        text = _(known[value]) if value in known else _run_value(study, item, reading)
+        label = (
+            _("evaluated window") if item.path == "window" else _(words(item.path) if entry is None else entry.label)
+        )
+        found.append((label, text, item))
+    return found
+
+
+def _run_value(study: Study, item: Input, reading: Reading) -> str:
+    """The value of a setting of the run that is not a choice."""
+    value = study.run[item.path]
+    if value is None:  # the window
+        return gettext(str(item.value))
+    if isinstance(value, Mapping):
+        ranges = [_range(study, path, ends, reading) for path, ends in value["ranges"].items()]
+        return _("{count}, seed {seed}: {ranges}", count=grouped(value["count"]), seed=value["seed"],
+                 ranges="; ".join(ranges))  # fmt: skip
+    if isinstance(value, list | tuple):
+        return _time(*value) if isinstance(value[-1], str) else _window(*value)
+    return _counted(decimal(str(item.value)))
+
+
+def _range(study: Study, path: str, ends: Sequence[float], reading: Reading) -> str:
+    """What a start value is called, and its range: ``Initial speed of the shaft 0 to 30 rad/s``."""
+    unit = unit_of(study, path)
+    said = _("{low} to {high}", low=number(reading.value(ends[0], unit)), high=reading.quantity(ends[1], unit))
+    return f"{reading.caption(path)} {said}"
+
+
+def _window(start: tuple[float, str], end: tuple[float, str]) -> str:
+    """From a time of the run to another: ``40 to 60 periods``."""
+    if start[1] != end[1]:
+        return _("{low} to {high}", low=_time(*start), high=_time(*end))
+    first, last = (decimal(f"{time:g}") for time, _unit in (start, end))
+    if end[1] == "periods":
+        return _("{low} to {high} periods", low=first, high=last)
+    return _("{low} to {high}", low=first, high=_time(*end))
+
+
+def _time(value: float, unit: str) -> str:
+    """A time of the run: ``60 periods``, ``2.5 s``."""
+    text = decimal(f"{value:g}")
+    if unit == "periods":
+        return ngettext("{n} period", "{n} periods", value, n=text)
+    if unit == "revolutions":
+        return ngettext("{n} revolution", "{n} revolutions", value, n=text)
+    return f"{text} {unit_text(unit)}"

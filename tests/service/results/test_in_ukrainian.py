@@ -1,0 +1,131 @@
+"""Phrases, captions, figures, faults and warnings in the reader's language; programs read English."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sprag.engine import Ending
+from sprag.service import languages
+from sprag.service.faults import Fault
+from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.languages.elsewhere import speak
+from sprag.service.languages.ranges import allowed_text
+from sprag.service.results.fault_texts import fault_text, warning_text
+from sprag.service.results.figures.figure import Figure, Line, Note, Panel, Quantity
+from sprag.service.results.figures.orders import motion_text
+from sprag.service.results.figures.read import read_figure
+from sprag.service.results.phrases import Amount, Phrase, joined, part_label, plural, shown, term, titled
+from sprag.service.results.pictures.curves import draw_figure
+from sprag.service.results.reading import CODES, Reading
+from sprag.service.results.wording import unit_text
+from sprag.worker.models import WarningText
+
+DRIVE, SHAFT = Reading("vibration-drive"), Reading("machine-shaft")
+
+
+def test_a_phrase_is_english_until_it_is_said_in_another_language() -> None:
+    phrase = plural("{count} jump, within {width}", "{count} jumps, each within {width}", 3, width=Amount(0.25, "N*m"))
+    with languages.language("uk"):
+        assert phrase == "3 jumps, each within 0.25 N·m"
+        assert phrase.said(DRIVE) == "3 стрибки, кожен у межах 0,25 Н·м"
+        assert pickle.loads(pickle.dumps(phrase)).said(DRIVE) == phrase.said(DRIVE)
+        assert Phrase("no case at {x}", x=Amount(1.5, "rad/s")).said(DRIVE) == "немає випадку при 1,5 рад/с"
+        assert joined("; ", (term("not_settled"), Phrase("± {width} (95 %)", width=Amount(0.5, "W")))).said(DRIVE) == (
+            "не усталено; ± 0,5 Вт (95 %)"
+        )
+    assert phrase.said(DRIVE) == phrase
+
+
+@pytest.mark.parametrize(("count", "text"), [(1, "1 привод"), (3, "3 приводи"), (11, "11 приводів")])
+def test_ukrainian_has_three_forms_of_a_number(count: int, text: str) -> None:
+    with languages.language("uk"):
+        assert shown(plural("{count} drive", "{count} drives", count)) == text
+
+
+def test_braces_of_other_texts_are_no_places() -> None:
+    assert Phrase("{name} fit".replace("fit", "law"), name="a {b}") == "a {b} law"
+    assert shown(part_label("{odd}")) == "{odd}"
+
+
+def test_captions_are_made_of_translated_parts() -> None:
+    with languages.language("uk"):
+        assert DRIVE.caption("pendulums.1.spring_rate") == "Жорсткість пружини, маятник 1"
+        assert DRIVE.caption("torque.mean.half_width") == "Середній момент муфт, півширина"
+        assert SHAFT.caption("omega.harmonics.3") == "Гармоніка 3 швидкості"
+        assert DRIVE.within("shaft.load") == "момент навантаження"
+        assert DRIVE.title("shaft.load", "N*m") == "Момент навантаження (Н·м)"
+        assert replace(DRIVE, names=CODES).caption("shaft.load") == "shaft.load"
+    assert DRIVE.caption("pendulums.1.spring_rate") == "Spring rate, pendulum 1"
+
+
+def test_words_of_codes_and_units() -> None:
+    with languages.language("uk"):
+        assert titled("take_up") == "Вибирання люфту"
+        assert motion_text("2 periods") == "2 періоди"
+        assert motion_text("irregular") == "нерегулярний"
+        assert shown(part_label("Pendulum 0")) == "Маятник 0"
+        assert [unit_text(unit) for unit in ("kg*m^2", "rad^2/s^2", "rpm", "N*m*s/rad", "1")] == [
+            "кг·м²", "рад²/с²", "об/хв", "Н·м·с/рад", ""
+        ]  # fmt: skip
+
+
+def test_figures_are_read_in_the_language_for_both_painters() -> None:
+    x = np.array([0.0, 0.5, 1.0])
+    line = Line("", x, x, "#0072b2", cases=np.arange(3), key="0")
+    panel = Panel(Quantity("power.useful.mean", "W"), (line,), notes=(Note(0.5, 0.5, "#0072b2", "largest", key="0"),))
+    figure = Figure(Quantity("shaft.load", "N*m"), (panel,), note="")
+    english = draw_figure(read_figure(figure, DRIVE), "", "svg")
+    with languages.language("uk"):
+        drawn = plotly_figure(read_figure(figure, DRIVE))
+        assert drawn["layout"]["xaxis"]["title"]["text"] == "Момент навантаження (Н·м)"
+        assert drawn["layout"]["yaxis"]["title"]["text"] == "Середня корисна потужність (Вт)"
+        assert drawn["layout"]["separators"][0] == ","
+        assert {trace["name"] for trace in drawn["data"]} >= {"найбільше на своїй кривій"}
+        assert "випадок %{customdata}" in drawn["data"][0]["hovertemplate"]
+        assert draw_figure(read_figure(figure, DRIVE), "", "svg") != english
+    assert "separators" not in plotly_figure(read_figure(figure, DRIVE))["layout"]
+
+
+def test_every_ending_has_a_sentence_of_its_own() -> None:
+    with languages.language("uk"):
+        said = [languages.gettext(ending.sentence) for ending in Ending]
+    assert len(set(said)) == len(said)
+    assert not {ending.sentence for ending in Ending} & set(said)
+
+
+def test_a_fault_is_the_meaning_of_its_code_with_value_and_range() -> None:
+    fault = Fault("/base/shaft/load", "out-of-range", "is too small", -1.0, ">= 0", "N*m")
+    with languages.language("uk"):
+        assert fault_text(fault) == "Значення поза дозволеними межами"
+        assert allowed_text("0.05 to 1.5 m") == "від 0,05 до 1,5 m"
+        assert allowed_text("1 to 100 characters") == "від 1 до 100 знаків"
+        assert allowed_text("1 to 100,000") == "від 1 до 100\N{NARROW NO-BREAK SPACE}000"
+        assert allowed_text("1 to 2,000 characters") == "від 1 до 2\N{NARROW NO-BREAK SPACE}000 знаків"
+        assert allowed_text("at most 64 axes") == "щонайбільше 64 axes"
+        assert allowed_text("each path on one axis") == "кожен шлях на одній осі"
+        assert allowed_text("grid, zip") == "grid, zip"
+        assert allowed_text(None) == ""
+    assert fault_text(fault) == "is too small"
+    assert allowed_text("0.05 to 1.5 m") == "0.05 to 1.5 m"
+
+
+def test_a_warning_has_its_place_and_its_numbers() -> None:
+    text = "/axes/0 (excitation.frequency): 5e+03 Hz is more than 1000 Hz; was it in rpm? (in 3 of 12 cases)"
+    warning = WarningText(text, "implausible-value")
+    with languages.language("uk"):
+        said = warning_text(warning)
+        assert said.startswith("/axes/0 (excitation.frequency): Значення далеко поза тим")
+        assert said.endswith("(5e+03 Гц; 1000 Гц; у 3 з 12 випадків)")
+        assert warning_text("stored by an earlier version") == "stored by an earlier version"
+    assert warning_text(warning) == text
+
+
+def test_another_process_gets_the_language_of_the_task() -> None:
+    with languages.language("uk"):
+        given = languages.current()
+    assert speak(given, titled, "held") == "Утримується"
+    assert languages.current() == languages.ENGLISH

@@ -1,0 +1,216 @@
+"""Units and captions: every painter shows one number in one unit, that of a conversion by hand."""
+
+from __future__ import annotations
+
+import io
+import math
+import pickle
+import re
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+
+from sprag.service.http.web.figures.maps import map_figure
+from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.results.curve_cases import draw, draw_map, select
+from sprag.service.results.curves import CurveQuery
+from sprag.service.results.exports import read_table
+from sprag.service.results.figures.curves import curves_figure
+from sprag.service.results.figures.read import read_figure, read_map
+from sprag.service.results.phrases import Amount, Name, Phrase
+from sprag.service.results.pictures.curves import paint_figure, painting
+from sprag.service.results.quantities import KINDS, UNITS_PATTERN, Units, read_units, typed_units, units_for
+from sprag.service.results.reading import CODES, Choice, Reading, reading_for
+from sprag.service.results.selection import SelectionError
+from sprag.service.results.wording import unit_text
+from sprag.service.spec.document import parse_spec
+from sprag.service.storage.records import CaseColumns
+from sprag.worker import models
+from sprag.worker.models.vocabulary import caption
+from tests.service.spec_sample import changed
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from sprag.worker.study import Study
+    from tests.service.conftest import Service
+
+#: Each unit in SI, by hand.
+BY_HAND = {
+    "deg": math.pi / 180.0, "rpm": 2.0 * math.pi / 60.0, "deg/s": math.pi / 180.0, "deg/s^2": math.pi / 180.0,
+    "ms": 1e-3, "min": 60.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "mm/s": 1e-3, "mm/s^2": 1e-3, "g0": 9.80665,
+    "mm^2": 1e-6, "cm^2": 1e-4, "g": 1e-3, "t": 1e3, "lb": 0.45359237, "g/cm^3": 1e3, "kg*cm^2": 1e-4,
+    "kg*mm^2": 1e-6, "g*cm^2": 1e-7, "kN": 1e3, "lbf": 4.4482216152605, "N*mm": 1e-3, "N*cm": 1e-2, "kN*m": 1e3,
+    "lbf*ft": 1.3558179483314, "lbf*in": 0.11298482902762, "mJ": 1e-3, "kJ": 1e3, "mW": 1e-3, "kW": 1e3, "kPa": 1e3,
+    "MPa": 1e6, "bar": 1e5, "N/mm": 1e3, "kN/m": 1e3, "N*mm*s/rad": 1e-3,
+}  # fmt: skip
+LOADS = [0.0, 0.2, 0.4]
+AXES = [
+    {"path": "shaft.load", "values": LOADS},
+    {"path": "excitation.frequency", "values": ["1200 rpm", "1500 rpm"]},
+]
+SPEED = "shaft.speed.mean"
+CHOICE = Choice("speed=rpm,torque=N*mm,frequency=rpm,power=mW")
+
+
+def study_of() -> tuple[Study, dict[str, Any]]:
+    spec = changed({"/axes": AXES})
+    return parse_spec(spec).study, spec
+
+
+def fetch(cases: NDArray[np.int64], names: Sequence[str]) -> CaseColumns:
+    """Speeds of 10 rad/s and more."""
+    values = {name: 10.0 + cases.astype(np.float64) for name in names}
+    return CaseColumns(cases, ["ok"] * cases.size, values, [""] * cases.size)
+
+
+def reading(choice: Choice = CHOICE) -> Reading:
+    return reading_for(*study_of(), choice)
+
+
+def test_every_offered_unit_is_that_of_a_conversion_by_hand() -> None:
+    for kind in KINDS:
+        assert Units().value(3.0, kind.unit) == 3.0
+        for unit in kind.others:
+            one = 1.0 / 60.0 if (kind.name, unit) == ("frequency", "rpm") else BY_HAND[unit]
+            units = Units({kind.unit: unit})
+            assert units.unit(kind.unit) == unit
+            assert units.value(3.0, kind.unit) == pytest.approx(3.0 / one, rel=1e-13)
+            assert units.values(np.array([3.0]), kind.unit)[0] == units.value(3.0, kind.unit)
+
+
+def test_both_painters_and_the_table_show_one_number_in_one_unit() -> None:
+    from matplotlib.figure import Figure
+
+    study, spec = study_of()
+    infos = models.study_results(study)
+    curves = draw(select(study, infos, CurveQuery("shaft.load", (SPEED,), ("excitation.frequency",))), fetch)
+    read = reading_for(study, spec, CHOICE)
+    figure = read_figure(curves_figure([("", curves)]), read)
+    page, picture = plotly_figure(figure), Figure()
+    with painting():
+        paint_figure(picture, figure, "")
+    wanted = [(10.0 + case) * 60.0 / (2.0 * math.pi) for case in (0, 2, 4)]
+    trace = next(trace for trace in page["data"] if trace["name"] == "1200")
+    axes = picture.axes[0]
+    np.testing.assert_allclose(trace["y"], wanted, rtol=1e-13)
+    np.testing.assert_allclose(np.asarray(axes.lines[0].get_ydata(), dtype=float), wanted, rtol=1e-13)
+    np.testing.assert_allclose(trace["x"], [1e3 * load for load in LOADS], rtol=1e-13)
+    titles = ("Load torque (N·mm)", "Mean shaft speed (rpm)")
+    assert (page["layout"]["xaxis"]["title"]["text"], page["layout"]["yaxis"]["title"]["text"]) == titles
+    assert (axes.get_xlabel(), axes.get_ylabel()) == titles
+    table = read_table(
+        {"shaft.load": LOADS, SPEED: [10.0, 12.0, None]}, {"shaft.load": "N*m", SPEED: "rad/s"}, read.units
+    ).decode()
+    head, first, *_, last = table.splitlines()
+    assert head == "shaft.load [N*mm],shaft.speed.mean [rpm]"
+    assert [float(cell) for cell in first.split(",")] == pytest.approx([0.0, wanted[0]], rel=1e-13)
+    assert last == "400.0,"
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet", "xlsx"])
+def test_files_of_all_rows_have_the_chosen_units(service: Service, form: str) -> None:
+    study_id = service.submit()
+    rows = service.fill(study_id)
+    names = [info.name for info in models.study_results(service.store.study(study_id))]
+    wanted = rows.values[:, names.index(SPEED)] * 30.0 / math.pi
+    path = f"/api/v1/studies/{study_id}/results"
+    answer = service.http.get(path, params={"format": form, "units": "rpm,torque=N*mm"})
+    loads = service.store.study(study_id).columns(range(9))["shaft.load"]
+    if form == "csv":
+        table = pd.read_csv(io.BytesIO(answer.content))
+        speed, load = f"{SPEED} [rpm]", "shaft.load [N*mm]"
+    elif form == "parquet":
+        table = pd.read_parquet(io.BytesIO(answer.content))
+        speed, load = SPEED, "shaft.load"
+        field = pq.read_schema(io.BytesIO(answer.content)).field(SPEED)
+        assert field.metadata[b"unit"] == b"rpm"
+    else:
+        table = pd.read_excel(io.BytesIO(answer.content), header=1)
+        speed, load = SPEED, "shaft.load"
+        units = dict(zip(table, pd.read_excel(io.BytesIO(answer.content), header=None, nrows=1).iloc[0], strict=True))
+        assert (units[SPEED], units["shaft.load"]) == ("rpm", "N*mm")
+    np.testing.assert_allclose(table[speed], wanted, rtol=1e-13)
+    np.testing.assert_allclose(table[load], loads * 1e3, rtol=1e-13)
+    refused = service.http.get(path, params={"format": "netcdf", "units": "rpm"})
+    assert refused.json()["errors"][0]["code"] == "not-used"
+
+
+def test_a_map_has_the_units_of_curves() -> None:
+    study, spec = study_of()
+    drawn = draw_map(study, models.study_results(study), "shaft.load", "excitation.frequency", SPEED, (), fetch)
+    page = map_figure(read_map(drawn, reading_for(study, spec, CHOICE)), contour=False)
+    np.testing.assert_allclose(page["data"][0]["y"], [1200.0, 1500.0], rtol=1e-13)
+    np.testing.assert_allclose(page["data"][0]["z"][0][0], 10.0 * 30.0 / math.pi, rtol=1e-13)
+    assert page["layout"]["yaxis"]["title"]["text"] == "Excitation frequency (rpm)"
+    assert page["data"][0]["colorbar"]["title"]["text"] == "Mean shaft speed (rpm)"
+
+
+def test_units_are_as_typed_unless_others_are_chosen() -> None:
+    study, spec = study_of()
+    typed = typed_units(study, spec)
+    assert (typed["Hz"], typed["m"]) == ("rpm", "mm")
+    assert units_for(study, spec, "si").chosen == {}
+    assert units_for(study, spec, "typed").unit("Hz") == "rpm"
+    mixed = units_for(study, spec, "typed, frequency=Hz, speed=rpm")
+    assert (mixed.unit("Hz"), mixed.unit("rad/s"), mixed.unit("m")) == ("Hz", "rpm", "mm")
+
+
+def test_a_bare_unit_is_of_the_first_kind_that_has_it() -> None:
+    assert read_units("rpm, mm, N·mm") == (False, {"rad/s": "rpm", "m": "mm", "N*m": "N*mm"})
+    assert read_units("typed") == (True, {})
+    assert read_units(reading().units.text) == (False, {"rad/s": "rpm", "N*m": "N*mm", "Hz": "rpm", "W": "mW"})
+
+
+@pytest.mark.parametrize("text", ["furlong", "speed=mm", "pace=rpm", "rpm;mm", "x" * 500])
+def test_unknown_units_are_refused(text: str) -> None:
+    with pytest.raises(SelectionError) as caught:
+        read_units(text)
+    (fault,) = caught.value.faults
+    assert (fault.where, bool(fault.allowed)) == ("units", True)
+    assert not re.search(UNITS_PATTERN, text)
+
+
+def test_the_documented_pattern_has_every_offered_choice() -> None:
+    units = [unit for kind in KINDS for unit in (kind.unit, *kind.others)]
+    pairs = [f"{kind.name}={unit}" for kind in KINDS for unit in (kind.unit, *kind.others)]
+    for text in ("", "si", "typed", "typed,rpm", *units, *pairs, ",".join(pairs[:12])):
+        read_units(text)
+        assert re.search(UNITS_PATTERN, text), text
+
+
+def test_phrases_are_said_in_the_words_and_units_of_the_reader() -> None:
+    load, power = Amount(0.2, "N*m"), Phrase("{value}", value=Amount(1.0, "W"))
+    phrase = Phrase("At {name} = {load}, {power}", name=Name("shaft.load", within=True), load=load, power=power)
+    assert phrase == "At shaft.load = 0.2 N·m, 1 W"
+    assert phrase.said(reading()) == "At load torque = 200 N·mm, 1000 mW"
+    assert pickle.loads(pickle.dumps(phrase)).said(reading()) == phrase.said(reading())
+    assert phrase.said(reading(Choice("si", CODES))) == phrase
+
+
+def test_a_bare_number_that_is_typed_beside_a_unit_has_it() -> None:
+    assert reading().typed("300", "N*m") == "300 N*mm"
+    assert reading().typed("0.3 N*m", "N*m") == "0.3 N*m"
+    assert Reading("vibration-drive").typed("300", "N*m") == "300"
+
+
+def test_every_parameter_and_result_has_a_caption_of_its_own() -> None:
+    for model in models.model_names():
+        names = [entry.path for entry in models.parameter_catalogue(model)]
+        names += [info.name for info in models.result_catalogue(model)]
+        names = [name.replace(".N", ".0").replace(".K", ".0") for name in names if "NAME" not in name]
+        captions = {name: caption(model, name) for name in names}
+        for name, text in captions.items():
+            assert not set("._") & set(text), (name, text)
+            assert text[0].isupper(), (name, text)
+        results = [captions[info.name.replace(".N", ".0")] for info in models.result_catalogue(model)]
+        assert len(results) == len(set(results))
+
+
+def test_texts_for_units_can_be_typeset() -> None:
+    assert {unit_text(unit) for kind in KINDS for unit in kind.others} >= {"N·mm", "kg·cm²", "deg/s²"}
