@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         Study,
         StudyTimeoutError,
         UnreachableError,
+        with_units,
     )
     from sprag.service.extras import MissingExtraError
 
@@ -43,6 +44,7 @@ _OF_CLIENT: Final = (
     "Study",
     "StudyTimeoutError",
     "UnreachableError",
+    "with_units",
 )
 __all__ = [
     "AsyncClient",
@@ -60,6 +62,7 @@ __all__ = [
     "engine",
     "run",
     "simulate",
+    "with_units",
 ]
 
 

@@ -3,32 +3,53 @@
     from sprag.service.client import Client
 
     with Client() as sprag:
-        study = sprag.submit("study.json").wait(progress=True)
+        study = sprag.submit("study.json").wait()
         table = study.table()
         curves = study.curves("shaft.load", "shaft.speed.mean", by="excitation.frequency").to_xarray()
 
 `AsyncClient` has the same methods as coroutines. `UnreachableError` means that no service answered at the address;
-`RefusedError` carries the service's problem document. pandas and xarray are loaded only when they are used.
+`RefusedError` carries the service's problem document. pandas, polars and xarray are loaded only when they are used.
 """
 
-from sprag.service.client.aio import AsyncClient, AsyncStudy
-from sprag.service.client.errors import RefusedError, ServiceError, SpecFileError, StudyTimeoutError, UnreachableError
+from sprag.service.client.asynchronous.client import AsyncClient
+from sprag.service.client.asynchronous.study import AsyncStudy
+from sprag.service.client.comparison import Comparison
+from sprag.service.client.errors import (
+    AmbiguousError,
+    RefusedError,
+    ServiceError,
+    SpecFileError,
+    StudyTimeoutError,
+    UnreachableError,
+    UntrustedError,
+)
+from sprag.service.client.events import StudyEvent
 from sprag.service.client.frames import Curves
+from sprag.service.client.motions import Engagements, Motion
 from sprag.service.client.plain import ServiceClient
-from sprag.service.client.study import Client, Study
+from sprag.service.client.synchronous.client import Client
+from sprag.service.client.synchronous.study import Study
+from sprag.service.client.tabular import with_units
 from sprag.service.client.wire import Query
 
 __all__ = [
+    "AmbiguousError",
     "AsyncClient",
     "AsyncStudy",
     "Client",
+    "Comparison",
     "Curves",
+    "Engagements",
+    "Motion",
     "Query",
     "RefusedError",
     "ServiceClient",
     "ServiceError",
     "SpecFileError",
     "Study",
+    "StudyEvent",
     "StudyTimeoutError",
     "UnreachableError",
+    "UntrustedError",
+    "with_units",
 ]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, cast, get_args
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, cast, get_args
 
 from sprag.service.faults import Code, Fault, FaultError, Kind, ParameterFault
 
@@ -26,6 +26,26 @@ class UnreachableError(ServiceError):
         super().__init__("unreachable", f"{address}: {reason}")
         self.address = address
         self.reason = reason
+
+
+#: Most studies that a message lists.
+_LISTED: Final = 5
+
+
+class AmbiguousError(ServiceError, ValueError):
+    """A text fits several studies; the fault lists them."""
+
+    def __init__(self, text: str, fits: Sequence[str]) -> None:
+        more = f" and {len(fits) - _LISTED} more" if len(fits) > _LISTED else ""
+        fault = Fault("ID", "ambiguous", "fits several studies", text, ", ".join(fits[:_LISTED]) + more)
+        super().__init__("invalid-parameter", str(fault), [fault])
+
+
+class UntrustedError(UnreachableError):
+    """The certificate of the service is not trusted."""
+
+    def __init__(self, address: str, why: str) -> None:
+        super().__init__(address, f"its certificate is not trusted: {why}")
 
 
 class RefusedError(ServiceError):
@@ -62,8 +82,8 @@ def _fault(error: Mapping[str, Any]) -> Fault:
     code = cast("Code", error["code"] if error.get("code") in get_args(Code) else "invalid-text")
     made = ParameterFault if error.get("parameter") is not None else Fault
     where = error.get("parameter", error.get("pointer"))
-    told = (str(error.get("message", "is wrong")), error.get("value"), error.get("allowed"), error.get("unit"))
-    return made(where, code, *told)
+    parts = (str(error.get("message", "is wrong")), error.get("value"), error.get("allowed"), error.get("unit"))
+    return made(where, code, *parts)
 
 
 class StudyTimeoutError(ServiceError):

@@ -6,14 +6,20 @@ import io
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.service.client.tabular import Tabular
 from sprag.service.extras import naming_extra
+from sprag.service.formats import NAME_ATTRIBUTE
 from sprag.worker.codes import ENDING_CODES, PENDING, REGIME_CODES
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pandas as pd
+    import polars as pl
     import xarray as xr
 
-    from sprag.service.answers.results import CurvesData
+    from sprag.service.answers.results import CaseDetail, CurvesData
+    from sprag.service.client.sketch import Line
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +35,8 @@ class _Coded:
         """The numbers of the names of a column; raises ValueError for an unknown name."""
         names = column.where(column.notna(), self.missing)
         if unknown := set(names) - set(self.codes):
-            told = f"the {column.name} {min(unknown)!r} is unknown to this version of the client"
-            raise ValueError(f"{told}; see `to_pandas`")
+            text = f"the {column.name} {min(unknown)!r} is unknown to this version of the client"
+            raise ValueError(f"{text}; see `to_pandas`")
         return names.map(self.codes)
 
     @property
@@ -51,7 +57,7 @@ _ORDER_MEANING: Final = "excitation periods after which the motion repeats itsel
 
 
 @dataclass(frozen=True, slots=True)
-class Curves:
+class Curves(Tabular):
     """Curves of results against one axis; ``data`` is the answer of the service. SI units."""
 
     data: CurvesData
@@ -123,20 +129,58 @@ class Curves:
         grid["case"].attrs = {"units": "1", "long_name": "number of the case"}
         return grid.set_coords("case")
 
+    def _lines(self) -> tuple[str, str, list[Line]]:
+        x, (name, info) = self.data["x"], next(iter(self.data["results"].items()))
+        lines: list[Line] = [(curve["x"], curve["y"][name]) for curve in self.data["curves"]]
+        return f"{x['path']} in {x['unit']}", f"{name} in {info['unit']}", lines
+
 
 def table_of(parquet: bytes) -> pd.DataFrame:
-    """All rows of a study, from its Parquet file."""
+    """All rows of a study, from its Parquet file, whose metadata have the units."""
     with naming_extra("a table", "tables"):
         import pandas as pd
-        import pyarrow  # noqa: F401 - pandas uses it
+        import pyarrow as pa
+        import pyarrow.parquet as pq
 
-    return pd.read_parquet(io.BytesIO(parquet))
+    file = pq.ParquetFile(pa.BufferReader(parquet))
+    fields = [(field.name, (field.metadata or {}).get(b"unit")) for field in file.schema_arrow]
+    table = pd.read_parquet(io.BytesIO(parquet))
+    table.attrs["units"] = {name: unit.decode() for name, unit in fields if unit is not None}
+    table.attrs["endings"] = {str(name): int(count) for name, count in table["ending"].value_counts().items()}
+    return table
+
+
+def beside(cases: Sequence[CaseDetail]) -> pd.DataFrame:
+    """Cases as columns, by their numbers, after the units; a row for each parameter, the ending, and each result."""
+    with naming_extra("side_by_side", "tables"):
+        import pandas as pd
+
+    rows = [{**case["parameters"], "ending": case["ending"], **case["results"]} for case in cases]
+    table = pd.DataFrame(
+        {"unit": cases[0]["units"] if cases else {}}, index=list(rows[0]) if rows else [], dtype=object
+    )
+    for case, row in zip(cases, rows, strict=True):
+        table[case["case"]] = pd.Series(row, dtype=object)
+    return table
+
+
+def polars_of(parquet: bytes) -> pl.DataFrame:
+    """All rows of a study as a polars table, from its Parquet file."""
+    with naming_extra("a polars table", "frames"):
+        import polars as pl
+
+    return pl.read_parquet(io.BytesIO(parquet))
 
 
 def grid_of(netcdf: bytes) -> xr.Dataset:
-    """All rows of a study as a labelled grid, from its NetCDF file."""
+    """All rows of a study as a labelled grid, from its NetCDF file; names are those of all other tables."""
     with naming_extra("a grid", "tables"):
         import h5netcdf  # noqa: F401 - xarray uses it
         import xarray as xr
 
-    return xr.load_dataset(io.BytesIO(netcdf), engine="h5netcdf")
+    grid = xr.load_dataset(io.BytesIO(netcdf), engine="h5netcdf")
+    for variable in grid.variables.values():
+        variable.encoding.pop(
+            "coordinates", None
+        )  # names of the file; xarray finds those of the grid when it writes it
+    return grid.rename({name: variable.attrs.pop(NAME_ATTRIBUTE, name) for name, variable in grid.variables.items()})

@@ -1,31 +1,21 @@
-"""Query parameters of a client's requests, and helpers for waiting."""
+"""Query parameters and bodies of a client's requests."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from sprag.service.client.errors import SpecFileError
 
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from sprag.service.answers.studies import StudyDetail
-
 Value = float | int | str
 Ends = tuple[Value, Value]
 Spec = Mapping[str, Any]
-
-
-class Progressing(Protocol):
-    """Called with a study from time to time."""
-
-    def __call__(self, study: StudyDetail, /) -> None:
-        """Receive the current study."""
 
 
 def spec_of(spec: Spec | str | PathLike[str]) -> Spec:
@@ -122,6 +112,19 @@ def case_query(ending: str | None, regime: str | None, flag: str | None) -> list
     return [(name, value) for name, value in given if value is not None]
 
 
+def cases_query(
+    ending: str | None,
+    regime: str | None,
+    flag: str | None,
+    where: str | Sequence[str],
+    at: Mapping[str, Value] | None,
+    sort: str | None,
+) -> list[tuple[str, str]]:
+    """Query of a list of cases; None leaves a parameter to the service."""
+    query = [*case_query(ending, regime, flag), *(("where", text) for text in _listed(where))]
+    return [*query, *(("at", f"{path}={value}") for path, value in (at or {}).items()), *given({"sort": sort})]
+
+
 def longer_query(regime: str | None, at_most: int | None) -> list[tuple[str, str]]:
     """Query of a longer study; None leaves a parameter to the service."""
     given = (("regime", regime), ("at_most", at_most))
@@ -196,26 +199,3 @@ def form_of(path: Path) -> str:
 
 def _listed(names: str | Sequence[str]) -> list[str]:
     return [names] if isinstance(names, str) else list(names)
-
-
-@contextmanager
-def reporting(progress: bool | Progressing) -> Iterator[Progressing]:
-    """The receiver of progress: a bar on standard error for True, none for False, otherwise the given function."""
-    if callable(progress):
-        yield progress
-        return
-    if not progress:
-        yield lambda _study: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("study", total=None)
-
-        def update(study: StudyDetail, /) -> None:
-            now = study["progress"]
-            bar.update(task, description=f"{study['id']} {study['state']}", completed=now["done"], total=now["total"])
-
-        yield update

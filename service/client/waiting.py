@@ -9,15 +9,12 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable, Mapping
+from typing import Any, Final
 
 from sprag.service.client.errors import RefusedError, ServiceError, StudyTimeoutError, UnreachableError
 from sprag.service.client.wire import SILENCE
 from sprag.worker.states import TERMINAL
-
-if TYPE_CHECKING:
-    from sprag.service.client.plain import ServiceClient
 
 _LOG = logging.getLogger(__name__)
 
@@ -118,29 +115,3 @@ class Waiting:
     def left(self) -> float | None:
         """Seconds until the timeout, None without one; a hanging poll must not exceed them."""
         return None if self._end is None else self._end - time.monotonic()
-
-
-def wait_for(client: ServiceClient, study_id: str, waiting: Waiting) -> dict[str, Any]:
-    """Wait until a study has ended or reached its deadline; returns its final state."""
-    while True:
-        try:
-            for study in _looks(client, study_id, waiting):
-                if waiting.over(study):
-                    return study
-        except ServiceError as error:
-            waiting.failed(error)
-        time.sleep(waiting.pause())
-
-
-def _looks(client: ServiceClient, study_id: str, waiting: Waiting) -> Iterator[dict[str, Any]]:
-    """The current study, then the study after each event of its stream."""
-    yield client.study(study_id, waiting.left())
-    if not waiting.listens():
-        return
-    waiting.listening()
-    for _ in client.events(study_id):
-        waiting.heard()
-        yield client.study(study_id, waiting.left())
-        if not waiting.listens():
-            return
-    waiting.listened()

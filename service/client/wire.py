@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import ipaddress
 import math
+import ssl
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, Literal
 from urllib.parse import quote
 
 import httpx
 
-from sprag.service.client.errors import RefusedError, ServiceError, UnreachableError
+from sprag.service.client.errors import RefusedError, ServiceError, UnreachableError, UntrustedError
 
 #: Seconds without a byte after which an event stream is abandoned; the service sends one every 15 s.
 SILENCE: Final = 30.0
 API: Final = "/api/v1"
+#: Addresses of the service that do not lie under its API.
+_OUTSIDE: Final = frozenset({"/livez", "/readyz", "/metrics"})
+#: Address of a service when none is given.
+DEFAULT_SERVER: Final = "http://127.0.0.1:8000"
 #: Seconds to wait for an answer; curves of a large study are read from disk first.
 TIMEOUT: Final = httpx.Timeout(60.0, connect=10.0)
 #: Writing a whole study can take minutes before its first byte arrives.
@@ -37,7 +42,22 @@ def connection_options(server: str, token: str | None) -> dict[str, Any]:
         raise ValueError(f"{server!r} is not the address of a service, such as http://127.0.0.1:8000")
     headers = {"Authorization": f"Bearer {token}"} if token else {}
     # A proxy from the environment is never used for this machine itself.
-    return {"base_url": server, "headers": headers, "timeout": TIMEOUT, "trust_env": not is_loopback(url.host)}
+    found = {"base_url": server, "headers": headers, "timeout": TIMEOUT, "trust_env": not is_loopback(url.host)}
+    return found | ({"verify": _trusted()} if url.scheme == "https" else {})
+
+
+def _trusted() -> ssl.SSLContext:
+    """Trust in what httpx trusts, in the authorities of this machine, and in that of ``SSL_CERT_FILE``.
+
+    ValueError where that file, or the folder ``SSL_CERT_DIR``, cannot be read.
+    """
+    try:
+        context = httpx.create_ssl_context()
+        context.load_default_certs()
+    except OSError as error:  # ssl.SSLError is one
+        named = "the certificates that SSL_CERT_FILE or SSL_CERT_DIR names cannot be read"
+        raise ValueError(f"{named}: {error}") from error
+    return context
 
 
 def within(seconds: float | None) -> httpx.Timeout:
@@ -86,29 +106,36 @@ def study_path(study_id: str) -> str:
     return f"/studies/{quote(study_id, safe='')}"
 
 
-def calibration_path(study_id: str) -> str:
-    """The path of what a calibration has found."""
-    return f"{study_path(study_id)}/calibration"
+def address(path: str) -> str:
+    """The address for a path under the API, or of the service's health and metrics."""
+    return path if path in _OUTSIDE else API + path
 
 
-def front_path(study_id: str) -> str:
-    """Address of the designs of a study with a goal."""
-    return f"{study_path(study_id)}/front"
+def model_path(name: str) -> str:
+    """Address of a model under the API."""
+    return f"/models/{quote(name, safe='')}"
 
 
-def answers_path(study_id: str) -> str:
-    """Address of what people ask of a study first."""
-    return f"{study_path(study_id)}/answers"
-
-
-def explore_path(study_id: str) -> str:
-    """Address of the selection of cases of a study."""
-    return f"{study_path(study_id)}/explore"
+def preset_path(name: str) -> str:
+    """Address of a study that comes with the service."""
+    return f"/presets/{quote(name, safe='')}"
 
 
 def case_path(study_id: str, case: int, part: str) -> str:
-    """Address of a case under the API, or of a part of it, such as "/branch"."""
+    """Address of a case under the API, or of a part of it, such as "/branch"; ValueError for a negative number."""
+    if case < 0:
+        raise ValueError(f"there is no case {case:d}: cases are numbered from 0")
     return f"{study_path(study_id)}/cases/{case:d}{part}"
+
+
+def component_path(component_id: str) -> str:
+    """Address of a component."""
+    return f"/components/{quote(component_id, safe='')}"
+
+
+def view_path(view_id: str) -> str:
+    """Address of a saved view under the API."""
+    return f"/views/{quote(view_id, safe='')}"
 
 
 def schedule_path(schedule_id: str) -> str:
@@ -127,7 +154,27 @@ def refusal(response: httpx.Response) -> ServiceError:
     return RefusedError(response.status_code, problem)
 
 
-def reason(error: httpx.HTTPError) -> str:
+def unanswered(server: str, error: httpx.HTTPError) -> UnreachableError:
+    """The error for a request without an answer."""
+    refused = _tls_error(error)
+    if isinstance(refused, ssl.SSLCertVerificationError):
+        return UntrustedError(server, refused.verify_message)
+    if refused is not None:
+        return UnreachableError(
+            server, f"no TLS connection: {(refused.reason or 'it ended').lower().replace('_', ' ')}"
+        )
+    return UnreachableError(server, _reason(error))
+
+
+def _tls_error(error: BaseException) -> ssl.SSLError | None:
+    """The failure of TLS that caused an error."""
+    cause: BaseException | None = error
+    while cause is not None and not isinstance(cause, ssl.SSLError):
+        cause = cause.__cause__ or cause.__context__
+    return cause
+
+
+def _reason(error: httpx.HTTPError) -> str:
     """Why there was no answer, in a few words."""
     if isinstance(error, httpx.ConnectError):
         return "cannot connect"
@@ -144,8 +191,3 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
-
-
-def is_event(line: str) -> bool:
-    """Whether a line of an event stream is an event's data or a keep-alive comment."""
-    return line.startswith(("data:", ":"))

@@ -50,7 +50,10 @@ def imported(module: str) -> subprocess.CompletedProcess[str]:
     [
         "sprag.service.client",
         "sprag.service.cli.app",
-        *(f"sprag.service.client.{name}" for name in ("aio", "frames", "plain", "queries", "study")),
+        *(
+            f"sprag.service.client.{name}"
+            for name in ("bars", "comparison", "frames", "motions", "plain", "retries", "sketch")
+        ),
     ],
 )
 def test_the_client_is_imported_without_the_rest(module: str) -> None:

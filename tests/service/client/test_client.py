@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -56,7 +57,8 @@ def answering(request: pytest.FixtureRequest) -> Iterator[tuple[str, int]]:
 
 def test_every_foreign_answer_is_one_of_two_failures(answering: tuple[str, int]) -> None:
     address, status = answering
-    with ServiceClient(address, token="secret") as client:
+    # Without repetition, which is for services that come back; 502 would be asked again for a minute.
+    with ServiceClient(address, token="secret", retry=0.0) as client:
         for ask in (
             lambda: client.study("st_1"),
             lambda: client.create_study({}),
@@ -84,3 +86,11 @@ def test_commands_say_so_in_a_sentence(answering: tuple[str, int], sprag: Sprag)
 def test_what_is_no_address(server: str) -> None:
     with pytest.raises(ValueError, match="address"):
         ServiceClient(server)
+
+
+def test_certificates_that_cannot_be_read_are_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    file = tmp_path / "authorities.pem"
+    monkeypatch.setenv("SSL_CERT_FILE", str(file))
+    file.write_text("no certificate")
+    with pytest.raises(ValueError, match="SSL_CERT_FILE or SSL_CERT_DIR"):
+        ServiceClient("https://sprag.example")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import io
 from collections.abc import Iterator
 from functools import partial
@@ -18,13 +17,13 @@ from anyio.from_thread import BlockingPortal
 
 from sprag.service.answers.studies import StudyDetail
 from sprag.service.client import (
+    AmbiguousError,
     AsyncClient,
     AsyncStudy,
     Client,
     Curves,
     RefusedError,
     SpecFileError,
-    Study,
     StudyTimeoutError,
     UnreachableError,
 )
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
     from sprag.worker.models import ChunkResult
 
 SPEED = "shaft.speed.mean"
+ID = "st_0123456789abcdef"
 
 
 @pytest.fixture
@@ -109,7 +109,7 @@ def test_a_study_from_submission_to_table_grid_and_curves(
     assert larger.detail()["cases"] == 12
     assert [item["id"] for item in client.studies()] == [larger.id, study.id]
     assert [item["name"] for item in client.studies("queued")] == ["larger"]
-    assert larger.act("cancel")["state"] in ("cancelling", "cancelled")
+    assert larger.cancel()["state"] in ("cancelling", "cancelled")
     assert client.study(study.id).detail()["progress"]["endings"] == {"ok": 8, "chatter": 1}
 
 
@@ -211,7 +211,7 @@ async def asynchronous(service: Service, spec: dict[str, Any], folder: Path) -> 
         larger = await study.extend(cases=[{"points": "shaft.load\n0.9\n"}])
         assert (await larger.detail())["cases"] == 10
         assert [item["id"] async for item in client.studies()] == [larger.id, study.id]
-        assert (await larger.act("cancel"))["id"] == larger.id
+        assert (await larger.cancel())["id"] == larger.id
         with pytest.raises(StudyTimeoutError):
             await (await client.submit(spec, fresh=True)).wait(timeout=0.0)
         with refused(RefusedError, "invalid-parameter", "invalid-choice"):
@@ -232,20 +232,6 @@ def test_the_asynchronous_client_does_the_same(
     service: Service, portal: BlockingPortal, spec: dict[str, Any], tmp_path: Path
 ) -> None:
     portal.call(partial(asynchronous, service, spec, tmp_path))
-
-
-def public(kind: type) -> dict[str, inspect.Signature]:
-    """Public methods of a class with their parameters, whatever they give."""
-    found = {name: item for name, item in vars(kind).items() if inspect.isfunction(item) and not name.startswith("_")}
-    return {name: inspect.signature(item).replace(return_annotation=None) for name, item in found.items()}
-
-
-def test_both_clients_have_the_same_methods() -> None:
-    assert public(AsyncStudy) == public(Study)
-    both = public(Client)
-    assert {name: signature for name, signature in public(AsyncClient).items() if name in both} == both
-    # What the asynchronous one has in the place of `Client.plain`.
-    assert set(public(AsyncClient)) - set(both) == {"request", "read", "pieces", "events", "items"}
 
 
 @pytest.mark.parametrize("value", [float("nan"), np.float64("inf")])
@@ -273,9 +259,36 @@ def test_server_and_token_come_from_the_environment(monkeypatch: pytest.MonkeyPa
 
     def answer(request: httpx.Request) -> httpx.Response:
         seen.append(request)
-        return httpx.Response(200, json={"id": "st_1"})
+        return httpx.Response(200, json={"id": ID})
 
     with Client(transport=httpx.MockTransport(answer)) as client:
-        assert repr(client.study("st_1")) == "Study('st_1')"
+        assert repr(client.study(ID)) == f"Study('{ID}')"
     assert seen[0].headers["authorization"] == "Bearer secret"
-    assert seen[0].url == "http://127.0.0.1:9/api/v1/studies/st_1"
+    assert seen[0].url == f"http://127.0.0.1:9/api/v1/studies/{ID}"
+
+
+def test_studies_are_named_as_on_the_command_line(client: Client, service: Service, spec: dict[str, Any]) -> None:
+    first, second = (service.submit({**spec, "name": name}) for name in ("feeder, slow", "feeder, fast"))
+    assert client.study("latest").id == second
+    assert client.study("feeder, s").id == first
+    assert client.study(first[:-2] if first[:-2] != second[:-2] else first).id == first
+    with pytest.raises(AmbiguousError, match="fits several studies") as caught:
+        client.study("feeder")
+    assert (caught.value.code, caught.value.faults[0].code) == ("invalid-parameter", "ambiguous")
+    with refused(RefusedError, "study-not-found"):
+        client.study("nothing")
+    for study in (first, second):
+        service.fill(study)
+    at = {"excitation.frequency": "16 Hz"}
+    assert client.compare(["feeder, slow", "latest"], "shaft.load", SPEED, at=at).names == (
+        "feeder, slow",
+        "feeder, fast",
+    )
+
+
+def test_cases_are_numbered_from_0(client: Client, service: Service) -> None:
+    study = client.study(service.submit())
+    with pytest.raises(ValueError, match="no case -1: cases are numbered from 0"):
+        study.case(-1)
+    with pytest.raises(ValueError, match="no case -3"):
+        study.trajectory(-3)

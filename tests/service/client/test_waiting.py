@@ -25,11 +25,13 @@ from tests.faults import refused
 DOWN, BUSY, PROXY, GONE = "down", 503, 502, 404
 EVENT = b'id: 1\nevent: progress\ndata: {"state": "running"}\n\n'
 
+STUDY = "st_00000000000000a1"
+
 
 def study(state: str, **fields: Any) -> dict[str, Any]:
     """A study as the service tells it."""
     progress = {"done": 1, "total": 2, "ok": 1, "rate": None, "seconds_left": None, "in_time": None, "endings": {}}
-    told = {"id": "st_1", "state": state, "time_over": False, "finish_by": None, "reason": None, "progress": progress}
+    told = {"id": STUDY, "state": state, "time_over": False, "finish_by": None, "reason": None, "progress": progress}
     return {**told, **fields}
 
 
@@ -65,8 +67,8 @@ def sleeps(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     async def sleep(seconds: float) -> None:
         noted.append(seconds)
 
-    monkeypatch.setattr("sprag.service.client.waiting.time.sleep", noted.append)
-    monkeypatch.setattr("sprag.service.client.aio.asyncio.sleep", sleep)
+    monkeypatch.setattr("sprag.service.client.synchronous.following.time.sleep", noted.append)
+    monkeypatch.setattr("sprag.service.client.asynchronous.following.asyncio.sleep", sleep)
     return noted
 
 
@@ -76,7 +78,7 @@ Waits = Callable[..., None]
 def plainly(scripted: Scripted, **options: Any) -> None:
     """Wait with the synchronous client."""
     with Client("http://sprag", transport=httpx.MockTransport(scripted)) as client:
-        client.study("st_1").wait(**options)
+        client.study(STUDY).wait(**options)
 
 
 def awaiting(scripted: Scripted, **options: Any) -> None:
@@ -84,7 +86,7 @@ def awaiting(scripted: Scripted, **options: Any) -> None:
 
     async def wait() -> None:
         async with AsyncClient("http://sprag", transport=httpx.MockTransport(scripted)) as client:
-            await (await client.study("st_1")).wait(**options)
+            await (await client.study(STUDY)).wait(**options)
 
     with asyncio.Runner() as runner:
         runner.run(wait())
@@ -173,9 +175,9 @@ def test_the_command_says_what_it_waits_for(
 ) -> None:
     held = study("paused", reason="the disk is full")
     client = served(Scripted([held, DOWN, DOWN, held, study("finished")], [[], []]))
-    assert remote.follow(client, "st_1")["state"] == "finished"
+    assert remote.follow(client, STUDY)["state"] == "finished"
     assert capsys.readouterr().err.splitlines() == [
-        "st_1 is paused: the disk is full",
+        f"{STUDY} is paused: the disk is full",
         "http://sprag: cannot connect - waiting for the service to answer again; the study is not lost.",
         "The service answers again.",
     ]
@@ -185,7 +187,7 @@ def test_the_demonstration_does_not_wait_for_a_service_that_it_started_itself(
     served: Callable[[Scripted], ServiceClient], sleeps: list[float]
 ) -> None:
     with pytest.raises(UnreachableError):
-        remote.follow(served(Scripted([study("running"), DOWN], [[]])), "st_1", patient=False)
+        remote.follow(served(Scripted([study("running"), DOWN], [[]])), STUDY, patient=False)
 
 
 def test_a_timeout_that_is_no_number_is_refused_before_the_service_is_asked() -> None:

@@ -1,44 +1,73 @@
-"""What both clients get of one case: its regimes, strobes, engagements, branch, diagram, section and basin."""
+"""One case of a study: its row, and the motions that are computed again for it."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any, cast
 
+from sprag.service.client.motions import Engagements, Motion
 from sprag.service.client.queries import basin_query, branch_query, given, transient_query
+from sprag.service.client.synchronous.part import StudyPart
+from sprag.service.client.wire import case_path
 
 if TYPE_CHECKING:
-    from sprag.service.answers.results import BasinData, Branch, RegimeRow
+    from sprag.service.answers.results import BasinData, Branch, CaseDetail, Portrait, RegimeRow
     from sprag.service.answers.sections import Sections
     from sprag.service.answers.transients import Transient
     from sprag.service.client.queries import Ends, Value
     from sprag.service.client.wire import Query
 
 
-class CaseAnswers(ABC):
+class StudyCases(StudyPart):
     """Those methods of a study that are about one case.
 
     ``start`` is the number of one of the starts of a case with many; by default 0, its own.
     """
 
-    @abstractmethod
     def _of_case(self, case: int, part: str = "", query: Query = ()) -> dict[str, Any]:
-        """The answer about a part of a case."""
+        return self._client.request("GET", case_path(self.id, case, part), params=list(query))
+
+    def case(self, case: int) -> CaseDetail:
+        """One case: parameters, ending, flags, results; "pending" while it has not been run."""
+        return cast("CaseDetail", self._of_case(case))
+
+    def trajectory(
+        self,
+        case: int,
+        begin: Value | None = None,
+        end: Value | None = None,
+        *,
+        points: int | None = None,
+        start: int | None = None,
+    ) -> Motion:
+        """Every variable, torque, power and state of one case over time, of a machine shaft over the angle.
+
+        Parameters
+        ----------
+        case : int
+        begin, end : float or str, optional
+            First and last time (s, or a text with a unit, such as "2 periods") or angle; by default the whole run, of a
+            settled study its end.
+        points : int, optional
+            Equally spaced times or angles.
+        start : int, optional
+        """
+        query = given({"from": begin, "to": end, "points": points, "start": start})
+        return Motion(cast("Any", self._of_case(case, "/trajectory", query)))
 
     def regimes(self, case: int) -> list[RegimeRow]:
         """The regimes to which the starts of a case come, the most frequent one first; [] of a case with one start.
 
         Their results have the share of the starts and its interval, and "regime.start", a start that comes to it.
         """
-        return cast("list[RegimeRow]", self._of_case(case)["regimes"])
+        return cast("list[RegimeRow]", (self._of_case(case))["regimes"])
 
-    def engagements(self, case: int, *, start: int | None = None) -> dict[str, Any]:
-        """Every engagement of the clutches of one case ("engagements"), and the means of its "periods"."""
-        return self._of_case(case, "/engagements", given({"start": start}))
+    def engagements(self, case: int, *, start: int | None = None) -> Engagements:
+        """Every engagement of the clutches of one case, and the means of its excitation periods."""
+        return Engagements(cast("Any", self._of_case(case, "/engagements", given({"start": start}))))
 
-    def strobes(self, case: int, *, start: int | None = None) -> dict[str, Any]:
+    def strobes(self, case: int, *, start: int | None = None) -> Portrait:
         """The state of one case once per excitation period ("strobes"), and its "orbit" if it has one."""
-        return self._of_case(case, "/strobes", given({"start": start}))
+        return cast("Portrait", self._of_case(case, "/strobes", given({"start": start})))
 
     def branch(
         self, case: int, along: str, low: Value | None = None, high: Value | None = None, *, start: int | None = None
@@ -140,83 +169,3 @@ class CaseAnswers(ABC):
             kind, points, load=load, angle=angle, torque=torque, within=within, revolutions=revolutions
         )
         return cast("Transient", self._of_case(case, "/transient", query))
-
-
-class AsyncCaseAnswers(ABC):
-    """The methods of `CaseAnswers`, as coroutines."""
-
-    @abstractmethod
-    async def _of_case(self, case: int, part: str = "", query: Query = ()) -> dict[str, Any]:
-        """The answer about a part of a case."""
-
-    async def regimes(self, case: int) -> list[RegimeRow]:
-        """The regimes of one case, as `Study.regimes` gives them."""
-        return cast("list[RegimeRow]", (await self._of_case(case))["regimes"])
-
-    async def engagements(self, case: int, *, start: int | None = None) -> dict[str, Any]:
-        """Every engagement of the clutches of one case, as `Study.engagements` gives them."""
-        return await self._of_case(case, "/engagements", given({"start": start}))
-
-    async def strobes(self, case: int, *, start: int | None = None) -> dict[str, Any]:
-        """The state of one case once per excitation period, and its orbit, as `Study.strobes` gives them."""
-        return await self._of_case(case, "/strobes", given({"start": start}))
-
-    async def branch(
-        self, case: int, along: str, low: Value | None = None, high: Value | None = None, *, start: int | None = None
-    ) -> Branch:
-        """The branch of periodic motions through that of one case, as `Study.branch` gives it."""
-        return cast("Branch", await self._of_case(case, "/branch", branch_query(along, low, high, start=start)))
-
-    async def diagram(
-        self,
-        case: int,
-        along: str,
-        low: Value | None = None,
-        high: Value | None = None,
-        *,
-        phase: Value | None = None,
-        points: int | None = None,
-        strobes: int | None = None,
-        start: int | None = None,
-    ) -> Sections:
-        """The bifurcation diagram of one case, as `Study.diagram` gives it."""
-        query = branch_query(along, low, high, phase=phase, points=points, strobes=strobes, start=start)
-        return cast("Sections", await self._of_case(case, "/diagram", query))
-
-    async def section(
-        self, case: int, phase: Value | None = None, strobes: int | None = None, *, start: int | None = None
-    ) -> Sections:
-        """The Poincare section of one case, as `Study.section` gives it."""
-        query = given({"phase": phase, "strobes": strobes, "start": start})
-        return cast("Sections", await self._of_case(case, "/section", query))
-
-    async def basin(
-        self,
-        case: int,
-        x: str | None = None,
-        y: str | None = None,
-        *,
-        x_range: Ends | None = None,
-        y_range: Ends | None = None,
-        points: int | None = None,
-    ) -> BasinData:
-        """The regime of each start of a grid of two initial values, as `Study.basin` gives it."""
-        return cast("BasinData", await self._of_case(case, "/basin", basin_query(x, y, x_range, y_range, points)))
-
-    async def transient(
-        self,
-        case: int,
-        kind: str,
-        *,
-        load: Value | None = None,
-        angle: Value | None = None,
-        torque: Value | None = None,
-        within: Value | None = None,
-        revolutions: Value | None = None,
-        points: int | None = None,
-    ) -> Transient:
-        """The run-up, a load step or the coasting of one case, as `Study.transient` gives it."""
-        query = transient_query(
-            kind, points, load=load, angle=angle, torque=torque, within=within, revolutions=revolutions
-        )
-        return cast("Transient", await self._of_case(case, "/transient", query))

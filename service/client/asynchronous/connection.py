@@ -1,0 +1,182 @@
+"""Requests and answers of the service: JSON, lists page by page, files piece by piece, events."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import uuid
+from collections.abc import AsyncGenerator, AsyncIterator
+from contextlib import aclosing, asynccontextmanager
+from typing import Any
+
+import httpx
+
+from sprag.service.client.events import EventReader, StudyEvent
+from sprag.service.client.retries import RETRY_SECONDS, Retries
+from sprag.service.client.wire import (
+    DEFAULT_SERVER,
+    EVENTS_TIMEOUT,
+    FILE_TIMEOUT,
+    Query,
+    address,
+    connection_options,
+    document,
+    refusal,
+    require_finite,
+    study_path,
+    unanswered,
+    within,
+)
+
+
+class AsyncConnection:
+    """A connection to a running service; a context manager.
+
+    Parameters
+    ----------
+    server : str, optional
+        Its address; by default that in ``SPRAG_SERVER``, else ``http://127.0.0.1:8000``.
+    token : str, optional
+        Its token; by default that in ``SPRAG_TOKEN``.
+    retry : float
+        Seconds for which requests are repeated, with growing pauses, while a service that has answered before does not
+        answer, for instance during a restart. Only requests that may be sent twice are repeated; 0 repeats none.
+    timeout : float, optional
+        Longest wait for an answer, s; by default 60, and any for files. At least 1.
+    transport : httpx.AsyncBaseTransport, optional
+        Replaces the network, for instance in tests.
+
+    Every method may raise `UnreachableError` when no service answers, and `RefusedError`, whose ``errors`` list each
+    fault with its field, value and allowed range. ValueError for a server that is not an HTTP address.
+    """
+
+    def __init__(
+        self,
+        server: str | None = None,
+        token: str | None = None,
+        *,
+        retry: float = RETRY_SECONDS,
+        timeout: float | None = None,
+        transport: httpx.AsyncBaseTransport | None = None,
+    ) -> None:
+        chosen = os.environ.get("SPRAG_SERVER") or DEFAULT_SERVER if server is None else server
+        self.server = chosen.rstrip("/")
+        options = connection_options(self.server, token or os.environ.get("SPRAG_TOKEN"))
+        self._http = httpx.AsyncClient(transport=transport, **options | {"timeout": within(timeout)})
+        self.retry = retry
+        self._answered = False
+
+    async def __aenter__(self) -> AsyncConnection:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+    async def close(self) -> None:
+        """Close the connection."""
+        await self._http.aclose()
+
+    async def request(
+        self, method: str, path: str, *, key: str | None = None, once: bool = False, **arguments: Any
+    ) -> dict[str, Any]:
+        """The JSON object that the service answers under its API.
+
+        ``key`` is an idempotency key, "" for a new one; ``once`` never repeats the request.
+        """
+        return document(self.server, await self._send(method, path, key=key, once=once, **arguments))
+
+    async def delete(self, path: str, query: Query = ()) -> None:
+        """Delete a resource of the API."""
+        response = await self._send("DELETE", path, params=list(query))
+        if response.is_error:
+            raise refusal(response)
+
+    async def _send(
+        self, method: str, path: str, *, key: str | None = None, once: bool = False, **arguments: Any
+    ) -> httpx.Response:
+        require_finite(arguments.get("json"))
+        if key is not None:
+            arguments["headers"] = {"Idempotency-Key": key or uuid.uuid4().hex}
+        retries = Retries(method, path, key is not None, self._seconds(once))
+        while True:
+            try:
+                response = await self._http.request(method, address(path), **arguments)
+            except httpx.HTTPError as error:
+                pause = retries.after_error(error)
+                if pause is None:
+                    raise unanswered(self.server, error) from error
+            else:
+                self._answered = True
+                pause = retries.after_answer(response)
+                if pause is None:
+                    return response
+            await asyncio.sleep(pause)
+
+    def _seconds(self, once: bool) -> float:
+        return self.retry if self._answered and not once else 0.0
+
+    async def read(self, path: str, query: Query) -> bytes:
+        """The bytes of a document under the API."""
+        async with self.pieces(path, query) as pieces:
+            return b"".join([piece async for piece in pieces])
+
+    @asynccontextmanager
+    async def pieces(self, path: str, query: Query) -> AsyncIterator[AsyncIterator[bytes]]:
+        """The bytes of a document under the API, piece by piece as they come."""
+        retries = Retries("GET", path, False, self._seconds(False))
+        begun = False
+        while True:
+            try:
+                async with self._http.stream(
+                    "GET", address(path), params=list(query), timeout=FILE_TIMEOUT
+                ) as response:
+                    self._answered = True
+                    pause = retries.after_answer(response)
+                    if pause is None:
+                        if response.is_error:
+                            await response.aread()
+                            raise refusal(response)
+                        begun = True
+                        yield response.aiter_bytes()
+                        return
+            except httpx.HTTPError as error:
+                pause = None if begun else retries.after_error(error)
+                if pause is None:
+                    raise unanswered(self.server, error) from error
+            await asyncio.sleep(pause)
+
+    async def events(self, study_id: str, last: str | None = None) -> AsyncGenerator[StudyEvent | None, None]:
+        """The events of a study's stream until it ends, None for each sign of life between them.
+
+        ``last`` is the id of the last received event. Raises UnreachableError where the stream breaks off.
+        """
+        headers = {} if last is None else {"Last-Event-ID": last}
+        path = f"{study_path(study_id)}/events"
+        reader = EventReader()
+        try:
+            async with self._http.stream("GET", address(path), headers=headers, timeout=EVENTS_TIMEOUT) as response:
+                if response.is_error:
+                    await response.aread()
+                    raise refusal(response)
+                async for line in response.aiter_lines():
+                    for event in reader.read(line):
+                        yield event
+        except httpx.HTTPError as error:
+            raise unanswered(self.server, error) from error
+
+    async def items(self, path: str, name: str, query: Query) -> AsyncGenerator[dict[str, Any], None]:
+        """The items of a list under the API, page by page."""
+        async with aclosing(self.pages(path, query)) as pages:
+            async for page in pages:
+                for item in page[name]:
+                    yield item
+
+    async def pages(self, path: str, query: Query) -> AsyncGenerator[dict[str, Any], None]:
+        """The pages of a list under the API."""
+        token: list[tuple[str, str]] = []
+        while True:
+            page = await self.request("GET", path, params=[*query, *token])
+            yield page
+            if page["next_page_token"] is None:
+                return
+            token = [("page_token", page["next_page_token"])]

@@ -1,0 +1,23 @@
+"""What every part of a study has: the connection and the study's address."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from sprag.service.client.wire import study_path
+
+if TYPE_CHECKING:
+    from sprag.service.client.asynchronous.connection import AsyncConnection
+    from sprag.service.client.wire import Query
+
+
+class AsyncStudyPart:
+    """A study at its address. ``id`` is its public name."""
+
+    def __init__(self, client: AsyncConnection, study_id: str) -> None:
+        self._client = client
+        self._path = study_path(study_id)
+        self.id = study_id
+
+    async def _get(self, part: str, query: Query = ()) -> dict[str, Any]:
+        return await self._client.request("GET", self._path + part, params=list(query))

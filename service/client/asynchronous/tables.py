@@ -1,0 +1,139 @@
+"""All rows of a study: as frames, as grids, as files."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+from sprag.service.client.asynchronous.part import AsyncStudyPart
+from sprag.service.client.frames import beside, grid_of, polars_of, table_of
+from sprag.service.client.queries import cases_query, curve_query, form_of, given
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    import pandas as pd
+    import polars as pl
+    import xarray as xr
+
+    from sprag.service.answers.results import Case, CaseDetail
+    from sprag.service.client.queries import Value
+    from sprag.service.client.wire import Query
+    from sprag.service.formats import Header
+
+
+class AsyncStudyTables(AsyncStudyPart):
+    """Those methods of a study that give all of its rows."""
+
+    async def cases(
+        self,
+        *,
+        ending: str | None = None,
+        regime: str | None = None,
+        flag: str | None = None,
+        where: str | Sequence[str] = (),
+        at: Mapping[str, Value] | None = None,
+        sort: str | None = None,
+    ) -> AsyncIterator[Case]:
+        """Finished cases, in order of their numbers, or those that are asked for.
+
+        Parameters
+        ----------
+        ending, regime, flag : str, optional
+            The only ending, and so on.
+        where : str or sequence of str
+            Ranges such as "shaft.load <= 2 N*m", all of which must hold.
+        at : mapping, optional
+            Paths of axes and their only values.
+        sort : str, optional
+            Parameter, result, "case" or "ending"; "-" before it: from the largest down.
+        """
+        query = cases_query(ending, regime, flag, where, at, sort)
+        async for case in self._client.items(f"{self._path}/cases", "cases", query):
+            yield cast("Case", case)
+
+    async def table(self, units: str | None = None) -> pd.DataFrame:
+        """All rows with all results as a pandas table, NaN for missing values; ``units`` such as "rpm, mm", or "typed".
+
+        ``attrs["units"]`` has the unit of each column, by default SI, ``attrs["endings"]`` the number of cases of each
+        ending.
+        """
+        return table_of(await self.download("parquet", units))
+
+    async def side_by_side(self, cases: Sequence[int]) -> pd.DataFrame:
+        """Cases beside each other: a row for each parameter and result, a column for each case, in the given order.
+
+        SI; the column ``unit`` has the units. RefusedError for a number that is not that of a case.
+        """
+        return beside([cast("CaseDetail", await self._get(f"/cases/{int(case)}")) for case in cases])
+
+    async def polars(self, units: str | None = None) -> pl.DataFrame:
+        """All rows with all results as a polars table, null for missing values; ``units`` as for `table`."""
+        return polars_of(await self.download("parquet", units))
+
+    async def grid(self) -> xr.Dataset:
+        """All rows as an xarray grid whose dimensions are the axes, with units as attributes."""
+        return grid_of(await self.download("netcdf"))
+
+    async def download(
+        self,
+        form: str,
+        units: str | None = None,
+        header: Header | None = None,
+        language: str | None = None,
+        point: Value | None = None,
+    ) -> bytes:
+        """All rows in a format of `sprag.service.results.exports`, or the report as "html" or "pdf".
+
+        ``header`` of CSV: "names", with units that are not SI, or "units", with every unit. ``language`` of a report:
+        a code such as "uk"; English without it. ``point`` of a report: its working point, such as "0.3 N*m".
+        """
+        return await self._client.read(*self._rows(form, units, header, language, point))
+
+    async def export(
+        self,
+        file: str | PathLike[str],
+        form: str | None = None,
+        *,
+        units: str | None = None,
+        header: Header | None = None,
+        language: str | None = None,
+        point: Value | None = None,
+    ) -> Path:
+        """Write all rows, or a report, to a file; its ending determines the format unless ``form`` is given.
+
+        ``header``, ``language`` and ``point`` as for `download`.
+        """
+        path = Path(file)
+        rows = self._rows(form or form_of(path), units, header, language, point)
+        # A refusal is raised before an existing file is opened.
+        async with self._client.pieces(*rows) as pieces:
+            with path.open("wb") as out:
+                async for piece in pieces:
+                    out.write(piece)
+        return path
+
+    def _rows(
+        self, form: str, units: str | None, header: Header | None, language: str | None, point: Value | None
+    ) -> tuple[str, Query]:
+        part = "/report" if form in ("html", "pdf") else "/results"
+        asked = {"format": form, "units": units, "header": header, "language": language, "point": point}
+        return self._path + part, given(asked)
+
+    async def picture(
+        self,
+        file: str | PathLike[str],
+        x: str | None = None,
+        y: str | Sequence[str] = (),
+        *,
+        by: str | Sequence[str] = (),
+        at: Mapping[str, Value] | None = None,
+        units: str | None = None,
+    ) -> Path:
+        """Write curves as a picture: .svg, .png or .pdf."""
+        path = Path(file)
+        query = [*curve_query(x, y, by, at), ("format", path.suffix[1:].lower())]
+        query += [] if units is None else [("units", units)]
+        path.write_bytes(await self._client.read(f"{self._path}/curves", query))
+        return path

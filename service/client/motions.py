@@ -1,0 +1,76 @@
+"""Motions of one case as tables: instantaneous values, engagements. pandas is loaded on first use."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, cast
+
+from sprag.service.client.tabular import Tabular
+from sprag.service.extras import naming_extra
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from sprag.service.answers.results import AngleTable, EngagementTables, Trajectory
+    from sprag.service.client.sketch import Line
+
+#: SI units of the columns of engagements and of periods.
+_ENGAGEMENT_UNITS: Final = {"start": "s", "end": "s", "torque_max": "N*m", "work_shaft": "J", "work_pendulum": "J"}
+_PERIOD_UNITS: Final = {"start": "s", "speed_mean": "rad/s", "speed_max": "rad/s", "torque_mean": "N*m"}
+
+
+@dataclass(frozen=True, slots=True)
+class Motion(Tabular):
+    """Instantaneous values of one case over time, or over the angle; ``data`` is the answer of the service."""
+
+    data: Trajectory | AngleTable
+
+    @property
+    def units(self) -> dict[str, str]:
+        """SI unit of each column that has one."""
+        axis = self.data["axis"]
+        return {axis["name"]: axis["unit"], **{name: info["unit"] for name, info in self.data["variables"].items()}}
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A row for each time or angle: every variable, and the states by name; ``attrs`` has units and the ending."""
+        with naming_extra("Motion.to_pandas", "tables"):
+            import pandas as pd
+
+        states = cast("dict[str, list[str]]", self.data.get("states", {}))
+        values = {name: pd.Series(column, dtype="float64") for name, column in self.data["values"].items()}
+        table = pd.DataFrame({self.data["axis"]["name"]: self._places(), **values, **states})
+        table.attrs.update(units=self.units, ending=self.data["ending"], case=self.data["case"])
+        return table
+
+    def _places(self) -> list[float]:
+        return cast("dict[str, list[float]]", self.data)[self.data["axis"]["name"]]
+
+    def _lines(self) -> tuple[str, str, list[Line]]:
+        name = next((key for key in self.data["values"] if "speed" in key), next(iter(self.data["values"]), ""))
+        if not name:
+            return "", "", []
+        axis, unit = self.data["axis"], self.units[name]
+        return f"{axis['name']} in {axis['unit']}", f"{name} in {unit}", [(self._places(), self.data["values"][name])]
+
+
+@dataclass(frozen=True, slots=True)
+class Engagements:
+    """The engagements of one case, and the means of its periods; ``data`` is the answer of the service. SI units."""
+
+    data: EngagementTables
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A row for each engagement: clutch, start, end, order, torque, work; ``attrs`` has units and the ending."""
+        return self._table("engagements", _ENGAGEMENT_UNITS)
+
+    def periods(self) -> pd.DataFrame:
+        """A row for each whole excitation period: start, speeds of the shaft, mean torque of all clutches."""
+        return self._table("periods", _PERIOD_UNITS)
+
+    def _table(self, part: str, units: dict[str, str]) -> pd.DataFrame:
+        with naming_extra("a table of engagements", "tables"):
+            import pandas as pd
+
+        table = pd.DataFrame(cast("dict[str, Any]", self.data)[part])
+        table.attrs.update(units=dict(units), ending=self.data["ending"], case=self.data["case"])
+        return table

@@ -1,0 +1,274 @@
+"""The client for scripts and notebooks: studies, schedules, models, presets, clutch fits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, cast
+
+from sprag.service.client.queries import finish_text, given, spec_of
+from sprag.service.client.synchronous.comparing import compare_studies
+from sprag.service.client.synchronous.connection import Connection
+from sprag.service.client.synchronous.naming import study_of
+from sprag.service.client.synchronous.study import Study
+from sprag.service.client.wire import component_path, model_path, preset_path, schedule_path, study_path, view_path
+
+if TYPE_CHECKING:
+    from datetime import datetime
+    from os import PathLike
+
+    from sprag.service.answers.catalogue import Health, Model, Preset
+    from sprag.service.answers.components import ComponentEntry
+    from sprag.service.answers.people import AuditEntry, Me, User
+    from sprag.service.answers.saved_views import SavedViewEntry
+    from sprag.service.answers.schedules import Night, ScheduleDetail, ScheduleSummary
+    from sprag.service.answers.studies import ClutchFitReport, Preview, StudySummary
+    from sprag.service.answers.workers import WorkerList
+    from sprag.service.client.comparison import Comparison
+    from sprag.service.client.queries import Spec, Value
+
+
+class Client(Connection):
+    """A connection to a running service, with everything that the service does. Parameters as of the connection."""
+
+    def __enter__(self) -> Client:
+        return self
+
+    def preview(self, spec: Spec | str | PathLike[str], *, finish_by: str | datetime | None = None) -> Preview:
+        """Preview of a study: cases, how many of them can be reused, time, size, warnings."""
+        query = given({"finish_by": None if finish_by is None else finish_text(finish_by)})
+        return cast("Preview", self.request("POST", "/studies:preview", json=spec_of(spec), params=query))
+
+    def submit(
+        self,
+        spec: Spec | str | PathLike[str],
+        *,
+        key: str | None = None,
+        priority: int = 0,
+        fresh: bool = False,
+        finish_by: str | datetime | None = None,
+    ) -> Study:
+        """Submit a study: a spec, or the name of a JSON or TOML file with one.
+
+        The same ``key`` submits it once, however often it is sent. A ``fresh`` study runs every case, even those that
+        other studies have. With ``finish_by``, an aware time or a duration such as "8 h", it is run coarse to fine and
+        held then.
+        """
+        finish = None if finish_by is None else finish_text(finish_by)
+        query = given({"priority": priority or None, "fresh": "true" if fresh else None, "finish_by": finish})
+        made = self.request("POST", "/studies", key=key or "", json=spec_of(spec), params=query)
+        return Study(self, made["id"])
+
+    def study(self, study_id: str) -> Study:
+        """A study by its id, its name, or the beginning of one; "latest": the newest.
+
+        RefusedError when there is none, AmbiguousError when several fit and none has that name, ValueError for an
+        empty text.
+        """
+        found = study_of(self, study_id)
+        return Study(self, (self.request("GET", study_path(found)))["id"])
+
+    def studies(
+        self,
+        state: str | None = None,
+        *,
+        search: str | None = None,
+        tag: str | None = None,
+        owner: str | None = None,
+        model: str | None = None,
+        archived: bool = False,
+        deleted: bool = False,
+        sort: str | None = None,
+    ) -> Iterator[StudySummary]:
+        """Every study that is neither archived nor deleted, or those that are searched for.
+
+        Parameters
+        ----------
+        search : str, optional
+            Words that occur in the name, the notes, the tags or the id.
+        state, tag, owner, model : str, optional
+            The only state, tag, and so on.
+        archived, deleted : bool
+            Only archived studies, or only deleted ones that can be restored.
+        sort : str, optional
+            "newest" (the default), "name", "state", "cases" or "ended".
+        """
+        words = {"state": state, "search": search, "tag": tag, "owner": owner, "model": model, "sort": sort}
+        query = given({**words, "archived": "true" if archived else None, "deleted": "true" if deleted else None})
+        for study in self.items("/studies", "studies", query):
+            yield cast("StudySummary", study)
+
+    def compare(
+        self,
+        studies: Sequence[str],
+        x: str | None = None,
+        y: str | Sequence[str] = (),
+        *,
+        by: str | Sequence[str] = (),
+        at: Mapping[str, Value] | None = None,
+    ) -> Comparison:
+        """Two to ten studies, named as for `study`: inputs in which they differ, and the same curves of each.
+
+        Curves are chosen as in `Study.curves`; without ``x`` and ``y``, those that the first study shows first.
+        """
+        ids = [study_of(self, text) for text in studies]
+        return compare_studies(self, ids, x, y, by=by, at=at)
+
+    def workers(self) -> WorkerList:
+        """The processes that run cases, by host, and those that are refused, with the reason."""
+        return cast("WorkerList", self.request("GET", "/workers"))
+
+    def models(self) -> list[Model]:
+        """Every model with its parameters, results and endings."""
+        return cast("list[Model]", (self.request("GET", "/models"))["models"])
+
+    def model(self, name: str) -> Model:
+        """One model with its parameters, results and endings."""
+        return cast("Model", self.request("GET", model_path(name)))
+
+    def presets(self) -> list[Preset]:
+        """The studies that come with the service, each with its ``spec``, which can be submitted."""
+        return cast("list[Preset]", (self.request("GET", "/presets"))["presets"])
+
+    def preset(self, name: str) -> Preset:
+        """One study that comes with the service."""
+        return cast("Preset", self.request("GET", preset_path(name)))
+
+    def fit_clutch(
+        self,
+        data: Sequence[Sequence[float | str]] | str,
+        accuracy: Value,
+        *,
+        max_degree: int | None = None,
+        through_origin: bool | None = None,
+        **more: Any,
+    ) -> ClutchFitReport:
+        """Fit the clutch law of the least degree that reaches an accuracy to measured pairs of windup and torque.
+
+        Parameters
+        ----------
+        data : sequence of pairs, or str
+            Windup in rad and torque in N*m, or the text of a CSV file of them.
+        accuracy : float or str
+            Largest residual, in N*m or with a unit.
+        max_degree : int, optional
+        through_origin : bool, optional
+        more
+            Further fields of the request.
+        """
+        rows = data if isinstance(data, str) else [list(row) for row in data]
+        fields = {"max_degree": max_degree, "through_origin": through_origin, **more}
+        body = {"data": rows, "accuracy": accuracy, **{k: v for k, v in fields.items() if v is not None}}
+        return cast("ClutchFitReport", self.request("POST", "/clutch-fits", json=body))
+
+    def components(self, kind: str | None = None) -> list[ComponentEntry]:
+        """The office's own springs, clutches and motors, or those of a kind, by kind and name."""
+        found = self.request("GET", "/components", params=given({"kind": kind}))
+        return cast("list[ComponentEntry]", found["components"])
+
+    def put_components(self, components: Sequence[Mapping[str, Any]] | str) -> list[ComponentEntry]:
+        """Add components, all or none: mappings with kind, name and fields, or the text of a CSV file.
+
+        Those of the same kind and name are replaced.
+        """
+        body = {"csv": components} if isinstance(components, str) else {"components": list(components)}
+        found = self.request("POST", "/components", json=body)
+        return cast("list[ComponentEntry]", found["components"])
+
+    def delete_component(self, component_id: str) -> None:
+        """Remove a component; studies that took it keep its values."""
+        self.delete(component_path(component_id))
+
+    def schedules(self) -> list[ScheduleSummary]:
+        """Every schedule with its last and its next run, newest first."""
+        return cast("list[ScheduleSummary]", (self.request("GET", "/schedules"))["schedules"])
+
+    def night(self, hours: float = 24) -> Night:
+        """Every due time of the last ``hours`` with its outcome, those that need attention first."""
+        return cast("Night", self.request("GET", "/night", params={"hours": hours}))
+
+    def schedule(self, schedule_id: str) -> ScheduleDetail:
+        """One schedule with its spec and its latest runs."""
+        return cast("ScheduleDetail", self.request("GET", schedule_path(schedule_id)))
+
+    def create_schedule(
+        self, spec: Spec | str | PathLike[str], *, key: str | None = None, **fields: Any
+    ) -> ScheduleDetail:
+        """Submit a study whenever it is due: ``cron`` or ``at``, and ``zone``, ``window``, ``name`` and so on.
+
+        The same ``key`` creates it once, however often it is sent.
+        """
+        body = {"spec": spec_of(spec), **fields}
+        return cast("ScheduleDetail", self.request("POST", "/schedules", key=key or "", json=body))
+
+    def views(self, study: str | None = None) -> list[SavedViewEntry]:
+        """Saved views of pages, or those of the study of that id: first the figures of its report, in order."""
+        found = self.request("GET", "/views", params=given({"study": study}))
+        return cast("list[SavedViewEntry]", found["views"])
+
+    def save_view(
+        self, page: str, name: str, query: str = "", *, study: str | None = None, in_report: bool = False
+    ) -> SavedViewEntry:
+        """Save the choices of a page under a name; a view of the same study, page and name is replaced.
+
+        Parameters
+        ----------
+        page : str
+            "curves", "map", "explore", "front", "drives", "sensitivity" or "cases" of a ``study``; "studies" or
+            "compare".
+        query : str
+            The choices as in the address of the page, such as "x=shaft.load&y=efficiency".
+        in_report : bool
+            Whether these curves or this map are a figure of the study's report.
+        """
+        body = {"page": page, "name": name, "query": query, "study": study, "in_report": in_report}
+        return cast("SavedViewEntry", self.request("POST", "/views", json=body))
+
+    def change_view(self, view_id: str, **fields: Any) -> SavedViewEntry:
+        """Change some fields of a view: ``name``, ``query``, ``in_report``, or ``place`` in the report."""
+        return cast("SavedViewEntry", self.request("PATCH", view_path(view_id), json=fields))
+
+    def delete_view(self, view_id: str) -> None:
+        """Delete a saved view."""
+        self.delete(view_path(view_id))
+
+    def change_schedule(self, schedule_id: str, **fields: Any) -> ScheduleDetail:
+        """Change some fields of a schedule, such as ``enabled=False``; the others are kept."""
+        return cast("ScheduleDetail", self.request("PATCH", schedule_path(schedule_id), json=fields))
+
+    def delete_schedule(self, schedule_id: str) -> None:
+        """Delete a schedule; its studies are kept."""
+        self.delete(schedule_path(schedule_id))
+
+    def me(self) -> Me:
+        """Who asks: user, token, role and quotas."""
+        return cast("Me", self.request("GET", "/me"))
+
+    def users(self) -> list[User]:
+        """Every user with role and quotas, by name; for administrators."""
+        return cast("list[User]", (self.request("GET", "/users"))["users"])
+
+    def audit(
+        self,
+        since: str | None = None,
+        until: str | None = None,
+        *,
+        actor: str | None = None,
+        action: str | None = None,
+        target: str | None = None,
+    ) -> Iterator[AuditEntry]:
+        """Every change, latest first, or those of a time, a user, an action, a study; for administrators."""
+        query = given({"since": since, "until": until, "actor": actor, "action": action, "target": target})
+        for entry in self.items("/audit", "entries", query):
+            yield cast("AuditEntry", entry)
+
+    def live(self) -> Health:
+        """Whether the service answers."""
+        return cast("Health", self.request("GET", "/livez", once=True))
+
+    def ready(self) -> Health:
+        """Whether studies can be submitted, read and run; RefusedError says what is missing."""
+        return cast("Health", self.request("GET", "/readyz", once=True))
+
+    def metrics(self) -> str:
+        """The metrics for Prometheus, as text."""
+        return (self.read("/metrics", ())).decode()

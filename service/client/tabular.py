@@ -1,0 +1,72 @@
+"""What the answers with a table have in common: pandas, polars, quantities with units, a look in notebooks."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from html import escape
+from typing import TYPE_CHECKING, Any, Final
+
+from sprag.service.client.sketch import Line, sketch
+from sprag.service.extras import naming_extra
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import polars as pl
+
+#: Units of columns that are no quantities of physics.
+_COUNTED: Final = frozenset({"", "1"})
+
+
+class Tabular(ABC):
+    """An answer of the service that is a table. Numbers are SI."""
+
+    __slots__ = ()
+
+    @property
+    @abstractmethod
+    def units(self) -> dict[str, str]:
+        """SI unit of each column that has one."""
+
+    @abstractmethod
+    def to_pandas(self) -> pd.DataFrame:
+        """The table, with ``attrs["units"]``."""
+
+    @abstractmethod
+    def _lines(self) -> tuple[str, str, list[Line]]:
+        """Captions of the axes and the curves of a small picture; no curves for none."""
+
+    def to_polars(self) -> pl.DataFrame:
+        """The same as a polars table, whose missing values are null."""
+        return as_polars(self.to_pandas())
+
+    def to_pint(self) -> pd.DataFrame:
+        """The same as a pandas table whose columns carry their units, by pint-pandas."""
+        return with_units(self.to_pandas())
+
+    def _repr_html_(self) -> str:
+        """A small picture in notebooks."""
+        x, y, lines = self._lines()
+        return sketch(x, y, lines) if lines else f"<pre>{escape(repr(self))}</pre>"
+
+
+def as_polars(frame: pd.DataFrame) -> pl.DataFrame:
+    """A pandas table as a polars table: NaN becomes null."""
+    with naming_extra("to_polars", "frames"):
+        import polars as pl
+
+    return pl.from_pandas(frame, nan_to_null=True)
+
+
+def with_units(frame: pd.DataFrame) -> pd.DataFrame:
+    """A copy of a table of this client whose columns carry the units of ``attrs["units"]``, by pint-pandas.
+
+    Columns that count something or have no unit stay as they are.
+    """
+    with naming_extra("with_units", "frames"):
+        import pint_pandas  # noqa: F401 - registers the type
+
+    units: dict[str, Any] = frame.attrs.get("units", {})
+    chosen = {name: f"pint[{unit}]" for name, unit in units.items() if name in frame and unit not in _COUNTED}
+    made = frame.astype(chosen)
+    made.attrs.update(frame.attrs)
+    return made

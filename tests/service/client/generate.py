@@ -1,0 +1,59 @@
+"""Makes the synchronous client of the asynchronous one: ``python -m tests.service.client.generate``."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[3]
+SOURCE = ROOT / "service" / "client" / "asynchronous"
+TARGET = SOURCE.with_name("synchronous")
+#: Words and what stands for them, in this order.
+WORDS = (
+    (r"\basync (def|for|with)\b", r"\1"),
+    (r"\bawait ", ""),
+    (r"\bAsyncGenerator\[(.*), None\]", r"Generator[\1, None, None]"),
+    (r"\bAsyncBaseTransport\b", "BaseTransport"),
+    (r"\basynccontextmanager\b", "contextmanager"),
+    (r"\bAsync(?=[A-Z])", ""),
+    (r"\bhttpx\.AsyncClient\b", "httpx.Client"),
+    (r"\b__a(enter|exit)__", r"__\1__"),
+    (r"\b(self\._http\.)aclose\b", r"\1close"),
+    (r"\baclosing\b", "closing"),
+    (r"\baread\b", "read"),
+    (r"\baiter_(bytes|lines)\b", r"iter_\1"),
+    (r"\basyncio\b", "time"),
+    (r"\basynchronous\b", "synchronous"),
+)
+
+
+def synchronous(text: str) -> str:
+    """The synchronous form of a module."""
+    for pattern, replacement in WORDS:
+        text = re.sub(pattern, replacement, text)
+    return text
+
+
+def write(folder: Path) -> None:
+    """Write the modules of the synchronous client but its first one, ordered and laid out by ruff."""
+    made = [folder / path.name for path in sorted(SOURCE.glob("[a-z]*.py"))]
+    for path in made:
+        path.write_text(synchronous((SOURCE / path.name).read_text(encoding="utf-8")), encoding="utf-8")
+    for command in (["check", "--fix-only", "--unsafe-fixes", "--select", "I,SIM117,UP028,C416,PIE790"], ["format"]):
+        run = [
+            sys.executable,
+            "-m",
+            "ruff",
+            *command,
+            "--quiet",
+            "--no-cache",
+            "--config",
+            str(ROOT / "pyproject.toml"),
+        ]
+        subprocess.run([*run, *made], check=True, cwd=ROOT)
+
+
+if __name__ == "__main__":
+    write(TARGET)

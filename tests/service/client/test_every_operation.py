@@ -1,0 +1,182 @@
+"""Every operation of the HTTP interface has a method of both clients, and a command or a reason to have none."""
+
+from __future__ import annotations
+
+import asyncio
+import inspect
+import json
+import re
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from sprag.service import client as clients
+from sprag.service.client import AsyncClient, AsyncStudy, Client, ServiceError, Study
+from tests.service.client import generate
+from tests.service.conftest import Service
+
+ID, SCHEDULE = "st_0123456789abcdef", "sc_0123456789abcdef"
+STUDY = {
+    "id": ID, "name": "", "model": "vibration-drive", "cases": 1, "state": "finished", "time_over": False,
+    "finish_by": None,
+    "progress": {"done": 1, "total": 1, "ok": 1, "rate": None, "seconds_left": None, "in_time": None},
+}  # fmt: skip
+LOAD, SPEED = "shaft.load", "shaft.speed.mean"
+
+Call = Callable[[Any, Any], Any]
+#: Of each operation: what both clients do for it (client, study), and the command, or after "-" why there is none.
+OPERATIONS: dict[str, tuple[Call, str]] = {
+    "create_study": (lambda c, _: c.submit({}), "submit SPEC"),
+    "list_studies": (lambda c, _: c.studies("queued"), "list"),
+    "preview_study": (lambda c, _: c.preview({}), "- `sprag preview` asks no service"),
+    "get_study": (lambda _, s: s.detail(), "watch ID"),
+    "change_study": (lambda _, s: s.change(name="x"), "edit ID --name x"),
+    "delete_study": (lambda _, s: s.delete(), "delete ID --yes"),
+    "restore_study": (lambda _, s: s.restore(), "restore ID"),
+    "get_rounds": (lambda _, s: s.rounds(), "rounds ID"),
+    "cancel_study": (lambda _, s: s.cancel(), "cancel ID"),
+    "pause_study": (lambda _, s: s.pause(), "pause ID"),
+    "resume_study": (lambda _, s: s.resume(), "resume ID"),
+    "retry_study": (lambda _, s: s.retry(["chatter"]), "retry ID"),
+    "extend_study": (lambda _, s: s.extend([]), "extend ID --axis shaft.load=1"),
+    "run_longer": (lambda _, s: s.run_longer(), "longer ID"),
+    "narrow_study": (lambda _, s: s.narrow(), "narrow ID"),
+    "select_cases": (lambda _, s: s.select("c > 0"), "select ID"),
+    "prioritize_study": (lambda _, s: s.prioritize(3), "prioritize ID 3"),
+    "get_events": (lambda _, s: s.events(), "- `sprag watch` listens to it while a study runs"),
+    "get_curves": (lambda _, s: s.curves(LOAD, SPEED), "curve ID"),
+    "get_map": (lambda _, s: s.map(LOAD, "b", SPEED), "map ID --x a --y b --z c"),
+    "get_results": (lambda _, s: s.table(), "export ID"),
+    "get_report": (lambda _, s: s.download("pdf"), "export ID --format pdf"),
+    "get_sensitivity": (lambda _, s: s.sensitivity(SPEED), "sensitivity ID --y c"),
+    "get_ribbon": (lambda _, s: s.ribbon(), "ribbon ID"),
+    "get_yield": (lambda _, s: s.yields("c > 0"), "yield ID c>0"),
+    "get_calibration": (lambda _, s: s.calibration(), "calibration ID"),
+    "get_front": (lambda _, s: s.front(), "front ID"),
+    "get_exploration": (lambda _, s: s.explore(), "explore ID"),
+    "get_answers": (lambda _, s: s.answers(), "answers ID"),
+    "list_cases": (lambda _, s: s.cases(ending="ok"), "cases ID"),
+    "get_case": (lambda _, s: s.case(3), "case ID 3"),
+    "get_trajectory": (lambda _, s: s.trajectory(3, 0, "2 periods", points=50), "case ID 3 trajectory"),
+    "get_branch": (lambda _, s: s.branch(3, LOAD), "case ID 3 branch --set along=shaft.load"),
+    "get_diagram": (lambda _, s: s.diagram(3, LOAD), "case ID 3 diagram"),
+    "get_section": (lambda _, s: s.section(3), "case ID 3 section"),
+    "get_engagements": (lambda _, s: s.engagements(3), "case ID 3 engagements"),
+    "get_strobes": (lambda _, s: s.strobes(3), "case ID 3 strobes"),
+    "get_transient": (lambda _, s: s.transient(3, "run-up"), "case ID 3 transient"),
+    "get_basin": (lambda _, s: s.basin(3), "case ID 3 basin"),
+    "fit_clutch": (lambda c, _: c.fit_clutch([(0, 0)], 0.1), "- `sprag fit` asks no service"),
+    "create_schedule": (lambda c, _: c.create_schedule({}, cron="@daily"), "schedule add SPEC --cron @daily"),
+    "list_schedules": (lambda c, _: c.schedules(), "schedule list"),
+    "get_night": (lambda c, _: c.night(12), "schedule night --hours 12"),
+    "get_schedule": (lambda c, _: c.schedule(SCHEDULE), "schedule show SCHEDULE"),
+    "change_schedule": (lambda c, _: c.change_schedule(SCHEDULE, enabled=False), "schedule pause SCHEDULE"),
+    "delete_schedule": (lambda c, _: c.delete_schedule(SCHEDULE), "schedule delete SCHEDULE"),
+    "list_components": (lambda c, _: c.components("spring"), "component list"),
+    "put_components": (lambda c, _: c.put_components([]), "component put SPEC"),
+    "delete_component": (lambda c, _: c.delete_component("cp_1"), "component delete ID"),
+    "list_views": (lambda c, _: c.views(ID), "view list --study ID"),
+    "save_view": (lambda c, _: c.save_view("compare", "x"), "view save /compare --name x"),
+    "change_view": (lambda c, _: c.change_view("vw_1", name="x"), "view change ID --name x"),
+    "delete_view": (lambda c, _: c.delete_view("vw_1"), "view delete ID"),
+    "list_models": (lambda c, _: c.models(), "models"),
+    "get_model": (lambda c, _: c.model("machine-shaft"), "models machine-shaft"),
+    "list_presets": (lambda c, _: c.presets(), "- `sprag presets` asks no service"),
+    "get_preset": (lambda c, _: c.preset("feeder"), "- `sprag presets` asks no service"),
+    "list_workers": (lambda c, _: c.workers(), "workers"),
+    "get_me": (lambda c, _: c.me(), "- says what a token may do; commands have it already"),
+    "list_users": (lambda c, _: c.users(), "- `sprag user list` reads the database"),
+    "get_audit": (lambda c, _: c.audit(), "- `sprag db audit` reads the database"),
+    "livez": (lambda c, _: c.live(), "- for the supervisor of the service"),
+    "readyz": (lambda c, _: c.ready(), "- for load balancers; `sprag doctor` looks for causes"),
+    "metrics": (lambda c, _: c.metrics(), "- for Prometheus"),
+}
+
+
+class Recorder:
+    """A service that knows one study, refuses everything else, and remembers what it was asked."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[str, str]] = []
+
+    def __call__(self, request: httpx.Request) -> httpx.Response:
+        """Answer the next request."""
+        self.asked.append((request.method.lower(), request.url.path))
+        if self.asked[-1] == ("get", f"/api/v1/studies/{ID}"):
+            return httpx.Response(200, json=STUDY)
+        return httpx.Response(418, json={"title": "refused"})
+
+    def reached(self, method: str, template: str) -> bool:
+        """Whether an operation was asked for."""
+        pattern = re.sub(r"\\{[a-z_]+\\}", "[^/:]+", re.escape(template))
+        return any(name == method and re.fullmatch(pattern, path) for name, path in self.asked)
+
+
+@pytest.fixture
+def operations(service: Service) -> dict[str, tuple[str, str]]:
+    """Method and address of every operation by its id."""
+    paths = service.http.get("/openapi.json").json()["paths"]
+    return {
+        operation["operationId"]: (method, path) for path, item in paths.items() for method, operation in item.items()
+    }
+
+
+def test_every_operation_is_in_the_list(operations: dict[str, tuple[str, str]]) -> None:
+    assert set(OPERATIONS) == set(operations)
+    assert all(command.startswith("- ") == (command[0] == "-") and command for _, command in OPERATIONS.values())
+
+
+def test_the_client_has_a_method_for_each(operations: dict[str, tuple[str, str]]) -> None:
+    for name, (call, _) in OPERATIONS.items():
+        recorder = Recorder()
+        with Client("http://sprag", transport=httpx.MockTransport(recorder)) as client, suppress(ServiceError):
+            answer = call(client, Study(client, ID))
+            if isinstance(answer, Iterator):
+                next(answer)
+        assert recorder.reached(*operations[name]), (name, recorder.asked)
+
+
+def test_so_has_the_asynchronous_one(operations: dict[str, tuple[str, str]]) -> None:
+    async def ask(call: Call, recorder: Recorder) -> None:
+        async with AsyncClient("http://sprag", transport=httpx.MockTransport(recorder)) as client:
+            answer = call(client, AsyncStudy(client, ID))
+            with suppress(ServiceError):
+                await (answer if inspect.isawaitable(answer) else anext(answer))
+
+    for name, (call, _) in OPERATIONS.items():
+        recorder = Recorder()
+        asyncio.run(ask(call, recorder))
+        assert recorder.reached(*operations[name]), (name, recorder.asked)
+
+
+def test_and_a_command_unless_a_reason_is_given(
+    operations: dict[str, tuple[str, str]],
+    sprag: Callable[..., Any],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    spec = tmp_path / "spec.json"
+    spec.write_text(json.dumps({"sprag": 1}))
+    words = {"SPEC": str(spec), "ID": ID, "SCHEDULE": SCHEDULE}
+    genuine = clients.ServiceClient
+    for name, (_, command) in OPERATIONS.items():
+        if command.startswith("-"):
+            continue
+        recorder = Recorder()
+        monkeypatch.setattr(clients, "ServiceClient", partial(genuine, transport=httpx.MockTransport(recorder)))
+        done = sprag(*(words.get(word, word) for word in command.split()))
+        assert recorder.reached(*operations[name]), (name, recorder.asked, done.err)
+
+
+def test_the_synchronous_client_is_made_from_the_asynchronous_one(tmp_path: Path) -> None:
+    folder = tmp_path / "service" / "client" / "synchronous"
+    folder.mkdir(parents=True)
+    generate.write(folder)
+    made = {path.name: path.read_text() for path in folder.glob("*.py")}
+    kept = {path.name: path.read_text() for path in generate.TARGET.glob("[a-z]*.py")}
+    assert made == kept, "run python -m tests.service.client.generate"
