@@ -13,13 +13,18 @@ from typing import Annotated, cast
 
 import typer
 from typer.core import TyperGroup
-from typer.main import get_group
+from typer.main import get_command
 
+from sprag.service import languages
+from sprag.service.actor import Door, act_as, of_machine
 from sprag.service.cli import (
     batches,
     branches,
     calibrations,
     cases,
+    catalogue,
+    compare,
+    components,
     database,
     demo,
     doctor,
@@ -34,25 +39,44 @@ from sprag.service.cli import (
     pictures,
     processes,
     remote,
+    saved_views,
     schedule,
+    settings,
     settle,
+    single_case,
+    studies,
     token,
     transients,
+    user,
+    workers,
 )
-from sprag.service.cli.console import CommandFailureError, ExitCode, TroubleError, WrongInputError, say, write_text
+from sprag.service.cli.completion import COMPLETION_VARIABLE
+from sprag.service.cli.console import (
+    CommandFailureError,
+    ExitCode,
+    TroubleError,
+    WrongInputError,
+    say,
+    write_text,
+    wrong_option,
+)
+from sprag.service.cli.groups import Groups
+from sprag.service.cli.language import OPTION, VARIABLE, chosen, code_of, refusal, translate
 from sprag.service.extras import command_for
 from sprag.service.faults import Kind
+from sprag.service.languages import N_, _
 
 #: Environment variable that shows the traceback of a bug.
 DEBUG_VARIABLE = "SPRAG_DEBUG"
 
 app = typer.Typer(
     name="sprag",
+    cls=Groups,
     help="Design studies of vibration drives with freewheel clutches and of main shafts of machines.",
     no_args_is_help=True,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
+    rich_markup_mode=None,
 )
 
 
@@ -64,17 +88,38 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
+def _known_language(code: str | None) -> None:
+    if code is not None and code_of(code) not in languages.available():
+        raise wrong_option(
+            OPTION,
+            "invalid-choice",
+            N_("is not a language of this program"),
+            code,
+            allowed=", ".join(languages.available()),
+        )
+
+
 @app.callback()
 def _every_command(
     _version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
     ] = False,
+    _language: Annotated[
+        str | None,
+        typer.Option(
+            OPTION,
+            envvar=VARIABLE,
+            metavar="CODE",
+            callback=_known_language,
+            help="Language of help and messages, such as uk; default: that of the system. JSON is always English.",
+        ),
+    ] = None,
 ) -> None:
     """Options before the name of a command; typer shows the application's own help instead of this text."""
 
 
 _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
-    "Run here": {
+    N_("Run here"): {
         "run": local.run,
         "validate": local.validate,
         "preview": local.preview,
@@ -91,68 +136,89 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "fit": fit.fit,
         "presets": local.presets,
     },
-    "Run a service": {
+    N_("Run a service"): {
         "demo": demo.demo,
         "serve": processes.serve,
         "worker": processes.worker,
         "doctor": doctor.doctor,
+        "settings": settings.settings,
     },
-    "Use a running service": {
+    N_("Use a running service"): {
         "submit": remote.submit,
         "extend": extend.extend,
         "longer": extend.longer,
         "narrow": extend.narrow,
+        "select": explore.select,
         "watch": remote.watch,
-        "list": remote.list_studies,
+        "list": studies.list_studies,
+        "edit": studies.edit,
+        "delete": studies.delete,
+        "restore": studies.restore,
         "pause": remote.pause,
         "resume": remote.resume,
         "cancel": remote.cancel,
         "retry": remote.retry,
         "prioritize": remote.prioritize,
         "answers": key_answers.answers,
+        "case": single_case.case,
         "cases": cases.cases,
+        "compare": compare.compare,
         "curve": pictures.curve,
         "explore": explore.explore,
         "export": remote.export,
         "front": fronts.front,
         "calibration": calibrations.calibration,
         "map": pictures.draw_map,
+        "models": catalogue.models,
         "ribbon": batches.ribbon,
+        "rounds": remote.rounds,
         "sensitivity": pictures.sensitivity,
+        "workers": workers.workers,
         "yield": batches.yields,
     },
 }
 for _title, _commands in _COMMANDS.items():
     for _name, _command in _commands.items():
         app.command(_name, rich_help_panel=_title)(_command)
+app.add_typer(components.app, name="component", rich_help_panel="Use a running service")
 app.add_typer(schedule.app, name="schedule", rich_help_panel="Use a running service")
+app.add_typer(saved_views.app, name="view", rich_help_panel="Use a running service")
 app.add_typer(token.app, name="token", rich_help_panel="Run a service")
+app.add_typer(user.app, name="user", rich_help_panel="Run a service")
 app.add_typer(database.app, name="db", rich_help_panel="Run a service")
 
 
 @cache
-def _command_line() -> TyperGroup:
-    """All commands with their options, which typer reads from the signatures of the functions."""
-    return get_group(app)
+def command_line(language: str) -> TyperGroup:
+    """All commands with their options, which typer reads from the signatures of functions; help is in ``language``."""
+    tree = cast("TyperGroup", get_command(app))
+    if language != languages.ENGLISH:
+        translate(tree)
+    return tree
 
 
 def execute(arguments: Sequence[str]) -> int:
     """Run one command; returns the exit code. Every failure is reported on standard error."""
+    with languages.language(chosen(arguments, os.environ)):
+        return _executed(arguments)
+
+
+def _executed(arguments: Sequence[str]) -> int:
     for stream in (sys.stdout, sys.stderr):
         # A terminal with another character set shows an escape instead of ending the command.
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
     try:
-        code = _invoke(arguments)
+        with act_as(of_machine(Door.COMMAND)):
+            code = _invoke(arguments)
         sys.stdout.flush()
     except (BrokenPipeError, _PipeClosedError):
         _drop_output()
         code = ExitCode.PIPE_CLOSED
     except OSError as error:  # a full disk, or no permission to write temporary files
         _drop_output()
-        failure = TroubleError(
-            "write-failed", f"{error.filename or 'standard output'}: {(error.strerror or str(error)).lower()}"
-        )
+        place = error.filename or _("standard output")
+        failure = TroubleError("write-failed", f"{place}: {(error.strerror or str(error)).lower()}")
         code = _report(failure, "--json" in arguments)
     return int(code)
 
@@ -166,9 +232,12 @@ def _invoke(arguments: Sequence[str]) -> int:
 
     as_json = "--json" in arguments
     try:
-        code = _command_line()(list(arguments), prog_name="sprag", standalone_mode=False) or ExitCode.DONE
+        code = (
+            command_line(languages.current())(list(arguments), prog_name="sprag", standalone_mode=False)
+            or ExitCode.DONE
+        )
         if code == ExitCode.INTERRUPTED:  # as typer returns Ctrl-C
-            say("interrupted")
+            say(_("interrupted"))
         return int(code)
     except CommandFailureError as failure:
         return _report(failure, as_json)
@@ -181,17 +250,23 @@ def _invoke(arguments: Sequence[str]) -> int:
     except OSError:
         raise
     except SystemExit as stop:
+        if stop.code == 0 or COMPLETION_VARIABLE in os.environ:  # what completion ends with
+            return cast("int", stop.code)
         # typer turns a broken pipe into exit code 1, which here would mean that some cases failed.
         raise _PipeClosedError from stop
     except Exception as error:
         command = command_for(error) if isinstance(error, ModuleNotFoundError) else None
         if command is not None:
             return _report(
-                TroubleError("missing-extra", f"this command needs a package that is not installed: {command}"), as_json
+                TroubleError(
+                    "missing-extra", _("this command needs a package that is not installed: {command}", command=command)
+                ),
+                as_json,
             )
         if os.environ.get(DEBUG_VARIABLE):
             traceback.print_exc()
-        sentence = f"This is a bug in Sprag: {type(error).__name__}: {error}. {DEBUG_VARIABLE}=1 shows where."
+        what = f"{type(error).__name__}: {error}"
+        sentence = _("This is a bug in Sprag: {what}. {variable}=1 shows where.", what=what, variable=DEBUG_VARIABLE)
         return _report(TroubleError("internal", sentence), as_json)
 
 
@@ -199,12 +274,14 @@ def _usage(error: typer.TyperException, as_json: bool) -> int:
     """Report an invalid command line."""
     context = getattr(error, "ctx", None)
     message = error.format_message().replace(": Value error, ", ": ")
-    if as_json:
+    if context is not None and message == context.get_help():  # a group without a command
+        say(message)
+    elif as_json:
         say(json.dumps(WrongInputError("invalid-parameter", message).document(), ensure_ascii=False))
     elif message:
-        say(f"sprag: {message}")
+        say(f"sprag: {refusal(message)}")
         if context is not None:
-            say(f"`{context.command_path} --help` shows how it is called.")
+            say(_("`{command} --help` shows how it is called.", command=context.command_path))
     return ExitCode.WRONG_INPUT
 
 

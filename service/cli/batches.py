@@ -6,22 +6,38 @@ from typing import Annotated, Any
 
 import typer
 
+from sprag.service.cli import completion
 from sprag.service.cli.console import cell_text, say, show_table
+from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
 from sprag.service.cli.pictures import HeldAt, answer, heading, held_text
 from sprag.service.cli.remote import connection
+from sprag.service.languages import _
 
 _FILE = typer.Option("-o", "--output", metavar="FILE", help="File to write: .svg, .png or .pdf, or .csv.")
 _FORMATS = ("svg", "png", "pdf", "csv")
-_X = typer.Option("--x", metavar="PATH", help="Axis along the lines; default: that of the curves.")
-_BY = typer.Option("--by", metavar="PATH", help="Axis with a line for each of its values; may be repeated.")
+_X = typer.Option(
+    "--x",
+    metavar="PATH",
+    help="Axis along the lines; default: that of the curves.",
+    autocompletion=completion.parameters,
+)
+_BY = typer.Option(
+    "--by",
+    metavar="PATH",
+    help="Axis with a line for each of its values; may be repeated.",
+    autocompletion=completion.parameters,
+)
 _MAP = typer.Option("--map", help="Write a map over the axes of --x and --by instead of lines.")
 
 
 def ribbon(
     study_id: StudyId,
     x: Annotated[str | None, _X] = None,
-    y: Annotated[list[str] | None, typer.Option("--y", metavar="RESULT", help="Result; may be repeated.")] = None,
+    y: Annotated[
+        list[str] | None,
+        typer.Option("--y", metavar="RESULT", help="Result; may be repeated.", autocompletion=completion.results),
+    ] = None,
     by: Annotated[list[str] | None, _BY] = None,
     at: HeldAt = None,
     quantile: Annotated[
@@ -39,6 +55,7 @@ def ribbon(
     query += [("quantile", _probability(text)) for text in quantile or ()]
     drawing = [("map", "true")] if mapped else []
     with connection(server, token) as client:
+        study_id = study_of(client, study_id)
         answer(client, study_id, "ribbon", query, file, show_ribbon, as_json, _FORMATS, drawing)
 
 
@@ -62,6 +79,7 @@ def yields(
     query = [*_places(x, by, at), *(("condition", text) for text in condition), ("worst", str(worst))]
     drawing = [("map", "true")] if mapped else []
     with connection(server, token) as client:
+        study_id = study_of(client, study_id)
         answer(client, study_id, "yield", query, file, show_yield, as_json, _FORMATS, drawing)
 
 
@@ -84,47 +102,50 @@ def show_ribbon(found: dict[str, Any]) -> None:
     for line in found["lines"]:
         held = held_text({**line["by"], **line["at"]}, found["units"])
         for name, result in line["results"].items():
-            title = f"{heading(name, found['results'][name]['unit'])}, {found['drives']} drives"
-            columns = [*_x_column(found), ("nominal", True)]
+            result_title = heading(name, found["results"][name]["unit"])
+            title = _("{result}, {drives} drives", result=result_title, drives=found["drives"])
+            columns = [*_x_column(found), (_("nominal"), True)]
             columns += [(f"{100.0 * p:g} %", True) for p in found["quantiles"]]
-            columns += [("failed", True)]
+            columns += [(_("failed"), True)]
             x = [line["x"]] if found["x"] else []
             rows = list(zip(*x, result["nominal"], *result["values"], line["failed"], strict=True))
             show_table(f"{title}; {held}" if held else title, columns, rows)
-            _show_causes(f"causes of the spread of {name}", result["causes"])
+            _show_causes(_("causes of the spread of {name}", name=name), result["causes"])
 
 
 def show_yield(found: dict[str, Any]) -> None:
     """A table for each line: the yield at each place; then the yield everywhere, the causes and the worst drives."""
-    title = " and ".join(condition["text"] for condition in found["conditions"])
+    title = _(" and ").join(condition["text"] for condition in found["conditions"])
     for line in found["lines"]:
         held = held_text({**line["by"], **line["at"]}, found["units"])
-        columns = [*_x_column(found), ("yield", True), ("from", True), ("to", True), ("drives", True), ("failed", True)]
+        heads = (_("yield"), _("from"), _("to"), _("drives"), _("failed"))
+        columns = [*_x_column(found), *((head, True) for head in heads)]
         x = [line["x"]] if found["x"] else []
         shares = [[_percent(share[part]) for share in line["each"]] for part in ("value", "low", "high")]
         rows = list(zip(*x, *shares, [share["drives"] for share in line["each"]], line["failed"], strict=True))
         show_table(f"{title}; {held}" if held else title, columns, rows)
         if found["x"]:
-            say(f"at every place: {yield_text(line['all'])}")
-        _show_causes("causes of missing the conditions", line["causes"])
+            say(_("at every place: {share}", share=yield_text(line["all"])))
+        _show_causes(_("causes of missing the conditions"), line["causes"])
         if line["worst"]:
             names = list(line["worst"][0]["results"])
-            columns = [("drive", True), ("case", True), *_x_column(found), ("margin", True)]
+            columns = [(_("drive"), True), (_("case"), True), *_x_column(found), (_("margin"), True)]
             columns += [(name, True) for name in names]
             rows = [
                 (one["drive"], one["case"], *([one["x"]] if "x" in one else []), _percent(one["margin"]),
                  *one["results"].values())
                 for one in line["worst"]
             ]  # fmt: skip
-            show_table("worst drives", columns, rows)
+            show_table(_("worst drives"), columns, rows)
 
 
 def yield_text(share: dict[str, Any]) -> str:
     """A yield in words."""
     if share["value"] is None:
-        return "no drive is run yet"
+        return _("no drive is run yet")
     low, high = _percent(share["low"]), _percent(share["high"])
-    return f"{_percent(share['value'])} ({low} to {high}) of {share['drives']} drives"
+    value = _percent(share["value"])
+    return _("{value} ({low} to {high}) of {drives} drives", value=value, low=low, high=high, drives=share["drives"])
 
 
 def _x_column(found: dict[str, Any]) -> list[tuple[str, bool]]:
@@ -136,9 +157,9 @@ def _show_causes(title: str, causes: dict[str, Any]) -> None:
     known.sort(key=lambda item: -item["share"])
     if known:
         rows = [(item["tolerance"], _percent(max(item["share"], 0.0)), _percent(item["error"])) for item in known]
-        show_table(title, [("tolerance", False), ("share", True), ("+-", True)], rows)
+        show_table(title, [(_("tolerance"), False), (_("share"), True), ("+-", True)], rows)
     if causes["note"]:
-        say(f"note: {causes['note']}")
+        say(_("note: {text}", text=_(causes["note"])))
 
 
 def _percent(share: float | None) -> str:

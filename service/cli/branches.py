@@ -23,6 +23,7 @@ from sprag.service.cli.options import (
     ValueFormatOption,
 )
 from sprag.service.json_text import to_bytes
+from sprag.service.languages import _
 
 if TYPE_CHECKING:
     from sprag.worker.models.branches import Along, CaseBranch
@@ -67,8 +68,17 @@ def _report(made: CaseBranch, study: Study, asked: Along, case: int) -> None:
     from sprag.service.spec.catalogue import unit_of
 
     if made.note:
-        say(f"case {case}: there is no branch: {made.note}")
+        say(_("case {case} has no branch: {why}", case=case, why=_(made.note)))
         return
     unit = unit_of(study, asked.paths[0])
-    say(f"case {case}: {len(made.parameters)} orbits of order {made.order}; from {made.ends[0]} to {made.ends[1]}")
+    say(
+        _(
+            "case {case}: {count} orbits of order {order}; from {first} to {last}",
+            case=case,
+            count=len(made.parameters),
+            order=made.order,
+            first=_(made.ends[0]),
+            last=_(made.ends[1]),
+        )
+    )
     say(*(special_text(special, unit) for special in made.specials))

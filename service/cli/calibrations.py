@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from sprag.service.cli.console import WrongInputError, say, show_table, write_json, write_text
+from sprag.service.cli.console import WrongInputError, say, show_table, warning_lines, write_json, write_text
 from sprag.service.cli.files import MAX_DATA_BYTES, decode, read_bytes, read_spec, spec_failure, write_pieces
+from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Processes, Server, SpecFile, StudyId, Token
 from sprag.service.cli.pictures import file_format, heading
 from sprag.service.cli.remote import connection
 from sprag.service.cli.running import run_parsed
 from sprag.service.cli.settings import read_settings
 from sprag.service.faults import Fault
+from sprag.service.languages import N_, _
 
 if TYPE_CHECKING:
     from sprag.service.results.calibration import Calibration
@@ -47,15 +49,15 @@ def calibrate(
 
     The spec has `calibrate`: the unknown parameters with their ranges, and the measured points.
     """
-    form = None if file is None else file_format(file, _FORMS, "file")
+    form = None if file is None else file_format(file, _FORMS)
     parsed = _read(spec, measured)
-    say(*(f"warning: {warning}" for warning in parsed.warnings))
+    say(*warning_lines(parsed.warnings))
     found, study_id = _run(parsed, db, processes)
     if file is not None and form is not None:
         write_pieces(file, [_content(found, form, parsed.study.name)])
     _tell(_report(study_id, found), as_json)
     if file is not None:
-        say(f"file: {file}")
+        say(_("file: {file}", file=file))
 
 
 def _read(path: str, measured: str | None) -> ParsedSpec:
@@ -63,8 +65,8 @@ def _read(path: str, measured: str | None) -> ParsedSpec:
 
     data = read_spec(path)
     if isinstance(data, Mapping) and not isinstance(data.get("calibrate"), Mapping):
-        problem = Fault("/calibrate", "required", "is required", None, "unknown parameters and measured points")
-        raise WrongInputError("invalid-spec", f"{path}: not a calibration", [problem])
+        problem = Fault("/calibrate", "required", N_("is required"), None, _("unknown parameters and measured points"))
+        raise WrongInputError("invalid-spec", _("{file}: not a calibration", file=path), [problem])
     if measured is not None and isinstance(data, Mapping):
         text = decode(measured, read_bytes(measured, MAX_DATA_BYTES))
         data = {**data, "calibrate": {**data["calibrate"], "measured": {"csv": text}}}
@@ -83,8 +85,8 @@ def _run(parsed: ParsedSpec, db: str | None, processes: int | None) -> tuple[Cal
     with run_parsed(
         parsed,
         settings,
-        lambda now: sentence(now.rounds) if now.rounds else "",
-        title="calibration",
+        lambda now: sentence(now.rounds, now.state) if now.rounds else "",
+        title=_("calibration"),
         db=db,
         processes=processes,
     ) as done:
@@ -96,11 +98,14 @@ def _run(parsed: ParsedSpec, db: str | None, processes: int | None) -> tuple[Cal
 def _content(found: Calibration, form: str, title: str) -> bytes:
     from sprag.service.results.calibration import calibration_csv
     from sprag.service.results.figures.calibration import calibration_figure
+    from sprag.service.results.figures.read import read_figure
     from sprag.service.results.pictures.curves import draw_figure
+    from sprag.service.results.reading import Reading
 
     if form == "csv":
         return calibration_csv(found)
-    return draw_figure(calibration_figure(found), title, cast("Picture", form))
+    figure = read_figure(calibration_figure(found), Reading(found.study.model))
+    return draw_figure(figure, title, cast("Picture", form))
 
 
 def _report(study_id: str, found: Calibration) -> dict[str, Any]:
@@ -117,28 +122,30 @@ def calibration(
     as_json: JsonFlag = False,
 ) -> None:
     """Show what a calibration has found: values with their intervals, what cannot be separated, the next point."""
-    form = None if file is None else file_format(file, _FORMS, "file")
+    form = None if file is None else file_format(file, _FORMS)
     with connection(server, token) as client:
+        study_id = study_of(client, study_id)
         found = client.calibration(study_id)
         if file is not None and form is not None:
             write_pieces(file, client.calibration_file(study_id, form))
     _tell(found, as_json)
     if file is not None:
-        say(f"file: {file}")
+        say(_("file: {file}", file=file))
 
 
 def _tell(found: dict[str, Any], as_json: bool) -> None:
     if as_json:
         write_json(found)
         return
-    columns = [(name, name != "parameter") for name in ("parameter", "value", "from", "to", "deviation")]
+    heads = (_("parameter"), _("value"), _("from"), _("to"), _("deviation"))
+    columns = [(head, place > 0) for place, head in enumerate(heads)]
     rows = [
         (heading(one["name"], one["unit"]), one["value"], *(one["interval"] or (None, None)), one["deviation"])
         for one in found["parameters"]
     ]
-    show_table("Values and 95 % intervals", columns, rows)
+    show_table(_("Values and 95 % intervals"), columns, rows)
     if found["correlations"] and len(rows) > 1:
         names = [one["name"] for one in found["parameters"]]
         lines = [(name, *row) for name, row in zip(names, found["correlations"], strict=True)]
-        show_table("Correlations", [("", False), *((name.replace(".", ".\n"), True) for name in names)], lines)
+        show_table(_("Correlations"), [("", False), *((name.replace(".", ".\n"), True) for name in names)], lines)
     write_text("".join(f"{sentence}\n" for sentence in found["sentences"]))

@@ -1,17 +1,21 @@
-"""``sprag cases``: the finished cases of a study of a running service, optionally of one ending, regime or flag."""
+"""``sprag cases``: the finished cases of a study of a running service, chosen and sorted."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import islice
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any
 
 import typer
 
+from sprag.service.cli import completion
+from sprag.service.cli.compare import pair
 from sprag.service.cli.console import WrongInputError, show_table, write_json
-from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
+from sprag.service.cli.names import study_of
+from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, OfEnding, OfFlag, OfRegime, Server, StudyId, Token
+from sprag.service.cli.pictures import heading
 from sprag.service.cli.remote import connection
 from sprag.service.faults import Fault
+from sprag.service.languages import N_, _
 
 #: Most cases of one request.
 _PAGE = 500
@@ -19,46 +23,75 @@ _PAGE = 500
 
 def cases(
     study_id: StudyId,
-    ending: Annotated[
-        str | None, typer.Option("--ending", metavar="ENDING", help="Only cases with this ending.")
+    ending: OfEnding = None,
+    regime: OfRegime = None,
+    flag: OfFlag = None,
+    where: Annotated[
+        list[str] | None,
+        typer.Option("--where", metavar="RANGE", help="Range such as 'efficiency >= 0.5'; may be repeated."),
     ] = None,
-    regime: Annotated[
-        str | None, typer.Option("--regime", metavar="REGIME", help="Only cases of this regime, of a settled study.")
+    at: Annotated[
+        list[str] | None, typer.Option("--at", metavar="PATH=VALUE", help="Only this value of an axis.")
     ] = None,
-    flag: Annotated[str | None, typer.Option("--flag", metavar="FLAG", help="Only cases with this flag.")] = None,
+    sort: Annotated[
+        str | None,
+        typer.Option(
+            "--sort",
+            metavar="NAME",
+            help="Parameter, result, case or ending; -NAME: largest first.",
+            autocompletion=completion.sortings,
+        ),
+    ] = None,
     result: Annotated[
-        list[str] | None, typer.Option("--result", metavar="RESULT", help="Result to show; may be repeated.")
+        list[str] | None,
+        typer.Option(
+            "--result", metavar="RESULT", help="Result to show; may be repeated.", autocompletion=completion.results
+        ),
     ] = None,
     limit: Annotated[int, typer.Option(min=1, max=100_000, help="Most cases to show.")] = 50,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """List finished cases of a study, in order of their numbers."""
-    from sprag.service.client.queries import case_query
+    """List finished cases of a study, in order of their numbers or sorted over all of them."""
+    from sprag.service.client.queries import cases_query
 
+    held = dict(pair(text) for text in at or ())
     with connection(server, token) as client:
-        query = [*case_query(ending, regime, flag), ("page_size", str(min(limit, _PAGE)))]
-        found = list(islice(client.cases(study_id, query), limit))
+        study_id = study_of(client, study_id)
+        query = [*cases_query(ending, regime, flag, where or (), held, sort), ("page_size", str(min(limit, _PAGE)))]
+        found, units = _first(client.case_pages(study_id, query), limit)
     if as_json:
         write_json({"cases": found})
     elif found:
-        _show(found, result or ())
+        _show(found, result or (), units)
     else:
-        show_table("", (("case", True), ("ending", False)), ())
+        show_table("", ((_("case"), True), (_("ending"), False)), ())
 
 
-def _show(found: Sequence[dict[str, Any]], results: Sequence[str]) -> None:
+def _first(pages: Iterable[dict[str, Any]], limit: int) -> tuple[list[dict[str, Any]], dict[str, str]]:
+    """At most ``limit`` cases, and the units of their columns."""
+    found: list[dict[str, Any]] = []
+    units: dict[str, str] = {}
+    for page in pages:
+        found, units = [*found, *page["cases"]], page.get("units", {})  # an older service has none
+        if len(found) >= limit:
+            break
+    return found[:limit], units
+
+
+def _show(found: Sequence[dict[str, Any]], results: Sequence[str], units: Mapping[str, str]) -> None:
     """A row for each case: its parameters, how it ended, its regime and flags, and the chosen results."""
     first = found[0]
     unknown = [name for name in results if name not in first["results"]]
     if unknown:
         allowed = ", ".join(first["results"])
-        faults = [Fault("--result", "unknown-name", "is not a result", name, allowed) for name in unknown]
-        raise WrongInputError("invalid-parameter", "invalid option", faults)
+        faults = [Fault("--result", "unknown-name", N_("is not a result"), name, allowed) for name in unknown]
+        raise WrongInputError("invalid-parameter", _("invalid option"), faults)
     kinds = [name for name in ("regime", "regime.order") if name in first["results"] and name not in results]
-    columns = [("case", True), *((path, True) for path in first["parameters"]), ("ending", False), ("flags", False)]
-    columns += [(name, name not in kinds[:1]) for name in (*kinds, *results)]
+    columns = [(_("case"), True), *((heading(path, units.get(path, "1")), True) for path in first["parameters"])]
+    columns += [(_("ending"), False), (_("flags"), False)]
+    columns += [(heading(name, units.get(name, "1")), name not in kinds[:1]) for name in (*kinds, *results)]
     rows = (
         (
             case["case"],

@@ -12,17 +12,22 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from enum import IntEnum
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, Final
 
+import typer
+
+from sprag.service import languages
+from sprag.service.cli.layout import Shape, blocks, broken, width_of
 from sprag.service.faults import Code, Fault, FaultError
+from sprag.service.languages import N_, _, decimal, pgettext
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-#: Width of tables that do not go to a terminal: wide enough that no number is cut.
+#: Width of titles that do not go to a terminal; tables are as wide as they need.
 _PLAIN_WIDTH = 160
-_WIDEST = 100_000
 #: Name of the normal ending of a case; asking the models would load the engine.
 OK: Final = "ok"
 
@@ -37,6 +42,26 @@ class ExitCode(IntEnum):
     INTERRUPTED = 130
     PIPE_CLOSED = 141
 
+    @property
+    def sentence(self) -> str:
+        """What it means."""
+        return _(_EXIT_SENTENCES[self])
+
+
+_EXIT_SENTENCES: Final = {
+    ExitCode.DONE: N_("done"),
+    ExitCode.NOT_ALL_OK: N_("some cases did not end ok"),
+    ExitCode.WRONG_INPUT: N_("wrong input; every problem has its own line: where, what, the value, what is allowed"),
+    ExitCode.TROUBLE: N_("the service does not answer, a disk is full or fails, or the database cannot be used"),
+    ExitCode.INTERRUPTED: N_("interrupted with Ctrl-C"),
+    ExitCode.PIPE_CLOSED: N_("the reader of standard output went away"),
+}
+
+
+def state_text(state: str) -> str:
+    """The state of a study within a sentence; tables have its name, as options take it."""
+    return _(state)
+
 
 class CommandFailureError(FaultError):
     """A command failed; carries the exit code and all messages."""
@@ -45,9 +70,11 @@ class CommandFailureError(FaultError):
 
     def lines(self) -> Iterator[str]:
         """The message and every fault, one per line."""
-        yield self.detail
+        yield _(self.detail)
         for fault in self.faults:
-            yield f"  {fault}"
+            yield f"  {fault_line(fault)}"
+            if _(fault.message) == fault.message and languages.current() != languages.ENGLISH:
+                yield f"    {fault.message}"
 
     def document(self) -> dict[str, object]:
         """The same as plain JSON data."""
@@ -55,6 +82,29 @@ class CommandFailureError(FaultError):
         if self.faults:
             document["problems"] = [fault.to_json() for fault in self.faults]
         return document
+
+
+def fault_line(fault: Fault) -> str:
+    """A fault in one line: where it is, what it is, the value, and what is allowed.
+
+    In another language a sentence that is not in the catalogue is replaced by the meaning of its code.
+    """
+    if languages.current() == languages.ENGLISH:
+        return str(fault)
+    from sprag.service.fault_meanings import MEANINGS
+    from sprag.service.languages.ranges import allowed_text
+
+    details = []
+    if fault.value is not None:
+        details.append(_("got {value}", value=repr(fault.value) if isinstance(fault.value, str) else fault.value))
+    if fault.allowed is not None:
+        details.append(_("allowed: {allowed}", allowed=allowed_text(fault.allowed)))
+    if fault.unit is not None and (fault.allowed is None or fault.unit not in fault.allowed):
+        details.append(_("unit {unit}", unit=fault.unit))
+    where, message = fault.where or _("(the whole spec)"), _(fault.message)
+    if message == fault.message:
+        message = _(MEANINGS.get(fault.code, message)).removesuffix(".")
+    return f"{where}: {message}" + (f" ({'; '.join(details)})" if details else "")
 
 
 class WrongInputError(CommandFailureError):
@@ -75,10 +125,12 @@ def wrong_option(
     *,
     allowed: str | None = None,
     unit: str | None = None,
-    detail: str = "invalid option",
+    detail: str | None = None,
 ) -> WrongInputError:
     """The failure that one option of the command means."""
-    return WrongInputError("invalid-parameter", detail, [Fault(option, code, message, value, allowed, unit)])
+    return WrongInputError(
+        "invalid-parameter", detail or _("invalid option"), [Fault(option, code, message, value, allowed, unit)]
+    )
 
 
 def write_json(data: object) -> None:
@@ -97,6 +149,37 @@ def say(*lines: str) -> None:
         sys.stderr.write(line + "\n")
 
 
+def warning_lines(warnings: Iterable[str], codes: Iterable[str | None] = ()) -> Iterator[str]:
+    """A line for each warning: its sentence; in another language the meaning of its code, and then the sentence.
+
+    ``codes`` are those of warnings of a service; other warnings know theirs.
+    """
+    from sprag.service.fault_meanings import WARNING_MEANINGS
+
+    meanings = dict[str, str](WARNING_MEANINGS.items())
+    for text, code in zip_longest(warnings, codes):
+        meaning = meanings.get(str(code or getattr(text, "code", "")))
+        known = languages.current() == languages.ENGLISH or meaning is None
+        yield _("warning: {text}", text=_(text) if known or meaning is None else f"{_(meaning)} ({text})")
+
+
+def confirmed(question: str) -> bool:
+    """Whether somebody at the terminal says yes to a question, in English or in the language of the task; an empty
+    answer is no. Raises typer.Abort where the input ends.
+    """
+    answers = (pgettext("letters of yes", "y yes"), pgettext("letters of no", "n no"))
+    yes, no = ({*english.split(), *own.split()} for english, own in zip(("y yes", "n no"), answers, strict=True))
+    while True:
+        sys.stderr.write(f"{question} [{answers[0].split()[0]}/{answers[1].split()[0].upper()}]: ")
+        sys.stderr.flush()
+        line = sys.stdin.readline()
+        if not line:
+            raise typer.Abort
+        given = line.strip().casefold()
+        if given in yes or given in no or not given:
+            return given in yes
+
+
 def console() -> Console:
     """The console of standard output: colours on a terminal only."""
     from rich.console import Console
@@ -108,33 +191,43 @@ def console() -> Console:
 Column = tuple[str, bool] | tuple[str, bool, bool]
 
 
-def table(title: str, columns: Iterable[Column], rows: Iterable[Sequence[object]]) -> Table:
-    """A table for people.
+def show_table(title: str, columns: Iterable[Column], rows: Iterable[Sequence[object]]) -> None:
+    """Print a table on standard output; None becomes a dash: a value that could not be computed.
 
-    None becomes a dash: a value that could not be computed.
+    On a terminal it is as wide as that: headings and texts are broken into lines, and columns for which there is no
+    room go on below, each time beside the first one. Elsewhere every row is one line. Numbers and ids are never cut.
     """
+    from rich.cells import cell_len
+
+    out, headed = console(), list(columns)
+    texts = [[cell_text(cell) for cell in row] for row in rows]
+    shapes = [
+        Shape(heading, max((cell_len(row[index]) for row in texts), default=0), numeric or any(whole))
+        for index, (heading, numeric, *whole) in enumerate(headed)
+    ]
+    parts = blocks(shapes, out.width if sys.stdout.isatty() else None)
+    out.width = max(out.width, *(width_of([*part.values()]) for part in parts))
+    for number, part in enumerate(parts):
+        out.print(_table(title if number == 0 else "", headed, part, texts))
+
+
+def _table(title: str, columns: Sequence[Column], widths: Mapping[int, int], texts: Iterable[Sequence[str]]) -> Table:
+    """Some columns of a table, in their widths."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
 
-    made = Table(title=Text(title) if title else None, title_justify="left", box=SIMPLE_HEAD, header_style="bold")
-    texts = [[cell_text(cell) for cell in row] for row in rows]
-    for index, (heading, numeric, *whole) in enumerate(columns):
-        # Truncated numbers or ids would be worse than a wide table.
-        longest = max((len(row[index]) for row in texts), default=0) if numeric or any(whole) else None
-        made.add_column(Text(heading), justify="right" if numeric else "left", min_width=longest)
+    drawn = Table(title=Text(title) if title else None, title_justify="left", box=SIMPLE_HEAD, header_style="bold")
+    for index, width in widths.items():
+        heading, numeric, *_ = columns[index]
+        drawn.add_column(
+            Text(broken(heading, width)), justify="right" if numeric else "left", width=width, overflow="fold"
+        )
     for row in texts:
-        made.add_row(*map(Text, row))
-    return made
-
-
-def show_table(title: str, columns: Iterable[Column], rows: Iterable[Sequence[object]]) -> None:
-    """Print a table on standard output, as wide as its numbers need."""
-    from rich.measure import Measurement
-
-    out, made = console(), table(title, columns, rows)
-    out.width = max(out.width, Measurement.get(out, out.options.update(max_width=_WIDEST), made).minimum)
-    out.print(made)
+        # A name such as a.b.c is broken after its dots, a text between words.
+        cells = ((row[index], width) for index, width in widths.items())
+        drawn.add_row(*(Text(cell if " " in cell else broken(cell, width)) for cell, width in cells))
+    return drawn
 
 
 def cell_text(cell: object) -> str:
@@ -142,9 +235,9 @@ def cell_text(cell: object) -> str:
     if cell is None:
         return "-"
     if isinstance(cell, bool):
-        return "yes" if cell else "no"
+        return _("yes") if cell else _("no")
     if isinstance(cell, float):
-        return f"{cell:.6g}" if math.isfinite(cell) else "-"
+        return decimal(f"{cell:.6g}") if math.isfinite(cell) else "-"
     return str(cell)
 
 
@@ -154,19 +247,19 @@ def ending_lines(endings: Mapping[str, int]) -> Iterator[str]:
 
     for name, count in endings.items():
         if name != OK:
-            yield f"  {count} {name}: {ENDING_SENTENCES[name]}"
+            yield f"  {count} {name}: {_(ENDING_SENTENCES[name])}"
 
 
 def duration_text(seconds: float) -> str:
     """A duration for display: "0.4 s", "12 s", "3 min 20 s", "2 h 05 min"."""
     if seconds < 10:
-        return f"{seconds:.1f} s"
+        return _("{seconds} s", seconds=decimal(f"{seconds:.1f}"))
     whole = round(seconds)
     if whole < 60:
-        return f"{whole} s"
+        return _("{seconds} s", seconds=whole)
     if whole < 3600:
-        return f"{whole // 60} min {whole % 60:02d} s"
-    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+        return _("{minutes} min {seconds} s", minutes=whole // 60, seconds=f"{whole % 60:02d}")
+    return _("{hours} h {minutes} min", hours=whole // 3600, minutes=f"{whole % 3600 // 60:02d}")
 
 
 def progress_text(
@@ -178,16 +271,18 @@ def progress_text(
     rounds: str | None = None,
 ) -> str:
     """Text beside a progress bar: state, round, cases per second, time left, and whether the deadline will be met."""
-    parts = [str(state)]
+    parts = [state_text(state)]
     if rounds is not None:
         parts.append(rounds)
     if rate:
-        parts.append(f"{rate:.3g} cases/s")
+        parts.append(_("{rate} cases/s", rate=decimal(f"{rate:.3g}")))
     if seconds_left is not None:
         low, high = map(duration_text, seconds_left)
-        parts.append(f"{low} left" if low == high else f"{low} to {high} left")
+        parts.append(
+            _("{time} left", time=low) if low == high else _("{shortest} to {longest} left", shortest=low, longest=high)
+        )
     if finish_by is not None and in_time is not None:
-        word = {"yes": "in time", "no": "not in time", "unsure": "perhaps in time"}[in_time]
+        word = {"yes": _("in time"), "no": _("not in time"), "unsure": _("perhaps in time")}[in_time]
         parts.append(f"{word} ({finish_by})")
     return ", ".join(parts)
 

@@ -1,23 +1,40 @@
-"""``sprag db``: upgrade, check and back up the database."""
+"""``sprag db``: upgrade, check, back up and move the database."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from sprag.service.cli.console import ExitCode, TroubleError, WrongInputError, say, write_json
-from sprag.service.cli.options import Database, JsonFlag
+from sprag.service.cli.files import write_pieces
+from sprag.service.cli.groups import Groups
+from sprag.service.cli.options import Database, JsonFlag, OutputFile
 from sprag.service.cli.settings import read_settings
+from sprag.service.faults import FaultError
+from sprag.service.languages import _
 
 if TYPE_CHECKING:
     from sprag.service.storage.session import Session
 
-app = typer.Typer(help="Upgrade, check and back up the database.", no_args_is_help=True, rich_markup_mode="rich")
+
+class AuditForm(StrEnum):
+    """Formats of the audit log."""
+
+    CSV = "csv"
+    JSONL = "jsonl"
+
+
+app = typer.Typer(
+    help="Upgrade, check, back up and move the database; read its audit log.",
+    no_args_is_help=True,
+    cls=Groups,
+)
 
 
 @app.command()
@@ -30,9 +47,10 @@ def upgrade(db: Database = None, as_json: JsonFlag = False) -> None:
     if as_json:
         write_json({"database": session.location, "before": before, "after": after})
     elif before == after:
-        print(f"{session.location}: already at revision {after}")
+        print(_("{database}: already at revision {revision}", database=session.location, revision=after))
     else:
-        print(f"{session.location}: from revision {before or 'none'} to {after}")
+        steps = {"before": before or _("none"), "after": after}
+        print(_("{database}: from revision {before} to {after}", database=session.location, **steps))
 
 
 @app.command()
@@ -46,8 +64,9 @@ def check(db: Database = None, as_json: JsonFlag = False) -> None:
         write_json({**asdict(report), "sound": not report.problems})
     else:
         backend = f"{report.backend} {report.backend_version}".rstrip()
-        print(f"{report.location}: {backend}, revision {report.revision or 'none'}")
-        print("\n".join(f"  {problem}" for problem in report.problems) or "  sound")
+        found = {"backend": backend, "revision": report.revision or _("none")}
+        print(_("{database}: {backend}, revision {revision}", database=report.location, **found))
+        print("\n".join(f"  {problem}" for problem in report.problems) or "  " + _("sound"))
     if report.problems:
         raise typer.Exit(ExitCode.TROUBLE)
 
@@ -63,14 +82,14 @@ def backup(
 
     target = Path(file)
     if target.exists():
-        raise WrongInputError("file-exists", f"{file}: exists already; a backup never replaces a file")
+        raise WrongInputError("file-exists", _("{file}: exists already; a backup never replaces a file", file=file))
     with _opened(db) as session:
         write_copy(session, target)
     size = target.stat().st_size
     if as_json:
         write_json({"database": session.location, "backup": str(target), "bytes": size})
     else:
-        say(f"{file}: {size} bytes")
+        say(_("{file}: {size} bytes", file=file, size=size))
 
 
 @app.command()
@@ -99,7 +118,74 @@ def prune(
         write_json({"deleted": [] if dry_run else found, "found": found})
     else:
         print("\n".join(found), end="\n" if found else "")
-        say(f"{len(found)} studies {'would be deleted' if dry_run else 'deleted'}")
+        count = len(found)
+        said = (
+            _("{count} studies would be deleted", count=count) if dry_run else _("{count} studies deleted", count=count)
+        )
+        say(said)
+
+
+@app.command()
+def move(
+    target: Annotated[
+        str, typer.Argument(metavar="TARGET", help="File or URL of an empty database, or that of an interrupted move.")
+    ],
+    db: Database = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Copy the whole database into another one, SQLite or PostgreSQL, and compare every row; stop Sprag first.
+
+    The source stays as it is. An interrupted move is continued by the same command.
+    """
+    from sprag.service.jobs.dispatching import owner_name
+    from sprag.service.storage.moving import move as move_all
+
+    with _opened(db) as source, _opened(target, existing=False) as other:
+        moved = move_all(source, other, owner_name(), say)
+    if as_json:
+        write_json({"source": source.location, "target": other.location, **asdict(moved)})
+    else:
+        places = {"target": other.location, "source": source.location}
+        print(_("{target} has every row of {source}; use it with --db from now on", **places))
+
+
+@app.command()
+def audit(
+    since: Annotated[
+        str | None, typer.Option("--since", metavar="TIME", help="From this date or time on, such as 2027-01-31.")
+    ] = None,
+    until: Annotated[
+        str | None, typer.Option("--until", metavar="TIME", help="Up to this time; of a date the whole day.")
+    ] = None,
+    actor: Annotated[
+        str | None, typer.Option("--actor", metavar="NAME", help="Only changes by this user, token or schedule.")
+    ] = None,
+    action: Annotated[
+        str | None, typer.Option("--action", metavar="ACTION", help="Only this action, such as study.delete.")
+    ] = None,
+    target: Annotated[
+        str | None, typer.Option("--target", metavar="ID", help="Only changes of this study, schedule, token or user.")
+    ] = None,
+    form: Annotated[AuditForm, typer.Option("--format", help="One row or one JSON object for each change.")] = (
+        AuditForm.CSV
+    ),
+    output: OutputFile = None,
+    db: Database = None,
+) -> None:
+    """Write the audit log: who changed what, when and from where; earliest first."""
+    from sprag.service.results.exports.audit import audit_pieces
+    from sprag.service.storage.audit import audit_filter
+    from sprag.service.storage.store import Store
+
+    try:
+        wanted = audit_filter(since, until, actor, action, target)
+    except FaultError as error:
+        named = [replace(fault, where=f"--{fault.where}") for fault in error.faults]
+        raise WrongInputError("invalid-parameter", _("invalid option"), named) from error
+    with _opened(db) as session:
+        url = session.url.render_as_string(hide_password=False)
+    with Store.open(url) as store:
+        write_pieces(output, audit_pieces(store.audit_rows(wanted), form.value))
 
 
 @contextmanager
@@ -110,7 +196,7 @@ def _opened(db: str | None, *, existing: bool = True) -> Iterator[Session]:
     location = read_settings(database=db).database_url
     file = file_of(location)
     if existing and file is not None and not file.exists():
-        raise WrongInputError("invalid-file", f"{file}: no such database")
+        raise WrongInputError("invalid-file", _("{file}: no such database", file=file))
     session = Session(location)
     try:
         yield session
@@ -128,4 +214,5 @@ def clock(db: Database = None) -> None:
     with Store.open(url) as store:
         now = store.clock.now()
         store.note_clock(now)
-        say(f"the clock is trusted: it is {now.isoformat(timespec='seconds')}")
+        store.note_change("database.clock", "", now=now.isoformat(timespec="seconds"))
+        say(_("the clock is trusted: it is {time}", time=now.isoformat(timespec="seconds")))

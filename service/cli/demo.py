@@ -19,6 +19,7 @@ from sprag.service.cli.console import ExitCode, TroubleError, say, show_table, w
 from sprag.service.cli.files import file_failure, write_pieces
 from sprag.service.cli.options import JsonFlag
 from sprag.service.cli.remote import connection, follow
+from sprag.service.languages import N_, _, decimal
 
 if TYPE_CHECKING:
     from sprag.service.client import ServiceClient
@@ -29,10 +30,10 @@ _AXIS = "shaft.load"
 _HELD = (("excitation.frequency", "25 Hz"), ("excitation.amplitude_x", "2 mm"))
 _SHOWN = ("shaft.speed.mean", "shaft.speed.max", "torque.mean", "power.useful.mean", "efficiency")
 _TABLE = (
-    ("shaft.speed.mean", "mean speed\n[rad/s]"),
-    ("torque.mean", "torque\n[N*m]"),
-    ("power.useful.mean", "power\n[W]"),
-    ("efficiency", "efficiency"),
+    ("shaft.speed.mean", N_("mean speed\n[rad/s]")),
+    ("torque.mean", N_("torque\n[N*m]")),
+    ("power.useful.mean", N_("power\n[W]")),
+    ("efficiency", N_("efficiency")),
 )
 _BAR = 20
 
@@ -51,7 +52,7 @@ def demo(
     with _service(target / "sprag.sqlite3") as (address, process), connection(address, None) as client:
         study = _show(client, target / "curve.png", as_json)
         if not leave:
-            say(f"Open {address}{study['links']['page']} (Ctrl-C ends the service).")
+            say(_("Open {address} (Ctrl-C ends the service).", address=address + study["links"]["page"]))
             with suppress(KeyboardInterrupt):
                 process.wait()
     if study["progress"]["ok"] != study["progress"]["total"]:
@@ -79,7 +80,7 @@ def _address(process: subprocess.Popen[bytes]) -> str:
     with process.stdout as output:
         line = output.readline()
     if not line:
-        raise TroubleError("unavailable", "The service did not start; its messages are above.")
+        raise TroubleError("unavailable", _("The service did not start; its messages are above."))
     return str(json.loads(line)["address"])
 
 
@@ -99,15 +100,18 @@ def _show(client: ServiceClient, picture: Path, as_json: bool) -> dict[str, Any]
     from sprag.service.spec.text import load_spec
     from sprag.worker.models import cache_folder
 
-    _, text = preset_text(PRESET)
+    text = preset_text(PRESET)[1]
     spec = load_spec(text, "json")
     created = client.create_study(spec)
-    say(f"Submitted {created['name']!r} to {client.server}: {created['cases']} cases.")
+    what = {"name": repr(created["name"]), "cases": created["cases"]}
+    say(_("Submitted {name} to {server}: {cases} cases.", server=client.server, **what))
     if not any(cache_folder().iterdir()):
-        say("The kernel is compiled first; this takes a few seconds, once.")
+        say(_("The kernel is compiled first; this takes a few seconds, once."))
     start = time.monotonic()
     study = follow(client, created["id"], patient=False)
-    say(f"{study['progress']['done']} cases done in {time.monotonic() - start:.1f} s, {study['progress']['ok']} ok.")
+    seconds = decimal(f"{time.monotonic() - start:.1f}")
+    done = {"done": study["progress"]["done"], "ok": study["progress"]["ok"]}
+    say(_("{done} cases done in {seconds} s, {ok} ok.", seconds=seconds, **done))
     query = [("x", _AXIS), *(("y", name) for name in _SHOWN), *(("at", f"{path}={value}") for path, value in _HELD)]
     curves = client.drawn(study["id"], "curves", query)
     write_pieces(str(picture), client.picture(study["id"], "curves", query, picture.suffix[1:]))
@@ -115,7 +119,7 @@ def _show(client: ServiceClient, picture: Path, as_json: bool) -> dict[str, Any]
         write_json({"study": study, "curves": curves, "picture": str(picture), "server": client.server})
     else:
         _show_curve(curves)
-    say(f"Picture of the curve: {picture}")
+    say(_("Picture of the curve: {file}", file=picture))
     return study
 
 
@@ -124,7 +128,9 @@ def _show_curve(curves: dict[str, Any]) -> None:
     from sprag.worker.models import OK
 
     (drawn,) = curves["curves"]
-    columns = [[None if value is None else f"{value:.4g}" for value in drawn["y"][name]] for name, _ in _TABLE]
+    columns = [
+        [None if value is None else decimal(f"{value:.4g}") for value in drawn["y"][name]] for name, _heading in _TABLE
+    ]
     speeds = [max(speed or 0.0, 0.0) for speed in drawn["y"][_TABLE[0][0]]]
     top = max(speeds) or 1.0
     bars = [
@@ -132,6 +138,6 @@ def _show_curve(curves: dict[str, Any]) -> None:
         for speed, ending in zip(speeds, drawn["endings"], strict=True)
     ]
     held = ", ".join(f"{path} {value}" for path, value in _HELD)
-    headings = [("load\n[N*m]", True), *((heading, True) for _, heading in _TABLE), ("mean speed", False)]
+    headings = [(_("load\n[N*m]"), True), *((_(heading), True) for _name, heading in _TABLE), (_("mean speed"), False)]
     rows = list(zip(drawn["x"], *columns, bars, strict=True))
-    show_table(f"Mechanical characteristic at {held}", headings, rows)
+    show_table(_("Mechanical characteristic at {place}", place=held), headings, rows)

@@ -20,6 +20,7 @@ from sprag.service.cli.console import ExitCode, WrongInputError, console, write_
 from sprag.service.cli.options import Database, JsonFlag
 from sprag.service.cli.settings import read_settings
 from sprag.service.faults import Fault
+from sprag.service.languages import N_, _, decimal
 from sprag.worker.limits import MAX_TOLERANCE, MIN_TOLERANCE
 
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sqlalchemy", "fastapi", "uvicorn")
@@ -59,10 +60,10 @@ def doctor(
         return
     if given:
         problems = [
-            Fault(f"--{name}", "not-used", "belongs to --kernel, which is not given", value)
+            Fault(f"--{name}", "not-used", N_("belongs to --kernel, which is not given"), value)
             for name, value in given.items()
         ]
-        raise WrongInputError("invalid-parameter", "invalid option", problems)
+        raise WrongInputError("invalid-parameter", _("invalid option"), problems)
     findings = list(examine(db))
     sound = all(finding.ok for finding in findings)
     if as_json:
@@ -70,7 +71,7 @@ def doctor(
     else:
         screen = console()
         for finding in findings:
-            mark, style = ("ok", "green") if finding.ok else ("WRONG", "bold red")
+            mark, style = (_("ok"), "green") if finding.ok else (_("WRONG"), "bold red")
             screen.print(f"{mark:>5}", style=style, end="  ")
             screen.print(f"{finding.subject}: {finding.detail}", markup=False, soft_wrap=True)
     if not sound:
@@ -82,8 +83,8 @@ def _show_kernel(shape: dict[str, Any], as_json: bool) -> None:
 
     for name, most in (("pendulums", MAX_PENDULUMS), ("coefficients", MAX_COEFFICIENTS)):
         if shape[name] > most:
-            problem = Fault(f"--{name}", "unknown-name", "is out of range", shape[name], allowed=f"1 .. {most}")
-            raise WrongInputError("invalid-parameter", "invalid option", [problem])
+            problem = Fault(f"--{name}", "unknown-name", N_("is out of range"), shape[name], allowed=f"1 .. {most}")
+            raise WrongInputError("invalid-parameter", _("invalid option"), [problem])
     text = kernel_source(**shape)
     if as_json:
         write_json({**shape, "source": text})
@@ -106,20 +107,32 @@ def _checks(db: str | None) -> dict[str, Callable[[], tuple[bool, str]]]:
     file = Path(url.removeprefix("sqlite:///")) if url.startswith("sqlite") else None
     here: dict[str, Callable[[], tuple[bool, str]]] = {}
     if file is not None:
-        here = {"SQLite": _sqlite, "rights": lambda: _rights(file), "disk": lambda: _disk(file), "backups": _backups}
+        here = {
+            "SQLite": _sqlite,
+            _("rights"): lambda: _rights(file),
+            _("disk"): lambda: _disk(file),
+            _("backups"): _backups,
+        }
     return {
-        "versions": _versions,
-        "database": lambda: _database(url, file),
-        "clock": lambda: _clock(url, file),
+        _("versions"): _versions,
+        _("database"): lambda: _database(url, file),
+        _("clock"): lambda: _clock(url, file),
+        _("workers"): lambda: _workers(url, file),
+        _("schedules"): lambda: _schedules(url, file),
         **here,
-        "kernel cache": _cache,
-        "engine": _known_values,
+        _("kernel cache"): _cache,
+        _("engine"): _known_values,
     }
 
 
 def _versions() -> tuple[bool, str]:
     libraries = ", ".join(f"{name} {version(name)}" for name in _LIBRARIES)
-    text = f"Sprag {version('sprag')}, Python {platform.python_version()} on {platform.system()} {platform.machine()}"
+    text = _(
+        "Sprag {version}, Python {python} on {system}",
+        version=version("sprag"),
+        python=platform.python_version(),
+        system=f"{platform.system()} {platform.machine()}",
+    )
     return sys.version_info >= (3, 11), f"{text}, {libraries}"
 
 
@@ -136,15 +149,20 @@ def _database(url: str, file: Path | None) -> tuple[bool, str]:
     from sprag.service.storage.tables import HEAD_REVISION
 
     if file is not None and not file.exists():
-        return True, f"{file} (not created yet)"
+        return True, _("{file} (not created yet)", file=file)
     session = Session(url)
     try:
         found, location = revision(session), session.location
     finally:
         session.close()
     if found not in (None, HEAD_REVISION):
-        return False, f"{location} has revision {found}, this program needs {HEAD_REVISION}: run `sprag db upgrade`"
-    return True, f"{location}, revision {found or 'none yet'}"
+        return False, _(
+            "{database} has revision {found}, this program needs {needed}: run `sprag db upgrade`",
+            database=location,
+            found=found,
+            needed=HEAD_REVISION,
+        )
+    return True, _("{database}, revision {revision}", database=location, revision=found or _("none yet"))
 
 
 def _rights(file: Path) -> tuple[bool, str]:
@@ -157,15 +175,17 @@ def _rights(file: Path) -> tuple[bool, str]:
     beside = [file.with_name(f"{file.name}{suffix}") for suffix in ("", "-wal", "-shm", ".lock", ".reserve")]
     shared = [str(path) for path in (*beside, *copies) if path.exists() and readable_by_others(path)]
     if shared:
-        return False, f"others can read {', '.join(shared)}: `chmod 600` keeps digests of tokens and designs private"
-    return True, "only their owner can read database and backups"
+        return False, _(
+            "others can read {files}: `chmod 600` keeps digests of tokens and designs private", files=", ".join(shared)
+        )
+    return True, _("only their owner can read database and backups")
 
 
 def _clock(url: str, file: Path | None) -> tuple[bool, str]:
     from sprag.service.storage.clock_watch import clock_problem
     from sprag.service.storage.store import Store
 
-    now = f"it is {datetime.now(UTC).isoformat(timespec='seconds')}"
+    now = _("it is {time}", time=datetime.now(UTC).isoformat(timespec="seconds"))
     if file is not None and not file.exists():
         return True, now
     with Store.open(url) as store:
@@ -173,10 +193,57 @@ def _clock(url: str, file: Path | None) -> tuple[bool, str]:
     return problem is None, problem or now
 
 
+def _workers(url: str, file: Path | None) -> tuple[bool, str]:
+    """Whether a dispatcher is at work and can run cases; that none runs is no fault of the installation."""
+    from sprag.service.jobs.workers import worker_list
+    from sprag.service.storage.store import Store
+
+    if file is not None and not file.exists():
+        return True, _("none yet")
+    with Store.open(url) as store:
+        found = worker_list(store)
+    alive = [item for item in found["dispatchers"] if not (item["silent"] or item["ended_at"])]
+    silent = [item["owner"] for item in found["dispatchers"] if item["silent"] and not item["ended_at"]]
+    if silent:
+        who = ", ".join(silent)
+        return False, _("no heartbeat from {names}: `sprag worker --take-over` replaces a worker that hangs", names=who)
+    if not alive:
+        return True, _("none is running")
+    if shortage := next((item["shortage"] for item in alive if item["shortage"]), None):
+        return False, shortage
+    hosts = [host for item in alive for host in item["hosts"]]
+    threads, names = sum(host["idle_threads"] for host in hosts), {host["host"] for host in hosts}
+    parts = [_("{usable} usable on {hosts} hosts", usable=found["usable"], hosts=len(names))]
+    parts.append(_("{count} idle threads", count=threads))
+    parts.append(_("{count} chunks in flight", count=found["chunks_in_flight"]))
+    parts.append(_("{rate} cases/s", rate=decimal(f"{sum(host['cases_per_second'] for host in hosts):.3g}")))
+    parts += [_("{count} dispatchers", count=len(alive))] * (len(alive) > 1)
+    refused = [
+        _("{worker} is refused: {why}", worker=it["address"], why=_(it["reason"]))
+        for one in alive
+        for it in one["refused"]
+    ]
+    return not refused, "; ".join([", ".join(parts), *refused])
+
+
+def _schedules(url: str, file: Path | None) -> tuple[bool, str]:
+    """Whether something has run whenever it should."""
+    from sprag.service.jobs.reports.watchdog import late_runs
+    from sprag.service.storage.store import Store
+
+    if file is not None and not file.exists():
+        return True, _("none yet")
+    with Store.open(url) as store:
+        late, schedules = late_runs(store), len(store.list_schedules())
+    if late:
+        return False, " ".join(f"{each.run.name or each.run.id}: {each.sentence}" for each in late)
+    return True, _("{count} schedules, none is late", count=schedules)
+
+
 def _disk(location: Path) -> tuple[bool, str]:
     folder = next(parent for parent in location.absolute().parents if parent.exists())
     free = shutil.disk_usage(folder).free
-    return free >= _LEAST_FREE_BYTES, f"{free / 1e9:.3g} GB free at {folder}"
+    return free >= _LEAST_FREE_BYTES, _("{size} GB free at {folder}", size=decimal(f"{free / 1e9:.3g}"), folder=folder)
 
 
 def _backups() -> tuple[bool, str]:
@@ -184,12 +251,14 @@ def _backups() -> tuple[bool, str]:
 
     folder = read_settings().backup_folder
     if not folder:
-        return True, "no backups are made (SPRAG_BACKUP_FOLDER is not set)"
+        return True, _("no backups are made (SPRAG_BACKUP_FOLDER is not set)")
     found = backups(Path(folder).expanduser())
     if not found:
-        return False, f"there is none in {folder} yet: is `sprag serve` or `sprag worker` running?"
+        return False, _("there is none in {folder} yet: is `sprag serve` or `sprag worker` running?", folder=folder)
     age = datetime.now(UTC) - found[-1][0]
-    return age < _OLD_BACKUP, f"{len(found)} in {folder}, the latest {age.total_seconds() / 3600:.0f} hours old"
+    hours = round(age.total_seconds() / 3600)
+    text = _("{count} in {folder}, the latest {hours} hours old", count=len(found), folder=folder, hours=hours)
+    return age < _OLD_BACKUP, text
 
 
 def _cache() -> tuple[bool, str]:
@@ -200,7 +269,10 @@ def _cache() -> tuple[bool, str]:
     with tempfile.NamedTemporaryFile(dir=folder, prefix=".doctor-") as probe:
         probe.write(b"x")
     if not cache_is_wanted():
-        return False, f"the configured folder is not writable, so kernels are kept in {folder}: set SPRAG_KERNEL_CACHE"
+        return False, _(
+            "the configured folder is not writable, so kernels are kept in {folder}: set SPRAG_KERNEL_CACHE",
+            folder=folder,
+        )
     return os.access(folder, os.W_OK | os.X_OK), str(folder)
 
 
@@ -210,4 +282,4 @@ def _known_values() -> tuple[bool, str]:
     wrong, largest = check_known_values()
     if wrong:
         return False, "; ".join(wrong)
-    return True, f"closed forms and a reference case agree within {largest:.1e}"
+    return True, _("closed forms and a reference case agree within {error}", error=decimal(f"{largest:.1e}"))

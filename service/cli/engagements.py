@@ -11,6 +11,7 @@ from sprag.service.cli.console import ExitCode, say, write_json, wrong_option
 from sprag.service.cli.files import is_json, output, read_study, require_cases, to_file
 from sprag.service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
 from sprag.service.json_text import to_bytes
+from sprag.service.languages import N_, _, decimal
 
 if TYPE_CHECKING:
     from sprag.worker.study import Study
@@ -46,8 +47,10 @@ def engagements(
             write(to_bytes(engagements_json(made, case, case_values(study, case))) + b"\n")
         else:
             write(engagements_csv(made, table.value))
-    told = f"{len(made.rows)} engagements from {made.start:g} s to {made.end:g} s"
-    say(f"case {case}: {told if made.ending == OK else ENDING_SENTENCES[made.ending]}")
+    first, last = (decimal(f"{time:g}") for time in (made.start, made.end))
+    text = _("{count} engagements from {first} s to {last} s", count=len(made.rows), first=first, last=last)
+    meaning = text if made.ending == OK else _(ENDING_SENTENCES[made.ending])
+    say(_("case {case}: {text}", case=case, text=meaning))
     if as_json and to_file(file):
         write_json({"file": file, "case": case, "ending": made.ending, "engagements": len(made.rows)})
     if made.ending != OK:
@@ -59,6 +62,6 @@ def _require(study: Study, case: int) -> None:
     from sprag.worker.models import VIBRATION_DRIVE, has_clutches
 
     if not has_clutches(study):
-        message, detail = "has no clutches, so that nothing engages", "this study has no engagements"
+        message, detail = N_("has no clutches, so that nothing engages"), _("this study has no engagements")
         raise wrong_option("/model", "wrong-type", message, study.model, allowed=VIBRATION_DRIVE, detail=detail)
     require_cases(study, [case])

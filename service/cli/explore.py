@@ -1,4 +1,4 @@
-"""``sprag explore``: cases of a running service chosen by ranges and kinds, sorted over all rows."""
+"""``sprag explore`` and ``select``: cases of a running service chosen by ranges and kinds, shown or as a new study."""
 
 from __future__ import annotations
 
@@ -6,32 +6,85 @@ from typing import Annotated, Any
 
 import typer
 
+from sprag.service.cli import completion
 from sprag.service.cli.console import Column, say, show_table, write_json
 from sprag.service.cli.files import write_pieces
-from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
+from sprag.service.cli.names import study_of
+from sprag.service.cli.options import (
+    DEFAULT_SERVER,
+    FileUnits,
+    JsonFlag,
+    OfEnding,
+    OfFlag,
+    OfRegime,
+    Server,
+    StudyId,
+    Token,
+    Wait,
+    WaitTimeout,
+    in_units,
+)
 from sprag.service.cli.pictures import file_format, heading
-from sprag.service.cli.remote import connection
-from sprag.worker.limits import MAX_SELECTED
+from sprag.service.cli.remote import connection, submitted
+from sprag.service.languages import _
+from sprag.worker.limits import MAX_POINTS_SELECTED, MAX_SELECTED
+
+Where = Annotated[
+    list[str] | None,
+    typer.Option("--where", metavar="RANGE", help='Range such as "shaft.load <= 2 N*m"; may be repeated.'),
+]
+Sort = Annotated[
+    str,
+    typer.Option(
+        "--sort",
+        metavar="NAME",
+        help='Parameter or result; "-NAME": from the largest down.',
+        autocompletion=completion.sortings,
+    ),
+]
+
+
+def select(
+    study_id: StudyId,
+    where: Where = None,
+    sort: Sort = "case",
+    limit: Annotated[
+        int, typer.Option("--limit", min=1, max=MAX_POINTS_SELECTED, metavar="N", help="Most cases of the new study.")
+    ] = 50,
+    ending: OfEnding = None,
+    regime: OfRegime = None,
+    flag: OfFlag = None,
+    wait: Wait = False,
+    timeout: WaitTimeout = None,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Submit a study of the first cases within ranges of parameters and results, as points."""
+    from sprag.service.client.queries import explore_query
+
+    query = explore_query(where or (), sort, limit, (), ending, regime, flag)
+    with connection(server, token) as client:
+        study_id = study_of(client, study_id)
+        submitted(client, client.select(study_id, query), wait, timeout, as_json)
 
 
 def explore(
     study_id: StudyId,
-    where: Annotated[
-        list[str] | None,
-        typer.Option("--where", metavar="RANGE", help='Range such as "shaft.load <= 2 N*m"; may be repeated.'),
-    ] = None,
-    sort: Annotated[
-        str, typer.Option("--sort", metavar="NAME", help='Parameter or result; "-NAME": from the largest down.')
-    ] = "case",
+    where: Where = None,
+    sort: Sort = "case",
     limit: Annotated[
         int, typer.Option("--limit", min=1, max=MAX_SELECTED, metavar="N", help="Most cases to show.")
     ] = 20,
     show: Annotated[
-        list[str] | None, typer.Option("--show", metavar="NAME", help="Quantity to show; may be repeated.")
+        list[str] | None,
+        typer.Option(
+            "--show", metavar="NAME", help="Quantity to show; may be repeated.", autocompletion=completion.quantities
+        ),
     ] = None,
-    ending: Annotated[str | None, typer.Option("--ending", metavar="ENDING", help="Only with this ending.")] = None,
-    regime: Annotated[str | None, typer.Option("--regime", metavar="REGIME", help="Only of this regime.")] = None,
-    flag: Annotated[str | None, typer.Option("--flag", metavar="FLAG", help="Only with this flag.")] = None,
+    ending: OfEnding = None,
+    regime: OfRegime = None,
+    flag: OfFlag = None,
     file: Annotated[
         str | None,
         typer.Option(
@@ -41,6 +94,7 @@ def explore(
             help=f"File to write: .csv, the selection, at most {MAX_SELECTED:,} cases.",
         ),
     ] = None,
+    units: FileUnits = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -48,26 +102,31 @@ def explore(
     """Show the cases within ranges of parameters and results, sorted over all rows."""
     from sprag.service.client.queries import explore_query
 
-    form = None if file is None else file_format(file, ("csv",), "table")
+    form = None if file is None else file_format(file, ("csv",))
     query = explore_query(where or (), sort, None, show or (), ending, regime, flag)
     with connection(server, token) as client:
+        study_id = study_of(client, study_id)
         found = client.explore(study_id, [*query, ("limit", str(limit))])
         if file is not None and form is not None:
-            write_pieces(file, client.explore_file(study_id, [*query, ("limit", str(MAX_SELECTED)), ("format", form)]))
+            asked = [*query, ("limit", str(MAX_SELECTED)), *in_units(units), ("format", form)]
+            write_pieces(file, client.explore_file(study_id, asked))
     if as_json:
         write_json(found)
     else:
         _show(found)
     if file is not None:
-        cut = f", the first {MAX_SELECTED:,} cases of the selection" if found["selected"] > MAX_SELECTED else ""
-        say(f"table: {file}{cut}")
+        say(
+            _("table: {file}, the first {count} cases of the selection", file=file, count=f"{MAX_SELECTED:,}")
+            if found["selected"] > MAX_SELECTED
+            else _("table: {file}", file=file)
+        )
 
 
 def _show(found: dict[str, Any]) -> None:
     """A line for each case in its order."""
     units = {item["name"]: item["unit"] for item in found["quantities"]}
-    columns: list[Column] = [("case", True), *((heading(name, unit), True) for name, unit in units.items())]
-    columns += [("ending", False), ("regime", False), ("flags", False)]
+    columns: list[Column] = [(_("case"), True), *((heading(name, unit), True) for name, unit in units.items())]
+    columns += [(_("ending"), False), (_("regime"), False), (_("flags"), False)]
     rows = [
         (
             case["case"],
@@ -78,4 +137,4 @@ def _show(found: dict[str, Any]) -> None:
         )
         for case in found["cases"]
     ]
-    show_table(f"{found['selected']} of {found['known']} cases", columns, rows)
+    show_table(_("{selected} of {known} cases", selected=found["selected"], known=found["known"]), columns, rows)

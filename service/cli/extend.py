@@ -7,11 +7,14 @@ from typing import Annotated, Any
 
 import typer
 
+from sprag.service.cli import completion
 from sprag.service.cli.console import say, wrong_option
 from sprag.service.cli.files import decode, read_bytes
+from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token, Wait, WaitTimeout
 from sprag.service.cli.remote import connection, submitted
-from sprag.service.spec.numbers import parse_number
+from sprag.service.languages import N_, _, ngettext
+from sprag.service.spec.numbers import could_be_one, parse_number, settled
 from sprag.worker.limits import (
     MAX_BODY_BYTES,
     MAX_NARROW_STEPS,
@@ -27,7 +30,9 @@ def extend(
     axis: Annotated[
         list[str] | None,
         typer.Option(
-            "--axis", metavar="PATH=VALUES", help="Further values, such as shaft.load=0.5,0.7; may be repeated."
+            "--axis",
+            metavar="PATH=VALUES",
+            help="Further values, such as shaft.load=0.5,0.7; with decimal commas 0,5;0,7. May be repeated.",
         ),
     ] = None,
     points: Annotated[
@@ -42,6 +47,7 @@ def extend(
     """Submit a study with more values on the axes of an old one, or more cases; only new cases are run."""
     addition = _addition(axis or [], points)
     with connection(server, token) as client:
+        study_id = study_of(client, study_id)
         old = client.study(study_id)
         study = client.extend(study_id, addition)
         say(_what_is_new(old, study))
@@ -53,7 +59,11 @@ def longer(
     regime: Annotated[
         str | None,
         typer.Option(
-            "--regime", metavar="REGIME", help="Regime of the cases of a settled study.", show_default="unsettled"
+            "--regime",
+            metavar="REGIME",
+            help="Regime of the cases of a settled study.",
+            show_default="unsettled",
+            autocompletion=completion.regimes,
         ),
     ] = None,
     at_most: Annotated[
@@ -72,6 +82,7 @@ def longer(
 ) -> None:
     """Submit a study of the unsettled cases of another, with more time for each."""
     with connection(server, token) as client:
+        study_id = study_of(client, study_id)
         submitted(client, client.run_longer(study_id, regime, at_most), wait, timeout, as_json)
 
 
@@ -96,6 +107,7 @@ def narrow(
     """Submit the sweep of a study once more, with smaller steps where its motion jumps."""
     query = [("steps", str(steps)), *(("at", text) for text in at or [])]
     with connection(server, token) as client:
+        study_id = study_of(client, study_id)
         submitted(client, client.narrow(study_id, query), wait, timeout, as_json)
 
 
@@ -103,15 +115,22 @@ def _what_is_new(old: Mapping[str, Any], study: Mapping[str, Any]) -> str:
     """How many of the cases are new."""
     new = study["cases"] - old["cases"]
     if not new:
-        return f"nothing is new: {old['id']} has all of the {old['cases']} cases"
-    return f"{new} of the {study['cases']} cases {'is' if new == 1 else 'are'} new, the others are those of {old['id']}"
+        return _("nothing is new: {study} has all of the {cases} cases", study=old["id"], cases=old["cases"])
+    return ngettext(
+        "{new} of the {cases} cases is new, the others are those of {study}",
+        "{new} of the {cases} cases are new, the others are those of {study}",
+        new,
+        new=new,
+        cases=study["cases"],
+        study=old["id"],
+    )
 
 
 def _addition(axes: list[str], points: str | None) -> dict[str, Any]:
     if bool(axes) == (points is not None):
-        message = "or --points is needed, and not both"
+        message = N_("or --points is needed, and not both")
         raise wrong_option(
-            "--axis", "exactly-one", message, allowed="--axis shaft.load=0.5,0.7", detail="missing option"
+            "--axis", "exactly-one", message, allowed="--axis shaft.load=0.5,0.7", detail=_("missing option")
         )
     if points is not None:
         return {"cases": [{"points": decode(points, read_bytes(points, MAX_BODY_BYTES))}]}
@@ -120,10 +139,20 @@ def _addition(axes: list[str], points: str | None) -> dict[str, Any]:
         path, sign, values = text.partition("=")
         if not sign or not path.strip() or not values.strip():
             raise wrong_option(
-                "--axis", "invalid-text", "must be PATH=VALUES", text, allowed="such as shaft.load=0.5,0.7"
+                "--axis", "invalid-text", N_("must be PATH=VALUES"), text, allowed=_("such as shaft.load=0.5,0.7")
             )
-        made.append({"path": path.strip(), "values": [_value(item.strip()) for item in values.split(",")]})
+        made.append({"path": path.strip(), "values": _values(values)})
     return {"axes": made}
+
+
+def _values(text: str) -> list[float | str]:
+    """The values of a list: semicolons separate them where there are any, otherwise commas."""
+    if could_be_one(text):
+        raise wrong_option(
+            "--axis", "ambiguous-comma", N_("could be one value or two"), text,
+            allowed=_("semicolons between values, or a decimal point"),
+        )  # fmt: skip
+    return [_value(item.strip()) for item in (settled(text.split(";")) if ";" in text else text.split(","))]
 
 
 def _value(text: str) -> float | str:

@@ -17,6 +17,7 @@ from typing import IO, TYPE_CHECKING, Literal, cast
 from sprag.service.cli.console import CommandFailureError, TroubleError, WrongInputError, wrong_option
 from sprag.service.cli.table_files import named, with_tables
 from sprag.service.faults import Fault, Kind
+from sprag.service.languages import N_, _
 from sprag.service.spec.report import SpecError
 from sprag.service.stale_files import mark, sweep
 from sprag.worker.limits import MAX_BODY_BYTES
@@ -53,7 +54,9 @@ def read_bytes(path: str, limit: int) -> bytes:
             with Path(path).open("rb") as file:
                 data = file.read(limit + 1)
     if len(data) > limit:
-        raise WrongInputError("invalid-file", f"{path}: larger than the allowed {limit} bytes")
+        raise WrongInputError(
+            "invalid-file", _("{file}: larger than the allowed {limit} bytes", file=path, limit=limit)
+        )
     return data
 
 
@@ -63,15 +66,23 @@ def decode(path: str, data: bytes) -> str:
     Raises WrongInputError when it is not text.
     """
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        raise WrongInputError("invalid-file", f"{path}: UTF-16 text; save it as UTF-8 (spreadsheets call it CSV UTF-8)")
+        raise WrongInputError(
+            "invalid-file", _("{file}: UTF-16 text; save it as UTF-8 (spreadsheets call it CSV UTF-8)", file=path)
+        )
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise WrongInputError(
-            "invalid-file", f"{path}: not UTF-8 text (byte {error.start} is {data[error.start]:#04x})"
+            "invalid-file",
+            _(
+                "{file}: not UTF-8 text (byte {place} is {value})",
+                file=path,
+                place=error.start,
+                value=f"{data[error.start]:#04x}",
+            ),
         ) from error
     if "\0" in text:
-        raise WrongInputError("invalid-file", f"{path}: a binary file, not text")
+        raise WrongInputError("invalid-file", _("{file}: a binary file, not text", file=path))
     return text
 
 
@@ -96,7 +107,7 @@ def read_spec(
     tables = named(files or ())
 
     if path == points == "-":
-        raise wrong_option("--points", "conflict", "standard input is the spec already", allowed="a file")
+        raise wrong_option("--points", "conflict", N_("standard input is the spec already"), allowed=_("a file"))
     data = read_bytes(path, MAX_BODY_BYTES)
     try:
         spec = load_spec(data, _format(path, data))
@@ -136,10 +147,12 @@ def require_cases(study: Study, cases: Iterable[int]) -> None:
     """Raise WrongInputError for numbers that no case has."""
     allowed = f"0 .. {study.cases - 1}"
     problems = [
-        Fault("--case", "unknown-name", "there is no such case", case, allowed) for case in cases if case >= study.cases
+        Fault("--case", "unknown-name", N_("there is no such case"), case, allowed)
+        for case in cases
+        if case >= study.cases
     ]
     if problems:
-        raise WrongInputError("invalid-parameter", "invalid option", problems)
+        raise WrongInputError("invalid-parameter", _("invalid option"), problems)
 
 
 @contextmanager
@@ -150,16 +163,16 @@ def naming_points(points: str | None) -> Iterator[None]:
     except WrongInputError as failure:
         if points is None:
             raise
-        told = [
+        lines = [
             replace(fault, where=points) if (fault.where or "").startswith("/axes") else fault
             for fault in failure.faults
         ]
-        raise WrongInputError(cast("Kind", failure.code), failure.detail, told) from failure
+        raise WrongInputError(cast("Kind", failure.code), failure.detail, lines) from failure
 
 
 def spec_failure(path: str, error: SpecError) -> WrongInputError:
     """The failure for a SpecError: its faults, one per line."""
-    return WrongInputError("invalid-spec", f"{path}: the spec is not valid", error.faults)
+    return WrongInputError("invalid-spec", _("{file}: the spec is not valid", file=path), error.faults)
 
 
 Write = Callable[[bytes], None]
@@ -174,14 +187,14 @@ def output(path: str | None) -> Iterator[Write]:
     """
     if path is None or path == "-":
         sys.stdout.flush()
-        yield _writer(sys.stdout.buffer, "standard output")
-        with _naming("standard output"):
+        yield _writer(sys.stdout.buffer, _("standard output"))
+        with _naming(_("standard output")):
             sys.stdout.buffer.flush()
         return
     target = Path(path)
     with _naming(target):
         if target.is_dir():
-            raise WrongInputError("invalid-file", f"{path}: is a directory")
+            raise WrongInputError("invalid-file", _("{file}: is a directory", file=path))
         through = target.exists() and not target.is_file()  # devices and pipes are written to, never replaced
     if through:
         with _naming(target):
@@ -231,7 +244,7 @@ def _naming(path: Path | str) -> Iterator[None]:
     except OSError as error:
         raise file_failure(path, error) from error
     except ValueError as error:  # a zero byte in the name
-        raise WrongInputError("invalid-file", f"{path!r} is not a file name") from error
+        raise WrongInputError("invalid-file", _("{name} is not a file name", name=repr(path))) from error
 
 
 @contextmanager

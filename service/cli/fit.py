@@ -8,10 +8,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sprag.service.cli.console import WrongInputError, say, show_table, write_json, write_text, wrong_option
+from sprag.service.cli.console import (
+    WrongInputError,
+    cell_text,
+    say,
+    show_table,
+    warning_lines,
+    write_json,
+    write_text,
+    wrong_option,
+)
 from sprag.service.cli.files import MAX_DATA_BYTES, decode, read_bytes
 from sprag.service.cli.options import JsonFlag
 from sprag.service.faults import Fault, warned
+from sprag.service.languages import N_, _
 from sprag.service.spec.numbers import parse_number
 from sprag.service.spec.report import shorten
 
@@ -20,27 +30,36 @@ if TYPE_CHECKING:
     from sprag.worker.models import ClutchFit, DegreeReport
 
 _DEGREE_COLUMNS = (
-    ("degree", True),
-    ("RMS [N*m]", True),
-    ("largest residual [N*m]", True),
-    ("rank", True),
-    ("condition number", True),
+    (N_("degree"), True),
+    (N_("RMS [N*m]"), True),
+    (N_("largest residual [N*m]"), True),
+    (N_("rank"), True),
+    (N_("condition number"), True),
 )
-_ROW_COLUMNS = (("line", True), ("angle [rad]", True), ("torque [N*m]", True), ("residual [N*m]", True))
+_ROW_COLUMNS = (
+    (N_("line"), True),
+    (N_("angle [rad]"), True),
+    (N_("torque [N*m]"), True),
+    (N_("residual [N*m]"), True),
+)
 
 
 def fit(
     data: Annotated[
         str, typer.Argument(metavar="DATA.csv", help="Measured rows of angle and torque; - reads standard input.")
     ],
-    accuracy: Annotated[str, typer.Option(help='Largest residual allowed, in N*m or with a unit ("50 N*mm").')],
-    max_degree: Annotated[int, typer.Option(help="Highest degree of the polynomial to try.")] = 7,
+    accuracy: Annotated[
+        str, typer.Option(metavar="TORQUE", help='Largest residual allowed, in N*m or with a unit ("50 N*mm").')
+    ],
+    max_degree: Annotated[int, typer.Option(metavar="N", help="Highest degree of the polynomial to try.")] = 7,
     full: Annotated[bool, typer.Option("--full", help="Full polynomial: torque at zero windup allowed.")] = False,
     angles_include_backlash: Annotated[
         bool,
         typer.Option("--angles-include-backlash", help="The measured angles include the backlash."),
     ] = False,
-    backlash: Annotated[str, typer.Option(help='Backlash in the angles, in rad or with a unit ("0.3 deg").')] = "0",
+    backlash: Annotated[
+        str, typer.Option(metavar="ANGLE", help='Backlash in the angles, in rad or with a unit ("0.3 deg").')
+    ] = "0",
     as_json: JsonFlag = False,
 ) -> None:
     """Fit the clutch polynomial of lowest degree that reaches the accuracy, and report on it.
@@ -49,7 +68,7 @@ def fit(
     """
     lost_motion = _quantity("--backlash", backlash, "rad")
     if lost_motion and not angles_include_backlash:
-        message = "is taken off the angles only with --angles-include-backlash"
+        message = N_("is taken off the angles only with --angles-include-backlash")
         raise wrong_option("--backlash", "not-used", message, backlash)
     measured = _measured(data)
     made = _fitted(
@@ -86,7 +105,7 @@ def _measured(path: str) -> MeasuredData:
     try:
         return parse_measured(decode(path, read_bytes(path, MAX_DATA_BYTES)), parse_quantity)
     except MeasuredDataError as error:
-        raise WrongInputError("invalid-data", f"{path}: no measured clutch data", error.faults) from error
+        raise WrongInputError("invalid-data", _("{file}: no measured clutch data", file=path), error.faults) from error
 
 
 def _fitted(measured: MeasuredData, *, accuracy: float, **options: Any) -> ClutchFit:
@@ -99,14 +118,14 @@ def _fitted(measured: MeasuredData, *, accuracy: float, **options: Any) -> Clutc
             raise WrongInputError("invalid-data", error.summary, _tried(error.degrees, accuracy)) from error
         where = _place(error.name, measured)
         problem = Fault(where, "no-clutch-law", error.message, shorten(error.value), allowed=error.allowed)
-        raise WrongInputError("invalid-data", "no law can be fitted", [problem]) from error
+        raise WrongInputError("invalid-data", _("no law can be fitted"), [problem]) from error
 
 
 def _place(name: str, measured: MeasuredData) -> str:
     """The user's name of the field: a line of the file, or an option."""
     row = re.match(r"data\.(\d+)", name)
     if row is not None:
-        return f"line {measured.lines[int(row[1])]}"
+        return _("line {number}", number=measured.lines[int(row[1])])
     return name if name in ("", "data") else "--" + name.replace("_", "-")
 
 
@@ -114,9 +133,9 @@ def _tried(degrees: Iterable[DegreeReport], accuracy: float) -> list[Fault]:
     """Best residual of each degree that was tried, as faults."""
     return [
         Fault(
-            f"degree {report.degree}",
+            _("degree {degree}", degree=report.degree),
             "out-of-range",
-            "largest residual in N*m",
+            N_("largest residual in N*m"),
             float(f"{report.max_residual:.6g}"),
             allowed=f"<= {accuracy:g}",
         )
@@ -138,16 +157,29 @@ def law_text(coefficients: tuple[float, ...]) -> str:
 
 def _report(measured: MeasuredData, made: ClutchFit) -> None:
     degrees = [(r.degree, r.rms, r.max_residual, r.rank, r.condition_number) for r in made.degrees_tried]
-    show_table("Degrees tried", _DEGREE_COLUMNS, degrees)
+    show_table(_("Degrees tried"), [(_(head), numeric) for head, numeric in _DEGREE_COLUMNS], degrees)
     rows = zip(measured.lines, measured.rows.tolist(), made.residuals, strict=True)
-    show_table("Residuals", _ROW_COLUMNS, [(line, angle, torque, residual) for line, (angle, torque), residual in rows])
-    eigenvalues = ", ".join(f"{value:.6g}" for value in made.eigenvalues)
-    write_text(
-        f"{law_text(made.coefficients)}   (N*m, windup u in rad, measured to u = {made.windup_limit:.6g} rad)\n"
-        f"degree {made.degree}, RMS {made.rms:.6g} N*m, largest residual {made.max_residual:.6g} N*m, "
-        f"{'monotone' if made.monotone else 'not monotone'}\n"
-        f"normal matrix: condition number {made.condition_number:.6g}, eigenvalues {eigenvalues}\n"
-        f'for a spec: "clutch": {{"coefficients": {list(made.coefficients)!r}, '
-        f'"windup_limit": {made.windup_limit!r}}}\n'
+    columns = [(_(head), numeric) for head, numeric in _ROW_COLUMNS]
+    cells = [(line, angle, torque, residual) for line, (angle, torque), residual in rows]
+    show_table(_("Residuals"), columns, cells)
+    law = law_text(made.coefficients)
+    spec = f'"clutch": {{"coefficients": {list(made.coefficients)!r}, "windup_limit": {made.windup_limit!r}}}'
+    numbers = {
+        "degree": made.degree,
+        "rms": cell_text(made.rms),
+        "residual": cell_text(made.max_residual),
+        "kind": _("monotone") if made.monotone else _("not monotone"),
+    }
+    eigenvalues = "; ".join(map(cell_text, made.eigenvalues))
+    lines = (
+        law + "   " + _("(N*m, windup u in rad, measured to u = {end} rad)", end=cell_text(made.windup_limit)),
+        _("degree {degree}, RMS {rms} N*m, largest residual {residual} N*m, {kind}", **numbers),
+        _(
+            "normal matrix: condition number {condition}, eigenvalues {eigenvalues}",
+            condition=cell_text(made.condition_number),
+            eigenvalues=eigenvalues,
+        ),
+        _("for a spec: {text}", text=spec),
     )
-    say(*(f"warning: {warning}" for warning in (*measured.warnings, *made.warnings)))
+    write_text("".join(f"{line}\n" for line in lines))
+    say(*warning_lines((*measured.warnings, *made.warnings)))

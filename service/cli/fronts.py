@@ -9,9 +9,11 @@ import typer
 
 from sprag.service.cli.console import say, show_table, write_json
 from sprag.service.cli.files import write_pieces
+from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
 from sprag.service.cli.pictures import file_format, heading
 from sprag.service.cli.remote import connection
+from sprag.service.languages import _
 
 #: Designs of a file: every one.
 _EVERY = 1_000_000
@@ -31,8 +33,9 @@ def front(
     as_json: JsonFlag = False,
 ) -> None:
     """Show the best designs of a study with a goal: goals, variables, results of limits."""
-    form = None if file is None else file_format(file, ("csv",), "table")
+    form = None if file is None else file_format(file, ("csv",))
     with connection(server, token) as client:
+        study_id = study_of(client, study_id)
         query = [("exact", str(exact).lower())]
         found = client.front(study_id, [*query, ("limit", str(limit))])
         if file is not None and form is not None:
@@ -42,21 +45,25 @@ def front(
     else:
         _show(found)
     if file is not None:
-        say(f"table: {file}")
+        say(_("table: {file}", file=file))
 
 
 def _show(found: dict[str, Any]) -> None:
     """A line for each design, the best first."""
     counts = found["counts"]
-    told = [f"{counts['known']} designs", f"{counts['feasible']} feasible", f"{counts['front']} on the front"]
+    parts = [
+        _("{count} designs", count=counts["known"]),
+        _("{count} feasible", count=counts["feasible"]),
+        _("{count} on the front", count=counts["front"]),
+    ]
     if counts["pending"]:
-        told.append(f"{counts['pending']} still to be run")
-    columns = [(name, True) for name in ("design", "case")]
+        parts.append(_("{count} still to be run", count=counts["pending"]))
+    columns = [(name, True) for name in (_("design"), _("case"))]
     columns += [(_lines(goal["result"], goal["unit"]), True) for goal in found["best"]]
     columns += [(_lines(one["name"], one["unit"]), True) for one in found["variables"]]
     limited, points = _limited(found), len(found["at"])
     columns += [
-        (_lines(name if points == 1 else f"{name} at {number}", unit), True)
+        (_lines(name if points == 1 else _("{name} at {number}", name=name, number=number), unit), True)
         for name, unit in limited.items()
         for number in range(1, points + 1)
     ]
@@ -71,7 +78,8 @@ def _show(found: dict[str, Any]) -> None:
         )
         for design in found["designs"]
     ]
-    show_table(", ".join(told), [*columns, ("feasible", False), ("exact", False), ("rank", True)], rows)
+    columns += [(_("feasible"), False), (_("exact"), False), (_("rank"), True)]
+    show_table(", ".join(parts), columns, rows)
 
 
 def _limited(found: dict[str, Any]) -> dict[str, str]:

@@ -6,11 +6,14 @@ from typing import Annotated, Any
 
 import typer
 
+from sprag.service.cli import completion
 from sprag.service.cli.console import Column, say, show_table, write_json
 from sprag.service.cli.files import write_pieces
-from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
+from sprag.service.cli.names import study_of
+from sprag.service.cli.options import DEFAULT_SERVER, CurveBy, FileUnits, JsonFlag, Server, StudyId, Token, in_units
 from sprag.service.cli.pictures import ChosenOf, HeldAt, file_format, heading, held_text
 from sprag.service.cli.remote import connection
+from sprag.service.languages import _
 
 _FORMATS = ("csv", "svg", "png", "pdf")
 
@@ -22,63 +25,70 @@ def answers(
         typer.Option("--point", metavar="VALUE", help='Working point on the axis along the curves, such as "0.3 N*m".'),
     ] = None,
     x: Annotated[
-        str | None, typer.Option("--x", metavar="PATH", help="Axis along the curves; default: that of the page.")
+        str | None,
+        typer.Option(
+            "--x",
+            metavar="PATH",
+            help="Axis along the curves; default: that of the page.",
+            autocompletion=completion.parameters,
+        ),
     ] = None,
-    by: Annotated[
-        list[str] | None, typer.Option("--by", metavar="PATH", help="Axis with one curve for each value.")
-    ] = None,
+    by: CurveBy = None,
     at: HeldAt = None,
     of: ChosenOf = None,
     file: Annotated[
         str | None,
         typer.Option("-o", "--output", metavar="FILE", help="Table or picture to write: .csv, .svg, .png or .pdf."),
     ] = None,
+    units: FileUnits = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Show what one asks of a study first: no-load speed, largest power, best efficiency, stall torque."""
-    form = None if file is None else file_format(file, _FORMATS, "file")
+    form = None if file is None else file_format(file, _FORMATS)
     query = [("point", point)] if point is not None else []
     query += [("x", x)] if x is not None else []
     query += [("by", path) for path in by or ()]
     query += [*(("at", item) for item in at or ()), *(("of", item) for item in of or ())]
     with connection(server, token) as client:
+        study_id = study_of(client, study_id)
         found = client.answers(study_id, query)
         if file is not None and form is not None:
-            write_pieces(file, client.answers_file(study_id, [*query, ("format", form)]))
+            write_pieces(file, client.answers_file(study_id, [*query, *in_units(units), ("format", form)]))
     if as_json:
         write_json(found)
     else:
         _show(found)
     if file is not None:
-        say(f"{'table' if form == 'csv' else 'picture'}: {file}")
+        say(_("table: {file}", file=file) if form == "csv" else _("picture: {file}", file=file))
 
 
 def _show(found: dict[str, Any]) -> None:
     """A table for each curve: its answers and its working point; then the extremes among all cases."""
     x = heading(found["x"] or "", found["unit"] or "1")
     columns: list[Column] = [
-        ("answer", False, True),
-        ("value", True),
-        ("unit", False),
+        (_("answer"), False, True),
+        (_("value"), True),
+        (_("unit"), False),
         (x, True),
-        ("cases", False),
-        ("", False, True),
+        (_("cases"), False),
+        (_("note"), False),
     ]
     for curve in found["curves"]:
         title = held_text({**curve["by"], **curve["at"]}, found["units"])
         show_table(title, columns, [_row(item) for item in (*curve["answers"], *curve["working_point"])])
     if found["overall"]:
-        columns[3] = ("", False, True)
+        columns[3] = (_("case with"), False)
         rows = [
             (*row[:3], held_text(item["parameters"], found["units"]), *row[4:])
             for item in found["overall"]
             for row in [_row(item)]
         ]
-        show_table("among all cases", columns, rows)
+        show_table(_("among all cases"), columns, rows)
 
 
 def _row(item: dict[str, Any]) -> tuple[object, ...]:
     unit = "" if item["unit"] == "1" else item["unit"]
-    return item["title"], item["value"], unit, item["x"], ", ".join(map(str, item["cases"])), item["note"]
+    cases = ", ".join(map(str, item["cases"]))
+    return _(item["title"]), item["value"], unit, item["x"], cases, _(item["note"]) if item["note"] else item["note"]

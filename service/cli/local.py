@@ -8,10 +8,11 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import UTC, datetime
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from sprag.service.cli import completion
 from sprag.service.cli.console import (
     ExitCode,
     WrongInputError,
@@ -20,6 +21,8 @@ from sprag.service.cli.console import (
     progress_text,
     say,
     show_table,
+    state_text,
+    warning_lines,
     write_json,
     write_text,
     wrong_option,
@@ -27,6 +30,7 @@ from sprag.service.cli.console import (
 from sprag.service.cli.files import is_json, output, read_study, require_cases, to_file
 from sprag.service.cli.options import (
     ChunkCases,
+    CsvHeader,
     FinishBy,
     Fresh,
     JsonFlag,
@@ -38,21 +42,22 @@ from sprag.service.cli.options import (
     ValueFormat,
     ValueFormatOption,
 )
-from sprag.service.cli.remote import TableFormat, table_format
+from sprag.service.cli.remote import TableFormat, require_csv, table_format
 from sprag.service.cli.running import run_parsed
 from sprag.service.cli.settings import read_settings
 from sprag.service.faults import Fault, warned
+from sprag.service.languages import N_, _, decimal, recorded
 from sprag.worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.service.formats import Format
+    from sprag.service.formats import Format, Header
     from sprag.service.jobs.local import LocalRun
     from sprag.service.results.report import ReportFormat
     from sprag.service.settings import Settings
     from sprag.service.spec.document import ParsedSpec
-    from sprag.service.storage.records import Progress
+    from sprag.service.storage.records import Progress, StudyRecord
     from sprag.worker.models import Trajectory
     from sprag.worker.study import Study
 
@@ -81,12 +86,12 @@ def validate(spec: SpecFile, points: PointsFile = None, tables: TableFiles = Non
             }
         )
         return
-    print(f"{spec}: valid, {parsed.study.cases} cases")
+    print(_("{file}: valid, {cases} cases", file=spec, cases=parsed.study.cases))
     _say_warnings(parsed)
 
 
 def _say_warnings(parsed: ParsedSpec) -> None:
-    say(*(f"warning: {warning}" for warning in parsed.warnings))
+    say(*warning_lines(parsed.warnings))
 
 
 def preview(
@@ -114,26 +119,37 @@ def preview(
     if as_json:
         write_json(made)
         return
-    count = f"{made['cases']} cases ({' x '.join(map(str, made['shape'])) or 'no axes'})"
-    if made["most_rounds"] > 1:
-        count = (
-            f"at most {made['most_cases']} cases in at most {made['most_rounds']} rounds, {made['cases']} in the first"
-        )
-    write_text(
-        f"{made['name'] or made['model']}: {count}, {made['results']} results each\n"
-        f"about {duration_text(made['estimated_seconds'])} and {made['estimated_bytes'] / 1e6:.3g} MB\n"
-    )
+    _show_preview(made)
     if reusable:
-        write_text(f"{reusable} of the cases need not be run: the database has them\n")
-    columns = (("axis", False), ("unit", False), ("values", True), ("first", True), ("last", True))
+        write_text(_("{count} of the cases need not be run: the database has them", count=reusable) + "\n")
+    heads = ((_("axis"), False), (_("unit"), False), (_("values"), True), (_("first"), True), (_("last"), True))
     rows = [
         (", ".join(axis["paths"]), axis["unit"], axis["values"], axis["first"], axis["last"]) for axis in made["axes"]
     ]
     if rows:
-        show_table("Axes", columns, rows)
+        show_table(_("Axes"), heads, rows)
     if made["derive"]:
-        show_table("Derived parameters", (("parameter", False), ("formula, SI", False)), [*made["derive"].items()])
-    say(*(f"warning: {warning}" for warning in made["warnings"]))
+        columns = ((_("parameter"), False), (_("formula, SI"), False))
+        show_table(_("Derived parameters"), columns, [*made["derive"].items()])
+    say(*warning_lines(made["warnings"], made["warning_codes"]))
+
+
+def _show_preview(made: Mapping[str, Any]) -> None:
+    """What a study has, and what it costs."""
+    cases = {"cases": made["cases"], "results": made["results"], "name": made["name"] or made["model"]}
+    if made["most_rounds"] > 1:
+        most = {"most": made["most_cases"], "rounds": made["most_rounds"]}
+        text = _(
+            "{name}: at most {most} cases in at most {rounds} rounds, {cases} in the first, {results} results each",
+            **most,
+            **cases,
+        )
+    else:
+        shape = " x ".join(map(str, made["shape"])) or _("no axes")
+        text = _("{name}: {cases} cases ({shape}), {results} results each", shape=shape, **cases)
+    size = decimal(f"{made['estimated_bytes'] / 1e6:.3g}")
+    cost = _("about {time} and {size} MB", time=duration_text(made["estimated_seconds"]), size=size)
+    write_text(f"{text}\n{cost}\n")
 
 
 def _reusable(settings: Settings, parsed: ParsedSpec) -> int:
@@ -174,10 +190,11 @@ def trajectory(
         made = _trajectory(study, case, start, end, points)
         written = is_json(file, as_json) if form is None else form is ValueFormat.JSON
         write(_trajectory_bytes(made, study, case, written))
-    told = f"{points} points {'in time' if made.along == 'time' else 'over the angle'}"
+    way = _("{count} points in time") if made.along == "time" else _("{count} points over the angle")
+    text = way.format(count=points)
     if not len(made.values):
-        told = f"no points: {ENDING_SENTENCES[made.ending]}"
-    say(f"case {case}: {made.ending}, {told}")
+        text = _("no points: {why}", why=_(ENDING_SENTENCES[made.ending]))
+    say(_("case {case}: {text}", case=case, text=f"{made.ending}, {text}"))
     if as_json and to_file(file):
         write_json({"file": file, "case": case, "ending": made.ending, "points": len(made.values)})
     if made.ending != OK:
@@ -196,7 +213,7 @@ def _trajectory(study: Study, case: int, start: str | None, end: str | None, poi
         problems = [
             Fault(f"--{item.where}", item.code, item.message, item.value, item.allowed) for item in error.faults
         ]
-        raise WrongInputError("invalid-parameter", "invalid option", problems) from error
+        raise WrongInputError("invalid-parameter", _("invalid option"), problems) from error
     return run_trajectory(study, case, first, last, points)
 
 
@@ -212,25 +229,30 @@ def _trajectory_bytes(made: Trajectory, study: Study, case: int, as_json: bool) 
 
 def presets(
     name: Annotated[
-        str | None, typer.Argument(metavar="[NAME]", help="Study to print; by default, a description of each.")
+        str | None,
+        typer.Argument(
+            metavar="[NAME]",
+            help="Study to print; by default, a description of each.",
+            autocompletion=completion.presets,
+        ),
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """List the studies that come with the program, or print the spec of one."""
     from sprag.service.presets import ABOUT, preset_names, preset_text
-    from sprag.service.spec.report import did_you_mean
 
     names = preset_names()
     if name is None:
         if as_json:
             write_json({"presets": list(names), "about": {item: asdict(ABOUT[item]) for item in names}})
         else:
-            width = max(map(len, names)) + 2
-            write_text("".join(f"{item:{width}}{ABOUT[item].shows}\n" for item in names))
+            columns = ((_("preset"), False, True), (_("shows"), False))
+            show_table("", columns, [(item, _(ABOUT[item].shows)) for item in names])
         return
     if name not in names:
-        message = f"unknown preset{did_you_mean(name, names)}"
-        raise wrong_option("NAME", "unknown-name", message, name, allowed=", ".join(names), detail="invalid argument")
+        message = N_("unknown preset")
+        detail = _("invalid argument")
+        raise wrong_option("NAME", "unknown-name", message, name, allowed=", ".join(names), detail=detail)
     file, text = preset_text(name)
     if as_json:
         write_json({"name": name, "file": file, "text": text})
@@ -246,6 +268,7 @@ def run(
     form: Annotated[
         TableFormat | None, typer.Option("--format", help="Default: by the name of FILE, otherwise csv.")
     ] = None,
+    header: CsvHeader = None,
     db: Annotated[
         str | None,
         typer.Option("--db", metavar="URL", help="Database to keep the study in; default: a temporary database."),
@@ -260,7 +283,8 @@ def run(
     from sprag.service.results.rounds import sentence
     from sprag.service.results.unaffected import Unaffected
 
-    finish = _finish(finish_by)
+    finish, written = _finish(finish_by), table_format(form, file, as_json)
+    require_csv(header, written)
     settings = read_settings(database=db, processes=processes, chunk_cases=chunk)
     parsed = read_study(spec, points, partial(_with_start, settings) if db is not None else None, tables)
     _say_warnings(parsed)
@@ -278,27 +302,36 @@ def run(
             finish_by=finish,
         ) as done,
     ):
-        for piece in _rows(done, table_format(form, file, as_json)):
+        for piece in _rows(done, written, header or "names"):
             write(piece)
         record, unaffecting = done.record, Unaffected().of(done.store, done.record)
         progress = done.store.progress(record.id)
         endings = progress.endings
-    kept = f", kept as {record.id}" if db is not None else ""
-    known = f", {record.reused} of them reused" if record.reused else ""
-    say(*(f"warning: {text}" for text in unaffecting))
+    say(*warning_lines(unaffecting))
     seconds = time.monotonic() - start
-    say(f"{record.done} of {record.cases} cases done{known}, {record.ok} ok, {seconds:.1f} s{kept}")
+    say(", ".join(_done(record, seconds, kept=db is not None)))
     if progress.rounds is not None:
-        say(sentence(progress.rounds))
+        say(sentence(progress.rounds, progress.state))
     say(*ending_lines(endings))
     if as_json and to_file(file):
         numbers = {"cases": record.cases, "done": record.done, "ok": record.ok, "reused": record.reused}
         study_id = record.id if db is not None else None
         write_json({"file": file, "study": study_id, **numbers, "endings": endings, "seconds": round(seconds, 3)})
     if record.time_over:
-        say(str(record.reason))
+        say(recorded.said(_(str(record.reason))))
     if record.ok != record.cases:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
+
+
+def _done(record: StudyRecord, seconds: float, *, kept: bool) -> Iterator[str]:
+    """How a run ended, in short."""
+    yield _("{done} of {cases} cases done", done=record.done, cases=record.cases)
+    if record.reused:
+        yield _("{count} of them reused", count=record.reused)
+    yield _("{count} ok", count=record.ok)
+    yield _("{seconds} s", seconds=decimal(f"{seconds:.1f}"))
+    if kept:
+        yield _("kept as {study}", study=record.id)
 
 
 def _with_start(settings: Settings, spec: object) -> object:
@@ -317,7 +350,7 @@ def _with_start(settings: Settings, spec: object) -> object:
 def _remark(now: Progress, finish_by: str | None) -> str:
     from sprag.service.results.rounds import sentence
 
-    rounds = None if now.rounds is None else sentence(now.rounds)
+    rounds = None if now.rounds is None else sentence(now.rounds, now.state)
     return progress_text(now.state, now.rate, now.seconds_left, finish_by, now.in_time, rounds)
 
 
@@ -331,8 +364,14 @@ def _telling_what_is_kept() -> Iterator[None]:
     except RunInterruptedError as stop:
         record = stop.record
         say(
-            f"the study {record.id} is {record.state.value}: {record.done} of {record.cases} cases are kept, "
-            "and the same command without --fresh reuses them"
+            _(
+                "the study {study} is {state}: {done} of {cases} cases are kept, and the same command without --fresh "
+                "reuses them",
+                study=record.id,
+                state=state_text(record.state),
+                done=record.done,
+                cases=record.cases,
+            )
         )
         raise
 
@@ -347,12 +386,15 @@ def _finish(text: str | None) -> datetime | None:
         raise wrong_option("--finish-by", error.code, str(error), text, allowed=ALLOWED) from None
 
 
-def _rows(done: LocalRun, form: Format | ReportFormat) -> Iterator[bytes]:
+def _rows(done: LocalRun, form: Format | ReportFormat, header: Header) -> Iterator[bytes]:
     """The rows of a finished study as the service exports them, or its report."""
     from sprag.service.results.exports import export, stored
     from sprag.service.results.report import write_report
     from sprag.service.results.report.content import report_of
+    from sprag.service.results.report.document import TitleBlock
 
     if form == "html" or form == "pdf":  # noqa: PLR1714 - narrows the type
-        return iter([write_report(report_of(done.store, done.record.id), form)])
-    return export(stored(done.store, done.record, done.store.study(done.record.id)), form)
+        settings = read_settings()
+        block = TitleBlock(office=settings.report_office)
+        return iter([write_report(report_of(done.store, done.record.id), block, settings.report_folder, form)])
+    return export(stored(done.store, done.record, done.store.study(done.record.id), header=header), form)

@@ -24,6 +24,7 @@ from sprag.service.cli.options import (
     ValueFormatOption,
 )
 from sprag.service.faults import Fault, FaultError
+from sprag.service.languages import N_, _
 from sprag.worker.limits import MAX_BASIN_POINTS
 
 if TYPE_CHECKING:
@@ -124,10 +125,10 @@ def regimes(spec: SpecFile, case: CaseOption = 0, points: PointsFile = None, as_
         raise wrong_option(
             "/starts",
             "required",
-            "is required",
+            N_("is required"),
             None,
-            allowed="`starts` in the spec of a settled study",
-            detail="the study has no starts",
+            allowed=_("`starts` in the spec of a settled study"),
+            detail=_("the study has no starts"),
         )
     done = run_chunk(taken(study, np.array([case])) if study.axes else study, 0, 1)
     infos = {info.name: (place, info) for place, info in enumerate(study_results(study))}
@@ -139,7 +140,7 @@ def regimes(spec: SpecFile, case: CaseOption = 0, points: PointsFile = None, as_
         write_json({"case": case, "ending": done.endings[0], "regimes": rows})
         return
     show_table(
-        f"Case {case}: {study.run['starts']['count']} starts",
+        _("Case {case}: {count} starts", case=case, count=study.run["starts"]["count"]),
         [(name.removeprefix("regime."), name != "regime") for name in _SHOWN],
         [tuple(row.values()) for row in rows],
     )
@@ -157,14 +158,14 @@ def study_of(spec: str, points: str | None, case: int, start: int | None) -> Stu
 
 
 @contextmanager
-def naming_options(study: Study, lacks: str = "has no motion that settles") -> Iterator[None]:
+def naming_options(study: Study, lacks: str = N_("has no motion that settles")) -> Iterator[None]:
     """Name the options of a command instead of the parameters of a request; WrongInputError for each fault."""
     try:
         yield
     except FaultError as error:
         if not error.faults:
             raise wrong_option("/model", "wrong-type", lacks, study.model, detail=error.detail) from error
-        raise WrongInputError("invalid-parameter", "invalid option", tuple(map(_option, error.faults))) from error
+        raise WrongInputError("invalid-parameter", _("invalid option"), tuple(map(_option, error.faults))) from error
 
 
 def _option(fault: Fault) -> Fault:

@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from sprag.service.cli import completion
+from sprag.service.formats import Header
 from sprag.worker.limits import MAX_STARTS
 
 #: Default address of `sprag serve`.
@@ -61,7 +63,51 @@ TableFiles = Annotated[
 OutputFile = Annotated[
     str | None, typer.Option("-o", "--output", metavar="FILE", help="File to write; default: standard output.")
 ]
-StudyId = Annotated[str, typer.Argument(metavar="ID", help="Id of the study.")]
+CsvHeader = Annotated[
+    Header | None,
+    typer.Option(
+        "--header", help="Heads of CSV columns: names, with units that are not SI, or every unit; default: names."
+    ),
+]
+FileUnits = Annotated[
+    str | None,
+    typer.Option(
+        "--units",
+        metavar="UNITS",
+        help='Units of FILE: si, typed (those of the spec), or a list such as "rpm, mm, torque=N*mm"; default: SI.',
+    ),
+]
+StudyId = Annotated[
+    str,
+    typer.Argument(
+        metavar="ID",
+        help="Id or name of the study, or the beginning of one; latest: the newest.",
+        autocompletion=completion.studies,
+    ),
+]
+OfEnding = Annotated[
+    str | None,
+    typer.Option("--ending", metavar="ENDING", help="Only cases with this ending.", autocompletion=completion.endings),
+]
+OfRegime = Annotated[
+    str | None,
+    typer.Option(
+        "--regime",
+        metavar="REGIME",
+        help="Only cases of this regime, of a settled study.",
+        autocompletion=completion.regimes,
+    ),
+]
+OfFlag = Annotated[
+    str | None,
+    typer.Option("--flag", metavar="FLAG", help="Only cases with this flag.", autocompletion=completion.flags),
+]
+CurveBy = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--by", metavar="PATH", help="Axis with one curve for each value.", autocompletion=completion.parameters
+    ),
+]
 Server = Annotated[
     str, typer.Option("--server", envvar="SPRAG_SERVER", metavar="URL", help="Address of the running service.")
 ]
@@ -117,3 +163,8 @@ WaitTimeout = Annotated[
         help="Longest time to wait, then exit code 3; default: no limit.",
     ),
 ]
+
+
+def in_units(units: str | None) -> list[tuple[str, str]]:
+    """The units of a file as a query."""
+    return [] if units is None else [("units", units)]

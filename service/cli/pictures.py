@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sprag.service.cli.console import OK, cell_text, say, show_table, write_json, wrong_option
+from sprag.service.cli import completion
+from sprag.service.cli.console import OK, cell_text, say, show_table, warning_lines, write_json, wrong_option
 from sprag.service.cli.files import write_pieces
-from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
+from sprag.service.cli.names import study_of
+from sprag.service.cli.options import DEFAULT_SERVER, CurveBy, FileUnits, JsonFlag, Server, StudyId, Token, in_units
 from sprag.service.cli.remote import connection
+from sprag.service.languages import N_, _, decimal
 
 if TYPE_CHECKING:
     from sprag.service.answers import Value
@@ -31,17 +34,21 @@ ChosenOf = Annotated[
 
 _PICTURES = ("svg", "png", "pdf")
 #: Indices and the headings of their columns.
-_SHARES = {"first_order": "first order", "first_order_error": "+-", "total": "total", "total_error": "+-"}
+_SHARES = {"first_order": N_("first order"), "first_order_error": "+-", "total": N_("total"), "total_error": "+-"}
 _ELEMENTARY = {"mu": "mu", "mu_star": "mu*", "mu_star_error": "+-", "sigma": "sigma"}
 
 
-def file_format(file: str, allowed: tuple[str, ...], what: str) -> str:
+def file_format(file: str, allowed: tuple[str, ...]) -> str:
     """The format given by the ending of ``file``; raises WrongInputError when it is not in ``allowed``."""
     form = file.rpartition(".")[2].lower()
     if form not in allowed:
-        names = ", ".join(f".{name}" for name in allowed[:-1]) + f" or .{allowed[-1]}"
+        names = ", ".join(f".{name}" for name in allowed)
         raise wrong_option(
-            "--output", "invalid-choice", f"no kind of {what}", file, allowed=f"a name that ends in {names}"
+            "--output",
+            "invalid-choice",
+            N_("is not a file of this kind"),
+            file,
+            allowed=_("a name that ends in {endings}", endings=names),
         )
     return form
 
@@ -58,7 +65,7 @@ def answer(
     drawing: Sequence[tuple[str, str]] = (),
 ) -> None:
     """Show what the service draws of a study, and write it where a file is named; ``drawing`` is said for it only."""
-    form = None if file is None else file_format(file, formats, "picture")
+    form = None if file is None else file_format(file, formats)
     found = client.drawn(study_id, part, query)
     if file is not None and form is not None:
         write_pieces(file, client.picture(study_id, part, [*query, *drawing], form))
@@ -67,25 +74,34 @@ def answer(
     else:
         show(found)
     if file is not None:
-        say(f"{'table' if form == 'csv' else 'picture'}: {file}")
+        say(_("table: {file}", file=file) if form == "csv" else _("picture: {file}", file=file))
 
 
 def curve(
     study_id: StudyId,
     x: Annotated[
         str | None,
-        typer.Option("--x", metavar="PATH", help="Axis along the curve; default: that of the page."),
+        typer.Option(
+            "--x",
+            metavar="PATH",
+            help="Axis along the curve; default: that of the page.",
+            autocompletion=completion.parameters,
+        ),
     ] = None,
     y: Annotated[
         list[str] | None,
-        typer.Option("--y", metavar="RESULT", help="Result to draw; may be repeated; default: those of the page."),
+        typer.Option(
+            "--y",
+            metavar="RESULT",
+            help="Result to draw; may be repeated; default: those of the page.",
+            autocompletion=completion.results,
+        ),
     ] = None,
-    by: Annotated[
-        list[str] | None, typer.Option("--by", metavar="PATH", help="Axis with one curve for each value.")
-    ] = None,
+    by: CurveBy = None,
     at: HeldAt = None,
     of: ChosenOf = None,
     file: PictureFile = None,
+    units: FileUnits = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -95,16 +111,31 @@ def curve(
     query += [("by", path) for path in by or ()]
     query += [*(("at", item) for item in at or ()), *(("of", item) for item in of or ())]
     with connection(server, token) as client:
-        answer(client, study_id, "curves", query, file, show_curves, as_json)
+        study_id = study_of(client, study_id)
+        answer(client, study_id, "curves", query, file, show_curves, as_json, drawing=in_units(units))
 
 
 def draw_map(
     study_id: StudyId,
-    x: Annotated[str, typer.Option("--x", metavar="PATH", help="Axis to the right, such as shaft.load.")],
-    y: Annotated[str, typer.Option("--y", metavar="PATH", help="Axis upwards, such as excitation.frequency.")],
-    z: Annotated[str, typer.Option("--z", metavar="RESULT", help="Result to draw.")],
+    x: Annotated[
+        str,
+        typer.Option(
+            "--x", metavar="PATH", help="Axis to the right, such as shaft.load.", autocompletion=completion.parameters
+        ),
+    ],
+    y: Annotated[
+        str,
+        typer.Option(
+            "--y",
+            metavar="PATH",
+            help="Axis upwards, such as excitation.frequency.",
+            autocompletion=completion.parameters,
+        ),
+    ],
+    z: Annotated[str, typer.Option("--z", metavar="RESULT", help="Result to draw.", autocompletion=completion.results)],
     at: HeldAt = None,
     file: PictureFile = None,
+    units: FileUnits = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -112,7 +143,8 @@ def draw_map(
     """Show one result over two axes as a table, and write it as a picture."""
     query = [("x", x), ("y", y), ("z", z), *(("at", item) for item in at or ())]
     with connection(server, token) as client:
-        answer(client, study_id, "map", query, file, show_map, as_json)
+        study_id = study_of(client, study_id)
+        answer(client, study_id, "map", query, file, show_map, as_json, drawing=in_units(units))
 
 
 def show_map(found: dict[str, Any]) -> None:
@@ -132,18 +164,33 @@ def _show_points(found: dict[str, Any], title: str) -> None:
     """The cases of a refined map, and how right it is."""
     points, axes = found["points"], (found["x"], found["y"])
     columns = [*((heading(axis["path"], axis["unit"]), True) for axis in axes)]
-    columns += [(heading(found["z"]["name"], found["z"]["unit"]), True), ("case", True)]
+    columns += [(heading(found["z"]["name"], found["z"]["unit"]), True), (_("case"), True)]
     show_table(title, columns, list(zip(points["x"], points["y"], points["z"], points["cases"], strict=True)))
-    error = "not known yet" if found["error"] is None else f"{100.0 * found['error']:.2g} % of the range"
+    asked, jumps = _percent(found["error_asked"]), _percent(found["jumps_share"])
     say(
-        f"error: {error}, {100.0 * found['error_asked']:.2g} % asked; "
-        f"{100.0 * found['jumps_share']:.2g} % of the map is not interpolated"
+        _(
+            "error: {error}, {asked} asked; {jumps} of the map is not interpolated",
+            error=_error(found["error"]),
+            asked=asked,
+            jumps=jumps,
+        )
     )
+
+
+def _error(error: float | None) -> str:
+    return _("not known yet") if error is None else _("{share} of the range", share=_percent(error))
+
+
+def _percent(share: float) -> str:
+    return decimal(f"{100.0 * share:.2g} %")
 
 
 def sensitivity(
     study_id: StudyId,
-    y: Annotated[list[str], typer.Option("--y", metavar="RESULT", help="Result; may be repeated.")],
+    y: Annotated[
+        list[str],
+        typer.Option("--y", metavar="RESULT", help="Result; may be repeated.", autocompletion=completion.results),
+    ],
     file: PictureFile = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
@@ -151,21 +198,23 @@ def sensitivity(
 ) -> None:
     """Show what results depend on: the share of their variance for every axis, and the range of its main effect."""
     with connection(server, token) as client:
+        study_id = study_of(client, study_id)
         answer(client, study_id, "sensitivity", [("y", name) for name in y], file, _show_sensitivity, as_json)
 
 
 def _show_sensitivity(found: dict[str, Any]) -> None:
     for result in found["results"]:
         _show_effects(result)
-    say(*(f"warning: {text}" for text in found["warnings"]))
+    say(*warning_lines(found["warnings"]))
 
 
 def _show_effects(result: dict[str, Any]) -> None:
-    way = "no shares" if result["method"] == "none" else f"method {result['method']}"
-    title = f"{heading(result['result'], result['unit'])}: {result['cases']} cases, {way}"
+    way = _("no shares") if result["method"] == "none" else _("method {name}", name=result["method"])
+    named = heading(result["result"], result["unit"])
+    title = _("{result}: {cases} cases, {way}", result=named, cases=result["cases"], way=way)
     names = _ELEMENTARY if result["method"] == "morris" else _SHARES
-    columns = [("axis", False), *((name, True) for name in names.values())]
-    columns += [("least mean", True), ("largest mean", True)]
+    columns = [(_("axis"), False), *((_(name), True) for name in names.values())]
+    columns += [(_("least mean"), True), (_("largest mean"), True)]
     rows = []
     for effect in result["effects"]:
         means = [value for value in effect["means"] if value is not None]
@@ -173,43 +222,49 @@ def _show_effects(result: dict[str, Any]) -> None:
         rows.append((", ".join(effect["paths"]), *indices, min(means, default=None), max(means, default=None)))
     show_table(title, columns, rows)
     if result["pairs"]:
-        told = [(", ".join(pair["paths"]), ", ".join(pair["other_paths"]), pair["second_order"], pair["error"])
+        interactions = [(", ".join(pair["paths"]), ", ".join(pair["other_paths"]), pair["second_order"], pair["error"])
                 for pair in result["pairs"]]  # fmt: skip
-        columns = [("axis", False), ("with", False), ("second order", True), ("+-", True)]
-        show_table("interactions of two axes", columns, told)
-    say(*(f"note: {text}" for text in result["notes"]))
+        columns = [(_("axis"), False), (_("with"), False), (_("second order"), True), ("+-", True)]
+        show_table(_("interactions of two axes"), columns, interactions)
+    say(*(_("note: {text}", text=_(text)) for text in result["notes"]))
 
 
-def show_curves(found: dict[str, Any]) -> None:
-    """One table for each curve: the axis, then every result against it; of a refined curve its error and jumps."""
+def show_curves(found: Mapping[str, Any], of: str = "") -> None:
+    """One table for each curve: the axis, then every result against it; of a refined curve its error and jumps.
+
+    ``of`` is the name of its study, where there are several.
+    """
     x = found["x"]
     columns = [(heading(x["path"], x["unit"]), True)]
     columns += [(heading(name, result["unit"]), True) for name, result in found["results"].items()]
     settled = all("regime" in drawn for drawn in found["curves"])
-    columns += [("regime", False)] * settled + [("ending", False)]
+    columns += [(_("regime"), False)] * settled + [(_("ending"), False)]
     for drawn in found["curves"]:
-        title = held_text({**drawn["by"], **drawn["at"]}, found["units"])
+        place = held_text({**drawn["by"], **drawn["at"]}, found["units"])
+        title = ": ".join(filter(None, (of, place)))
         regimes = [drawn["regime"]] if settled else []
         rows = zip(drawn["x"], *drawn["y"].values(), *regimes, drawn["endings"], strict=True)
         show_table(title, columns, [(*row[:-1], "" if row[-1] == OK else row[-1]) for row in rows])
         if "error" in drawn:
             say(*_refined(drawn, found["error_asked"], x["unit"]))
         elif "jumps" in drawn:
-            say(*(f"jump at {_ends(jump, x['unit'])} ({jump['why']})" for jump in drawn["jumps"]))
+            places = ((_ends(jump, x["unit"]), _(jump["why"])) for jump in drawn["jumps"])
+            say(*(_("jump at {place} ({why})", place=place, why=why) for place, why in places))
 
 
 def _refined(drawn: dict[str, Any], asked: float, unit: str) -> Iterator[str]:
-    """What is told of a refined curve."""
+    """What is known of a refined curve, in sentences."""
     for name, error in drawn["error"].items():
-        told = "not known yet" if error is None else f"{100.0 * error:.2g} % of the range"
-        yield f"error of {name}: {told}, {100.0 * asked:.2g} % asked"
+        yield _("error of {name}: {error}, {asked} asked", name=name, error=_error(error), asked=_percent(asked))
     for jump in drawn["jumps"]:
-        why, results = jump["why"].replace("_", " "), ", ".join(jump["results"])
-        yield f"jump at {_ends(jump, unit)} ({why}): {results} not interpolated"
+        why, results = _(jump["why"].replace("_", " ")), ", ".join(jump["results"])
+        place = _ends(jump, unit)
+        yield _("jump at {place} ({why}): {results} not interpolated", place=place, why=why, results=results)
 
 
 def _ends(jump: dict[str, Any], unit: str) -> str:
-    return f"{cell_text(jump['low'])} to {cell_text(jump['high'])}" + ("" if unit == "1" else f" {unit}")
+    ends = _("{low} to {high}", low=cell_text(jump["low"]), high=cell_text(jump["high"]))
+    return ends + ("" if unit == "1" else f" {unit}")
 
 
 def held_text(values: Mapping[str, Value], units: Mapping[str, str]) -> str:

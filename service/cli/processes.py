@@ -8,12 +8,20 @@ from typing import Annotated
 
 import typer
 
+from sprag.service import languages
 from sprag.service.cli.console import TroubleError, WrongInputError, write_json
 from sprag.service.cli.options import ChunkCases, Database, JsonFlag, Processes
 from sprag.service.cli.settings import read_settings
 
 Host = Annotated[
     str | None, typer.Option("--host", metavar="ADDRESS", help="Address to listen on; default: this machine only.")
+]
+TlsCertificate = Annotated[
+    str | None,
+    typer.Option("--tls-certificate", metavar="FILE", help="PEM file with the certificate: https without a proxy."),
+]
+TlsKey = Annotated[
+    str | None, typer.Option("--tls-key", metavar="FILE", help="PEM file with its key; default: in the same file.")
 ]
 Port = Annotated[int | None, typer.Option(min=0, max=65535, help="Port to listen on; 0: any free one.")]
 
@@ -24,6 +32,8 @@ def serve(
     db: Database = None,
     processes: Processes = None,
     chunk: ChunkCases = None,
+    tls_certificate: TlsCertificate = None,
+    tls_key: TlsKey = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Start the service and its worker; Ctrl-C ends both. With --json the address is printed on standard output."""
@@ -31,19 +41,29 @@ def serve(
     gc.disable()
     from sprag.service.http.server import AddressError
     from sprag.service.http.server import serve as run_service
+    from sprag.service.http.tls import CertificateError
     from sprag.service.settings import UnsafeSettingsError
 
     gc.freeze()
     gc.enable()
-    settings = read_settings(host=host, port=port, database=db, processes=processes, chunk_cases=chunk)
+    settings = read_settings(
+        host=host,
+        port=port,
+        database=db,
+        processes=processes,
+        chunk_cases=chunk,
+        tls_certificate=tls_certificate,
+        tls_key=tls_key,
+    )
 
     def announce(address: str) -> None:
         write_json({"address": address})
         sys.stdout.flush()
 
     try:
-        run_service(settings, announce=announce if as_json else None)
-    except UnsafeSettingsError as error:
+        with languages.language(languages.ENGLISH):  # of requests and logs, whoever starts the service
+            run_service(settings, announce=announce if as_json else None)
+    except (UnsafeSettingsError, CertificateError) as error:
         raise WrongInputError("invalid-settings", str(error)) from error
     except AddressError as error:
         raise TroubleError("unavailable", str(error)) from error
@@ -56,7 +76,8 @@ def worker(
         bool,
         typer.Option(
             "--take-over",
-            help="Do not wait for another worker, which can then store nothing more; kill it if it hangs.",
+            help="Do not wait for another worker, which can then store nothing more; kill it if it hangs. "
+            "On PostgreSQL: end the workers that do not respond.",
         ),
     ] = False,
 ) -> None:
@@ -66,4 +87,5 @@ def worker(
 
     settings = read_settings(database=db, processes=processes)
     logs.configure(settings.log_format, requests=False)
-    run_dispatcher(worker_settings(settings), stop_on_signals(), take_over=take_over)
+    with languages.language(languages.ENGLISH):
+        run_dispatcher(worker_settings(settings), stop_on_signals(), take_over=take_over)

@@ -1,30 +1,37 @@
-"""Commands that talk to a running service: submit, watch, list, pause, resume, cancel, retry, export, curve."""
+"""Commands that talk to a running service: submit, watch, pause, resume, cancel, retry, rounds, export."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import islice
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast, get_args
 
 import typer
 
+from sprag.service.cli import completion
 from sprag.service.cli.console import (
     OK,
     CommandFailureError,
     ExitCode,
     TroubleError,
     WrongInputError,
+    cell_text,
     progress_bar,
     progress_text,
     say,
     show_table,
+    state_text,
+    warning_lines,
     write_json,
+    wrong_option,
 )
 from sprag.service.cli.files import naming_points, read_spec, to_file, write_pieces
+from sprag.service.cli.names import study_of
 from sprag.service.cli.options import (
     DEFAULT_SERVER,
+    CsvHeader,
+    FileUnits,
     FinishBy,
     Fresh,
     JsonFlag,
@@ -37,17 +44,16 @@ from sprag.service.cli.options import (
     Token,
     Wait,
     WaitTimeout,
+    in_units,
 )
 from sprag.service.faults import Fault, Kind
-from sprag.service.formats import REPORT_FORMATS, Format, ReportFormat, format_of
+from sprag.service.formats import REPORT_FORMATS, Format, Header, ReportFormat, format_of
+from sprag.service.languages import N_, _, recorded
 from sprag.worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
 from sprag.worker.states import TERMINAL, StudyState
 
 if TYPE_CHECKING:
     from sprag.service.client import Query, RefusedError, ServiceClient
-
-#: Most studies of one request.
-_PAGE = 100
 
 #: A parameter as in the service's messages: "by=", "at=shaft.load=0.2".
 _PARAMETER_IN_TEXT = re.compile(r"(?<![\w.-])(x|y|by|at)=(?=(\w?))")
@@ -65,7 +71,7 @@ TableFormat = Literal[Format, ReportFormat]
 @contextmanager
 def connection(server: str, token: str | None) -> Iterator[ServiceClient]:
     """A client of the service; its errors become failures of the command."""
-    from sprag.service.client import RefusedError, ServiceClient, StudyTimeoutError, UnreachableError
+    from sprag.service.client import RefusedError, ServiceClient, StudyTimeoutError, UnreachableError, UntrustedError
 
     try:
         client = ServiceClient(server, token)
@@ -74,23 +80,34 @@ def connection(server: str, token: str | None) -> Iterator[ServiceClient]:
     with client:
         try:
             yield client
+        except UntrustedError as error:
+            raise TroubleError(
+                "unreachable",
+                f"{error}; SSL_CERT_FILE names a PEM file with the certificate of its issuer.",
+            ) from error
         except UnreachableError as error:
             raise TroubleError(
                 "unreachable",
-                f"No Sprag service at {error.address} ({error.reason}); start one with `sprag serve` or name another "
-                "with --server.",
+                _(
+                    "No Sprag service at {address} ({why}); start one with `sprag serve` or name another with "
+                    "--server.",
+                    address=error.address,
+                    why=error.reason,
+                ),
             ) from error
         except RefusedError as error:
             raise refusal(error) from error
         except StudyTimeoutError as error:
-            raise TroubleError("not-done", f"{error}; it continues.") from error
+            raise TroubleError("not-done", _("{what}; it continues.", what=error)) from error
 
 
 def refusal(error: RefusedError) -> CommandFailureError:
     """The failure of the command for a refusal of the service."""
     kind = cast("Kind", error.code)
     if error.status == 401:
-        return TroubleError(kind, f"{error} Give the service's token with --token or in SPRAG_TOKEN.")
+        return TroubleError(
+            kind, _("{refusal} Give the service's token with --token or in SPRAG_TOKEN.", refusal=_(str(error)))
+        )
     if error.status in (403, 421) or error.status >= 500:
         return TroubleError(kind, str(error))
     faults = [
@@ -137,7 +154,7 @@ def submit(
 
 def submitted(client: ServiceClient, study: dict[str, Any], wait: bool, timeout: float | None, as_json: bool) -> None:
     """Tell of a study that was submitted, at once or when it has ended."""
-    say(*(f"warning: {warning}" for warning in study.get("warnings", ())))
+    say(*warning_lines(study.get("warnings", ()), study.get("warning_codes", ())))
     if wait:
         study = follow(client, study["id"], timeout)
     show_study(study, as_json)
@@ -154,6 +171,7 @@ def watch(
 ) -> None:
     """Follow a study until it has ended, even across restarts of the service."""
     with connection(server, token) as client:
+        study_id = study_of(client, study_id)
         client.study(study_id, timeout)  # a wrong address or id fails immediately
         study = follow(client, study_id, timeout)
     show_study(study, as_json)
@@ -168,18 +186,20 @@ def follow(
     For a held study the reason is printed, and watching continues until it is resumed or cancelled. The same applies to
     a service that does not answer; with ``patient`` false, the command fails instead.
     """
-    from sprag.service.client.waiting import Waiting, wait_for
+    from sprag.service.client.synchronous.following import wait_for
+    from sprag.service.client.waiting import Waiting
 
-    told: set[str | None] = set()
+    reasons: set[str | None] = set()
     with progress_bar(study_id) as update:
 
         def tell(study: dict[str, Any]) -> None:
             progress = study["progress"]
             update(progress["done"], progress["total"], _remark(study))
             held = study["state"] == StudyState.PAUSED and not study["time_over"]
-            if held and study.get("reason") not in told:
-                told.add(study.get("reason"))
-                say(f"{study_id} is paused: {study.get('reason') or 'on request'}")
+            if held and study.get("reason") not in reasons:
+                reasons.add(study.get("reason"))
+                why = recorded.said(_(study["reason"])) if study.get("reason") else _("on request")
+                say(_("{study} is paused: {why}", study=study_id, why=why))
 
         return wait_for(client, study_id, Waiting(tell, timeout, patient=patient, notify=say))
 
@@ -213,16 +233,28 @@ def show_study(study: dict[str, Any], as_json: bool) -> None:
     print(study["id"])
     progress = study["progress"]
     endings = ", ".join(f"{count} {name}" for name, count in progress.get("endings", {}).items() if name != OK)
-    say(
-        f"{study['name'] or study['model']}: {study['state']}, {progress['done']} of {progress['total']} cases done, "
-        f"{progress['ok']} ok"
-        + (f" ({endings})" if endings else "")
-        + (f"; {_rounds(study)}" if _rounds(study) else "")
-        + (f"; {study['reused']} taken from other studies" if study.get("reused") else "")
-        + (f"; to be finished by {study['finish_by']}" if _is_due(study) else "")
+    counts = _(
+        "{name}: {state}, {done} of {total} cases done, {ok} ok",
+        name=study["name"] or study["model"],
+        state=state_text(study["state"]),
+        **{name: progress[name] for name in ("done", "total", "ok")},
     )
+    say("; ".join([counts + (f" ({endings})" if endings else ""), *_remarks(study)]))
     if study["time_over"]:
-        say(f"{study['id']}: {study['reason']}")
+        say(f"{study['id']}: {recorded.said(_(study['reason']))}")
+
+
+def _remarks(study: dict[str, Any]) -> Iterator[str]:
+    """What else is known of a study: rounds, reuse, hosts, deadline."""
+    if rounds := _rounds(study):
+        yield rounds
+    if study.get("reused"):
+        yield _("{count} taken from other studies", count=study["reused"])
+    found = [origin["host"] for origin in study.get("computed_by", []) if origin["host"]]
+    if hosts := sorted({host for names in found for host in names.split(", ")}):
+        yield _("computed by {hosts}", hosts=", ".join(hosts))
+    if _is_due(study):
+        yield _("to be finished by {time}", time=study["finish_by"])
 
 
 def _is_due(study: dict[str, Any]) -> bool:
@@ -230,62 +262,46 @@ def _is_due(study: dict[str, Any]) -> bool:
     return bool(study.get("finish_by")) and not (study["time_over"] or study["state"] in TERMINAL)
 
 
-def list_studies(
-    state: Annotated[StudyState | None, typer.Option(help="Only studies in this state.")] = None,
-    limit: Annotated[int, typer.Option(min=1, max=100_000, help="Most studies to show, newest first.")] = 50,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
-) -> None:
-    """List the studies of the service, newest first."""
+def act_on(study_id: str, verb: str, server: str, token: str | None, as_json: bool, query: Query = ()) -> None:
+    """Let the service do ``verb`` with a study, and print it."""
     with connection(server, token) as client:
-        query = [("page_size", str(min(limit, _PAGE))), *([] if state is None else [("state", state.value)])]
-        studies = list(islice(client.studies(query), limit))
-    if as_json:
-        write_json({"studies": studies})
-        return
-    columns = (("id", False, True), ("state", False, True), ("done", True), ("cases", True), ("created", False),
-               ("finish by", False), ("name", False))  # fmt: skip
-    rows = [
-        (s["id"], s["state"], s["progress"]["done"], s["progress"]["total"], s["created_at"], s["finish_by"], s["name"])
-        for s in studies
-    ]
-    show_table("", columns, rows)
-
-
-def _act(study_id: str, verb: str, server: str, token: str | None, as_json: bool, query: Query = ()) -> None:
-    with connection(server, token) as client:
+        study_id = study_of(client, study_id)
         study = client.act(study_id, verb, query)
     show_study(study, as_json)
 
 
 def cancel(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:
     """Cancel a study; finished cases are kept."""
-    _act(study_id, "cancel", server, token, as_json)
+    act_on(study_id, "cancel", server, token, as_json)
 
 
 def pause(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:
     """Hold a study: running cases are finished, no new ones are started."""
-    _act(study_id, "pause", server, token, as_json)
+    act_on(study_id, "pause", server, token, as_json)
 
 
 def resume(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:
     """Resume a study that is held; a past deadline or a closed window no longer applies."""
-    _act(study_id, "resume", server, token, as_json)
+    act_on(study_id, "resume", server, token, as_json)
 
 
 def retry(
     study_id: StudyId,
     ending: Annotated[
         list[str] | None,
-        typer.Option("--ending", metavar="ENDING", help="Only cases with this ending; may be repeated."),
+        typer.Option(
+            "--ending",
+            metavar="ENDING",
+            help="Only cases with this ending; may be repeated.",
+            autocompletion=completion.endings,
+        ),
     ] = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Run only those cases of an ended study again that did not end ok."""
-    _act(study_id, "retry", server, token, as_json, [("ending", name) for name in ending or ()])
+    act_on(study_id, "retry", server, token, as_json, [("ending", name) for name in ending or ()])
 
 
 def prioritize(
@@ -298,7 +314,31 @@ def prioritize(
     as_json: JsonFlag = False,
 ) -> None:
     """Change the priority of a study: among waiting studies the highest runs first."""
-    _act(study_id, "prioritize", server, token, as_json, [("priority", str(priority))])
+    act_on(study_id, "prioritize", server, token, as_json, [("priority", str(priority))])
+
+
+def rounds(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:
+    """List the rounds of a study that chooses its own cases, with what was known before each."""
+    with connection(server, token) as client:
+        study_id = study_of(client, study_id)
+        found = client.rounds(study_id)
+    if as_json:
+        write_json(found)
+        return
+    columns = (
+        (_("round"), True),
+        (_("first case"), True),
+        (_("cases"), True),
+        (_("planned"), False),
+        (_("known before"), False),
+    )
+    rows = [(r["round"], r["first_case"], r["cases"], r["planned_at"], _known(r["summary"])) for r in found["rounds"]]
+    show_table("", columns, rows)
+
+
+def _known(summary: dict[str, Any]) -> str:
+    single = {name: value for name, value in summary.items() if not isinstance(value, dict | list)}
+    return ", ".join(f"{name} {cell_text(value)}" for name, value in single.items())
 
 
 def export(
@@ -307,6 +347,18 @@ def export(
         TableFormat | None, typer.Option("--format", help="Default: by the name of FILE, otherwise csv.")
     ] = None,
     file: OutputFile = None,
+    units: FileUnits = None,
+    header: CsvHeader = None,
+    project: Annotated[str | None, typer.Option("--project", metavar="TEXT", help="Project, of a report.")] = None,
+    author: Annotated[str | None, typer.Option("--author", metavar="TEXT", help="Author, of a report.")] = None,
+    number: Annotated[str | None, typer.Option("--number", metavar="TEXT", help="Number of a report.")] = None,
+    date: Annotated[str | None, typer.Option("--date", metavar="TEXT", help="Date of a report.")] = None,
+    point: Annotated[
+        str | None, typer.Option("--point", metavar="VALUE", help='Working point of a report, such as "0.3 N*m".')
+    ] = None,
+    language: Annotated[
+        str | None, typer.Option("--language", metavar="CODE", help="Language of a report, such as uk.")
+    ] = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -314,13 +366,29 @@ def export(
     """Write all case rows of a study, or a report of it, to a file or to standard output."""
     chosen = table_format(form, file, as_json)
     with connection(server, token) as client:
+        study_id = study_of(client, study_id)
+        block = {"project": project, "author": author, "number": number, "date": date}
+        every = {**block, "point": point, "language": language}
+        given = [(name, text) for name, text in every.items() if text is not None]
         table = chosen in get_args(Format)
-        pieces = client.results(study_id, chosen) if table else client.report(study_id, chosen)
+        require_csv(header, chosen)
+        if table and given:
+            raise wrong_option(
+                f"--{given[0][0]}", "not-used", N_("only reports have it"), given[0][1], allowed="pdf, html"
+            )
+        asked = [*in_units(units), *given, *([] if header is None else [("header", header)])]
+        pieces = (client.results if table else client.report)(study_id, chosen, asked)
         written = write_pieces(file, pieces)
     if to_file(file):
-        say(f"{file}: {written} bytes")
+        say(_("{file}: {size} bytes", file=file, size=written))
         if as_json:
             write_json({"file": file, "format": chosen, "bytes": written})
+
+
+def require_csv(header: Header | None, form: str) -> None:
+    """Raise WrongInputError for ``--header`` where the file is not CSV."""
+    if header is not None and form != "csv":
+        raise wrong_option("--header", "not-used", N_("only CSV files have it"), header, allowed="csv")
 
 
 def table_format(form: TableFormat | None, file: str | None, as_json: bool) -> Format | ReportFormat:
@@ -328,5 +396,5 @@ def table_format(form: TableFormat | None, file: str | None, as_json: bool) -> F
     if form is not None:
         return form
     ending = (file or "").rpartition(".")[2].lower()
-    told = next((known for known in REPORT_FORMATS if known == ending), None) or format_of(file or "")
-    return told or ("json" if as_json else "csv")
+    form = next((known for known in REPORT_FORMATS if known == ending), None) or format_of(file or "")
+    return form or ("json" if as_json else "csv")

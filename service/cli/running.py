@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from sprag.service.cli.console import progress_bar
+from sprag.service.languages import _
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -23,7 +24,7 @@ def run_parsed(
     settings: Settings,
     remark: Callable[[Progress], str],
     *,
-    title: str = "study",
+    title: str | None = None,
     db: str | None,
     processes: int | None,
     fresh: bool = False,
@@ -31,15 +32,15 @@ def run_parsed(
 ) -> Iterator[LocalRun]:
     """Run a study as `run_here` does: in the database of ``settings`` where ``db`` is given.
 
-    ``db`` and ``processes`` are the options of the command. ``title`` stands beside the bar where the study has no
-    name, ``remark`` behind it.
+    ``db`` and ``processes`` are the options of the command. ``title`` stands beside the bar, instead of "study", where
+    the study has no name; ``remark`` behind it.
     """
     from sprag.service.jobs.local import pool_size, run_here
 
     local = settings.executor == "pool"
     most = settings.pool_processes
     with (
-        progress_bar(parsed.study.name or title) as update,
+        progress_bar(parsed.study.name or title or _("study")) as update,
         run_here(
             parsed.spec,
             parsed.study,

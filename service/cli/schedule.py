@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sprag.service.cli.console import WrongInputError, say, show_table, write_json, wrong_option
+from sprag.service.cli.console import ExitCode, WrongInputError, say, show_table, write_json, wrong_option
 from sprag.service.cli.files import read_spec
+from sprag.service.cli.groups import Groups
 from sprag.service.cli.options import DEFAULT_SERVER, Fresh, JsonFlag, Server, SpecFile, Token
 from sprag.service.cli.remote import PriorityOption, connection
+from sprag.service.languages import N_, _, recorded
 from sprag.worker.limits import MAX_PRIORITY
 
 if TYPE_CHECKING:
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
 app = typer.Typer(
     help="Studies that the service submits on a schedule, once or repeatedly.",
     no_args_is_help=True,
-    rich_markup_mode="rich",
+    cls=Groups,
 )
 
 ScheduleId = Annotated[str, typer.Argument(metavar="ID", help="Id of the schedule.")]
@@ -27,7 +29,7 @@ Cron = Annotated[
     typer.Option(
         "--cron",
         metavar="FIELDS",
-        help='Recurring: minute, hour, day, month, weekday, such as "0 22 * * 1-5".',
+        help='Recurring: minute, hour, day, month, weekday, such as "0 22 * * 1-5"; or @hourly, @daily, @weekly ...',
     ),
 ]
 At = Annotated[str | None, typer.Option("--at", metavar="TIME", help="Once, such as 2027-01-31T22:00.")]
@@ -49,7 +51,45 @@ RunFinish = Annotated[
         help='Run coarse to fine until a time of day, such as 06:00, or for a duration, such as "8 h"; "" for none.',
     ),
 ]
-Name = Annotated[str | None, typer.Option("--name", help="Name of its studies; default: that of the spec.")]
+Overlap = Annotated[
+    str | None,
+    typer.Option(
+        "--overlap",
+        metavar="POLICY",
+        help="While an earlier study of it has not ended: queue (default), skip the due time, or replace that study.",
+    ),
+]
+CatchUp = Annotated[
+    str | None,
+    typer.Option(
+        "--catch-up",
+        metavar="POLICY",
+        help="Of due times that were missed, run the latest (default), all (at most 50), or none.",
+    ),
+]
+Grace = Annotated[
+    str | None,
+    typer.Option(
+        "--misfire-grace",
+        metavar="TIME",
+        help='Longest delay with which a due time is still run, such as "30 min"; "" for any.',
+    ),
+]
+Email = Annotated[
+    list[str] | None,
+    typer.Option("--email", metavar="ADDRESS", help='Report its runs by mail; may be repeated; "" for none.'),
+]
+Webhook = Annotated[
+    str | None,
+    typer.Option("--webhook", metavar="URL", help='Report its runs by a signed POST to that address; "" for none.'),
+]
+ReportWhen = Annotated[
+    str | None,
+    typer.Option("--report", metavar="WHEN", help="Report always (default), or only on trouble."),
+]
+Name = Annotated[
+    str | None, typer.Option("--name", metavar="TEXT", help="Name of its studies; default: that of the spec.")
+]
 
 
 @app.command()
@@ -63,6 +103,12 @@ def add(
     priority: PriorityOption = 0,
     fresh: Fresh = False,
     finish_by: RunFinish = None,
+    overlap: Overlap = None,
+    catch_up: CatchUp = None,
+    misfire_grace: Grace = None,
+    email: Email = None,
+    webhook: Webhook = None,
+    report: ReportWhen = None,
     key: Annotated[
         str | None,
         typer.Option("--key", metavar="KEY", help="Idempotency key: the same key creates one schedule."),
@@ -75,6 +121,7 @@ def add(
     fields: dict[str, Any] = {
         "spec": read_spec(spec),
         **_given(cron=cron, at=at, zone=zone, name=name, finish_by=finish_by, **_window(window)),
+        **_given(overlap=overlap, catch_up=catch_up, misfire_grace=misfire_grace, **_report(email, webhook, report)),
         "priority": priority,
         "fresh": fresh,
     }
@@ -90,10 +137,8 @@ def list_schedules(server: Server = DEFAULT_SERVER, token: Token = None, as_json
     if as_json:
         write_json(found)
         return
-    columns = [
-        (heading, False, heading == "id")
-        for heading in ("id", "when", "window", "finish by", "last run", "next run", "name")
-    ]
+    heads = (_("id"), _("when"), _("window"), _("finish by"), _("last run"), _("next run"), _("name"))
+    columns = [(head, False, place == 0) for place, head in enumerate(heads)]
     rows = []
     for s in found["schedules"]:
         window = "-".join(s["window"] or ()) or None
@@ -112,8 +157,31 @@ def show(
         write_json(schedule)
         return
     _show(schedule, as_json)
-    columns = (("due", False), ("missed before", True), ("study", False, True), ("problem", False))
-    show_table("", columns, [(r["due"], r["missed"], r["study"], r["problem"]) for r in schedule["runs"]])
+    columns = ((_("due"), False), (_("missed before"), True), (_("study"), False, True), (_("problem"), False))
+    show_table(
+        "", columns, [(_clock(r["due_local"]), r["missed"], r["study"], _known(r["problem"])) for r in schedule["runs"]]
+    )
+
+
+@app.command()
+def night(
+    hours: Annotated[float, typer.Option("--hours", min=1, max=744, help="Hours to look back on.")] = 24,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Show what schedules did in the last hours, first what needs attention; exit code 1 if anything does."""
+    with connection(server, token) as client:
+        found = client.night(hours)
+    if as_json:
+        write_json(found)
+    else:
+        columns = ((_("due"), False), (_("schedule"), False), (_("outcome"), False), (_("study"), False, True))
+        rows = [(_clock(r["due_local"]), r["name"], _(r["sentence"]), r["study"]) for r in found["late"]]
+        rows += [(_clock(r["due_local"]), r["name"], _(r["outcome"]["sentence"]), r["study"]) for r in found["runs"]]
+        show_table("", columns, rows)
+    if found["trouble"] or found["late"]:
+        raise typer.Exit(ExitCode.NOT_ALL_OK)
 
 
 @app.command()
@@ -135,6 +203,12 @@ def change(
         typer.Option("--fresh/--no-fresh", help="Run every case, including those that other studies already have."),
     ] = None,
     finish_by: RunFinish = None,
+    overlap: Overlap = None,
+    catch_up: CatchUp = None,
+    misfire_grace: Grace = None,
+    email: Email = None,
+    webhook: Webhook = None,
+    report: ReportWhen = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -142,28 +216,37 @@ def change(
     """Change the given fields of a schedule; the others are kept."""
     fields = _given(
         cron=cron, at=at, zone=zone, name=name, priority=priority, fresh=fresh, finish_by=finish_by, **_window(window)
-    )
+    ) | _given(overlap=overlap, catch_up=catch_up, misfire_grace=misfire_grace, **_report(email, webhook, report))
     if spec is not None:
         fields["spec"] = read_spec(spec)
     if not fields:
-        raise WrongInputError("invalid-parameter", "nothing to change; `sprag schedule change --help` lists the fields")
+        raise WrongInputError(
+            "invalid-parameter", _("nothing to change; `sprag schedule change --help` lists the fields")
+        )
     _change(schedule_id, fields, server, token, as_json)
 
 
 @app.command()
-def enable(
-    schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False
+def pause(
+    schedule_id: ScheduleId,
+    until: Annotated[
+        str | None,
+        typer.Option("--until", metavar="TIME", help="Resume by itself then, such as 2027-01-07T00:00 in its zone."),
+    ] = None,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
 ) -> None:
-    """Enable a disabled schedule from now on."""
-    _change(schedule_id, {"enabled": True}, server, token, as_json)
+    """Pause a schedule: it is kept, but not due, until it is resumed or until a certain time."""
+    _change(schedule_id, {"enabled": False} if until is None else {"paused_until": until}, server, token, as_json)
 
 
 @app.command()
-def disable(
+def resume(
     schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False
 ) -> None:
-    """Disable a schedule: it is kept, but never due."""
-    _change(schedule_id, {"enabled": False}, server, token, as_json)
+    """Resume a paused schedule from now on."""
+    _change(schedule_id, {"enabled": True, "paused_until": None}, server, token, as_json)
 
 
 @app.command()
@@ -171,7 +254,7 @@ def delete(schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Toke
     """Delete a schedule; its studies are kept."""
     with connection(server, token) as client:
         client.delete_schedule(schedule_id)
-    say(f"{schedule_id} is deleted")
+    say(_("{what} is deleted", what=schedule_id))
 
 
 def _change(schedule_id: str, fields: Mapping[str, Any], server: str, token: str | None, as_json: bool) -> None:
@@ -180,13 +263,16 @@ def _change(schedule_id: str, fields: Mapping[str, Any], server: str, token: str
 
 
 def _given(**fields: Any) -> dict[str, Any]:
-    """The given fields; an empty window or deadline removes it."""
+    """The given fields; an empty window, deadline or misfire grace removes it."""
     given = {name: value for name, value in fields.items() if value is not None}
     if given.get("window") == []:
         given["window"] = None
-    if given.get("finish_by") == "":
-        given["finish_by"] = None
-    return given
+    return given | {name: None for name in ("finish_by", "misfire_grace", "report_webhook") if given.get(name) == ""}
+
+
+def _report(email: list[str] | None, webhook: str | None, when: str | None) -> dict[str, Any]:
+    addresses = None if email is None else [address for address in email if address]
+    return {"report_email": addresses, "report_webhook": webhook, "report_when": when}
 
 
 def _window(text: str | None) -> dict[str, Any]:
@@ -196,7 +282,7 @@ def _window(text: str | None) -> dict[str, Any]:
         return {"window": []}
     begin, dash, end = text.partition("-")
     if not dash:
-        raise wrong_option("--window", "invalid-text", "is not a time window", text, allowed="as 22:00-06:00")
+        raise wrong_option("--window", "invalid-text", N_("is not a time window"), text, allowed=_("as 22:00-06:00"))
     return {"window": [begin.strip(), end.strip()]}
 
 
@@ -205,9 +291,13 @@ def _show(schedule: dict[str, Any], as_json: bool) -> None:
         write_json(schedule)
         return
     print(schedule["id"])
-    window = f", between {' and '.join(schedule['window'])} only" if schedule["window"] else ""
-    finish = f", finished by {schedule['finish_by']}" if schedule["finish_by"] else ""
-    say(f"{schedule['name']}: {_when(schedule)}{window}{finish}; next run: {_next(schedule)}")
+    parts = [f"{schedule['name']}: {_when(schedule)}"]
+    if schedule["window"]:
+        first, last = schedule["window"]
+        parts.append(_("between {first} and {last} only", first=first, last=last))
+    if schedule["finish_by"]:
+        parts.append(_("finished by {time}", time=schedule["finish_by"]))
+    say(", ".join(parts) + "; " + _("next run: {time}", time=_next(schedule)))
 
 
 def _when(schedule: dict[str, Any]) -> str:
@@ -215,8 +305,24 @@ def _when(schedule: dict[str, Any]) -> str:
 
 
 def _next(schedule: dict[str, Any]) -> str:
-    return schedule["next_due"] or ("none" if schedule["enabled"] else "disabled")
+    until = schedule["paused_until"]
+    paused = _("paused until {time}", time=_clock(until)) + "; " if until else ""
+    if schedule["next_due"] is not None:
+        return f"{paused}{_clock(schedule['next_due_local'])}"
+    return _("none") if schedule["enabled"] else _("paused")
 
 
 def _run(run: dict[str, Any] | None) -> str | None:
-    return None if run is None else f"{run['due']} {run['study'] or run['problem'] or run['state']}"
+    if run is None:
+        return None
+    return f"{_clock(run['due_local'])} {run['study'] or _known(run['problem']) or run['state']}"
+
+
+def _known(text: str | None) -> str | None:
+    """A sentence of the service in the language of the task, where the catalogue has it."""
+    return recorded.said(_(text)) if text else text
+
+
+def _clock(text: str) -> str:
+    """A time on the wall clock of a schedule with its offset: ``2027-01-31 22:00 +01:00``."""
+    return f"{text[:10]} {text[11:16]} {text[-6:]}"

@@ -1,11 +1,16 @@
-"""The settings of a command: from its options, the environment, the defaults, in this order."""
+"""The settings of a command: from its options, the environment, the file of settings, the defaults, in this order."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import os
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Final
 
-from sprag.service.cli.console import WrongInputError
+from sprag.service.cli.console import WrongInputError, show_table, write_json
+from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag
 from sprag.service.faults import Fault
+from sprag.service.languages import N_, _
 from sprag.service.spec.report import shorten
 
 if TYPE_CHECKING:
@@ -19,7 +24,7 @@ def read_settings(**options: object) -> Settings:
     """
     from pydantic import ValidationError
 
-    from sprag.service.settings import ENV_PREFIX, Settings, SettingsFileError
+    from sprag.service.settings import ENV_PREFIX, Settings, SettingsFileError, is_secret
 
     given = {name: value for name, value in options.items() if value is not None}
     try:
@@ -29,8 +34,8 @@ def read_settings(**options: object) -> Settings:
     except ValidationError as error:
         problems = []
         for item in error.errors(include_url=False):
-            name = str(item["loc"][0]) if item["loc"] else ""
-            value = None if name == "token" else shorten(item.get("input"))
+            name = str(item["loc"][0])
+            value = None if is_secret(name) else shorten(item.get("input"))
             problems.append(
                 Fault(
                     ENV_PREFIX + name.upper(),
@@ -39,4 +44,78 @@ def read_settings(**options: object) -> Settings:
                     value,
                 )
             )
-        raise WrongInputError("invalid-settings", "invalid setting", problems) from error
+        raise WrongInputError("invalid-settings", _("invalid setting"), problems) from error
+
+
+#: Environment variables that are not settings of the service, each with its meaning.
+VARIABLES: Final = {
+    "SPRAG_SETTINGS": "path of a TOML file with settings",
+    "SPRAG_SERVER": "address of the service that `submit`, `watch`, `list`, `curve` and the like use; "
+    f"`{DEFAULT_SERVER}` unless set",
+    "SPRAG_KERNEL_CACHE": "folder of the compiled kernels; the user's cache folder unless set",
+    "SPRAG_COMPILER": "`plain` compiles kernels by numba's documented interface alone, for a minute instead of "
+    "seconds, with the same results ([porting-numba.md](porting-numba.md)); `programs` unless set",
+    "SPRAG_LANGUAGE": "language of help and messages of commands, such as `uk`; that of the system (`LC_ALL`, "
+    "`LC_MESSAGES`, `LANG`) unless set",
+    "SPRAG_DEBUG": "set to anything: a fault of the program shows where it lies",
+}
+_DEFAULT: Final = "default"
+_HIDDEN: Final = "(secret)"
+
+
+@dataclass(frozen=True, slots=True)
+class EffectiveSetting:
+    """A setting, or a variable of commands, with its value as text and where it comes from; a secret is not shown."""
+
+    name: str
+    value: str
+    origin: str
+
+
+def _cells(row: EffectiveSetting) -> tuple[str, ...]:
+    """Name, value and origin of a setting for a table."""
+    value = _("(secret)") if row.value == _HIDDEN else row.value
+    return row.name, value, _("default") if row.origin == _DEFAULT else row.origin
+
+
+def settings(as_json: JsonFlag = False) -> None:
+    """Show the settings that apply here, each with its origin: a variable of the environment, a file, the default."""
+    rows = [*_of_service(), *_of_commands()]
+    if as_json:
+        write_json({"settings": [asdict(row) for row in rows]})
+    else:
+        show_table("", ((_("setting"), False, True), (_("value"), False), (_("origin"), False)), map(_cells, rows))
+
+
+def _of_service() -> Iterator[EffectiveSetting]:
+    """Every setting of the service, in order of declaration."""
+    found = read_settings()
+    from pydantic import SecretStr
+
+    from sprag.service.settings import ENV_PREFIX, FILE_VARIABLE, Settings, default_database_path, read_file, shown
+
+    file, environment = read_file(Settings), {name.upper() for name, value in os.environ.items() if value}
+    for name in Settings.model_fields:
+        value, variable = getattr(found, name), f"{ENV_PREFIX}{name.upper()}"
+        origin = variable if variable in environment else os.environ[FILE_VARIABLE] if name in file else _DEFAULT
+        if name == "database" and not value:
+            value = str(default_database_path())
+        yield EffectiveSetting(name, _HIDDEN if isinstance(value, SecretStr) else shown(value), origin)
+
+
+def _of_commands() -> Iterator[EffectiveSetting]:
+    """Every other variable, by its own name."""
+    try:
+        from sprag.worker import models
+    except ValueError as error:  # the engine refuses an unknown SPRAG_COMPILER
+        where = "SPRAG_COMPILER"
+        fault = Fault(where, "invalid-choice", N_("is not a way to compile"), os.environ.get(where), "programs, plain")
+        raise WrongInputError("invalid-settings", _("invalid setting"), [fault]) from error
+    defaults = {
+        "SPRAG_SERVER": DEFAULT_SERVER,
+        "SPRAG_KERNEL_CACHE": str(models.cache_folder()),
+        "SPRAG_COMPILER": "programs",
+    }
+    for name in VARIABLES:
+        value = os.environ.get(name, "")
+        yield EffectiveSetting(name, value or defaults.get(name, ""), name if value else _DEFAULT)

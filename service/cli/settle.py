@@ -12,6 +12,7 @@ from sprag.service.cli.console import ExitCode, progress_bar, say, show_table, w
 from sprag.service.cli.files import output, read_study, require_cases, to_file
 from sprag.service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
 from sprag.service.json_text import to_bytes
+from sprag.service.languages import N_, _
 from sprag.worker.limits import MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ def settle(
                 write(piece)
     endings = Counter(ending for block in blocks for ending in block.first_rows().endings)
     regimes = Counter(row.results["regime"] for block in blocks for row in block.rows() if row.ending == OK)
-    say(", ".join(f"{count} {regime}" for regime, count in regimes.most_common()) or "no case ended ok")
+    say(", ".join(f"{count} {regime}" for regime, count in regimes.most_common()) or _("no case ended ok"))
     if as_json and to_file(file):
         write_json({"file": file, "cases": len(cases), "regimes": dict(regimes), "endings": dict(endings)})
     if set(endings) != {OK}:
@@ -74,7 +75,7 @@ def _settled(study: Study, at_most: int | None) -> Study:
     from sprag.worker.models import VIBRATION_DRIVE, settled_study
 
     if study.model != VIBRATION_DRIVE:
-        message, detail = "has no motion that settles", "this study cannot be settled"
+        message, detail = N_("has no motion that settles"), _("this study cannot be settled")
         raise wrong_option("/model", "wrong-type", message, study.model, allowed=VIBRATION_DRIVE, detail=detail)
     return settled_study(study, at_most)
 
@@ -97,7 +98,7 @@ def _blocks(study: Study, cases: list[int]) -> list[RowBlock]:
     if study.sweep is not None:
         return [_of_lines(study, np.array(cases, dtype=np.int64))]
     blocks = []
-    with progress_bar(study.name or "study") as update:
+    with progress_bar(study.name or _("study")) as update:
         for first in range(0, len(cases), _BATCH):
             part = np.array(cases[first : first + _BATCH], dtype=np.int64)
             done = run_chunk(taken(study, part) if study.axes else study, 0, part.size)
@@ -142,21 +143,23 @@ def _of_lines(study: Study, cases: NDArray[np.int64]) -> RowBlock:
 
 def _show(block: RowBlock, starts: int) -> None:
     """One case as a table, without missing values; a column for each of its regimes."""
-    from sprag.service.results.regimes import ORDER
-    from sprag.worker.models import ENDING_SENTENCES, OK, motion_sentence
+    from sprag.service.results.phrases import shown as said
+    from sprag.service.results.regimes import ORDER, motion_sentence
+    from sprag.worker.models import ENDING_SENTENCES, OK
 
     first, *others = block.rows()
     regime, order = (first.results[name] for name in ("regime", ORDER))
-    found = motion_sentence(str(regime), order if isinstance(order, int) else None) if first.ending == OK else ""
-    meaning = found or ENDING_SENTENCES[first.ending]
+    settled = motion_sentence(str(regime), order if isinstance(order, int) else None) if first.ending == OK else None
+    meaning = said(settled) if settled else _(ENDING_SENTENCES[first.ending])
     if others:
-        meaning = f"{len(block)} regimes, to which its {starts} starts come"
+        meaning = _("{count} regimes, to which its {starts} starts come", count=len(block), starts=starts)
     values = zip(block.infos, block.values.T.tolist(), strict=True)
     rows = [
         (info.name, *("" if math.isnan(value) else info.cell(value) for value in own), info.unit)
         for info, own in values
         if any(map(math.isfinite, own))
     ]
-    heads = [f"regime {number}" for number in range(len(block))] if others else ["value"]
+    heads = [_("regime {number}", number=number) for number in range(len(block))] if others else [_("value")]
     shown = [(head, True) for head in heads]
-    show_table(f"Case {first.case}: {meaning}", [("result", False, True), *shown, ("unit", False)], rows)
+    title = _("Case {case}: {text}", case=first.case, text=meaning)
+    show_table(title, [(_("result"), False, True), *shown, (_("unit"), False)], rows)

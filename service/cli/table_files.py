@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from sprag.service.cli.console import WrongInputError, wrong_option
+from sprag.service.languages import N_, _
 
 #: What has a table, and what else in it stays when a file takes the place of its table, its formula or its links. The
 #: names are not imported: a command for a running service does without the models.
@@ -18,7 +19,7 @@ _KEPT: Final[Mapping[str, frozenset[str]]] = {
     "torque": frozenset({"interpolation"}),
     "motor": frozenset({"interpolation", "inertia", "scale"}),
 }
-_ALLOWED = "PLACE=FILE, such as operation=torque.csv, drive.motor=motor.csv or parts.0.operation.indicator=p.csv"
+_ALLOWED = N_("PLACE=FILE, such as operation=torque.csv, drive.motor=motor.csv or parts.0.operation.indicator=p.csv")
 
 
 def named(files: Sequence[str]) -> list[tuple[str, str]]:
@@ -26,7 +27,7 @@ def named(files: Sequence[str]) -> list[tuple[str, str]]:
     found = [(place.strip(), name) for place, _, name in (text.partition("=") for text in files)]
     for text, (place, name) in zip(files, found, strict=True):
         if not place or not name:
-            raise wrong_option("--file", "wrong-type", "is not a place and a file", text, allowed=_ALLOWED)
+            raise wrong_option("--file", "wrong-type", N_("is not a place and a file"), text, allowed=_(_ALLOWED))
     return found
 
 
@@ -53,8 +54,8 @@ def with_tables(spec: Mapping[str, Any], texts: Sequence[tuple[str, str]]) -> di
 
 
 def _missing(place: str) -> WrongInputError:
-    message = "there is no such part in the base of the spec, to which a table could be given"
-    return wrong_option("--file", "unknown-name", message, place, allowed=_ALLOWED)
+    message = N_("there is no such part in the base of the spec, to which a table could be given")
+    return wrong_option("--file", "unknown-name", message, place, allowed=_(_ALLOWED))
 
 
 def _within(data: Any, name: str) -> Any:

@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 import secrets
-from datetime import UTC
+from datetime import UTC, timedelta
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sprag.service.cli.console import WrongInputError, say, show_table, write_json
+from sprag.service.cli.console import WrongInputError, say, show_table, write_json, wrong_option
+from sprag.service.cli.groups import Groups
 from sprag.service.cli.options import Database, JsonFlag
-from sprag.service.cli.settings import read_settings
+from sprag.service.cli.user import users_of
+from sprag.service.languages import N_, _
 from sprag.service.storage.scopes import TokenScope
+from sprag.worker.limits import MAX_NAME_LENGTH
 
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from sprag.service.storage.store import Store
     from sprag.service.storage.tokens import TokenRecord
 
 app = typer.Typer(
     help="Create, list and revoke tokens; without a command: print a secret for SPRAG_TOKEN.",
     invoke_without_command=True,
-    rich_markup_mode="rich",
+    cls=Groups,
 )
 
 
@@ -40,33 +42,50 @@ def token(context: typer.Context, as_json: JsonFlag = False) -> None:
 
 @app.command()
 def create(
-    name: Annotated[str, typer.Option("--name", help="Owner or purpose of the token.")],
+    name: Annotated[str, typer.Option("--name", metavar="TEXT", help="Owner or purpose of the token.")],
     scope: Annotated[
         TokenScope, typer.Option("--scope", help="read: read everything; write: change it too.")
     ] = TokenScope.WRITE,
+    user: Annotated[
+        str | None, typer.Option("--user", metavar="NAME", help="User whose token it is; default: nobody's.")
+    ] = None,
+    expires: Annotated[
+        int | None,
+        typer.Option(
+            "--expires", metavar="DAYS", min=1, max=36_500, help="Days for which it is valid; default: always."
+        ),
+    ] = None,
     db: Database = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Create a token and print it; only its digest is stored, so it cannot be shown again."""
-    with _store(db) as store:
-        secret, record = store.create_token(name, scope)
+    if not 1 <= len(name) <= MAX_NAME_LENGTH or not name.isprintable() or not name.strip():
+        allowed = _("1 to {most} printable characters in one line", most=MAX_NAME_LENGTH)
+        raise wrong_option("--name", "invalid-text", N_("is not the name of a token"), name, allowed=allowed)
+    with users_of(db) as store:
+        ends = None if expires is None else store.clock.now() + timedelta(days=expires)
+        secret, record = store.create_token(name, scope, owner=user, expires_at=ends)
     if as_json:
         write_json({"token": secret, **_json(record)})
     else:
         print(secret)
-        say(f"{record.id}: {record.name}, {record.scope}. It is shown only once; every request now needs a token.")
+        said = _("It is shown only once; every request now needs a token.")
+        say(f"{record.id}: {record.name}, {record.scope}. {said}")
 
 
 @app.command("list")
 def list_tokens(db: Database = None, as_json: JsonFlag = False) -> None:
-    """List all tokens, newest first, without their secrets."""
-    with _store(db) as store:
+    """List all tokens with owner, expiry and last use, newest first, without their secrets."""
+    with users_of(db) as store:
         found = [_json(record) for record in store.tokens()]
     if as_json:
         write_json({"tokens": found})
         return
-    columns = [(heading, False, heading == "id") for heading in ("id", "name", "scope", "created", "revoked")]
-    show_table("", columns, [[t["id"], t["name"], t["scope"], t["created_at"], t["revoked_at"]] for t in found])
+    fields = ("id", "name", "user", "scope", "created_at", "expires_at", "used_at", "revoked_at")
+    times = (_("created"), _("expires"), _("used"), _("revoked"))
+    heads = (_("id"), _("name"), _("user"), _("scope"), *times)
+    columns = [(head, False, place == 0) for place, head in enumerate(heads)]
+    show_table("", columns, [[t[field] for field in fields] for t in found])
 
 
 @app.command()
@@ -78,7 +97,7 @@ def revoke(
     """Revoke a token and end the browser sessions that it started, within two seconds."""
     from sprag.service.storage.errors import TokenNotFoundError
 
-    with _store(db) as store:
+    with users_of(db) as store:
         try:
             record = store.revoke_token(token_id)
         except TokenNotFoundError as error:
@@ -86,24 +105,21 @@ def revoke(
     if as_json:
         write_json(_json(record))
     else:
-        say(f"{record.id} ({record.name}) is revoked")
-
-
-def _store(db: str | None) -> Store:
-    from sprag.service.storage.store import Store
-
-    return Store.open(read_settings(database=db).database_url)
+        say(_("{token} ({name}) is revoked", token=record.id, name=record.name))
 
 
 def _json(record: TokenRecord) -> dict[str, Any]:
     return {
         "id": record.id,
         "name": record.name,
+        "user": record.owner,
         "scope": record.scope.value,
         "created_at": _text(record.created_at),
-        "revoked_at": None if record.revoked_at is None else _text(record.revoked_at),
+        "expires_at": _text(record.expires_at),
+        "used_at": _text(record.used_at),
+        "revoked_at": _text(record.revoked_at),
     }
 
 
-def _text(moment: datetime) -> str:
-    return moment.astimezone(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
+def _text(moment: datetime | None) -> str | None:
+    return None if moment is None else moment.astimezone(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")

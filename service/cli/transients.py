@@ -21,6 +21,7 @@ from sprag.service.cli.options import (
     ValueFormatOption,
 )
 from sprag.service.json_text import to_bytes
+from sprag.service.languages import N_, _
 from sprag.worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 
 if TYPE_CHECKING:
@@ -70,9 +71,9 @@ def transient(
     study = read_study(spec, files=tables).study
     require_cases(study, [case])
     if every and case:
-        raise wrong_option("--case", "conflict", "cannot be given with --all", case, allowed="--case or --all")
+        raise wrong_option("--case", "conflict", N_("cannot be given with --all"), case, allowed=_("--case or --all"))
     given = {"load": load, "angle": angle, "torque": torque, "within": within, "revolutions": revolutions}
-    with naming_options(study, "has no transients"):
+    with naming_options(study, N_("has no transients")):
         course = course_of(study, case, kind, given)
     if every:
         _write_all(study, course, file, as_json=is_json(file, as_json) if form is None else form is ValueFormat.JSON)
@@ -105,7 +106,8 @@ def _write_all(study: Study, course: Course, file: str | None, *, as_json: bool)
             ends[str(row["outcome"])] += 1
             cells = ["" if value is None else value for value in row.values()]
             write(to_bytes(row) + b"\n" if as_json else csv_lines([cells]))
-    say(f"{study.cases} cases: " + ", ".join(f"{count} {outcome}" for outcome, count in ends.most_common()))
+    text = ", ".join(f"{count} {outcome}" for outcome, count in ends.most_common())
+    say(_("{count} cases: {text}", count=study.cases, text=text))
     if set(ends) - {completed(course)}:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
 
@@ -120,7 +122,7 @@ def _report(made: Transient, case: int) -> None:
     from sprag.service.results.wording import number, unit_text
     from sprag.worker.models.transients import RESULTS
 
-    say(f"case {case}: {made.outcome}. {made.cause}")
+    say(_("case {case}: {text}", case=case, text=f"{made.outcome}. {_(made.cause)}"))
     for name, unit, meaning in RESULTS:
         if math.isfinite(made.results[name]):
-            say(f"  {name} = {number(made.results[name], 6)} {unit_text(unit)}".rstrip() + f"  ({meaning})")
+            say(f"  {name} = {number(made.results[name], 6)} {unit_text(unit)}".rstrip() + f"  ({_(meaning)})")

@@ -11,7 +11,7 @@ def test_parameters_are_called_as_the_options_are() -> None:
         "parameter": "by",
         "message": "the axis is already taken by x=shaft.load; name it in by=, or give at=shaft.load=VALUE",
     }
-    title = "The selected cases cannot be drawn"
+    title = "The selection is not possible"
     failure = refusal(RefusedError(422, {"title": title, "detail": "by: ...", "errors": [item]}))
     assert failure.detail == title
     assert str(failure.faults[0]) == (

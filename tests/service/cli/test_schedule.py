@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from datetime import timedelta
 from typing import TYPE_CHECKING
 
 import pytest
 
 from sprag.service.cli.app import execute
+from sprag.service.schedules.policies import DueTime
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
@@ -60,9 +62,19 @@ def test_a_schedule_is_kept_shown_changed_and_deleted(run: Run, service: Service
     assert (kept["priority"], kept["fresh"], kept["window"], kept["spec"]) == (5, True, ["22:00", "06:00"], SPEC)
     assert name in run("list")[1]
     assert json.loads(run("list", "--json")[1])["schedules"][0]["id"] == name
-    assert run("disable", name)[2].endswith("next run: disabled\n")
+    assert run("pause", name)[2].endswith("next run: paused\n")
     assert service.get(f"/schedules/{name}")["next_due"] is None
-    assert run("enable", name)[0] == 0
+    assert run("resume", name)[0] == 0
+    err = run("pause", name, "--until", "2098-12-31T12:00")[2]
+    assert "next run: paused until 2098-12-31 12:00 +01:00; 2098-12-31 22:00 +01:00\n" in err
+    assert run("resume", name)[0] == 0
+    assert service.get(f"/schedules/{name}")["paused_until"] is None
+    policies = ("--overlap", "skip", "--catch-up", "all", "--misfire-grace", "30 min")
+    assert run("change", name, *policies)[0] == 0
+    changed = service.get(f"/schedules/{name}")
+    assert (changed["overlap"], changed["catch_up"], changed["misfire_grace"]) == ("skip", "all", "30 min")
+    assert run("change", name, "--misfire-grace", "")[0] == 0
+    assert service.get(f"/schedules/{name}")["misfire_grace"] is None
     assert run("change", name, "--at", "2099-01-31T22:00", "--window", "", "--no-fresh")[0] == 0
     changed = service.get(f"/schedules/{name}")
     assert (changed["cron"], changed["window"], changed["fresh"]) == (None, None, False)
@@ -81,5 +93,33 @@ def test_what_is_wrong_is_told_by_field(run: Run, spec_file: str) -> None:
         code, _, err = run("add", spec_file, *arguments, "--json")
         assert (code, [(item["pointer"], item["code"]) for item in json.loads(err)["problems"]]) == (2, [(where, told)])
     assert run("change", "sc_0")[0] == 2
-    code, _, err = run("disable", "sc_0", "--json")
+    code, _, err = run("pause", "sc_0", "--json")
     assert (code, json.loads(err)["code"]) == (2, "schedule-not-found")
+
+
+def test_the_last_night_is_a_table_and_an_exit_code(run: Run, service: Service, spec_file: str) -> None:
+    assert run("night")[0] == 0
+    name = run("add", spec_file, "--cron", "* * * * *", "--misfire-grace", "1 s", "--name", "odd")[1].strip()
+    record = service.store.get_schedule(name)
+    now = service.store.clock.now()
+    assert service.store.take_due(record, [DueTime(now - timedelta(hours=1), too_late=True)], None, now)
+    code, out, _ = run("night", "--hours", "2")
+    assert code == 1
+    assert "Missed: No worker was running" in out.replace("\n", " ")
+    assert json.loads(run("night", "--json")[1])["trouble"] == 1
+    assert run("night", "--hours", "0")[0] == 2
+
+
+def test_recipients_are_options(run: Run, service: Service, spec_file: str) -> None:
+    """No mail is sent here, so that they are refused by the service."""
+    options = ("--email", "dora@example.com", "--webhook", "https://hooks.example/", "--report", "trouble")
+    code, _, err = run("add", spec_file, "--cron", "@daily", *options, "--json")
+    assert (code, [item["pointer"] for item in json.loads(err)["problems"]]) == (
+        2,
+        ["/report_email", "/report_webhook"],
+    )
+    name = run("add", spec_file, "--cron", "@daily", "--report", "trouble")[1].strip()
+    assert service.get(f"/schedules/{name}")["report_when"] == "trouble"
+    assert run("change", name, "--email", "", "--webhook", "", "--report", "always")[0] == 0
+    found = service.get(f"/schedules/{name}")
+    assert (found["report_email"], found["report_webhook"], found["report_when"]) == ([], None, "always")

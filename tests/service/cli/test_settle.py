@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from sprag.engine.vibration_drive.regimes import settled_infos
-from sprag.worker.models import motion_sentence
+from sprag.service.results.regimes import motion_sentence
 from tests.conftest import Finished
 
 Sprag = Callable[..., Finished]

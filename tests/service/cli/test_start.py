@@ -18,3 +18,12 @@ def test_the_command_line_and_the_store_load_no_heavy_library() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["[]", "[]"]
+
+
+def test_help_is_shown_without_what_draws_tables() -> None:
+    code = (
+        "import sys; from sprag.service.cli.app import execute; "
+        "print(execute(['--help']), [name for name in ('pygments', 'rich') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "0 []"

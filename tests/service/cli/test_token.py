@@ -39,6 +39,10 @@ def test_tokens_are_created_listed_and_revoked(settings: Settings, capsys: pytes
     assert json.loads(run("list", "--json", *db)[1])["tokens"][0]["revoked_at"].startswith("20")
     code, _, err = run("revoke", "tk_0", "--json", *db)
     assert (code, json.loads(err)["code"]) == (2, "token-not-found")
+    for name in ("", "  ", "a\x1b[2Jb", "a\nb", "x" * 201):
+        code, out, err = run("create", "--name", name, *db)
+        assert (code, out) == (2, "")
+        assert "--name: is not the name of a token" in err
     made = json.loads(run("create", "--name", "x", "--json", *db)[1])
     assert (made["scope"], made["token"][:6]) == ("write", "sprag_")
 

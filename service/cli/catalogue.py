@@ -1,0 +1,43 @@
+"""``sprag models``: what a running service computes."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from sprag.service.cli import completion
+from sprag.service.cli.console import show_table, write_json
+from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, Token
+from sprag.service.cli.remote import connection
+from sprag.service.languages import _
+
+
+def models(
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="MODEL",
+            help="Model whose parameters and results to list.",
+            autocompletion=completion.models,
+        ),
+    ] = None,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """List the models of a service, or the parameters and results of one."""
+    with connection(server, token) as client:
+        found = client.models() if name is None else client.model(name)
+    if as_json:
+        write_json(found)
+    elif name is None:
+        columns = ((_("model"), False, True), (_("parameters"), True), (_("results"), True), (_("engine"), False))
+        rows = [(m["name"], len(m["parameters"]), len(m["results"]), m["engine_version"]) for m in found["models"]]
+        show_table("", columns, rows)
+    else:
+        parameters = [(p["path"], p["unit"], p["range"], _(p["help"])) for p in found["parameters"]]
+        columns = ((_("path"), False, True), (_("unit"), False), (_("range"), False), ("", False))
+        show_table(_("parameters"), columns, parameters)
+        results = [(r["name"], r["unit"], _(r["description"])) for r in found["results"]]
+        show_table(_("results"), ((_("name"), False, True), (_("unit"), False), ("", False)), results)

@@ -1,0 +1,84 @@
+"""``sprag compare``: studies of a running service side by side."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+
+from sprag.service.answers.differing import MOST_COMPARED
+from sprag.service.cli import completion
+from sprag.service.cli.console import Column, show_table, write_json, wrong_option
+from sprag.service.cli.names import study_of
+from sprag.service.cli.options import DEFAULT_SERVER, CurveBy, JsonFlag, Server, Token
+from sprag.service.cli.pictures import show_curves
+from sprag.service.cli.remote import connection
+from sprag.service.languages import N_, _
+
+
+def compare(
+    studies: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="ID...", help="Studies, named as for other commands.", autocompletion=completion.studies
+        ),
+    ],
+    x: Annotated[
+        str | None,
+        typer.Option(
+            "--x",
+            metavar="PATH",
+            help="Axis along the curves; default: that of the first study.",
+            autocompletion=completion.parameters,
+        ),
+    ] = None,
+    y: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--y",
+            metavar="RESULT",
+            help="Result; may be repeated; default: those of the first study.",
+            autocompletion=completion.results,
+        ),
+    ] = None,
+    by: CurveBy = None,
+    at: Annotated[
+        list[str] | None, typer.Option("--at", metavar="PATH=VALUE", help="Value at which another axis is held.")
+    ] = None,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Compare studies: the inputs in which they differ, and the same curves of each."""
+    from sprag.service.client.synchronous.comparing import compare_studies
+
+    if not 2 <= len(studies) <= MOST_COMPARED:
+        raise wrong_option(
+            "ID", "out-of-range", N_("wrong number of studies"), len(studies), allowed=f"2 .. {MOST_COMPARED}"
+        )
+    held = dict(pair(text) for text in at or ())
+    with connection(server, token) as client:
+        ids = [study_of(client, text) for text in studies]
+        found = compare_studies(client, ids, x, y or (), by=by or (), at=held)
+    if as_json:
+        curves = {name: curves.data for name, curves in zip(found.names, found.curves, strict=True)}
+        write_json({"studies": list(found.names), "inputs": found.inputs, "curves": curves})
+        return
+    columns: list[Column] = [(_("input"), False, True), *((name, False) for name in found.names)]
+    rows = [(pointer, *map(_text, values)) for pointer, values in found.inputs.items()]
+    show_table(_("inputs that differ"), columns, rows)
+    for name, drawn in zip(found.names, found.curves, strict=True):
+        show_curves(drawn.data, name)
+
+
+def pair(text: str) -> tuple[str, str]:
+    """Path and value of the option ``--at``."""
+    path, equals, value = text.partition("=")
+    if not equals:
+        raise wrong_option("--at", "invalid-text", N_("is not a value of an axis"), text, allowed="PATH=VALUE")
+    return path.strip(), value.strip()
+
+
+def _text(value: object) -> str | None:
+    return None if value is None else value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)

@@ -1,0 +1,74 @@
+"""``sprag component``: the office's own springs, clutches and motors."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, cast
+
+import typer
+
+from sprag.service.cli.console import say, show_table, write_json
+from sprag.service.cli.files import decode, read_bytes, read_spec, write_pieces
+from sprag.service.cli.groups import Groups
+from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, OutputFile, Server, Token
+from sprag.service.cli.remote import connection
+from sprag.service.languages import _
+from sprag.worker.limits import MAX_BODY_BYTES
+
+app = typer.Typer(help="The office's own springs, clutches and motors.", no_args_is_help=True, cls=Groups)
+
+Kind = Annotated[str | None, typer.Option("--kind", metavar="KIND", help="Only spring, clutch or motor.")]
+
+
+@app.command("list")
+def list_components(
+    kind: Kind = None,
+    file: OutputFile = None,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """List the components, or write them as a CSV file that `put` reads."""
+    with connection(server, token) as client:
+        if file is not None:
+            query = [("format", "csv"), *([] if kind is None else [("kind", kind)])]
+            write_pieces(file, client.download("/components", query))
+            return
+        found = client.components(kind)
+    if as_json:
+        write_json(found)
+        return
+    columns = ((_("id"), False, True), (_("kind"), False), (_("name"), False), (_("fields"), False), (_("note"), False))
+    rows = []
+    for one in found["components"]:
+        fields = ", ".join(f"{name} {text}" for name, text in one["fields"].items())
+        rows.append((one["id"], one["kind"], one["name"], fields, one["note"]))
+    show_table("", columns, rows)
+
+
+@app.command()
+def put(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="CSV file, or JSON as the interface takes it.")],
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Add the components of a file, all or none; those of the same kind and name are replaced."""
+    text = decode(file, read_bytes(file, MAX_BODY_BYTES))
+    body = cast("dict[str, Any]", read_spec(file)) if file.lower().endswith(".json") else {"csv": text}
+    with connection(server, token) as client:
+        made = client.put_components(body)
+    if as_json:
+        write_json(made)
+    else:
+        say(_("{count} components are in the catalogue", count=len(made["components"])))
+
+
+@app.command()
+def delete(
+    component_id: Annotated[str, typer.Argument(metavar="ID", help="Id of the component.")],
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+) -> None:
+    """Remove a component; studies that took it keep its values."""
+    with connection(server, token) as client:
+        client.delete_component(component_id)

@@ -1,0 +1,114 @@
+"""``sprag view``: addresses of pages under a name, and the figures of a study's report."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any
+from urllib.parse import urlsplit
+
+import typer
+
+from sprag.service.cli.console import say, show_table, write_json, wrong_option
+from sprag.service.cli.groups import Groups
+from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, Token
+from sprag.service.cli.remote import connection
+from sprag.service.languages import N_, _
+
+app = typer.Typer(help="Saved views of pages, and the figures of a study's report.", no_args_is_help=True, cls=Groups)
+
+ViewId = Annotated[str, typer.Argument(metavar="ID", help="Id of the view.")]
+_STUDY_PAGE = re.compile(r".*/studies/(?P<study>[^/]+)/(?P<page>[a-z]+)")
+
+
+@app.command("list")
+def list_views(
+    study: Annotated[str | None, typer.Option("--study", metavar="ID", help="Only the views of this study.")] = None,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """List saved views: figures of reports in order, then the others by name."""
+    with connection(server, token) as client:
+        found = client.views(study)
+    if as_json:
+        write_json(found)
+        return
+    columns = ((_("id"), False, True), (_("figure"), True), (_("name"), False), (_("address"), False))
+    rows = [(one["id"], "" if one["place"] is None else str(one["place"]), one["name"], one["address"])
+            for one in found["views"]]  # fmt: skip
+    show_table("", columns, rows)
+
+
+@app.command()
+def save(
+    address: Annotated[str, typer.Argument(metavar="ADDRESS", help="Address of the page, as the browser shows it.")],
+    name: Annotated[
+        str, typer.Option("--name", metavar="NAME", help="Its name; a view of the page with it is replaced.")
+    ],
+    report: Annotated[
+        bool, typer.Option("--report", help="Also make these curves or this map a figure of the study's report.")
+    ] = False,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Save the address of a page under a name."""
+    body = {**_place(address), "name": name, "in_report": report}
+    with connection(server, token) as client:
+        _show(client.save_view(body), as_json)
+
+
+@app.command()
+def change(
+    view_id: ViewId,
+    name: Annotated[str | None, typer.Option("--name", metavar="NAME", help="Its new name.")] = None,
+    report: Annotated[
+        bool | None, typer.Option("--report/--no-report", help="Whether it is a figure of the study's report.")
+    ] = None,
+    place: Annotated[
+        int | None, typer.Option("--place", metavar="N", help="Its place among the figures of the report, from 1.")
+    ] = None,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Rename a view, or change whether and where it is in the report of its study."""
+    given = {"name": name, "in_report": report, "place": place}
+    with connection(server, token) as client:
+        _show(client.change_view(view_id, {key: value for key, value in given.items() if value is not None}), as_json)
+
+
+@app.command()
+def delete(view_id: ViewId, server: Server = DEFAULT_SERVER, token: Token = None) -> None:
+    """Delete a saved view."""
+    with connection(server, token) as client:
+        client.delete_view(view_id)
+
+
+def _place(address: str) -> dict[str, Any]:
+    """Page, study and choices of an address; WrongInputError for one that has none."""
+    try:
+        parts = urlsplit(address)
+    except ValueError:  # as of http://[
+        parts = urlsplit("")
+    path = parts.path.rstrip("/")
+    if found := _STUDY_PAGE.fullmatch(path):
+        return {**found.groupdict(), "query": parts.query}
+    if path.endswith("/compare"):
+        return {"page": "compare", "query": parts.query}
+    if parts.query and "/studies/" not in path:
+        return {"page": "studies", "query": parts.query}
+    allowed = _("the address of a page with choices, such as /studies/ID/curves?x=shaft.load")
+    raise wrong_option(
+        "ADDRESS", "invalid-text", N_("is not an address of a page with views"), address, allowed=allowed
+    )
+
+
+def _show(saved: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        write_json(saved)
+        return
+    named = f"{saved['id']}: {saved['name']}"
+    say(
+        named if saved["place"] is None else _("{view}, figure {place} of the report", view=named, place=saved["place"])
+    )

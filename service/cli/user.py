@@ -1,0 +1,190 @@
+"""``sprag user``: add, list, change and remove users of the database."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from sprag.service.actor import Role
+from sprag.service.cli.console import WrongInputError, say, show_table, write_json, wrong_option
+from sprag.service.cli.groups import Groups
+from sprag.service.cli.options import Database, JsonFlag
+from sprag.service.cli.settings import read_settings
+from sprag.service.languages import N_, _
+from sprag.service.storage.scopes import MAX_USER_NAME
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from sprag.service.storage.store import Store
+    from sprag.service.storage.users import Quota, UserRecord
+
+app = typer.Typer(
+    help="Add, list, change and remove users.",
+    no_args_is_help=True,
+    cls=Groups,
+)
+
+Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the user, as a trusted proxy gives it.")]
+RoleOption = Annotated[
+    Role | None,
+    typer.Option("--role", help="viewer: reads; designer: submits and changes what is theirs; administrator: all."),
+]
+Cases = Annotated[
+    int | None,
+    typer.Option("--cases", min=0, max=2**63 - 1, help="Most cases that wait; 0: no limit; default: SPRAG_USER_CASES."),
+]
+Storage = Annotated[
+    int | None,
+    typer.Option(
+        "--storage",
+        metavar="MIB",
+        min=0,
+        max=2**43 - 1,
+        help="Most MiB of results; 0: no limit; default: SPRAG_USER_STORAGE.",
+    ),
+]
+Checks = Annotated[
+    int | None,
+    typer.Option("--checks", min=0, max=64, help="Most checks at once; 0: no limit; default: SPRAG_USER_CHECKS."),
+]
+
+
+@app.command()
+def add(
+    name: Name,
+    role: RoleOption = Role.DESIGNER,
+    cases: Cases = None,
+    storage: Storage = None,
+    checks: Checks = None,
+    db: Database = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Add a user, who logs in with a token (`sprag token create --user`) or through a trusted proxy."""
+    if not 1 <= len(name) <= MAX_USER_NAME or not name.isprintable() or name != name.strip():
+        allowed = _("1 to {most} printable characters, no blank at either end", most=MAX_USER_NAME)
+        raise wrong_option("NAME", "invalid-text", N_("is not the name of a user"), name, allowed=allowed)
+    with users_of(db) as store:
+        record = store.add_user(name, role or Role.DESIGNER, _quota(cases, storage, checks))
+    _show(
+        record,
+        as_json,
+        _("{name} is a user: {role}; every request now needs a token", name=record.name, role=record.role),
+    )
+
+
+@app.command("list")
+def list_users(db: Database = None, as_json: JsonFlag = False) -> None:
+    """List all users with role, quotas, and what is used of them."""
+    with users_of(db) as store:
+        found = [(record, store.usage(record.name)) for record in store.users()]
+    if as_json:
+        write_json({"users": [{**_json(u), "cases": used.cases, "bytes": used.bytes} for u, used in found]})
+        return
+    limit = _("limit")
+    waiting, size, checks = _("cases waiting"), _("bytes"), _("checks")
+    headings = (_("name"), _("role"), waiting, limit, size, limit, checks, _("removed"))
+    rows = [
+        (u.name, u.role, used.cases, u.quota.cases, used.bytes, u.quota.bytes, u.quota.checks, _json(u)["removed_at"])
+        for u, used in found
+    ]
+    show_table("", [(head, 2 <= place <= 6, place == 0) for place, head in enumerate(headings)], rows)
+
+
+@app.command()
+def change(
+    name: Name,
+    role: RoleOption = None,
+    cases: Cases = None,
+    storage: Storage = None,
+    checks: Checks = None,
+    db: Database = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Change the role or the quotas of a user, within two seconds; what is not given is kept."""
+    if role is None and cases is None and storage is None and checks is None:
+        raise WrongInputError("invalid-parameter", _("nothing to change; `sprag user change --help` lists the options"))
+    with users_of(db) as store:
+        record = store.change_user(name, role, _quota(cases, storage, checks))
+    _show(record, as_json, _("{name} is changed: {role}", name=record.name, role=record.role))
+
+
+@app.command()
+def remove(name: Name, db: Database = None, as_json: JsonFlag = False) -> None:
+    """Remove a user, whose tokens and sessions end within two seconds; studies and schedules are kept."""
+    with users_of(db) as store:
+        record = store.change_user(name, removed=True)
+    _show(
+        record,
+        as_json,
+        _("{name} is removed; `sprag user hand-over` gives what was theirs to another user", name=record.name),
+    )
+
+
+@app.command()
+def restore(name: Name, db: Database = None, as_json: JsonFlag = False) -> None:
+    """Let a removed user in again, with the same tokens."""
+    with users_of(db) as store:
+        record = store.change_user(name, removed=False)
+    _show(record, as_json, _("{name} is a user again: {role}", name=record.name, role=record.role))
+
+
+@app.command("hand-over")
+def hand_over(
+    name: Name,
+    to: Annotated[str, typer.Option("--to", metavar="NAME", help="The user to whom they belong from now on.")],
+    db: Database = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Give the studies and schedules of one user to another."""
+    with users_of(db) as store:
+        studies, schedules = store.hand_over(name, to)
+    if as_json:
+        write_json({"studies": studies, "schedules": schedules})
+    else:
+        counts = {"studies": studies, "schedules": schedules}
+        say(_("{studies} studies and {schedules} schedules of {name} belong to {to} now", name=name, to=to, **counts))
+
+
+@contextmanager
+def users_of(db: str | None) -> Iterator[Store]:
+    """The store of a database; an unknown user, or one who exists already, is wrong input."""
+    from sprag.service.storage.errors import UserExistsError, UserNotFoundError
+    from sprag.service.storage.store import Store
+
+    with Store.open(read_settings(database=db).database_url) as store:
+        try:
+            yield store
+        except UserNotFoundError as error:
+            raise WrongInputError("user-not-found", str(error)) from error
+        except UserExistsError as error:
+            raise WrongInputError("user-exists", str(error)) from error
+
+
+def _quota(cases: int | None, storage: int | None, checks: int | None) -> Quota:
+    from sprag.service.storage.users import Quota
+
+    return Quota(cases, None if storage is None else storage * 2**20, checks)
+
+
+def _show(record: UserRecord, as_json: bool, sentence: str) -> None:
+    if as_json:
+        write_json(_json(record))
+    else:
+        say(sentence)
+
+
+def _json(record: UserRecord) -> dict[str, Any]:
+    from sprag.service.json_text import timestamp
+
+    return {
+        "name": record.name,
+        "role": record.role.value,
+        "created_at": timestamp(record.created_at),
+        "removed_at": None if record.removed_at is None else timestamp(record.removed_at),
+        "most_cases": record.quota.cases,
+        "most_bytes": record.quota.bytes,
+        "most_checks": record.quota.checks,
+    }

@@ -1,0 +1,178 @@
+"""Every command that changes a database is in its audit log, with the user of the machine; `sprag user`."""
+
+from __future__ import annotations
+
+import getpass
+import json
+import socket
+import sqlite3
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sprag.service.cli.app import command_line, execute
+from sprag.service.jobs import local
+from sprag.service.storage.audit import AuditFilter
+from sprag.service.storage.scopes import TokenScope
+from sprag.service.storage.store import Store
+from tests.contract.filling import create, finish
+from tests.migrations.freeze import FOLDER
+from tests.service.calibrating import spec_of
+from tests.service.timed_spec import SPEC
+
+Run = Callable[..., int]
+
+#: By command: what it writes into the log, and its arguments; words in capitals are the ids and files of `known`.
+CHANGING = {
+    "run": (["study.create", "study.cancel"], "SPEC"),
+    "calibrate": (["study.create", "study.cancel"], "BENCH"),
+    "token create": (["token.create"], "--name laptop --user dora --expires 30"),
+    "token revoke": (["token.revoke"], "TOKEN"),
+    "user add": (["user.add"], "emil --role viewer --cases 100 --storage 10 --checks 1"),
+    "user change": (["user.change"], "dora --role administrator"),
+    "user remove": (["user.remove"], "dora"),
+    "user restore": (["user.restore"], "dora"),
+    "user hand-over": (["user.hand-over"], "dora --to ada"),
+    "db prune": (["study.delete"], "--older-than 1"),
+    "db clock": (["database.clock"], ""),
+}
+#: Commands that read, and those that name their actors themselves.
+OTHERS = {
+    "preview": "reads which rows can be reused",
+    "serve": "its requests, schedules and nightly work act by themselves",
+    "worker": "the same without requests; cases are no changes of a person",
+    "doctor": "reads",
+    "token list": "reads",
+    "user list": "reads",
+    "db check": "reads",
+    "db backup": "writes another file",
+    "db audit": "reads",
+    "db move": "writes another database, which has the log of this one",
+    "db upgrade": "test_an_upgrade_is_in_the_log_of_the_new_revision",
+}
+
+
+@pytest.fixture
+def known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Store, dict[str, str]]]:
+    """A database with users, a token and an old study that has ended; no command runs a case."""
+
+    class Interrupted:
+        def __init__(self, *_: Any, **__: Any) -> None:
+            pass
+
+        def run(self, _: Any) -> None:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(local, "Dispatcher", Interrupted)
+    for name, spec in (("spec", SPEC), ("bench", spec_of())):
+        (tmp_path / f"{name}.json").write_text(json.dumps(spec))
+    with Store.open(f"sqlite:///{tmp_path / 'known.sqlite3'}") as store:
+        from sprag.service.actor import Role
+
+        for name in ("dora", "ada"):
+            store.add_user(name, Role.DESIGNER)
+        record = create(store)
+        finish(store, record)
+        with store.session.write() as connection:
+            connection.exec_driver_sql("UPDATE studies SET finished_at = finished_at - 172800000000")
+        token = store.create_token("old", TokenScope.READ)[1].id
+        words = {"SPEC": str(tmp_path / "spec.json"), "BENCH": str(tmp_path / "bench.json"), "TOKEN": token}
+        yield store, {**words, "DB": str(tmp_path / "known.sqlite3")}
+
+
+def commands_on_a_database() -> set[str]:
+    """Every command with the option --db."""
+
+    def walk(group: Any, before: str) -> Iterator[str]:
+        for name, command in group.commands.items():
+            if hasattr(command, "commands"):
+                yield from walk(command, f"{before}{name} ")
+            elif any("--db" in parameter.opts for parameter in command.params):
+                yield before + name
+
+    return set(walk(command_line("en"), ""))
+
+
+def test_every_command_on_a_database_is_in_one_of_the_lists() -> None:
+    assert commands_on_a_database() == {*CHANGING, *OTHERS}
+
+
+@pytest.mark.parametrize("command", CHANGING)
+def test_every_change_by_a_command_is_in_the_log(known: tuple[Store, dict[str, str]], command: str) -> None:
+    store, words = known
+    before = [row.number for row in store.audit_rows(AuditFilter())]
+    actions, arguments = CHANGING[command]
+    given = [words.get(word, word) for word in arguments.split()]
+    assert execute([*command.split(), *given, "--db", words["DB"]]) in (0, 130)
+    rows = [row for row in store.audit_rows(AuditFilter()) if row.number not in before]
+    assert [row.action for row in rows] == actions
+    assert {(row.door, row.actor, row.address) for row in rows} == {
+        ("command", getpass.getuser(), socket.gethostname())
+    }
+
+
+def test_commands_that_read_leave_no_row(known: tuple[Store, dict[str, str]], tmp_path: Path) -> None:
+    store, words = known
+    before = list(store.audit_rows(AuditFilter()))
+    backup = str(tmp_path / "copy.sqlite3")
+    for command in (
+        "token list",
+        "user list",
+        "db check",
+        "db audit",
+        f"db backup {backup}",
+        "db prune --older-than 9",
+    ):
+        assert execute([*command.split(), "--db", words["DB"]]) == 0, command
+    assert list(store.audit_rows(AuditFilter())) == before
+
+
+def test_an_upgrade_is_in_the_log_of_the_new_revision(tmp_path: Path) -> None:
+    database = tmp_path / "old.sqlite3"
+    connection = sqlite3.connect(database)
+    connection.executescript((FOLDER / "0020.sql").read_text(encoding="utf-8"))
+    connection.close()
+    assert execute(["db", "upgrade", "--db", str(database)]) == 0
+    with Store.open(f"sqlite:///{database}") as store:
+        (row,) = store.audit_rows(AuditFilter())
+        assert (row.action, row.door, row.detail["before"]) == ("database.upgrade", "command", "0020")
+        assert {study.owner for study in store.list_studies().studies} == {None}
+    assert execute(["db", "upgrade", "--db", str(database)]) == 0
+    with Store.open(f"sqlite:///{database}") as store:
+        assert len(list(store.audit_rows(AuditFilter()))) == 1
+
+
+def test_users_are_listed_and_wrong_ones_refused(
+    known: tuple[Store, dict[str, str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, words = known
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        code = execute([*arguments, "--db", words["DB"]])
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    assert "dora" in run("user", "list")[1]
+    listed = json.loads(run("user", "list", "--json")[1])["users"]
+    assert [(user["name"], user["role"], user["most_cases"]) for user in listed] == [
+        ("ada", "designer", None),
+        ("dora", "designer", None),
+    ]
+    for arguments, code in (
+        (("user", "add", "dora"), "user-exists"),
+        (("user", "add", " x"), "invalid-parameter"),
+        (("user", "change", "x", "--role", "viewer"), "user-not-found"),
+        (("user", "change", "dora"), "invalid-parameter"),
+        (("token", "create", "--name", "x", "--user", "x"), "user-not-found"),
+    ):
+        failed = run(*arguments, "--json")
+        assert (failed[0], json.loads(failed[2])["code"]) == (2, code), arguments
+    assert run("db", "audit", "--since", "yesterday")[0] == 2
+    made = json.loads(run("token", "create", "--name", "x", "--user", "dora", "--expires", "1", "--json")[1])
+    assert (made["user"], made["used_at"]) == ("dora", None)
+    assert made["expires_at"] > made["created_at"]
+    lines = run("db", "audit", "--action", "user.add", "--format", "jsonl")[1].splitlines()
+    assert [json.loads(line)["target"] for line in lines] == ["dora", "ada"]
+    assert run("db", "audit")[1].startswith("number,at,door,actor,")

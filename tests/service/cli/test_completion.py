@@ -1,0 +1,153 @@
+"""Completion by the shells, and the help that it shows."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+from sprag.service.cli import completion
+from sprag.service.cli.app import app
+from sprag.worker.models import ENDING_SENTENCES, REGIME_SENTENCES, flags_of, model_names
+from tests.conftest import ROOT
+from tests.service.conftest import Service
+from tests.serving import served
+
+Sprag = Callable[..., Any]
+
+#: Prints what bash offers for the last of its arguments.
+BASH = """
+eval "$(_SPRAG_COMPLETE=source_bash sprag)"
+complete -p sprag >&2
+COMP_WORDS=(sprag "$@"); COMP_CWORD=$#
+_sprag_completion sprag
+printf '%s\n' "${COMPREPLY[@]}"
+"""
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> dict[str, str]:
+    """An environment whose PATH has the command `sprag`."""
+    script = tmp_path / "bin" / "sprag"
+    script.parent.mkdir()
+    script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m sprag.service.cli "$@"\n')
+    script.chmod(0o755)
+    path = f"{script.parent}{os.pathsep}{os.environ['PATH']}"
+    return {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT), "HOME": str(tmp_path)}
+
+
+def offered(program: dict[str, str], *words: str) -> list[str]:
+    """What bash offers for the last word."""
+    done = subprocess.run(["bash", "-c", BASH, "bash", *words], env=program, capture_output=True, text=True, check=True)
+    assert done.stderr == "complete -o default -F _sprag_completion sprag\n"
+    return done.stdout.split()
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
+def test_bash_completes_commands_options_and_choices(program: dict[str, str]) -> None:
+    assert offered(program, "ex") == ["extend", "explore", "export"]
+    assert offered(program, "db", "up") == ["upgrade"]
+    assert offered(program, "export", "--pro") == ["--project"]
+    assert offered(program, "export", "--format", "p") == ["parquet", "pdf"]
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
+def test_bash_completes_studies_of_the_service(program: dict[str, str], service: Service, spec: dict[str, Any]) -> None:
+    first = service.submit({**spec, "name": "feeder"})
+    second = service.submit({**spec, "name": "two words"})
+    with served(service.app) as address:
+        program["SPRAG_SERVER"] = address
+        assert offered(program, "watch", "") == ["latest", second, first]
+        assert offered(program, "compare", "latest", "fe") == ["feeder"]
+        assert offered(program, "watch", "two") == [], "a name that needs quotes"
+    assert offered(program, "watch", "") == [], "no service answers"
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
+def test_bash_completes_what_options_take(program: dict[str, str], service: Service, spec: dict[str, Any]) -> None:
+    study = service.submit({**spec, "name": "feeder"})
+    case = service.get(f"/studies/{study}/cases/0")
+    with served(service.app) as address:
+        program["SPRAG_SERVER"] = address
+        quantities = [*case["parameters"], *case["results"]]
+        assert offered(program, "cases", study, "--sort", "") == ["case", "ending", *quantities]
+        assert offered(program, "cases", "fee", "--sort", "shaft.l") == ["shaft.load"]
+        assert offered(program, "explore", "latest", "--limit", "3", "--show", "") == quantities
+        assert offered(program, "curve", study, "--x", "") == [*case["parameters"]]
+        assert offered(program, "compare", study, "latest", "--y", "eff") == ["efficiency"]
+        assert offered(program, "cases", "--sort", "") == ["case", "ending"], "no study is named yet"
+        assert offered(program, "models", "") == [m["name"] for m in service.get("/models")["models"]]
+        assert offered(program, "list", "--model", "m") == ["machine-shaft"]
+    assert offered(program, "cases", study, "--sort", "shaft") == [], "no service answers"
+    assert offered(program, "cases", study, "--ending", "c") == ["chatter", "cannot_assemble", "crashed", "cancelled"]
+    assert offered(program, "cases", study, "--regime", "") == [*REGIME_SENTENCES][1:]
+    assert offered(program, "explore", study, "--flag", "un") == ["unsettled"]
+    assert offered(program, "retry", study, "--ending", "chat") == ["chatter"]
+    assert offered(program, "presets", "p") == ["press", "punching_press"]
+    assert offered(program, "list", "--sort", "n") == ["newest", "name"]
+
+
+def test_every_ending_and_flag_is_offered() -> None:
+    assert set(completion.endings()) == set(map(str, ENDING_SENTENCES))
+    assert set(completion.flags()) == {flag for model in model_names() for flag in flags_of(model)}
+
+
+@pytest.mark.parametrize(
+    ("shell", "variables", "expected"),
+    [
+        ("zsh", {"_TYPER_COMPLETE_ARGS": "sprag exp"}, '"export":"Write all case rows'),
+        (
+            "fish",
+            {"_TYPER_COMPLETE_ARGS": "sprag exp", "_TYPER_COMPLETE_FISH_ACTION": "get-args"},
+            "export\tWrite all case rows",
+        ),
+    ],
+)
+def test_other_shells_complete_too(
+    sprag: Sprag, monkeypatch: pytest.MonkeyPatch, shell: str, variables: dict[str, str], expected: str
+) -> None:
+    monkeypatch.setenv("_SPRAG_COMPLETE", f"source_{shell}")
+    script = sprag()
+    assert script.code == 0
+    assert f"_SPRAG_COMPLETE=complete_{shell}" in script.out
+    monkeypatch.setenv("_SPRAG_COMPLETE", f"complete_{shell}")
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    assert expected in sprag().out
+
+
+def test_an_unknown_shell_is_refused(sprag: Sprag, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("_SPRAG_COMPLETE", "source_csh")
+    done = sprag()
+    assert (done.code, done.err) == (1, "Shell csh not supported.\n")
+
+
+def test_h_is_help(sprag: Sprag) -> None:
+    for command in ([], ["run"], ["db"], ["db", "upgrade"]):
+        done = sprag(*command, "-h")
+        assert done.code == 0
+        assert done.out == sprag(*command, "--help").out
+        assert "-h, --help" in done.out
+
+
+def test_help_lists_every_command_with_its_first_sentence(sprag: Sprag) -> None:
+    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    shown = " ".join(sprag("-h").out.split())
+    for name, command in commands.items():
+        assert f" {name} {command.get_short_help_str(limit=400)}" in shown
+    assert "..." not in shown.replace("[ARGS]...", "")
+    titles = [shown.index(title) for title in ("Run here:", "Run a service:", "Use a running service:")]
+    assert titles == sorted(titles)
+
+
+def test_a_group_without_a_command_shows_its_help(sprag: Sprag) -> None:
+    done = sprag("db")
+    assert (done.code, done.out) == (2, "")
+    assert done.err == sprag("db", "--help").out

@@ -1,0 +1,225 @@
+"""Studies named by people, and the commands about one case, several studies, and the settings."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+from anyio.from_thread import BlockingPortal
+from rich.cells import cell_len
+
+from sprag.service import client as clients
+from sprag.service.cli.app import execute
+from sprag.service.cli.console import WrongInputError
+from sprag.service.cli.names import study_of
+from sprag.service.client.plain import ServiceClient
+from sprag.service.client.synchronous import naming
+from sprag.service.settings import default_database_path
+from sprag.worker.models import cache_folder
+from tests.service.conftest import PortalTransport, Service
+
+Sprag = Callable[..., Any]
+API = "/api/v1"
+
+
+@pytest.fixture
+def here(service: Service, portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands ask the service of the test."""
+    transport = PortalTransport(service.app, portal)
+    monkeypatch.setattr(clients, "ServiceClient", partial(ServiceClient, transport=transport))
+
+
+def submit(service: Service, spec: dict[str, Any], name: str) -> str:
+    return service.submit({**spec, "name": name})
+
+
+def test_what_names_a_study(service: Service, portal: BlockingPortal, spec: dict[str, Any]) -> None:
+    with ServiceClient("http://localhost", transport=PortalTransport(service.app, portal)) as client:
+        assert study_of(client, "latest") == "latest", "there is none"
+        first, second = submit(service, spec, "Feeder, slow"), submit(service, spec, "Feeder, fast")
+        for text, meant in (
+            (first, first),
+            ("latest", second),
+            ("Feeder, slow", first),
+            ("feeder, f", second),
+            (second[:-2] if first[:-2] != second[:-2] else second, second),
+            (first[3:-1] if first[3:-1] != second[3:-1] else first, first),
+            ("st_0123456789abcdef", "st_0123456789abcdef"),
+            ("nothing", "nothing"),
+        ):
+            assert study_of(client, text) == meant, text
+        for nothing in ("", " "):
+            with pytest.raises(WrongInputError) as empty:
+                study_of(client, nothing)
+            assert [(fault.where, fault.code) for fault in empty.value.faults] == [("ID", "required")]
+            with pytest.raises(ValueError, match="id or name"):
+                naming.study_of(client, nothing)
+        third = submit(service, spec, "Feeder")
+        assert study_of(client, "Feeder") == third, "a whole name precedes the beginning of others"
+        with pytest.raises(Exception, match="not unique") as caught:
+            study_of(client, "feeder,")
+        (fault,) = caught.value.faults  # type: ignore[attr-defined]
+        assert fault.code == "ambiguous"
+        assert first in str(fault.allowed)
+        assert second in str(fault.allowed)
+
+
+def test_an_unknown_name_is_refused_by_the_service(service: Service, sprag: Sprag, here: None) -> None:
+    done = sprag("cancel", "nothing")
+    assert done.code == 2
+    assert "nothing" in done.err
+
+
+def test_a_study_is_deleted_after_asking(service: Service, sprag: Sprag, here: None, spec: dict[str, Any]) -> None:
+    study_id = submit(service, spec, "old")
+    done = sprag("delete", "old", "--yes")
+    assert (done.code, service.http.get(f"{API}/studies/{study_id}").status_code) == (2, 200), "it has not ended"
+    service.fill(study_id)
+    done = sprag("delete", "old", "--json")
+    assert done.code == 2
+    assert json.loads(done.err)["problems"][0]["code"] == "required", "nobody can be asked here"
+    assert service.http.get(f"{API}/studies/{study_id}").status_code == 200
+    done = sprag("delete", "old", "--yes", "--json")
+    assert (done.code, json.loads(done.out)) == (0, {"deleted": study_id})
+    assert service.http.get(f"{API}/studies/{study_id}").status_code == 404
+
+
+def test_a_case_and_its_motions(
+    service: Service, sprag: Sprag, here: None, spec: dict[str, Any], tmp_path: Path
+) -> None:
+    spec["run"] = {"duration": "12 periods", "window": ["6 periods", "12 periods"]}
+    service.fill(study := submit(service, spec, "short"))
+    done = sprag("case", "short", 4)
+    assert done.code == 0
+    assert done.err.startswith("case 4: chatter.")
+    words = done.out.split()
+    assert words[words.index("excitation.frequency") + 2] == "Hz"
+    assert words[words.index("shaft.speed.mean") + 1 :][:2] == ["-", "rad/s"]
+    case = json.loads(sprag("case", "short", 3, "--json").out)
+    assert case["case"] == 3
+    numbers = [name for name, value in case["results"].items() if not isinstance(value, str)]
+    assert {*case["parameters"], *numbers} <= {*case["units"]}
+    assert service.get(f"/studies/{study}/cases")["units"] == case["units"]
+    listed = sprag("cases", "short", "--result", "torque.mean").out
+    assert {"[N*m]", "[Hz]"} <= {*listed.split()}
+
+    done = sprag("case", "short", 4, "trajectory", "--set", "from=6 periods", "--set", "points=20")
+    rows = list(csv.DictReader(io.StringIO(done.out)))
+    assert len(rows) == 20
+    file = tmp_path / "strobes.svg"
+    assert sprag("case", "short", 4, "strobes", "-o", file).code == 0
+    assert file.read_bytes().startswith(b"<?xml")
+    done = sprag("case", "short", 4, "trajectory", "--set", "pionts=20")
+    assert done.code == 2
+    assert "--pionts" in done.err
+    for wrong in (("--set", "points=20"), ("-o", file), ("trajectory", "--set", "points")):
+        done = sprag("case", "short", 4, *wrong)
+        assert (done.code, done.out) == (2, ""), wrong
+
+
+@pytest.mark.parametrize("width", [50, 64, 80, 100, 132, 200])
+def test_tables_of_commands_fit_the_terminal(
+    service: Service, sprag: Sprag, here: None, spec: dict[str, Any], monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
+    service.fill(submit(service, spec, "feeder"))
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", str(width))
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("NO_COLOR", "1")
+    for command in (("answers", "feeder"), ("case", "feeder", 3), ("cases", "feeder"), ("presets",), ("list",)):
+        done = sprag(*command)
+        assert done.code == 0, done.err
+        lines = re.sub(r"\x1b\[[0-9;]*m", "", done.out).splitlines()
+        assert 20 < max(map(cell_len, lines)) <= width, command
+        assert "\N{HORIZONTAL ELLIPSIS}" not in done.out
+
+
+def test_studies_side_by_side(service: Service, sprag: Sprag, here: None, spec: dict[str, Any]) -> None:
+    heavy = {**spec, "base": {**spec["base"], "shaft": {"inertia": "4e-3 kg*m^2", "load": 0.1}}}
+    for name, each in (("light", spec), ("heavy", heavy)):
+        service.fill(submit(service, each, name))
+    chosen = ("--x", "shaft.load", "--y", "shaft.speed.mean", "--at", "excitation.frequency=16 Hz")
+    done = sprag("compare", "light", "heavy", *chosen)
+    assert done.code == 0, done.err
+    assert "/base/shaft/inertia" in done.out
+    assert "4e-3 kg*m^2" in done.out
+    found = json.loads(sprag("compare", "light", "heavy", *chosen, "--json").out)
+    assert found["studies"] == ["light", "heavy"]
+    assert found["inputs"]["/base/shaft/inertia"] == ["2e-3 kg*m^2", "4e-3 kg*m^2"]
+    assert len(found["curves"]["heavy"]["curves"][0]["x"]) == 3
+    assert sprag("compare", "light").code == 2
+    assert sprag("compare", "light", "heavy", "--at", "16 Hz").code == 2
+
+
+def test_models_and_rounds(service: Service, sprag: Sprag, here: None, spec: dict[str, Any]) -> None:
+    assert "machine-shaft" in sprag("models").out
+    assert "excitation.frequency" in sprag("models", "vibration-drive").out
+    assert sprag("models", "perpetuum-mobile").code == 2
+    submit(service, spec, "plain")
+    assert json.loads(sprag("rounds", "plain", "--json").out)["rounds"] == []
+    assert "first case" in sprag("rounds", "plain").out
+
+
+def test_settings_say_where_they_come_from(sprag: Sprag, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "sprag.toml"
+    file.write_text('port = 8100\nhost = "127.0.0.2"\n')
+    monkeypatch.setenv("SPRAG_SETTINGS", str(file))
+    monkeypatch.setenv("SPRAG_PORT", "8200")
+    monkeypatch.setenv("SPRAG_TOKEN", "correct-horse-battery-staple")
+    monkeypatch.setenv("SPRAG_ZONE", "")
+    monkeypatch.setenv("SPRAG_DATABASE", "postgresql://bob:hunter2@host/sprag")
+    monkeypatch.setenv("SPRAG_SERVER", "https://tools.example")
+    monkeypatch.delenv("SPRAG_COMPILER", raising=False)
+    done = sprag("settings", "--json")
+    found = {row["name"]: (row["value"], row["origin"]) for row in json.loads(done.out)["settings"]}
+    assert found["port"] == ("8200", "SPRAG_PORT")
+    assert found["host"] == ("127.0.0.2", str(file))
+    assert found["zone"] == ("UTC", "default")
+    assert found["token"] == ("(secret)", "SPRAG_TOKEN")
+    assert found["database"] == ("postgresql://bob:***@host/sprag", "SPRAG_DATABASE")
+    assert found["SPRAG_SETTINGS"] == (str(file), "SPRAG_SETTINGS")
+    assert found["SPRAG_SERVER"] == ("https://tools.example", "SPRAG_SERVER")
+    assert found["SPRAG_COMPILER"] == ("programs", "default")
+    assert found["SPRAG_KERNEL_CACHE"][0] == str(cache_folder())
+    assert found["SPRAG_DEBUG"] == ("", "default")
+    assert "correct-horse" not in sprag("settings").out
+    monkeypatch.delenv("SPRAG_DATABASE")
+    found = {row["name"]: row["value"] for row in json.loads(sprag("settings", "--json").out)["settings"]}
+    assert found["database"] == str(default_database_path())
+    monkeypatch.setenv("SPRAG_PORT", "many")
+    assert sprag("settings").code == 2
+
+
+@pytest.mark.usefixtures("here")
+def test_a_file_has_the_header_that_is_asked_for(
+    service: Service, spec: dict[str, Any], sprag: Sprag, examples: Path, tmp_path: Path
+) -> None:
+    service.fill(service.submit(spec))
+    done = sprag("export", "latest", "--header", "units")
+    assert done.code == 0
+    assert "shaft.load [N*m]" in done.out.partition("\n")[0].split(",")
+    for command in (["export", "latest"], ["run", examples / "one_pendulum.json"]):
+        refused = sprag(*command, "-o", tmp_path / "rows.xlsx", "--header", "units", "--json")
+        (problem,) = refused.failure["problems"]
+        assert (refused.code, problem["code"], problem["allowed"]) == (2, "not-used", "csv")
+    assert list(tmp_path.glob("rows*")) == []
+
+
+@pytest.mark.usefixtures("here")
+def test_a_study_is_kept_where_the_answer_is_no(
+    service: Service, spec: dict[str, Any], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study = submit(service, spec, "Feeder")
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr("sprag.service.cli.studies.confirmed", lambda _question: False)
+    assert execute(["delete", study, "--server", "http://localhost"]) == 0
+    assert "nothing is deleted" in capsys.readouterr().err
+    assert service.http.get(f"{API}/studies/{study}").status_code == 200
