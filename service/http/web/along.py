@@ -7,6 +7,7 @@ from urllib.parse import urlencode
 
 from fastapi import Query
 
+from sprag.service.http.reading import read_as
 from sprag.service.http.web.study import study_frame
 from sprag.service.results.branches import ranged_axes
 from sprag.service.results.selection import axis_name
@@ -40,6 +41,7 @@ def along_frame(
         "tab": "/cases",
         "case": case,
         "start": "" if start is None else str(start),
+        "read_as": read_as(),
         "own": f"/studies/{study_id}/cases/{case}",
         "choices": [(path, axis_name(study, path)) for path in ranged_axes(study, initial=initial)],
     }

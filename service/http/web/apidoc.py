@@ -117,7 +117,7 @@ def with_token_needed(document: dict[str, Any]) -> dict[str, Any]:
     needed: list[dict[str, list[str]]] = [{"bearer": []}]
     paths = {
         path: {
-            method: {**operation, "security": needed} if "security" in operation else operation
+            method: {**operation, "security": needed} if operation.get("security") else operation
             for method, operation in operations.items()
         }
         for path, operations in document["paths"].items()

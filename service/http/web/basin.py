@@ -5,25 +5,29 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Request
+from fastapi import Request
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError, parameter_error
 from sprag.service.http.basin_query import USUAL_POINTS, AskedBasin, BasinParameters
 from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
 from sprag.service.http.drawing import unchanging
+from sprag.service.http.reading import FileChoice, read_as
 from sprag.service.http.respond import json_response
+from sprag.service.http.routers import page_router
 from sprag.service.http.web.figures.answers import basin_plot
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
+from sprag.service.jobs.reading import reading_of
 from sprag.service.results import basins
 from sprag.worker.limits import MAX_BASIN_POINTS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
 _FIELDS: Final = ("x", "x_from", "x_to", "y", "y_from", "y_to", "points")
 #: Characters of a field that are read.
@@ -59,18 +63,19 @@ def basin_page(context: Ctx, request: Request, study_id: StudyId, case: CaseNumb
         usual=usual,
         usual_points=USUAL_POINTS,
         faults=faults,
-        figure=f"{own}/figure?{asked}" if asked else "",
+        figure=f"{own}/figure?{asked}{read_as()}" if asked else "",
         file=f"/api/v1{own}?{asked}",
     )
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/basin/figure")
-async def basin(work: Attended, study_id: StudyId, case: CaseNumber, asked: AskedBasin) -> Response:
+async def basin(work: Attended, study_id: StudyId, case: CaseNumber, asked: AskedBasin, choice: FileChoice) -> Response:
     """The figure of a basin."""
     study, query = await work.case_of(study_id, case, lambda study: asked.of(study, case))
 
     async def make() -> Response:
-        return json_response(await work.run_case(basin_plot, study, case, query))
+        reading = await run_in_threadpool(reading_of, work.context.store, study_id, choice)
+        return json_response(await work.run_case(basin_plot, study, case, query, reading))
 
     return await unchanging(work, study_id, make)
 

@@ -5,19 +5,23 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError
 from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, study_with
+from sprag.service.http.reading import FileChoice
 from sprag.service.http.respond import json_response
+from sprag.service.http.routers import page_router
 from sprag.service.http.web.along import Begin, End, Text, along_frame, query_of
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
+from sprag.service.jobs.reading import reading_of
+from sprag.service.languages import _
 from sprag.service.results.branches import along_of, neighbours, result_of, usual_along
 from sprag.service.results.figures.branch import OwnCases, branch_figure
+from sprag.service.results.figures.read import read_figure
 from sprag.service.results.portraits import require_strobes
 from sprag.service.results.start_states import check_start
 from sprag.worker.models.branches import branch_results, run_branch
@@ -28,7 +32,7 @@ if TYPE_CHECKING:
     from sprag.worker.models.branches import Along
     from sprag.worker.study import Study
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/branch")
@@ -54,7 +58,7 @@ def branch_page(
         "branch.html",
         status=422 if faults else 200,
         **along_frame(context, study_id, study, case, {"along": path, "low": low, "high": high, "y": result}, which),
-        title="Branch",
+        title=_("Branch"),
         faults=faults,
         results=branch_results(study),
         branch=query,
@@ -64,7 +68,7 @@ def branch_page(
 @router.get("/studies/{study_id:study}/cases/{case:case}/branch/figure")
 async def branch_drawn(
     work: Attended, study_id: StudyId, case: CaseNumber, along: Text, low: Begin = "", high: End = "",
-    y: Text = "", which: StartNumber = None,
+    y: Text = "", which: StartNumber = None, *, choice: FileChoice,
 ) -> Response:  # fmt: skip
     """The figure of a branch, with the cases of the study along its parameter."""
 
@@ -74,7 +78,8 @@ async def branch_drawn(
     study, (asked, result) = await work.case_of(study_id, case, look, which)
     made = await work.run_case(run_branch, *motion_of(study, case, which), asked)
     own = await run_in_threadpool(_own_cases, work.context, study_id, study, case, asked, result)
-    return json_response(plotly_figure(branch_figure(made, study, asked, result, own)))
+    reading = await run_in_threadpool(reading_of, work.context.store, study_id, choice)
+    return json_response(plotly_figure(read_figure(branch_figure(made, study, asked, result, own), reading)))
 
 
 def _own_cases(context: Context, study_id: str, study: Study, case: int, along: Along, result: str) -> OwnCases:

@@ -6,20 +6,21 @@ import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-from fastapi import APIRouter, Query
+from fastapi import Query
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.faults import Fault, FaultError
 from sprag.service.http.context import Context, Ctx
 from sprag.service.http.problems import api_error
+from sprag.service.http.routers import page_router
 from sprag.service.http.web.form.entries import plain
 from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
-from sprag.service.results.wording import words
+from sprag.service.results.reading import Reading
 from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.fields import WHICH_CASES
 from sprag.worker import models
@@ -29,7 +30,7 @@ from sprag.worker.planning.calibrate.plan import LOSSES
 if TYPE_CHECKING:
     from sprag.service.jobs.submission import Submission
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
 #: Rows for unknown parameters.
 ROWS: Final = 6
@@ -86,6 +87,7 @@ def _page(
     paths = [path for path in study.base if path not in study.derive]
     infos = [info for info in models.study_results(study) if info.kind != "category"]
     first = models.presentation_of(study).along[:1]
+    reading = Reading(study.model)
     example = [f"{path} [{unit_of(study, path)}]" for path in first] + [f"{infos[0].name} [{infos[0].unit}]", "sigma"]
     return page(
         "calibrate.html",
@@ -95,7 +97,7 @@ def _page(
         values=values,
         faults=faults,
         rows=range(ROWS),
-        paths=[(path, words(path), unit_of(study, path), study.base[path]) for path in paths],
+        paths=[(path, reading.caption(path), unit_of(study, path), study.base[path]) for path in paths],
         results=[(info.name, info.unit) for info in infos],
         losses=LOSSES,
         example=",".join(example),

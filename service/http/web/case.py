@@ -5,23 +5,29 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated, Any
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Query
+from fastapi import Query
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.faults import FaultError
 from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, study_with
-from sprag.service.http.drawing import picture, unchanging
+from sprag.service.http.drawing import Columns, picture, unchanging
+from sprag.service.http.reading import CHOICE, FileChoice, address_pairs
 from sprag.service.http.respond import json_response
+from sprag.service.http.routers import page_router
 from sprag.service.http.web.figures.answers import SAMPLES, motion_figures, strobes_figure
 from sprag.service.http.web.form.own_machine import case_address, has_laboratory
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
+from sprag.service.jobs.reading import reading_of
+from sprag.service.languages import _
 from sprag.service.results import trajectories
 from sprag.service.results.defaults import main_results
+from sprag.service.results.phrases import meanings, shown
 from sprag.service.results.pictures.curves import draw_motion
 from sprag.service.results.portraits import require_strobes
-from sprag.service.results.regimes import ORDER
+from sprag.service.results.regimes import ORDER, motion_sentence
 from sprag.service.results.selection import axis_name, own_paths
 from sprag.service.results.start_states import check_start
 from sprag.service.results.sweeps import direction_texts
@@ -37,14 +43,13 @@ if TYPE_CHECKING:
     from sprag.service.storage.records import CaseRow
     from sprag.worker.study import Study
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
 #: Periods of the motion that are shown first, at the end of the evaluated window.
 _FIRST_PERIODS = 4
 #: Result with the start that a row describes.
 _START = "regime.start"
 
-Columns = Annotated[int, Query(ge=1, le=2)]
 Begin = Annotated[str, Query(alias="from", max_length=80)]
 End = Annotated[str, Query(alias="to", max_length=80)]
 
@@ -83,9 +88,9 @@ def _motion(row: CaseRow) -> str:
     regime, order, after = (row.results.get(name) for name in ("regime", ORDER, "regime.settled_after"))
     if not isinstance(regime, str) or regime in row.flags:
         return ""
-    sentence = models.motion_sentence(regime, order if isinstance(order, int) else None)
+    sentence = shown(motion_sentence(regime, order if isinstance(order, int) else None))
     if isinstance(after, float):
-        sentence += f" From its start it is settled after {number(after, 3)} periods."
+        sentence += " " + _("From its start it is settled after {n} periods.", n=number(after, 3))
     return sentence
 
 
@@ -118,10 +123,12 @@ def case_page(
     except FaultError as error:
         faults = error.faults
     start = [] if which is None else [("start", str(which))]
+    chosen = address_pairs(CHOICE.get())
     query = urlencode([("from", repr(span[0])), ("to", repr(span[1])), *start]) if span else ""
     own = f"/studies/{study_id}/cases/{case}"
     infos = models.study_results(study)
     extent = models.extent(study, case)
+    endings, flags = meanings(models.ENDING_SENTENCES), meanings(models.flags_of(study.model))
     return page(
         "case.html",
         status=422 if faults else 200,
@@ -132,9 +139,9 @@ def case_page(
         regimes=[row for row in rows if row.results.get("regime.number") is not None],
         start="" if which is None else str(which),
         ending=PENDING if row is None else row.ending,
-        sentence="The case has not been run yet." if row is None else models.ENDING_SENTENCES.get(row.ending, ""),
+        sentence=_("The case has not been run yet.") if row is None else endings.get(row.ending, ""),
         motion="" if row is None else _motion(row),
-        flags=[(flag, models.flags_of(study.model).get(flag, "")) for flag in (() if row is None else row.flags)],
+        flags=[(flag, flags.get(flag, "")) for flag in (() if row is None else row.flags)],
         parameters=_parameters(study, case),
         value_texts=direction_texts(study, case),
         infos=infos,
@@ -145,8 +152,9 @@ def case_page(
         begin=begin,
         end=end,
         extent=extent,
-        figures=f"{own}/motion?columns=2&{query}",
-        picture=f"{own}/motion.svg?{query}",
+        figures=f"{own}/motion?columns=2&{query}&{urlencode(chosen)}",
+        picture=f"{own}/motion.svg?{query}&{urlencode(chosen)}",
+        chosen=urlencode(chosen),
         file=f"/api/v1{own}/trajectory?{query}&points={SAMPLES}&format=csv",
         own=own,
         has_clutches=models.has_clutches(study),
@@ -163,6 +171,7 @@ async def motion(
     work: Attended,
     study_id: StudyId,
     case: CaseNumber,
+    choice: FileChoice,
     begin: Begin = "",
     end: End = "",
     which: StartNumber = None,
@@ -172,7 +181,9 @@ async def motion(
     study, span = await work.case_of(study_id, case, lambda study: _span(study, case, begin, end), which)
 
     async def make() -> Response:
-        return json_response(await work.run_case(motion_figures, *motion_of(study, case, which), *span, columns))
+        reading = await run_in_threadpool(reading_of, work.context.store, study_id, choice)
+        figures = await work.run_case(motion_figures, *motion_of(study, case, which), *span, columns, reading)
+        return json_response(figures)
 
     return await unchanging(work, study_id, make)
 
@@ -190,15 +201,22 @@ async def in_laboratory(work: Attended, study_id: StudyId, case: CaseNumber, whi
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/motion.svg")
 async def motion_picture(
-    work: Attended, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = "", which: StartNumber = None
+    work: Attended,
+    study_id: StudyId,
+    case: CaseNumber,
+    choice: FileChoice,
+    begin: Begin = "",
+    end: End = "",
+    which: StartNumber = None,
 ) -> Response:
     """The motion as one picture, for pages without JavaScript."""
     study, span = await work.case_of(study_id, case, lambda study: _span(study, case, begin, end), which)
 
     async def make() -> Response:
         made = await work.run_case(models.run_trajectory, *motion_of(study, case, which), *span, SAMPLES // 3)
-        title = f"{study.name}, case {case}"
-        return await picture(draw_motion, "svg", made, models.presentation_of(study), title, (), None).response(work)
+        reading = await run_in_threadpool(reading_of, work.context.store, study_id, choice)
+        shown, title = models.presentation_of(study), f"{study.name}, case {case}"
+        return await picture(draw_motion, "svg", made, shown, reading, title, (), None).response(work)
 
     return await unchanging(work, study_id, make)
 
@@ -208,6 +226,7 @@ async def strobes(
     work: Attended,
     study_id: StudyId,
     case: CaseNumber,
+    choice: FileChoice,
     columns: Columns = 2,
     which: StartNumber = None,
 ) -> Response:
@@ -215,6 +234,7 @@ async def strobes(
     study, _ = await work.case_of(study_id, case, require_strobes, which)
 
     async def make() -> Response:
-        return json_response(await work.run_case(strobes_figure, *motion_of(study, case, which), columns))
+        reading = await run_in_threadpool(reading_of, work.context.store, study_id, choice)
+        return json_response(await work.run_case(strobes_figure, *motion_of(study, case, which), columns, reading))
 
     return await unchanging(work, study_id, make)

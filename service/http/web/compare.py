@@ -2,45 +2,62 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from starlette.responses import Response
 
+from sprag.service.answers.differing import MOST_COMPARED, differing, unique_names
+from sprag.service.formats import MEDIA_TYPES
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx
-from sprag.service.http.drawing import Drawing, picture, tag_of, unless_known
+from sprag.service.http.drawing import Drawing, attached, picture, tag_of, unless_known
+from sprag.service.http.reading import CHOICE, FileChoice, address_pairs
 from sprag.service.http.respond import json_response
-from sprag.service.http.web.choice import held
+from sprag.service.http.routers import page_router
 from sprag.service.http.web.figures.plotly import plotly_figure
-from sprag.service.http.web.study import fixed_choices
+from sprag.service.http.web.held import fixed_choices
+from sprag.service.http.web.saved_views import saved_here
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended, Work
+from sprag.service.jobs.reading import reading_of
+from sprag.service.results.choice import held
 from sprag.service.results.curve_cases import draw, select
 from sprag.service.results.curves import CurveQuery, Curves
 from sprag.service.results.defaults import main_query, varying_axes
+from sprag.service.results.differences import compared_csv, differences
 from sprag.service.results.figures.curves import curves_figure
+from sprag.service.results.figures.read import read_figure
+from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.pictures.curves import draw_compare
 from sprag.service.results.selection import SelectionError, refused
 from sprag.service.spec.catalogue import unit_of
+from sprag.service.spec.units import QuantityError, parse_quantity
+from sprag.service.storage.errors import StudyNotFoundError
+from sprag.service.storage.listing import StudyFilter
 from sprag.worker import models
+from sprag.worker.limits import MAX_SEARCH_LENGTH
+from sprag.worker.models.parameters import parameter_of
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
+    from collections.abc import Awaitable, Callable, Sequence
 
     from starlette.datastructures import QueryParams
 
+    from sprag.service.results.reading import Choice, Reading
     from sprag.service.storage.records import StudyRecord
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
-_MOST: Final = 8
 _LISTED: Final = 50
+#: Characters of an input in the table.
+_LONGEST: Final = 120
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +72,17 @@ class Comparison:
     y: tuple[str, ...]
     by: tuple[str, ...]
     at: tuple[str, ...]
+    #: Id of the study from which the others differ; "" where the curves themselves are drawn.
+    less: str = ""
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of the studies in legends."""
+        return labels(self.records)
 
     def label(self, position: int) -> str:
-        """Name of a study in legends; with its id where another one has the same name."""
-        record = self.records[position]
-        names = [other.name for other in self.records]
-        return record.name if names.count(record.name) == 1 else f"{record.name} ({record.id})"
+        """Name of a study in legends."""
+        return self.labels[position]
 
     def query(self, position: int) -> CurveQuery:
         """The curves of one study; axes that only it has are held at their usual value."""
@@ -71,16 +93,29 @@ class Comparison:
     def pairs(self) -> list[tuple[str, str]]:
         """The comparison as parameters of a URL."""
         chosen = [("x", self.x), *(("y", name) for name in self.y), *(("by", path) for path in self.by)]
-        return [*(("study", record.id) for record in self.records), *chosen, *(("at", item) for item in self.at)]
+        return [*(("study", record.id) for record in self.records), *chosen, *(("at", item) for item in self.at),
+                *([("less", self.less)] if self.less else [])]  # fmt: skip
 
 
-def comparison(context: Context, given: QueryParams) -> Comparison:
-    """The comparison of a URL; SelectionError where the studies have nothing in common, StudyNotFoundError for
-    unknown ones.
-    """
-    ids = list(dict.fromkeys(name for name in given.getlist("study") if name))[:_MOST]
-    records = [context.store.get_study(study_id) for study_id in ids]
-    studies = [context.store.study(study_id) for study_id in ids]
+def labels(records: list[StudyRecord]) -> list[str]:
+    """Names of studies that tell them apart."""
+    return unique_names([record.name for record in records], [record.id for record in records])
+
+
+def chosen_studies(context: Context, given: QueryParams) -> list[StudyRecord]:
+    """The studies of a URL; SelectionError where there is none or too many, StudyNotFoundError for unknown ones."""
+    ids = list(dict.fromkeys(name for name in given.getlist("study") if name))
+    if len(ids) > MOST_COMPARED:
+        allowed = f"at most {MOST_COMPARED}"
+        raise refused("study", "too-many", "too many studies are compared at once", len(ids), allowed=allowed)
+    if not ids:
+        raise refused("study", "required", "is missing", allowed=f"1 to {MOST_COMPARED} ids of studies")
+    return [context.store.get_study(study_id) for study_id in ids]
+
+
+def comparison(context: Context, given: QueryParams, records: list[StudyRecord]) -> Comparison:
+    """The comparison of a URL, whose studies are ``records``; SelectionError where they have nothing in common."""
+    studies = [context.store.study(record.id) for record in records]
     axes = [axis.paths[0] for axis in varying_axes(studies[0])]
     axes = [
         path
@@ -101,7 +136,13 @@ def comparison(context: Context, given: QueryParams) -> Comparison:
     )
     by = tuple(path for path in given.getlist("by") if path and path != x)
     at = tuple(item for item in given.getlist("at") if item.partition("=")[2].strip())
-    return Comparison(records, studies, axes, results, x, y or (results[0].name,), by, at)
+    less = given.get("less", "")
+    if less and (len(records) < 2 or less not in [record.id for record in records]):
+        raise refused("less", "invalid-choice", "is none of the compared studies", less)
+    if less:
+        results = [info for info in results if info.kind != "category"]
+        y = tuple(name for name in y if any(info.name == name for info in results))
+    return Comparison(records, studies, axes, results, x, y or (results[0].name,), by, at, less)
 
 
 def drawn(context: Context, chosen: Comparison) -> list[tuple[str, Curves]]:
@@ -114,7 +155,61 @@ def drawn(context: Context, chosen: Comparison) -> list[tuple[str, Curves]]:
             faults = [replace(item, message=f"{chosen.label(position)}: {item.message}") for item in error.faults]
             raise SelectionError(faults) from error
         found.append((chosen.label(position), draw(selection, partial(context.store.rows_for_cases, record.id))))
+    if chosen.less:
+        return differences(found, [record.id for record in chosen.records].index(chosen.less))
     return found
+
+
+@dataclass(frozen=True, slots=True)
+class DifferingInput:
+    """An input in which studies differ: its path in the spec, what it is called, and the value of each study."""
+
+    path: str
+    caption: str
+    values: list[str]
+
+
+def differing_inputs(context: Context, records: list[StudyRecord], reading: Reading) -> list[DifferingInput]:
+    """Inputs in which the studies differ: parameters of the machine as they are read, others as they were written."""
+    studies = [context.store.study(record.id) for record in records]
+    found = differing([context.store.spec(record.id) for record in records])
+    paths = {pointer: pointer[1:].replace("/", ".").replace("~1", "/").replace("~0", "~") for pointer in found}
+    rows = (_differing(paths[pointer], values, studies, reading) for pointer, values in found.items())
+    return [row for row in rows if row is not None]
+
+
+def _differing(path: str, values: Sequence[Any], studies: list[Study], reading: Reading) -> DifferingInput | None:
+    """None where the values differ only in how they were written."""
+    first, _dot, name = path.partition(".")
+    entry = (
+        next((found for study in studies if (found := parameter_of(study, name))), None) if first == "base" else None
+    )
+    numbers = [None if value is None or entry is None else _in_si(value, entry.unit) for value in values]
+    if entry is None or all(number is None for number in numbers):
+        return DifferingInput(path, path, [_written(value) for value in values])
+    if None not in numbers and len(set(numbers)) == 1:
+        return None
+    shown = [
+        _written(value) if number is None else reading.quantity(number, entry.unit, 8)
+        for value, number in zip(values, numbers, strict=True)
+    ]
+    return DifferingInput(path, reading.caption(name), shown)
+
+
+def _in_si(value: object, unit: str) -> float | None:
+    """A quantity of a spec; None for anything else."""
+    try:
+        return parse_quantity(value, unit)
+    except QuantityError:
+        return None
+
+
+def _written(value: object) -> str:
+    """A value of a spec as text, long lists shortened."""
+    if value is None:
+        return "–"
+    text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} …"
 
 
 @router.get("/compare")
@@ -124,54 +219,118 @@ def compare_page(context: Ctx, request: Request) -> Response:
     faults: tuple[Any, ...] = ()
     chosen: Comparison | None = None
     held_at: list[tuple[str, ...]] = []
-    if given.get("study"):
+    records: list[StudyRecord] = []
+    choosing = bool(given.get("choose"))
+    if given.get("study") and not choosing:
         try:
-            chosen = comparison(context, given)
+            records = chosen_studies(context, given)
+            chosen = comparison(context, given, records)
             for position, study in enumerate(chosen.studies):
                 held_at.append(select(study, models.study_results(study), chosen.query(position)).held)
         except SelectionError as error:
             faults = error.faults
-    query = "" if chosen is None else urlencode(chosen.pairs())
+    choice = CHOICE.get()
+    reading = None if chosen is None else reading_of(context.store, chosen.records[0].id, choice)
+    differ = len(records) > 1
+    query = "" if chosen is None else urlencode([*chosen.pairs(), *address_pairs(choice)])
     return page(
         "compare.html",
-        status=422 if faults else 200,
+        # Inputs are compared of any studies.
+        status=422 if any(fault.code != "nothing-varies" for fault in faults) else 200,
         chosen=chosen,
-        ids=given.getlist("study"),
+        reading=reading,
+        choice=choice,
+        records=records,
+        running=next((record.id for record in records if not record.state.terminal), ""),
+        **_offered(context, given, choosing=choosing or not records),
+        most=MOST_COMPARED,
+        labels=labels(records),
+        inputs=differing_inputs(context, records, reading_of(context.store, records[0].id, choice)) if differ else [],
         faults=faults,
-        listed=[views.summary(record) for record in context.store.list_studies(page_size=_LISTED).studies],
         units={} if chosen is None else {path: unit_of(chosen.studies[0], path) for path in chosen.axes},
-        held=held_at,
-        fixed=[] if chosen is None else _fixed(chosen),
+        held=[[reading.say(text) for text in texts] for texts in held_at] if reading else [],
+        fixed=[] if chosen is None or reading is None else _fixed(chosen, reading),
         figure=f"/compare/figure?{query}",
-        picture=f"/compare/picture.svg?{query}",
+        query=query,
+        here_saved=saved_here(context.store.general_views(), "compare", None, query, ", ".join(labels(records))),
     )
 
 
-def _fixed(chosen: Comparison) -> list[dict[str, Any]]:
+def _offered(context: Context, given: QueryParams, *, choosing: bool) -> dict[str, Any]:
+    """The studies of the address, and where some are chosen, those found beside them."""
+    ids = list(dict.fromkeys(name for name in given.getlist("study") if name))
+    if not choosing:
+        return {"choosing": False, "ids_of": ids}
+    search = given.get("search", "").strip()[:MAX_SEARCH_LENGTH]
+    found = context.store.list_studies(_LISTED, wanted=StudyFilter(search))
+    chosen = list(filter(None, (_known(context, study_id) for study_id in ids[:_LISTED])))
+    ids = [record.id for record in chosen]
+    listed = [*chosen, *(record for record in found.studies if record.id not in ids)]
+    return {
+        "choosing": True,
+        "ids_of": ids,
+        "search": search,
+        "listed": [views.summary(record) for record in listed],
+        "more": found.next_token is not None,
+    }
+
+
+def _known(context: Context, study_id: str) -> StudyRecord | None:
+    try:
+        return context.store.get_study(study_id)
+    except StudyNotFoundError:
+        return None
+
+
+def _fixed(chosen: Comparison, reading: Reading) -> list[dict[str, Any]]:
     """Axes that all studies have and that are not drawn, with the first study's values to choose from."""
     given = tuple((item.partition("=")[0], item.partition("=")[2]) for item in chosen.at)
-    choices = fixed_choices(chosen.studies[0], (chosen.x, *chosen.by), given)
+    choices = fixed_choices(chosen.studies[0], (chosen.x, *chosen.by), given, reading)
     return [choice for choice in choices if choice["path"] in chosen.axes]
 
 
-def _answered(work: Work, show: Callable[[list[tuple[str, Curves]]], Response | Drawing]) -> Awaitable[Response]:
-    """What ``show`` makes of the curves that the address compares, unless the client has it."""
+def _answered(
+    work: Work, choice: Choice, show: Callable[[list[tuple[str, Curves]], Reading], Response | Drawing]
+) -> Awaitable[Response]:
+    """What ``show`` makes of the curves that the address compares, unless the client has it.
+
+    They are read as the first study is.
+    """
     context, given = work.context, work.request.query_params
 
     def look() -> tuple[str, Callable[[], Response | Drawing]]:
-        revisions = [context.store.get_study(study_id).revision for study_id in given.getlist("study")[:_MOST]]
-        return tag_of(work.request, revisions), lambda: show(drawn(context, comparison(context, given)))
+        records = chosen_studies(context, given)
+
+        def make() -> Response | Drawing:
+            chosen = comparison(context, given, records)
+            return show(drawn(context, chosen), reading_of(context.store, chosen.records[0].id, choice))
+
+        return tag_of(work.request, [record.revision for record in records]), make
 
     return unless_known(work, look)
 
 
 @router.get("/compare/figure")
-async def compare_figure(work: Attended) -> Response:
+async def compare_figure(work: Attended, choice: FileChoice) -> Response:
     """The figure of a comparison."""
-    return await _answered(work, lambda curves: json_response(plotly_figure(curves_figure(curves))))
+
+    def show(curves: list[tuple[str, Curves]], reading: Reading) -> Response:
+        return json_response(plotly_figure(read_figure(curves_figure(curves), reading)))
+
+    return await _answered(work, choice, show)
 
 
-@router.get("/compare/picture.svg")
-async def compare_picture(work: Attended) -> Response:
-    """The comparison as a picture, for pages without JavaScript."""
-    return await _answered(work, partial(picture, draw_compare, "svg"))
+@router.get("/compare/picture.{form}")
+async def compare_picture(work: Attended, choice: FileChoice, form: pictures.Picture) -> Response:
+    """The comparison as a picture, for pages without JavaScript and as a file."""
+    return await _answered(work, choice, partial(picture, draw_compare, form))
+
+
+@router.get("/compare/curves.csv")
+async def compare_table(work: Attended, choice: FileChoice) -> Response:
+    """Every point of the compared curves, or of their differences, as a table."""
+
+    def show(curves: list[tuple[str, Curves]], reading: Reading) -> Response:
+        return Response(compared_csv(curves, reading), media_type=MEDIA_TYPES["csv"], headers=attached("compared.csv"))
+
+    return await _answered(work, choice, show)

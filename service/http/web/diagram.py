@@ -4,18 +4,24 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-from fastapi import APIRouter, Query
+from fastapi import Query
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError
 from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, study_with
 from sprag.service.http.drawing import unchanging
+from sprag.service.http.reading import FileChoice
 from sprag.service.http.respond import json_response
+from sprag.service.http.routers import page_router
 from sprag.service.http.web.along import Begin, End, Text, along_frame, query_of
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
+from sprag.service.jobs.reading import reading_of
+from sprag.service.languages import _
 from sprag.service.results.branches import usual_along
+from sprag.service.results.figures.read import read_figure
 from sprag.service.results.figures.sections import diagram_figure, section_figure
 from sprag.service.results.portraits import require_strobes
 from sprag.service.results.sections import diagram_of, section_of, variable_of, variables
@@ -27,7 +33,7 @@ if TYPE_CHECKING:
     from sprag.worker.models.sections import Sampling
     from sprag.worker.study import Study
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
 Phase = Annotated[str, Query(max_length=80)]
 
@@ -62,7 +68,7 @@ def diagram_page(
         "diagram.html",
         status=422 if faults else 200,
         **along_frame(context, study_id, study, case, entered, which, initial=True),
-        title="Bifurcation diagram",
+        title=_("Bifurcation diagram"),
         faults=faults,
         variables=variables(study),
         diagram=diagram,
@@ -73,7 +79,7 @@ def diagram_page(
 @router.get("/studies/{study_id:study}/cases/{case:case}/diagram/figure")
 async def diagram_drawn(
     work: Attended, study_id: StudyId, case: CaseNumber, along: Text, low: Begin = "", high: End = "",
-    phase: Phase = "", y: Text = "", which: StartNumber = None,
+    phase: Phase = "", y: Text = "", which: StartNumber = None, *, choice: FileChoice,
 ) -> Response:  # fmt: skip
     """The figure of a bifurcation diagram."""
 
@@ -84,14 +90,20 @@ async def diagram_drawn(
 
     async def make() -> Response:
         made = await work.run_case(run_sections, *motion_of(study, case, which), asked)
-        return json_response(plotly_figure(diagram_figure(made, study, asked, shown)))
+        reading = await run_in_threadpool(reading_of, work.context.store, study_id, choice)
+        return json_response(plotly_figure(read_figure(diagram_figure(made, study, asked, shown), reading)))
 
     return await unchanging(work, study_id, make)
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/section/figure")
 async def section_drawn(
-    work: Attended, study_id: StudyId, case: CaseNumber, phase: Phase = "", which: StartNumber = None
+    work: Attended,
+    study_id: StudyId,
+    case: CaseNumber,
+    choice: FileChoice,
+    phase: Phase = "",
+    which: StartNumber = None,
 ) -> Response:
     """The figure of a Poincare section."""
 
@@ -102,6 +114,7 @@ async def section_drawn(
 
     async def make() -> Response:
         made = await work.run_case(run_sections, *motion_of(study, case, which), asked)
-        return json_response(plotly_figure(section_figure(made, study, asked)))
+        reading = await run_in_threadpool(reading_of, work.context.store, study_id, choice)
+        return json_response(plotly_figure(read_figure(section_figure(made, study, asked), reading)))
 
     return await unchanging(work, study_id, make)

@@ -6,25 +6,30 @@ import re
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.drawing import Drawing, conditional
+from sprag.service.http.reading import CHOICE, FileChoice, read_as
 from sprag.service.http.respond import JSON
-from sprag.service.http.web.choice import held
+from sprag.service.http.routers import page_router
 from sprag.service.http.web.figures import answers as figures
+from sprag.service.http.web.held import fixed_choices, with_held
 from sprag.service.http.web.results import axis_choices
-from sprag.service.http.web.study import fixed_choices, study_frame
+from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended, Work
 from sprag.service.jobs import answers, batch_answers
 from sprag.service.jobs.batch_answers import RibbonQuery, YieldQuery
+from sprag.service.jobs.reading import reading_of
+from sprag.service.results.choice import held
 from sprag.service.results.defaults import drawn_results, main_query
 from sprag.service.results.selection import SelectionError, refused
 from sprag.service.results.tolerances.batch import Asked
+from sprag.service.results.tolerances.conditions import first_condition
 from sprag.service.results.tolerances.ribbons import MOST_QUANTILES, QUANTILES
 from sprag.service.results.tolerances.written import percent
 from sprag.worker import models
@@ -36,15 +41,14 @@ if TYPE_CHECKING:
     from starlette.datastructures import QueryParams
 
     from sprag.service.answers.tolerances import RibbonReport, YieldReport
+    from sprag.service.results.reading import Choice
     from sprag.service.storage.records import StudyRecord
     from sprag.worker.study import Study
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
 #: Worst drives in the table.
 WORST: Final = 10
-#: The condition that is shown first.
-_FIRST_PART: Final = "90 % of nominal"
 _PROBABILITY: Final = re.compile(r"([\d.eE+-]+)\s*(%?)")
 
 
@@ -54,7 +58,8 @@ async def drives_page(context: Ctx, work: Attended, request: Request, study_id: 
     study = await run_in_threadpool(context.store.study, study_id)
     if study.spread is None or study.plan is not None:
         return RedirectResponse(f"/studies/{study_id}", status_code=303)
-    given = request.query_params
+    reading = await run_in_threadpool(reading_of, context.store, study_id, CHOICE.get())
+    given = with_held(request.query_params, study, reading)
     faults: tuple[Any, ...] = ()
     found: tuple[RibbonReport, YieldReport] | None = None
     try:
@@ -82,11 +87,13 @@ def _page(
     )
     reached = urlencode([*places, *(("condition", text) for text in wanted.conditions)])
     asked = ribbon.asked
-    fixed = fixed_choices(study, tuple(path for path in (asked.x, *asked.by) if path), asked.at)
+    frame = study_frame(context, study_id)
+    drawn_over = tuple(path for path in (asked.x, *asked.by) if path)
+    fixed = fixed_choices(study, drawn_over, asked.at, frame["reading"])
     return page(
         "drives.html",
         status=422 if faults else 200,
-        **study_frame(context, study_id),
+        **frame,
         tab="/drives",
         faults=faults,
         asked=asked,
@@ -97,12 +104,13 @@ def _page(
         axes=axis_choices(study),
         results=[info for info in models.study_results(study) if info.kind != "category"],
         fixed=[one for one in fixed if one["path"] != DRIVE],
+        result_units={info.name: info.unit for info in models.study_results(study)},
         ribbon=found and found[0],
         reached=found and found[1],
-        ribbon_figure=f"{own}/figures/ribbon?{drawn}",
-        yield_figure=f"{own}/figures/yield?{reached}",
-        ribbon_files=f"{views.study_address(study_id)}/ribbon?{drawn}",
-        yield_files=f"{views.study_address(study_id)}/yield?{reached}",
+        ribbon_figure=f"{own}/figures/ribbon?{drawn}{read_as()}",
+        yield_figure=f"{own}/figures/yield?{reached}{read_as()}",
+        ribbon_files=f"{views.study_address(study_id)}/ribbon?{drawn}{read_as()}",
+        yield_files=f"{views.study_address(study_id)}/yield?{reached}{read_as()}",
     )
 
 
@@ -122,7 +130,7 @@ def _queries(study: Study, given: QueryParams) -> tuple[RibbonQuery, YieldQuery]
     at = tuple(pair for pair in held(study, given.getlist("at"), drawn) if pair[0] != DRIVE) if drawn else ()
     asked = Asked(x, by, at)
     texts = [line for text in given.getlist("condition") for line in text.splitlines() if line.strip()]
-    conditions = tuple(texts) or (f"{y[0]} >= {_FIRST_PART}",)
+    conditions = tuple(texts) or (first_condition(study, y[0]),)
     return RibbonQuery(y, asked, _quantiles(given.getlist("quantile"))), YieldQuery(conditions, asked, WORST)
 
 
@@ -145,21 +153,21 @@ def _quantiles(texts: list[str]) -> tuple[float, ...]:
 
 
 @router.get("/studies/{study_id:study}/figures/ribbon")
-async def ribbon_of(work: Attended, study_id: StudyId) -> Response:
+async def ribbon_of(work: Attended, study_id: StudyId, choice: FileChoice) -> Response:
     """The figure of the ribbons."""
-    return await _figure(work, study_id, figures.ribbon_json, 0)
+    return await _figure(work, study_id, figures.ribbon_json, 0, choice)
 
 
 @router.get("/studies/{study_id:study}/figures/yield")
-async def yield_of(work: Attended, study_id: StudyId) -> Response:
+async def yield_of(work: Attended, study_id: StudyId, choice: FileChoice) -> Response:
     """The figure of the yield."""
-    return await _figure(work, study_id, figures.yield_json, 1)
+    return await _figure(work, study_id, figures.yield_json, 1, choice)
 
 
-async def _figure(work: Work, study_id: str, draw: Callable[..., bytes], which: int) -> Response:
+async def _figure(work: Work, study_id: str, draw: Callable[..., bytes], which: int, choice: Choice) -> Response:
     def make(record: StudyRecord) -> Response | Drawing:
         query = _queries(work.context.store.study(study_id), work.request.query_params)[which]
-        drawing = Drawing(draw, (work.context.library, study_id, query), JSON)
+        drawing = Drawing(draw, (work.context.library, study_id, query, choice), JSON)
         return drawing if record.cases > answers.FEW // 10 else drawing.here()
 
     return await conditional(work, study_id, "figure", make)

@@ -2,39 +2,42 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Request
+from fastapi import Query, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
+from sprag.service.http.drawing import Drawing, conditional, picture
+from sprag.service.http.reading import FileChoice, read_as
+from sprag.service.http.routers import page_router
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
+from sprag.service.jobs import sensitivities
+from sprag.service.languages import N_
 from sprag.service.results.defaults import drawn_results, varying_axes
 from sprag.service.results.pictures.sensitivity import MOST_RESULTS
 from sprag.service.results.selection import SelectionError
-from sprag.service.results.sensitivity import sensitivity
 from sprag.worker import models
 
 if TYPE_CHECKING:
     from sprag.service.answers.results import ResultSensitivity
     from sprag.service.http.context import Context
-    from sprag.service.jobs.checks import Library
+    from sprag.service.storage.records import StudyRecord
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
 #: Methods by which indices were found, in words.
 METHODS: Final = {
-    "grid": "exact sums over a full grid",
-    "saltelli": "estimated from the design for Sobol indices",
-    "morris": "elementary effects of trajectories (Morris)",
-    "rbd-fast": "estimated from a sample",
-    "none": "no shares of the variance",
+    "grid": N_("exact sums over a full grid"),
+    "saltelli": N_("estimated from the design for Sobol indices"),
+    "morris": N_("elementary effects of trajectories (Morris)"),
+    "rbd-fast": N_("estimated from a sample"),
+    "none": N_("no shares of the variance"),
 }
 
 
@@ -50,23 +53,17 @@ async def sensitivity_page(context: Ctx, work: Attended, request: Request, study
     faults: tuple[Any, ...] = ()
     found: list[ResultSensitivity] = []
     try:
-        found = await work.check(effects, context.library, study_id, names)
+        found = await work.check(sensitivities.sensitivities_shown, context.library, study_id, names)
     except SelectionError as error:
         faults = error.faults
     return await run_in_threadpool(_page, context, study_id, names, found, faults)
-
-
-def effects(library: Library, study_id: str, names: tuple[str, ...]) -> list[ResultSensitivity]:
-    """The sensitivities of these results as JSON data; raises SelectionError as `sensitivity` does."""
-    store = library.store
-    fetch = partial(store.rows_for_cases, study_id)
-    return [item.to_json() for item in sensitivity(store.study(study_id), store.spec(study_id), names, fetch)]
 
 
 def _page(
     context: Context, study_id: str, names: tuple[str, ...], found: list[ResultSensitivity], faults: tuple[Any, ...]
 ) -> Response:
     infos = models.study_results(context.store.study(study_id))
+    chosen = urlencode([("y", name) for name in names])
     return page(
         "effects.html",
         status=422 if faults else 200,
@@ -77,5 +74,21 @@ def _page(
         results=[info for info in infos if info.kind != "category"],
         found=found,
         methods=METHODS,
-        files=f"{views.study_address(study_id)}/sensitivity?{urlencode([('y', name) for name in names])}",
+        picture=f"/studies/{study_id}/figures/sensitivity?{chosen}{read_as()}",
+        files=f"{views.study_address(study_id)}/sensitivity?{chosen}{read_as()}",
     )
+
+
+@router.get("/studies/{study_id:study}/figures/sensitivity")
+async def picture_of(
+    work: Attended, study_id: StudyId, choice: FileChoice, y: Annotated[list[str], Query(min_length=1)]
+) -> Response:
+    """Bars of the shares of the variance, or of elementary effects, and main effects, as their reader has chosen."""
+
+    names = tuple(dict.fromkeys(y))
+
+    def make(record: StudyRecord) -> Drawing:
+        title = record.name or record.model
+        return picture(sensitivities.sensitivities_picture, "svg", work.context.library, study_id, names, choice, title)
+
+    return await conditional(work, study_id, "svg", make)

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.http.context import CaseNumber, StartNumber, StudyId
+from sprag.service.http.routers import page_router
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.results.engagements import require_clutches
+from sprag.service.results.phrases import meanings
 from sprag.worker import models
 from sprag.worker.models.starts import motion_of
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
 #: Most rows of a page.
 _SHOWN = 100
@@ -34,7 +35,7 @@ async def engagements_page(work: Attended, study_id: StudyId, case: CaseNumber, 
         case=case,
         made=made,
         rows=made.rows[:_SHOWN],
-        sentence=models.ENDING_SENTENCES.get(made.ending, ""),
-        regime=models.REGIME_SENTENCES.get(made.regime, ""),
+        sentence=meanings(models.ENDING_SENTENCES).get(made.ending, ""),
+        regime=meanings(models.REGIME_SENTENCES).get(made.regime, ""),
         file=f"/api/v1{own}/engagements",
     )

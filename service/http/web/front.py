@@ -5,14 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated, Final
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Query
+from fastapi import Query
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.http import views
 from sprag.service.http.context import Context, StudyId
-from sprag.service.http.drawing import Drawing, conditional, picture
+from sprag.service.http.drawing import Columns, Drawing, conditional, picture
+from sprag.service.http.reading import CHOICE, FileChoice, address_pairs, read_as
 from sprag.service.http.respond import JSON
+from sprag.service.http.routers import page_router
 from sprag.service.http.web.figures import answers as figures
 from sprag.service.http.web.front_view import FrontView, front_view
 from sprag.service.http.web.study import study_frame
@@ -26,7 +28,7 @@ if TYPE_CHECKING:
 
     from sprag.service.storage.records import StudyRecord
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
 #: Designs that are linked with each other: in parallel coordinates and by the filter.
 _LINKED: Final = 1000
@@ -61,25 +63,28 @@ def _front_page(context: Context, study_id: str, view: FrontView, *, exact: bool
         tab="/front",
         exact=exact,
         **vars(view),
-        figure=f"/studies/{study_id}/figures/front?{urlencode(drawn | only)}",
-        history=f"/studies/{study_id}/figures/search",
+        figure=f"/studies/{study_id}/figures/front?{urlencode(drawn | only)}{read_as()}",
+        history=f"/studies/{study_id}/figures/search?columns=2{read_as()}",
         data=f"{address}?{urlencode({'limit': _LINKED} | only)}",
-        files=f"{address}?{urlencode(drawn | only)}",
+        files=f"{address}?{urlencode(drawn | only)}{read_as()}",
+        search=f"/studies/{study_id}/front/search.svg?{urlencode(address_pairs(CHOICE.get()))}",
         pictured=view.report["counts"]["known"] <= pictures.MAX_PICTURE_POINTS,
     )
 
 
 @router.get("/studies/{study_id:study}/figures/front")
-async def front_of(work: Attended, study_id: StudyId, x: X = "", y: X = "", exact: Exact = "") -> Response:
+async def front_of(
+    work: Attended, study_id: StudyId, choice: FileChoice, x: X = "", y: X = "", exact: Exact = ""
+) -> Response:
     """The figure of all designs over two quantities."""
-    shown = (bool(exact), (x or None, y or None))
+    shown = (bool(exact), (x or None, y or None), choice)
     return await _figure(work, study_id, figures.front_json, *shown)
 
 
 @router.get("/studies/{study_id:study}/figures/search")
-async def search_of(work: Attended, study_id: StudyId) -> Response:
+async def search_of(work: Attended, study_id: StudyId, choice: FileChoice, columns: Columns = 2) -> Response:
     """The figure of the search: what each generation has reached."""
-    return await _figure(work, study_id, figures.search_json)
+    return await _figure(work, study_id, figures.search_json, choice, columns)
 
 
 async def _figure(work: Work, study_id: str, draw: Callable[..., bytes], *shown: object) -> Response:
@@ -91,10 +96,12 @@ async def _figure(work: Work, study_id: str, draw: Callable[..., bytes], *shown:
 
 
 @router.get("/studies/{study_id:study}/front/search.svg")
-async def search_picture(work: Attended, study_id: StudyId) -> Response:
+async def search_picture(work: Attended, study_id: StudyId, choice: FileChoice) -> Response:
     """The same as a picture."""
 
     def make(record: StudyRecord) -> Response | Drawing:
-        return picture(answers.search_picture, "svg", work.context.library, study_id, record.name or record.model)
+        return picture(
+            answers.search_picture, "svg", work.context.library, study_id, choice, record.name or record.model
+        )
 
     return await conditional(work, study_id, "svg", make)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from starlette.responses import RedirectResponse, Response
 
+from sprag.service.actor import Role
 from sprag.service.http.access import COOKIE, SESSION_SECONDS
 from sprag.service.http.problems import ApiError
+from sprag.service.http.routers import page_router
 from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.way_in import LOGIN_PATH, access_of, kept_form, kept_page, login_page, within
-from sprag.service.storage.scopes import TokenScope
+from sprag.service.languages import _
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
 
 @router.get(LOGIN_PATH)
@@ -30,13 +32,14 @@ async def log_in(request: Request, values: Form) -> Response:
         grant = access.of_token(values.get("token", "").strip().encode("utf-8", "replace"))
         if grant is None:
             await access.attempts.failed(request.scope, "page /login")
-            return login_page(request, access, wanted, fault="This token is not valid.", status=401, kept=kept)
+            return login_page(request, access, wanted, fault=_("This token is not valid."), status=401, kept=kept)
     except ApiError as error:
         response = login_page(request, access, wanted, fault=error.detail, status=error.type.status, kept=kept)
         response.headers.update(error.headers)
         return response
-    if kept is not None and grant.scope is not TokenScope.WRITE:
-        fault = f"Token {grant.name or grant.id} is read-only: it cannot send the form. Use another one."
+    if kept is not None and grant.role is Role.VIEWER:
+        reason = _(grant.reading)
+        fault = _("{who} {reason}, so the form cannot be sent. Use another token.", who=grant.label, reason=reason)
         return login_page(request, access, wanted, fault=fault, status=403, kept=kept)
     answer = RedirectResponse(within(wanted), 303) if kept is None else kept_page(grant, wanted, kept)
     answer.set_cookie(
@@ -60,5 +63,7 @@ async def log_out(request: Request) -> Response:
 
 
 def _is_secure(request: Request) -> bool:
-    """Whether the browser uses TLS, with this service or with a proxy before it."""
-    return "https" in (request.url.scheme, request.headers.get("x-forwarded-proto", ""))
+    """Whether the browser uses TLS, with this service or with a trusted proxy before it."""
+    forwarded = request.headers.get("x-forwarded-proto", "")
+    trusted = access_of(request).attempts.from_proxy(request.scope)
+    return request.url.scheme == "https" or (trusted and forwarded == "https")

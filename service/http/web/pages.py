@@ -1,60 +1,46 @@
-"""General pages: the list of studies, the documentation of the API, kinds of problems; and static files."""
+"""General pages: the documentation of the API, kinds of problems; and static files."""
 
 from __future__ import annotations
 
-import os
-from importlib.resources import files
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from fastapi import APIRouter, Query, Request
-from starlette.middleware.gzip import GZipMiddleware
+from fastapi import Request
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 
-from sprag.service.http import views
-from sprag.service.http.context import Ctx
 from sprag.service.http.problems import PROBLEM_TYPES, ApiError
-from sprag.service.http.respond import json_response
-from sprag.service.http.views import preset_of
+from sprag.service.http.respond import entity_tag, json_response, not_modified
+from sprag.service.http.routers import page_router
 from sprag.service.http.web import apidoc
 from sprag.service.http.web.apidoc import with_token_needed
+from sprag.service.http.web.manual import PAGES, manual_page, titles
+from sprag.service.http.web.plotly_script import plotly_script
 from sprag.service.http.web.templates import page
-from sprag.service.presets import preset_names
-from sprag.worker.states import StudyState
 
 if TYPE_CHECKING:
     from starlette.types import Receive, Scope, Send
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
-_LISTED: Final = 50
-#: The script that draws the pictures, as it lies in the package of that name.
+#: The script that draws the pictures.
 PLOTLY: Final = "plotly.min.js"
-
-
-@router.get("/")
-def index(
-    context: Ctx,
-    after: Annotated[str | None, Query(max_length=200)] = None,
-    state: Annotated[StudyState | None, Query()] = None,
-) -> Response:
-    """The studies, newest first, and the examples to start from."""
-    found = context.store.list_studies(page_size=_LISTED, page_token=after, state=state)
-    return page(
-        "index.html",
-        studies=[views.summary(record) for record in found.studies],
-        more=found.next_token,
-        after=after,
-        state=state,
-        states=list(StudyState),
-        presets=[preset_of(name) for name in preset_names()],
-    )
+#: Files change only with the program.
+_KEPT: Final = "max-age=3600"
 
 
 @router.get("/docs")
 async def docs(request: Request) -> Response:
     """The interface, operation by operation."""
     return page("docs.html", groups=apidoc.groups(request.app.openapi()), problems=PROBLEM_TYPES.values())
+
+
+@router.get("/docs/{name}")
+async def manual(name: str) -> Response:
+    """A page of the guide or the theory."""
+    if name not in PAGES:
+        raise ApiError("not-found", f"Unknown page; known pages: {', '.join(PAGES)}.")
+    return await run_in_threadpool(lambda: page("manual.html", page=manual_page(name), titles=titles()))
 
 
 @router.get("/openapi.json")
@@ -73,27 +59,20 @@ async def problem(slug: str) -> Response:
 
 
 class _Files(StaticFiles):
-    """Style sheet, icon and scripts of all pages, and plotly's script from its package."""
+    """Style sheet, icon and scripts of all pages."""
 
     def get_path(self, scope: Scope) -> str:
         """The name in the URL."""
         return str(scope["path_params"]["name"])
 
-    def lookup_path(self, path: str) -> tuple[str, os.stat_result | None]:
-        """The file of that name and its status; None where there is none."""
-        if path != PLOTLY:
-            return super().lookup_path(path)
-        file = str(files("plotly") / "package_data" / PLOTLY)
-        return file, os.stat(file)
-
     def file_response(self, *args: Any, **options: Any) -> Response:
         """The file; it changes only with the program."""
         response = super().file_response(*args, **options)
-        response.headers["Cache-Control"] = "max-age=3600"
+        response.headers["Cache-Control"] = _KEPT
         return response
 
 
-_FILES: Final = GZipMiddleware(_Files(packages=[("sprag.service.http.web", "static")]), compresslevel=6)
+_FILES: Final = _Files(packages=[("sprag.service.http.web", "static")])
 
 
 class _FileAnswer(Response):
@@ -102,6 +81,19 @@ class _FileAnswer(Response):
 
 
 @router.get("/static/{name}")
-async def static(name: str) -> Response:  # noqa: ARG001 - the files take it from the address
+async def static(request: Request, name: str) -> Response:
     """Style sheet, icon and scripts of all pages."""
-    return _FileAnswer()
+    return await run_in_threadpool(_plotly, request) if name == PLOTLY else _FileAnswer()
+
+
+def _plotly(request: Request) -> Response:
+    script = plotly_script()
+    packed = "gzip" in request.headers.get("accept-encoding", "")
+    tag = entity_tag(PLOTLY, packed, len(script.plain))
+    headers = {"Cache-Control": _KEPT, "ETag": tag, "Vary": "Accept-Encoding"}
+    if (known := not_modified(request, tag)) is not None:
+        known.headers.update(headers)
+        return known
+    if packed:
+        headers["Content-Encoding"] = "gzip"
+    return Response(script.packed if packed else script.plain, media_type="text/javascript", headers=headers)

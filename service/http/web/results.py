@@ -5,20 +5,33 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated, Any, Final
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Query, Request
+from fastapi import Query, Request
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
-from sprag.service.http.drawing import Drawing, conditional, placed
+from sprag.service.http.drawing import Columns, Drawing, conditional, placed
+from sprag.service.http.reading import CHOICE, FileChoice, address_pairs
 from sprag.service.http.respond import JSON, json_response
-from sprag.service.http.web.choice import MapQuery, characteristic, curve_query, map_query, pairs_of, value_choices
+from sprag.service.http.routers import page_router
 from sprag.service.http.web.figures import answers
-from sprag.service.http.web.study import fixed_choices, orders_address, regime_maps, study_frame
+from sprag.service.http.web.held import fixed_choices, with_held
+from sprag.service.http.web.saved_views import saved_here
+from sprag.service.http.web.study import orders_address, regime_maps, study_frame
 from sprag.service.http.web.study_answers import answers_choice
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.jobs.answers import FEW
+from sprag.service.languages import N_, _
+from sprag.service.results.choice import (
+    Address,
+    MapQuery,
+    characteristic,
+    curve_query,
+    map_query,
+    pairs_of,
+    value_choices,
+)
 from sprag.service.results.curve_cases import select
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import varying_axes
@@ -36,12 +49,12 @@ if TYPE_CHECKING:
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
 _NOTHING: Final[dict[str, Any]] = {"data": [], "layout": {}}
 
 #: Kinds of map: word on the control.
-KINDS: Final = {"heatmap": "Colours", "contour": "Lines of equal value"}
+KINDS: Final = {"heatmap": N_("Colours"), "contour": N_("Lines of equal value")}
 
 
 @router.get("/studies/{study_id:study}/curves")
@@ -49,12 +62,14 @@ def curves_page(context: Ctx, request: Request, study_id: StudyId) -> Response:
     """Results against an axis; the user chooses the family and the held values."""
     study = context.store.study(study_id)
     infos = models.study_results(study)
+    frame = study_frame(context, study_id)
+    reading = frame["reading"]
     faults: tuple[Any, ...] = ()
     query: CurveQuery | None = None
     values = 0
     held: tuple[str, ...] = ()
     try:
-        query = curve_query(study, infos, request.query_params)
+        query = curve_query(study, infos, with_held(request.query_params, study, reading))
         if query is None:
             return RedirectResponse(f"/studies/{study_id}", status_code=303)
         selection = select(study, infos, query)
@@ -62,28 +77,32 @@ def curves_page(context: Ctx, request: Request, study_id: StudyId) -> Response:
         values = sum(line.cases.size for line in selection.lines) * len(selection.results)
     except SelectionError as error:
         faults = error.faults
-    shown = query or curve_query(study, infos, type(request.query_params)())
+    shown = query or curve_query(study, infos, Address())
     assert shown is not None
-    pairs = pairs_of(shown)
+    files = urlencode([*pairs_of(shown), *address_pairs(CHOICE.get())])
+    alt = _("{y} against {x}", y=", ".join(map(reading.caption, shown.y)), x=reading.within(shown.x))
     return page(
         "curves.html",
         status=422 if faults else 200,
-        **study_frame(context, study_id),
+        **frame,
         tab="/curves",
         query=shown,
         faults=faults,
         axes=axis_choices(study),
         results=[info for info in infos if info.kind != "category"],
-        fixed=fixed_choices(study, (shown.x, *shown.by), shown.at),
+        fixed=fixed_choices(study, (shown.x, *shown.by), shown.at, reading),
         choices=[] if faults else value_choices(study, shown),
-        figure=f"/studies/{study_id}/figures/curves?{urlencode(pairs)}",
-        files=f"{views.study_address(study_id)}/curves?{urlencode(pairs)}",
+        figure=f"/studies/{study_id}/figures/curves?{files}",
+        files=f"{views.study_address(study_id)}/curves?{files}",
+        report=files,
+        alt=alt,
         pictured=values <= pictures.MAX_PICTURE_POINTS,
         settled=models.is_settled(study.run),
         orders=orders_address(study, study_id),
         regime_maps=regime_maps(study, study_id),
         many_starts=has_starts(study.run),
-        held=held,
+        held=list(map(reading.say, held)),
+        here_saved=saved_here(frame["saved"], "curves", study_id, files, alt),
     )
 
 
@@ -94,24 +113,31 @@ def map_page(
     """One result over two axes."""
     study = context.store.study(study_id)
     infos = models.study_results(study)
+    frame = study_frame(context, study_id)
+    reading = frame["reading"]
     faults: tuple[Any, ...] = ()
     query: MapQuery | None = None
     held: tuple[str, ...] = ()
     try:
-        query = map_query(study, infos, request.query_params)
+        query = map_query(study, infos, with_held(request.query_params, study, reading))
         if query is None:
             return RedirectResponse(f"/studies/{study_id}", status_code=303)
         held = select(study, infos, CurveQuery(query.x, (query.z,), (query.y,), query.at)).held
     except SelectionError as error:
         faults = error.faults
-    shown = query or map_query(study, infos, type(request.query_params)())
+    shown = query or map_query(study, infos, Address())
     assert shown is not None
-    pairs = pairs_of(shown)
+    pairs = [*pairs_of(shown), *address_pairs(CHOICE.get())]
     kind = kind if kind in KINDS else "heatmap"
+    query_text = urlencode([*pairs, ("kind", kind)])
+    alt = _(
+        "{z} over {x} and {y}",
+        z=reading.caption(shown.z), x=reading.within(shown.x), y=reading.within(shown.y),
+    )  # fmt: skip
     return page(
         "map.html",
         status=422 if faults else 200,
-        **study_frame(context, study_id),
+        **frame,
         tab="/map",
         query=shown,
         kind=kind,
@@ -119,10 +145,12 @@ def map_page(
         faults=faults,
         axes=axis_choices(study),
         results=_mapped_results(study, infos),
-        fixed=fixed_choices(study, (shown.x, shown.y), shown.at),
-        figure=f"/studies/{study_id}/figures/map?{urlencode([*pairs, ('kind', kind)])}",
-        files=f"{views.study_address(study_id)}/map?{urlencode(pairs)}",
-        held=held,
+        fixed=fixed_choices(study, (shown.x, shown.y), shown.at, reading),
+        figure=f"/studies/{study_id}/figures/map?{query_text}",
+        files=f"{views.study_address(study_id)}/map?{query_text}",
+        alt=alt,
+        held=list(map(reading.say, held)),
+        here_saved=saved_here(frame["saved"], "map", study_id, query_text, alt),
     )
 
 
@@ -141,7 +169,7 @@ def axis_choices(study: Study) -> list[dict[str, Any]]:
 
 
 @router.get("/studies/{study_id:study}/figures/curves")
-async def curves_of(work: Attended, study_id: StudyId, columns: Annotated[int, Query(ge=1, le=2)] = 1) -> Response:
+async def curves_of(work: Attended, study_id: StudyId, choice: FileChoice, columns: Columns = 1) -> Response:
     """The figure of curves: as many points as the eye can distinguish, always including the highest and lowest."""
 
     def make(_record: StudyRecord) -> Response | Drawing:
@@ -150,20 +178,28 @@ async def curves_of(work: Attended, study_id: StudyId, columns: Annotated[int, Q
         query = curve_query(study, models.study_results(study), work.request.query_params)
         if query is None:
             return json_response(_NOTHING)
-        return placed(context, Drawing(answers.curves_json, (context.library, study_id, query, columns), JSON))
+        return placed(context, Drawing(answers.curves_json, (context.library, study_id, query, choice, columns), JSON))
 
     return await conditional(work, study_id, "figure", make)
 
 
 @router.get("/studies/{study_id:study}/figures/answers")
-async def answers_of(work: Attended, study_id: StudyId, columns: Annotated[int, Query(ge=1, le=2)] = 1) -> Response:
+async def answers_of(work: Attended, study_id: StudyId, choice: FileChoice, columns: Columns = 1) -> Response:
     """The figure of the main results with the answers of the study marked."""
 
     def make(_record: StudyRecord) -> Response | Drawing:
         context, given = work.context, work.request.query_params
         study = context.store.study(study_id)
         query = answers_choice(study, given, characteristic(study, models.study_results(study)))
-        shown = (context.library, study_id, query, given.get("point") or None, given.get("curve") or "", columns)
+        shown = (
+            context.library,
+            study_id,
+            query,
+            given.get("point") or None,
+            given.get("curve") or "",
+            choice,
+            columns,
+        )
         drawing = Drawing(answers.answers_json, shown, JSON)
         return drawing if study.cases > FEW // 2 else drawing.here()
 
@@ -171,7 +207,7 @@ async def answers_of(work: Attended, study_id: StudyId, columns: Annotated[int, 
 
 
 @router.get("/studies/{study_id:study}/figures/map")
-async def map_of(work: Attended, study_id: StudyId, kind: str = "heatmap") -> Response:
+async def map_of(work: Attended, study_id: StudyId, choice: FileChoice, kind: str = "heatmap") -> Response:
     """The figure of a map."""
 
     def make(_record: StudyRecord) -> Response | Drawing:
@@ -181,6 +217,8 @@ async def map_of(work: Attended, study_id: StudyId, kind: str = "heatmap") -> Re
         if query is None:
             return json_response(_NOTHING)
         curves = CurveQuery(query.x, (query.z,), (query.y,), query.at)
-        return placed(context, Drawing(answers.map_json, (context.library, study_id, curves, kind == "contour"), JSON))
+        return placed(
+            context, Drawing(answers.map_json, (context.library, study_id, curves, choice, kind == "contour"), JSON)
+        )
 
     return await conditional(work, study_id, "figure", make)

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from datetime import datetime
 from typing import Annotated, Any, Final
 from zoneinfo import ZoneInfo
 
-from fastapi import APIRouter, Query
+from fastapi import Query
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.http.context import Context, Ctx
 from sprag.service.http.problems import ApiError
+from sprag.service.http.routers import page_router
 from sprag.service.http.schedule_views import summary
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form.entries import Values
@@ -20,19 +22,44 @@ from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended, Work
 from sprag.service.jobs import checks
+from sprag.service.jobs.nights import HOURS, MOST_HOURS, night
+from sprag.service.languages import N_
 from sprag.service.presets import preset_names
 from sprag.service.schedules.fields import ScheduleFields, change_fields
-from sprag.service.schedules.times import zones
+from sprag.service.schedules.report_to import require_deliverable
 from sprag.service.spec.report import SpecError
 from sprag.service.storage.errors import StudyNotFoundError, TooManySchedulesError
+from sprag.service.zones import zones
 from sprag.worker.limits import MAX_PRIORITY
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
 _WHOLE: Final = re.compile(r"-?[0-9]{1,8}")
 #: Most studies offered for a schedule.
 _OFFERED: Final = 50
-_EMPTY: Final[Values] = {"when": "cron", "cron": "0 22 * * 1-5", "zone": "UTC", "priority": "0"}
+_EMPTY: Final[Values] = {
+    "when": "cron",
+    "cron": "0 22 * * 1-5",
+    "zone": "UTC",
+    "priority": "0",
+    "overlap": "queue",
+    "catch_up": "latest",
+}
+#: Hours that the page of the last night offers.
+_HOURS: Final = (
+    (12, N_("12 hours")),
+    (24, N_("24 hours")),
+    (72, N_("three days")),
+    (168, N_("a week")),
+    (744, N_("a month")),
+)
+#: Most curves on that page.
+_PICTURES: Final = 12
+#: Fields that the buttons of the list change.
+_CHANGES: Final[dict[str, dict[str, object]]] = {
+    "pause": {"enabled": False},
+    "resume": {"enabled": True, "paused_until": None},
+}
 #: Field of the form by the first part of a fault's JSON Pointer.
 _FIELD_OF: Final = {"window": "window_begin", "spec": "source"}
 
@@ -42,6 +69,12 @@ def schedules(context: Ctx) -> Response:
     """Every schedule, newest first."""
     found = [summary(record) for record in context.store.list_schedules()]
     return page("schedules.html", schedules=found)
+
+
+@router.get("/night")
+def last_night(context: Ctx, hours: Annotated[float, Query(ge=1, le=MOST_HOURS)] = HOURS) -> Response:
+    """What schedules did in the last hours."""
+    return page("night.html", night=night(context.store, hours), hours=hours, choices=_HOURS, pictures=_PICTURES)
 
 
 @router.get("/schedules/new")
@@ -78,9 +111,9 @@ def act(context: Ctx, schedule_id: str, verb: str) -> Response:
     """A button of the list."""
     if verb == "delete":
         context.store.delete_schedule(schedule_id)
-    elif verb in ("enable", "disable"):
+    elif verb in _CHANGES:
         record = context.store.get_schedule(schedule_id)
-        fields = change_fields(record.fields, {"enabled": verb == "enable"}, context.store.clock.now())
+        fields = change_fields(record.fields, _CHANGES[verb], context.store.clock.now())
         context.store.change_schedule(schedule_id, fields)
     else:
         raise ApiError("not-found", "Unknown action.")
@@ -93,6 +126,8 @@ async def _save(context: Context, work: Work, values: Values, schedule_id: str |
     try:
         data, old = await run_in_threadpool(_asked, context, values, schedule_id)
         fields = await work.check(checks.schedule_fields, work.context.library, data, now, old)
+        if old is None or fields.report_to != old.report_to:
+            require_deliverable(fields.report_to, context.settings.reports)
         if schedule_id is None:
             await run_in_threadpool(context.store.create_schedule, fields)
         else:
@@ -117,6 +152,8 @@ def _asked(context: Context, values: Values, schedule_id: str | None) -> tuple[d
     old = context.store.get_schedule(schedule_id).fields
     if data.get("at") == _values_of(old)["at"] and data.get("zone") == old.timing.zone:
         del data["at"]  # unchanged; the time may have passed
+    if data["paused_until"] == (_values_of(old)["paused_until"] or None) and data.get("zone") == old.timing.zone:
+        del data["paused_until"]
     return data, old
 
 
@@ -130,7 +167,10 @@ def _data_of(context: Context, values: Mapping[str, str]) -> dict[str, Any]:
         "window": [begin, end] if begin or end else None,
         "priority": int(priority) if _WHOLE.fullmatch(priority) else priority,
         "fresh": "fresh" in values,
-        "finish_by": values.get("finish_by", "").strip() or None,
+        **{name: values.get(name, "").strip() or None for name in ("finish_by", "misfire_grace", "paused_until")},
+        **{name: values[name] for name in ("overlap", "catch_up", "report_when") if name in values},
+        "report_email": re.split(r"[\s,;]+", emails) if (emails := values.get("report_email", "").strip()) else [],
+        "report_webhook": values.get("report_webhook", "").strip() or None,
     }
     when = "at" if values.get("when") == "at" else "cron"
     data[when] = values.get(when, "").strip() or None
@@ -143,20 +183,32 @@ def _data_of(context: Context, values: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _values_of(fields: ScheduleFields) -> Values:
-    at = fields.timing.at
-    window = fields.window
+    at, zone = fields.timing.at, fields.timing.zone
+    window, policies = fields.window, fields.policies
     return {
         "name": fields.name,
         "when": "cron" if at is None else "at",
         "cron": fields.timing.cron or "",
-        "at": "" if at is None else f"{at.astimezone(ZoneInfo(fields.timing.zone)):%Y-%m-%dT%H:%M}",
-        "zone": fields.timing.zone,
+        "at": _entry(at, zone),
+        "zone": zone,
         "window_begin": "" if window is None else f"{window.begin:%H:%M}",
         "window_end": "" if window is None else f"{window.end:%H:%M}",
         "priority": str(fields.priority),
         "finish_by": fields.finish_by or "",
+        "overlap": policies.overlap.value,
+        "catch_up": policies.catch_up.value,
+        "misfire_grace": policies.misfire_grace or "",
+        "paused_until": _entry(policies.paused_until, zone),
+        "report_email": ", ".join(fields.report_to.email),
+        "report_webhook": fields.report_to.webhook or "",
+        "report_when": fields.report_to.when.value,
         **({"fresh": "on"} if fields.fresh else {}),
     }
+
+
+def _entry(moment: datetime | None, zone: str) -> str:
+    """A time as the form has it, on the wall clock of ``zone``."""
+    return "" if moment is None else f"{moment.astimezone(ZoneInfo(zone)):%Y-%m-%dT%H:%M}"
 
 
 def _form(

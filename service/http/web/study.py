@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
 import numpy as np
-from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import QueryParams
 from starlette.responses import RedirectResponse, Response
@@ -17,35 +16,37 @@ from sprag.service import formats
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx, StudyId
 from sprag.service.http.problems import ApiError
-from sprag.service.http.web.choice import characteristic, map_query, pairs_of
+from sprag.service.http.reading import CHOICE, address_pairs
+from sprag.service.http.routers import page_router
 from sprag.service.http.web.form.check import fits_of, has_measured_clutch
+from sprag.service.http.web.held import fixed_choices
+from sprag.service.http.web.saved_views import report_figures, saved_here, view_actions
 from sprag.service.http.web.study_answers import AnswersView, answers_view
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.jobs import answers, checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.json_text import timestamp
+from sprag.service.languages import N_, _
+from sprag.service.results.choice import characteristic, map_query, pairs_of
 from sprag.service.results.curve_cases import select
-from sprag.service.results.defaults import MOST_CHOICES, caption, drawn_numbers, varying_axes
+from sprag.service.results.defaults import caption, drawn_numbers, varying_axes
 from sprag.service.results.directions import ends_in_words
-from sprag.service.results.exports.inputs import inputs as every_input
-from sprag.service.results.exports.inputs import run_inputs
+from sprag.service.results.phrases import meanings
 from sprag.service.results.pictures import curves as pictures
+from sprag.service.results.reading import Reading, reading_for
 from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.regimes import DOUBTFUL, ORDER, counted
 from sprag.service.results.selection import SelectionError
-from sprag.service.spec.catalogue import unit_of
+from sprag.service.results.shown_inputs import inputs, run_settings
 from sprag.service.spec.narrow import narrowed_cases
-from sprag.service.spec.numbers import parse_number
 from sprag.service.storage.records import Kinds
 from sprag.worker import models
 from sprag.worker.limits import MAX_CASES, NARROW_STEPS
-from sprag.worker.models.parameters import parameter_of
 from sprag.worker.models.starts import has_starts
 from sprag.worker.planning.calibrate.plan import CALIBRATE
 from sprag.worker.planning.goals.plan import GOAL
 from sprag.worker.states import TRANSITIONS, StudyEvent, StudyState
-from sprag.worker.sweeps import DIRECTIONS, SWEEP
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -55,10 +56,15 @@ if TYPE_CHECKING:
     from sprag.service.results.curves import CurveQuery
     from sprag.worker.study import Study
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
 #: Actions on a study and the labels of their buttons.
-VERBS: Final = {"pause": "Pause", "resume": "Resume", "cancel": "Cancel the rest", "retry": "Run failed cases again"}
+VERBS: Final = {
+    "pause": N_("Pause"),
+    "resume": N_("Resume"),
+    "cancel": N_("Cancel the rest"),
+    "retry": N_("Run failed cases again"),
+}
 _EVENTS: Final = {
     "pause": StudyEvent.PAUSE,
     "resume": StudyEvent.RESUME,
@@ -71,27 +77,32 @@ def study_frame(context: Context, study_id: str) -> dict[str, Any]:
     """The common part of all pages about a study: the study as in the API, its actions, the related pages."""
     (record, progress), study = context.store.look(study_id), context.store.study(study_id)
     # Counting kinds takes time in proportion to the rows, so only the page that shows them does it.
-    shown = views.detail(record, progress, study, context.store.spec(study_id), Kinds({}, {}))
+    spec, choice = context.store.spec(study_id), CHOICE.get()
+    shown = views.detail(record, progress, study, spec, Kinds({}, {}), ())
     varying = len(varying_axes(study))
     grid = study.combine == "grid" and varying > 1
     mapped = grid or map_plan(study) is not None
     tabs = [
-        ("", "Overview"),
-        *([("/front", "Designs")] if _has_goal(study) else []),
-        *([("/calibration", "Calibration")] if _calibrates(study) else []),
-        *([("/drives", "Drives")] if study.spread is not None and study.plan is None else []),
-        *([("/curves", "Curves")] if varying else []),
-        *([("/map", "Map")] if mapped else []),
-        *([("/sensitivity", "Sensitivity")] if varying and study.plan is None else []),
+        ("", N_("Overview")),
+        *([("/front", N_("Designs"))] if _has_goal(study) else []),
+        *([("/calibration", N_("Calibration"))] if _calibrates(study) else []),
+        *([("/drives", N_("Drives"))] if study.spread is not None and study.plan is None else []),
+        *([("/curves", N_("Curves"))] if varying else []),
+        *([("/map", N_("Map"))] if mapped else []),
+        *([("/sensitivity", N_("Sensitivity"))] if varying and study.plan is None else []),
     ]
     return {
         "study": shown,
         "live": not StudyState(shown["state"]).terminal,
         "verbs": {verb: VERBS[verb] for verb in _verbs(StudyState(shown["state"]), record.ok < record.done)},
-        "tabs": [*tabs, ("/explore", "Explore"), ("/cases", "Cases")],
-        "endings": models.ENDING_SENTENCES,
+        "tabs": [*tabs, ("/explore", N_("Explore")), ("/cases", N_("Cases"))],
+        "endings": meanings(models.ENDING_SENTENCES),
         "formats": list(formats.MEDIA_TYPES),
         "now": timestamp(datetime.now(UTC)),
+        "choice": choice,
+        "reading": reading_for(study, spec, choice),
+        "saved": (saved := context.store.saved_views(study_id)),
+        "views_of": lambda part: saved_here(saved, part, study_id),
     }
 
 
@@ -106,7 +117,7 @@ async def study_page(context: Ctx, work: Attended, study_id: StudyId) -> Respons
     spec = await run_in_threadpool(context.store.spec, study_id)
     fits = await work.check(fits_of, spec) if has_measured_clutch(spec) else {}
     usual, many = await run_in_threadpool(_usual_curves, context, study_id)
-    asked = (context.library, study_id, work.request.query_params.multi_items(), usual)
+    asked = (context.library, study_id, work.request.query_params.multi_items(), usual, CHOICE.get())
     view = await (work.check(answers_view, *asked) if many else run_in_threadpool(answers_view, *asked))
     return await run_in_threadpool(_study_page, context, study_id, fits, view, usual)
 
@@ -134,25 +145,29 @@ def _study_page(
         "study.html",
         status=422 if view.faults else 200,
         **frame,
+        origins=context.store.origins(study_id),
         tab="",
         shown=models.presentation_of(study),
         answers=view,
         faults=view.faults,
-        fixed=[] if view.query is None else fixed_choices(study, (view.query.x, *view.query.by), view.query.at),
-        **_main_figure(study, study_id, query, view),
+        fixed=[]
+        if view.query is None
+        else fixed_choices(study, (view.query.x, *view.query.by), view.query.at, frame["reading"]),
+        **_main_figure(study, study_id, query, view, frame["reading"]),
+        view_actions=view_actions(),
+        report_figures=report_figures(study, study_id, frame["saved"]),
         orders=orders_address(study, study_id),
         regime_maps=regime_maps(study, study_id),
         only_row=None if first is None else first.results.items(),
         units={info.name: info.unit for info in models.study_results(study)},
         inputs=inputs(study, frame["study"]["spec"]),
-        run=run_inputs(study, frame["study"]["spec"]),
+        run=run_settings(study, frame["study"]["spec"], frame["reading"]),
         fits=fits,
         regimes=kinds.regimes,
         counts=counted(kinds.regimes),
-        regime_meanings=models.REGIME_SENTENCES,
-        # The flags of regimes appear together with the regimes.
+        regime_meanings=meanings(models.REGIME_SENTENCES),
         flags={flag: count for flag, count in kinds.flags.items() if flag not in models.REGIME_SENTENCES},
-        flag_meanings=models.flags_of(study.model),
+        flag_meanings=meanings(models.flags_of(study.model)),
         ends_of=ends_in_words,
         to_run_longer=(*DOUBTFUL, models.NOT_SETTLED),
         narrowed=_narrowed(context, study, study_id) if models.JUMPED in kinds.flags else 0,
@@ -181,27 +196,31 @@ def _drawable(points: int) -> bool:
     return points <= pictures.MAX_PICTURE_POINTS
 
 
-def _main_figure(study: Study, study_id: str, query: CurveQuery | None, view: AnswersView) -> dict[str, Any]:
+def _main_figure(
+    study: Study, study_id: str, query: CurveQuery | None, view: AnswersView, reading: Reading
+) -> dict[str, Any]:
     """The addresses of the figure on the page, of its picture and of the page where others are chosen; its caption."""
+    chosen = address_pairs(CHOICE.get())
+    own = urlencode(chosen)
     if _has_goal(study):
         return {
-            "heading": "Designs",
-            "figure": f"/studies/{study_id}/figures/front",
-            "picture": f"{views.study_address(study_id)}/front?format=svg" if _drawable(study.cases) else None,
+            "heading": _("Designs"),
+            "figure": f"/studies/{study_id}/figures/front?{own}",
+            "picture": f"{views.study_address(study_id)}/front?format=svg&{own}" if _drawable(study.cases) else None,
             "others": f"/studies/{study_id}/front",
-            "kind": "Designs",
-            "invitation": "More on the page",
-            "caption": "Every design of the search; grey ones are outside the limits",
+            "kind": _("Designs"),
+            "invitation": _("More on the page"),
+            "caption": _("Every design of the search; grey ones are outside the limits"),
         }
     if _calibrates(study):
         return {
-            "heading": "Calibration",
-            "figure": f"/studies/{study_id}/figures/calibration",
-            "picture": f"{views.study_address(study_id)}/calibration?format=svg",
+            "heading": _("Calibration"),
+            "figure": f"/studies/{study_id}/figures/calibration?columns=2&{own}",
+            "picture": f"{views.study_address(study_id)}/calibration?format=svg&{own}",
             "others": f"/studies/{study_id}/calibration",
-            "kind": "Calibration",
-            "invitation": "More on the page",
-            "caption": "Measured points on the fitted curve, and the residuals",
+            "kind": _("Calibration"),
+            "invitation": _("More on the page"),
+            "caption": _("Measured points on the fitted curve, and the residuals"),
         }
     if query is None:
         return {
@@ -216,14 +235,17 @@ def _main_figure(study: Study, study_id: str, query: CurveQuery | None, view: An
     mapped = map_query(study, models.study_results(study), QueryParams()) if map_plan(study) is not None else None
     if mapped is not None:
         kind, pairs, more = "map", pairs_of(mapped), ("kind", "heatmap")
-        text = f"{mapped.z} over {mapped.x} and {mapped.y}"
+        text = _(
+            "{z} over {x} and {y}",
+            z=reading.caption(mapped.z), x=reading.within(mapped.x), y=reading.within(mapped.y),
+        )  # fmt: skip
         drawable = True
     else:
         kind, pairs, more = "curves", pairs_of(query), ("columns", "2")
-        text = caption(study, query)
+        text = caption(study, query).said(reading)
         drawable = _drawable(drawn_numbers(study, query))
-    picture = f"{views.study_address(study_id)}/{kind}?{urlencode([*pairs, ('format', 'svg')])}"
-    figure = f"/studies/{study_id}/figures/{kind}?{urlencode([*pairs, more])}"
+    picture = f"{views.study_address(study_id)}/{kind}?{urlencode([*pairs, ('format', 'svg'), *chosen])}"
+    figure = f"/studies/{study_id}/figures/{kind}?{urlencode([*pairs, more, *chosen])}"
     if view.figure is not None:  # with the answers on the curves
         figure, picture = view.figure, view.picture or picture
     return {
@@ -231,8 +253,8 @@ def _main_figure(study: Study, study_id: str, query: CurveQuery | None, view: An
         "figure": figure,
         "picture": picture if drawable else None,
         "others": f"/studies/{study_id}/{kind}?{urlencode(pairs)}",
-        "kind": kind.capitalize(),
-        "invitation": "Choose others with",
+        "kind": _("Map") if mapped is not None else _("Curves"),
+        "invitation": _("Choose others with"),
         "caption": text,
     }
 
@@ -255,29 +277,18 @@ def _with_rows(context: Context, study: Study, study_id: str, query: CurveQuery 
     return replace(query, at=tuple((path, repr(values[path])) for path, _ in query.at))
 
 
-def inputs(study: Study, spec: Mapping[str, Any]) -> list[tuple[str, list[dict[str, Any]]]]:
-    """Every parameter of the base by section, with letter, value, unit and origin."""
-    sections: dict[str, list[dict[str, Any]]] = {}
-    for item in every_input(study, spec):
-        entry = parameter_of(study, item.path)
-        section, _, name = item.path.rpartition(".")
-        symbol = f"c_{int(name) + 1}" if name.isdigit() else "" if entry is None else entry.symbol
-        sections.setdefault(section, []).append({"name": name, "symbol": symbol, "item": item})
-    return [(section or "in general", rows) for section, rows in sections.items()]
-
-
 @router.get("/studies/{study_id:study}/delete")
 def delete_page(context: Ctx, study_id: StudyId) -> Response:
     """The confirmation page for deleting a study, with everything that is deleted."""
     record = context.store.get_study(study_id)
-    return page("delete.html", study=views.summary(record), ended=record.over)
+    return page("delete.html", study=views.summary(record), ended=record.over, days=context.settings.restore_days)
 
 
 @router.post("/studies/{study_id:study}/delete")
-def delete(context: Ctx, study_id: StudyId) -> Response:
+def delete(context: Ctx, study_id: StudyId, at_once: bool = False) -> Response:
     """Delete the study and show the list of the remaining ones."""
-    context.store.delete_study(study_id)
-    return RedirectResponse("/", status_code=303)
+    context.store.delete_study(study_id, at_once=at_once)
+    return RedirectResponse("/" if at_once else f"/?done=delete&changed={study_id}", status_code=303)
 
 
 def _not_settled(flags: Mapping[str, int]) -> dict[str, int]:
@@ -327,39 +338,6 @@ def act(context: Ctx, study_id: StudyId, verb: str) -> Response:
         raise ApiError("not-found", "Unknown action.")
     wishes[verb](study_id)
     return RedirectResponse(f"/studies/{study_id}", status_code=303)
-
-
-def fixed_choices(study: Study, drawn: tuple[str, ...], at: tuple[tuple[str, str], ...]) -> list[dict[str, Any]]:
-    """For each held axis of a picture: its values, and the selected one."""
-    chosen = dict(at)
-    found = []
-    for axis in study.axes:
-        if len(axis) < 2 or any(path in axis.paths for path in drawn):
-            continue
-        path = next((path for path in axis.paths if path in chosen), axis.paths[0])
-        unit = unit_of(study, axis.paths[0])
-        text = chosen.get(path)
-        found.append(
-            {
-                "path": axis.paths[0],
-                "paths": axis.paths,
-                "unit": unit,
-                "values": [] if len(axis) > MOST_CHOICES else sorted(set(axis.values)),
-                "chosen": text,
-                "number": _direction(text) if axis.paths == (SWEEP,) else _plain(text),
-                "names": dict(enumerate(DIRECTIONS)) if axis.paths == (SWEEP,) else {},
-            }
-        )
-    return found
-
-
-def _direction(text: str | None) -> float | None:
-    """A direction of a sweep given in words or as its number."""
-    return float(DIRECTIONS.index(text)) if text in DIRECTIONS else _plain(text)
-
-
-def _plain(text: str | None) -> float | None:
-    return None if text is None else parse_number(text)
 
 
 def orders_address(study: Study, study_id: str) -> str | None:

@@ -9,14 +9,19 @@ from urllib.parse import urlencode
 from starlette.datastructures import QueryParams
 
 from sprag.service.http import views
-from sprag.service.http.web.choice import curve_query, pairs_of, value_choices
+from sprag.service.http.reading import address_pairs
+from sprag.service.http.web.held import with_held
 from sprag.service.jobs.key_answers import answers_of
+from sprag.service.jobs.reading import reading_of
+from sprag.service.languages import decimal
+from sprag.service.results.choice import curve_query, pairs_of, value_choices
 from sprag.service.results.key_answer_words import curve_name, note_of, place_text
 from sprag.service.results.key_answers import answers_query
 from sprag.service.results.pictures.curves import MAX_PICTURE_POINTS
 from sprag.service.results.selection import SelectionError
 from sprag.service.results.wording import unit_text
-from sprag.service.spec.units import has_unit
+from sprag.service.spec.catalogue import unit_of
+from sprag.service.spec.units import has_unit, split_quantity
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -26,6 +31,7 @@ if TYPE_CHECKING:
     from sprag.service.jobs.checks import Library
     from sprag.service.results.curves import CurveQuery
     from sprag.service.results.key_answers import CurveAnswers, Found, StudyAnswers
+    from sprag.service.results.reading import Choice, Reading
     from sprag.worker.study import Study
 
 #: Parameters of the page's address that choose curves.
@@ -70,6 +76,7 @@ class AnswersView:
     overall : extremes among all cases
     choices : values of the axes that tell curves apart, where some are chosen
     figure, picture : addresses of the figure and of its picture
+    report : parameters of the report with these answers
     """
 
     faults: tuple[Fault, ...] = ()
@@ -86,6 +93,7 @@ class AnswersView:
     choices: list[dict[str, Any]] = field(default_factory=list)
     figure: str | None = None
     picture: str | None = None
+    report: list[tuple[str, str]] = field(default_factory=list)
 
     @property
     def known(self) -> bool:
@@ -104,59 +112,90 @@ def answers_choice(study: Study, given: QueryParams, usual: CurveQuery | None) -
 
 
 def answers_view(
-    library: Library, study_id: str, given: Sequence[tuple[str, str]], usual: CurveQuery | None
+    library: Library, study_id: str, given: Sequence[tuple[str, str]], usual: CurveQuery | None, choice: Choice
 ) -> AnswersView:
     """The answers of a study as the page shows them; those of the ``usual`` curves where others cannot be shown."""
     study, params = library.store.study(study_id), QueryParams(list(given))
     faults: tuple[Fault, ...] = ()
-    point = (params.get("point") or "").strip() or None
+    reading = reading_of(library.store, study_id, choice)
+    params = with_held(params, study, reading)
+    point: str | None = None
     query = usual
     try:
         query = answers_choice(study, params, usual)
+        point = _point(study, query, params, reading)
         found = answers_of(library, study_id, query, point)
     except SelectionError as error:
         faults, query, typed = error.faults, usual, point
         found = answers_of(library, study_id, usual, None)
-        return _view(study, study_id, found, faults, typed or "", "")
-    return _view(study, study_id, found, faults, point or "", params.get("curve") or "")
+        return _view(study, study_id, found, faults, typed or "", "", reading, choice)
+    return _view(study, study_id, found, faults, point or "", params.get("curve") or "", reading, choice)
+
+
+def _point(study: Study, query: CurveQuery | None, params: QueryParams, reading: Reading) -> str | None:
+    """The working point of the address; a bare number is in the unit that the page shows."""
+    text = (params.get("point") or "").strip()
+    return (text if query is None else reading.typed(text, unit_of(study, query.x))) or None
 
 
 def _view(
-    study: Study, study_id: str, found: StudyAnswers, faults: tuple[Fault, ...], point: str, curve: str
+    study: Study,
+    study_id: str,
+    found: StudyAnswers,
+    faults: tuple[Fault, ...],
+    point: str,
+    curve: str,
+    reading: Reading,
+    choice: Choice,
 ) -> AnswersView:
-    names = [curve_name(one, study) for one in found.curves]
+    names: list[str] = [*(curve_name(one, study) for one in found.curves)]
     chosen = names.index(curve) if curve in names else _usual_curve(study, found)
     one = found.curves[chosen] if found.curves else None
-    overall = [_tile(item, found.unit, study) for item in found.overall if item.value is not None]
+    overall = [_tile(item, found.unit, reading, study) for item in found.overall if item.value is not None]
     if one is None:
         return AnswersView(faults, overall=overall)
-    tiles, here = ([_tile(item, found.unit) for item in part] for part in (one.answers, one.working_point))
+    tiles, here = ([_tile(item, found.unit, reading) for item in part] for part in (one.answers, one.working_point))
     if found.query is None:
         return AnswersView(faults, tiles=tiles or here, here=here if tiles else [])
     pairs = pairs_of(found.query)
     asked = [pair for pair in pairs if pair[0] != "y"]
     shown = [("point", point)] if point and not faults else []
-    usual = f"{found.point:.10g}" if found.point is not None else ""
+    usual = f"{reading.value(found.point, found.unit):.10g}" if found.point is not None else ""
     used = point if point and not faults else usual
+    unit = reading.unit(found.unit)
     drawn = sum(line.cases.size for line in (part.line for part in found.curves)) * len(found.query.y)
     address = views.study_address(study_id)
     named = [("curve", names[chosen]), ("columns", "2")]
+    picture = f"{address}/answers?{urlencode([*asked, *shown, ('format', 'svg'), *address_pairs(choice)])}"
     return AnswersView(
         faults,
         found.query,
         point or usual,
-        used if has_unit(used) else f"{used} {unit_text(found.unit)}".strip(),
-        found.unit,
+        _as_read(used, unit),
+        unit,
         chosen,
         names,
         tiles,
         here,
-        [FamilyRow(name, _row(part, found)) for name, part in zip(names, found.curves, strict=True) if len(names) > 1],
+        [
+            FamilyRow(name, _row(part, found, reading))
+            for name, part in zip(names, found.curves, strict=True)
+            if len(names) > 1
+        ],
         overall,
         value_choices(study, found.query),
-        f"/studies/{study_id}/figures/answers?{urlencode([*asked, *shown, *named])}",
-        f"{address}/answers?{urlencode([*asked, *shown, ('format', 'svg')])}" if drawn <= MAX_PICTURE_POINTS else None,
+        f"/studies/{study_id}/figures/answers?{urlencode([*asked, *shown, *named, *address_pairs(choice)])}",
+        picture if drawn <= MAX_PICTURE_POINTS else None,
+        [*asked, *shown],
     )
+
+
+def _as_read(text: str, unit: str) -> str:
+    """A working point as people read it; a bare number is in ``unit``."""
+    if not has_unit(text):
+        return f"{decimal(text)} {unit_text(unit)}".strip()
+    own = split_quantity(text)[1]
+    return f"{decimal(text.removesuffix(own).strip())} {unit_text(own)}" if text.endswith(own) else text
 
 
 def _usual_curve(study: Study, found: StudyAnswers) -> int:
@@ -170,19 +209,21 @@ def _usual_curve(study: Study, found: StudyAnswers) -> int:
     return min(range(len(found.curves)), key=lambda place: distance(found.curves[place]), default=0)
 
 
-def _row(one: CurveAnswers, found: StudyAnswers) -> list[Tile]:
-    return [_tile(item, found.unit) for item in (one.answers or one.working_point)]
+def _row(one: CurveAnswers, found: StudyAnswers, reading: Reading) -> list[Tile]:
+    return [_tile(item, found.unit, reading) for item in (one.answers or one.working_point)]
 
 
-def _tile(item: Found, x_unit: str, study: Study | None = None) -> Tile:
+def _tile(item: Found, x_unit: str, reading: Reading, study: Study | None = None) -> Tile:
+    """An answer in the units and words of the reader."""
     where = None if item.answer.kind in ("at_zero", "until_zero", "here") else item.x
+    title = reading.say_name(item.answer.title) if item.answer.title == item.answer.result else item.answer.title
     return Tile(
-        item.answer.title if item.answer.title != item.answer.result else item.info.name,
-        item.value,
-        item.unit,
-        where,
+        reading.say(title),
+        reading.value(item.value, item.unit),
+        reading.unit(item.unit),
+        reading.value(where, x_unit),
         item.above,
-        note_of(item, x_unit),
+        note_of(item, x_unit).said(reading),
         tuple(case for case in (item.case, item.other) if case is not None),
-        place_text(study, item.case) if study is not None and item.case is not None else "",
+        place_text(study, item.case).said(reading) if study is not None and item.case is not None else "",
     )

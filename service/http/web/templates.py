@@ -5,50 +5,158 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
+from datetime import datetime
 from functools import lru_cache
-from typing import Any
+from typing import Any, Final
 from urllib.parse import urlencode
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+from jinja2.ext import Extension
 from markupsafe import Markup, escape
 from starlette.responses import Response
 
+from sprag.service import languages
+from sprag.service.actor import Role
 from sprag.service.http.access import ASKING
-from sprag.service.results.wording import counted, number, symbol, unit_text, words
-from sprag.service.storage.scopes import TokenScope
+from sprag.service.http.prefix import PREFIX, here
+from sprag.service.http.reading import PAGE
+from sprag.service.http.web.explained import explained
+from sprag.service.http.web.script_texts import translated_texts
+from sprag.service.languages import N_, recorded
+from sprag.service.languages.ranges import allowed_text
+from sprag.service.results.fault_texts import fault_text, warning_text
+from sprag.service.results.phrases import Phrase, model_title, shown, titled, word
+from sprag.service.results.wording import counted, duration, number, symbol, unit_text
+from sprag.service.schedules.times import wall_clock
+from sprag.worker.models import WarningText
+
+#: The beginning of an attribute that is an address: a path of this service, or an expression that may give one.
+_ADDRESS = re.compile(
+    r"""(?<=\s)(?P<name>href|src|action|formaction|data-(?:check|engagements|events|figure|front|motion))="
+    (?:(?P<path>/(?!/))|\{\{(?P<expression>.*?)\}\})""",
+    re.VERBOSE,
+)
+
+
+#: A text of the catalogues, whose addresses are completed when it is shown.
+_TRANSLATED: Final = re.compile(r"(\{%-? *trans\b.*?\{%-? *endtrans *-?%\})", re.DOTALL)
+
+
+class Addresses(Extension):
+    """Adds the URL prefix of the service (`sprag.service.http.prefix`) to every address in a page."""
+
+    def preprocess(self, source: str, name: str | None, filename: str | None = None) -> str:  # noqa: ARG002
+        """The template with ``here`` where an address begins."""
+
+        def completed(match: re.Match[str]) -> str:
+            inside = "here('/')" if match["path"] else f"({match['expression']}) | here"
+            return f'{match["name"]}="{{{{ {inside} }}}}'
+
+        pieces = _TRANSLATED.split(source)
+        pieces[::2] = [_ADDRESS.sub(completed, piece) for piece in pieces[::2]]
+        return "".join(pieces)
+
+
+def _with_prefix(text: str) -> str:
+    """A text of the catalogues with complete addresses."""
+    return _ADDRESS.sub(lambda match: f'{match["name"]}="{here("/")}', text) if '="/' in text else text
+
+
+def _text(message: str) -> str:
+    return _with_prefix(languages.gettext(message))
+
+
+def _plain_text(message: str, **values: object) -> str:
+    """`_` of templates: text, which the page escapes; texts with tags are in ``{% trans %}``."""
+    text = languages.gettext(message)
+    return text % values if values else text
+
+
+def _text_of(one: str, many: str, number: float) -> str:
+    return _with_prefix(languages.ngettext(one, many, number))
+
+
+def _read(value: object) -> object:
+    """What a page writes: phrases and warnings in the reader's language, anything else as it is."""
+    if isinstance(value, Phrase):
+        return shown(value)
+    return warning_text(value) if isinstance(value, WarningText) else value
 
 
 @lru_cache(maxsize=1)
 def _templates() -> Environment:
     environment = Environment(
-        loader=PackageLoader("sprag.service.http.web"),
+        # Sketches of machines stand in reports too.
+        loader=ChoiceLoader([PackageLoader("sprag.service.http.web"), PackageLoader("sprag.service.results.report")]),
         autoescape=True,
+        extensions=[Addresses, "jinja2.ext.i18n"],
         undefined=StrictUndefined,
+        finalize=_read,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.policies["ext.i18n.trimmed"] = True
+    # What the extension for texts adds.
+    environment.install_gettext_callables(_text, _text_of, newstyle=True, pgettext=languages.pgettext)  # type: ignore[attr-defined]
+    environment.globals["_"] = _plain_text
     environment.filters |= {
-        "number": number,
+        "number": cell,
         "counted": counted,
+        "decimal": languages.decimal,
         "unit": unit_text,
         "spec": spec_text,
         "marked": marked,
         "symbol": symbol,
-        "words": words,
+        "words": titled,
+        "word": word,
+        "text": languages.gettext,
+        "recorded": recorded.said,
+        "say": shown,
+        "fault": fault_text,
+        "allowed": allowed_text,
+        "day": day,
+        "model": model_title,
         "moment": moment,
+        "wall": wall,
         "duration": duration,
         "time_left": time_left,
         "bytes": bytes_text,
         "query": urlencode,
+        "here": here,
     }
+    environment.globals["here"] = here
+    environment.globals["prefix_of_urls"] = PREFIX.get
+    environment.globals["language"] = languages.current
+    environment.globals["languages"] = languages.titles
+    environment.globals["script_texts"] = translated_texts
+    environment.globals["page_address"] = PAGE.get
     environment.globals["read_only"] = _read_only
+    environment.globals["units_back"] = _units_back
+    environment.globals["explained"] = explained
+    environment.globals["administers"] = _administers
     return environment
 
 
+def cell(value: float | str | None, digits: int = 5) -> str:
+    """`number` with the words of a category: ``unsettled`` in the reader's language."""
+    return word(value) if isinstance(value, str) else number(value, digits)
+
+
+def _units_back() -> str:
+    """The way back from the page of units to the page that is made, for its address."""
+    return f"?{urlencode({'back': PAGE.get()})}" if PAGE.get() not in {"", "/"} else ""
+
+
 def _read_only() -> str:
-    """Name of the token for which the page is made, where it is read-only; "" where it allows everything."""
+    """Who asks for the page, where that is a viewer; "" for anybody who may change something."""
     grant = ASKING.get()
-    return "" if grant is None or grant.scope is TokenScope.WRITE else grant.name or grant.id
+    return grant.label if grant is not None and grant.role is Role.VIEWER else ""
+
+
+def _administers() -> bool:
+    """Whether an administrator asks for the page."""
+    grant = ASKING.get()
+    return grant is not None and grant.role is Role.ADMINISTRATOR
 
 
 def page(name: str, status: int = 200, **values: Any) -> Response:
@@ -73,29 +181,30 @@ def marked(text: str) -> Markup:
 
 
 def moment(text: str | None) -> str:
-    """A time stamp to the second."""
-    return text[:19].replace("T", " ") + " UTC" if text else "–"
+    """A time stamp to the second, its date as the language writes it."""
+    return f"{datetime.fromisoformat(text).strftime(languages.date_format())} {text[11:19]} UTC" if text else "–"
 
 
-def duration(seconds: float) -> str:
-    """A rough duration in a suitable unit, two digits: ``40 s``, ``3 min``, ``2.5 h``."""
-    if seconds < 1.0:
-        return "less than 1 s"
-    for limit, divisor, unit in ((100.0, 1.0, "s"), (6000.0, 60.0, "min"), (172800.0, 3600.0, "h")):
-        if seconds < limit:
-            return f"{float(f'{seconds / divisor:.2g}'):g} {unit}"
-    return f"{float(f'{seconds / 86400.0:.2g}'):g} days"
+def day(text: str) -> str:
+    """The date of a time stamp as the language writes it."""
+    return datetime.fromisoformat(text).strftime(languages.date_format())
+
+
+def wall(text: str, zone: str) -> str:
+    """A time stamp on the wall clock of ``zone``."""
+    return wall_clock(datetime.fromisoformat(text), zone)
 
 
 def time_left(seconds: Mapping[str, float]) -> str:
     """The bounds of the time left, or a single value where both read the same."""
     low, high = duration(seconds["low"]), duration(seconds["high"])
-    return low if low == high else f"{low} to {high}"
+    return low if low == high else languages.gettext("{low} to {high}", low=low, high=high)
 
 
 def bytes_text(count: float) -> str:
     """A size of a file: ``12 kB``, ``3.4 MB``."""
-    for divisor, unit in ((1e9, "GB"), (1e6, "MB"), (1e3, "kB")):
+    for divisor, unit in ((1e9, N_("GB")), (1e6, N_("MB")), (1e3, N_("kB"))):
         if count >= divisor:
-            return f"{float(f'{count / divisor:.2g}'):g} {unit}"
-    return f"{count:.0f} B"
+            rounded = float(f"{count / divisor:.2g}")
+            return f"{languages.decimal(f'{rounded:g}')} {languages.gettext(unit)}"
+    return languages.gettext("{n} B", n=f"{count:.0f}")

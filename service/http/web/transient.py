@@ -5,17 +5,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated, Any, Final
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Query
+from fastapi import Query
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError
 from sprag.service.http.context import CaseNumber, StudyId, study_with
+from sprag.service.http.reading import FileChoice, read_as
 from sprag.service.http.respond import json_response
+from sprag.service.http.routers import page_router
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
+from sprag.service.jobs.reading import reading_of
+from sprag.service.languages import N_
+from sprag.service.results.figures.read import read_figure
 from sprag.service.results.figures.transient import transient_figure
 from sprag.service.results.transients import course_of, require_transients
 from sprag.worker.models.transients import RESULTS, has_motor, run_transient, shape_of_transients
@@ -24,10 +29,14 @@ if TYPE_CHECKING:
     from sprag.worker.models.transients import Course
     from sprag.worker.study import Study
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
 _POINTS: Final = 2000
-_KINDS: Final = {"run-up": "run-up from rest", "load-step": "step of the load", "coasting": "coasting, drive off"}
+_KINDS: Final = {
+    "run-up": N_("run-up from rest"),
+    "load-step": N_("step of the load"),
+    "coasting": N_("coasting, drive off"),
+}
 
 Text = Annotated[str, Query(max_length=80)]
 
@@ -67,7 +76,7 @@ async def transient_page(
         faults=faults,
         made=made,
         results=[] if made is None else [(*info, made.results[info[0]]) for info in RESULTS],
-        figure=f"{own}/figure?{query}" if query else "",
+        figure=f"{own}/figure?{query}{read_as()}" if query else "",
         file=f"/api/v1{own}?{query}",
     )
 
@@ -75,7 +84,7 @@ async def transient_page(
 @router.get("/studies/{study_id:study}/cases/{case:case}/transient/figure")
 async def transient_drawn(
     work: Attended, study_id: StudyId, case: CaseNumber, kind: Text, load: Text = "", angle: Text = "",
-    torque: Text = "", within: Text = "", revolutions: Text = "",
+    torque: Text = "", within: Text = "", revolutions: Text = "", *, choice: FileChoice,
 ) -> Response:  # fmt: skip
     """The figure of a transient."""
     given = {"load": load, "angle": angle, "torque": torque, "within": within, "revolutions": revolutions}
@@ -86,4 +95,5 @@ async def transient_drawn(
     study, course = await work.case_of(study_id, case, look)
     await work.load(shape_of_transients(study))
     made = await work.run_case(run_transient, study, case, course, _POINTS)
-    return json_response(plotly_figure(transient_figure(made)))
+    reading = await run_in_threadpool(reading_of, work.context.store, study_id, choice)
+    return json_response(plotly_figure(read_figure(transient_figure(made), reading)))

@@ -10,7 +10,9 @@ from sprag.service.jobs.answers import curves_drawn, map_of
 from sprag.service.jobs.batch_answers import ribbon_of, yield_of
 from sprag.service.jobs.explore import explored
 from sprag.service.jobs.key_answers import answers_of
+from sprag.service.jobs.reading import reading_of
 from sprag.service.json_text import to_bytes
+from sprag.service.languages import gettext
 from sprag.service.results.basins import basin_of, units_of
 from sprag.service.results.figures.answers import answers_figure
 from sprag.service.results.figures.basin import basin_figure
@@ -19,7 +21,9 @@ from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.explore import explore_figure
 from sprag.service.results.figures.front import front_figure, history_figure
 from sprag.service.results.figures.motion import motion_figure, phase_figure
+from sprag.service.results.figures.orders import motion_text
 from sprag.service.results.figures.portrait import portrait_figure
+from sprag.service.results.figures.read import read_figure, read_map
 from sprag.service.results.figures.ribbons import ribbon_figure, yield_figure
 from sprag.service.results.key_answer_words import curve_name
 from sprag.service.results.wording import number
@@ -31,96 +35,122 @@ if TYPE_CHECKING:
     from sprag.service.results.basins import BasinQuery
     from sprag.service.results.curves import CurveQuery
     from sprag.service.results.explore import ExploreQuery
+    from sprag.service.results.figures.figure import Figure
+    from sprag.service.results.reading import Choice, Reading
     from sprag.worker.study import Study
 
 #: Times at which a motion is sampled for a picture.
 SAMPLES: Final = 6000
 
 
-def curves_json(library: Library, study_id: str, query: CurveQuery, columns: int) -> bytes:
+def _drawn(library: Library, study_id: str, figure: Figure, choice: Choice) -> Data:
+    """A described figure of a study as its reader wants it."""
+    return plotly_figure(read_figure(figure, reading_of(library.store, study_id, choice)))
+
+
+def curves_json(library: Library, study_id: str, query: CurveQuery, choice: Choice, columns: int) -> bytes:
     """The figure of curves, as JSON text."""
-    return to_bytes(plotly_figure(curves_figure([("", curves_drawn(library, study_id, query))], columns)))
+    figure = curves_figure([("", curves_drawn(library, study_id, query))], columns)
+    return to_bytes(_drawn(library, study_id, figure, choice))
 
 
 def answers_json(
-    library: Library, study_id: str, query: CurveQuery | None, point: str | None, curve: str, columns: int
+    library: Library,
+    study_id: str,
+    query: CurveQuery | None,
+    point: str | None,
+    curve: str,
+    choice: Choice,
+    columns: int,
 ) -> bytes:
     """The figure of the main results with the answers of the study marked, as JSON text."""
     found = answers_of(library, study_id, query, point)
     if found.drawn is None:
         return to_bytes({"data": [], "layout": {}})
-    names = [curve_name(one, library.store.study(study_id)) for one in found.curves]
+    names: list[str] = [*(curve_name(one, library.store.study(study_id)) for one in found.curves)]
     chosen = names.index(curve) if curve in names else None
-    return to_bytes(plotly_figure(answers_figure(found, columns, chosen=chosen)))
+    return to_bytes(_drawn(library, study_id, answers_figure(found, columns, chosen=chosen), choice))
 
 
-def explore_json(library: Library, study_id: str, query: ExploreQuery, x: str, y: str) -> bytes:
-    """The figure of two quantities of all cases, as JSON text."""
-    return to_bytes(plotly_figure(explore_figure(explored(library, study_id, query), x, y)))
-
-
-def map_json(library: Library, study_id: str, query: CurveQuery, contours: bool) -> bytes:
-    """The figure of a map, as JSON text."""
-    return to_bytes(map_figure(map_of(library, study_id, query), contours))
-
-
-def front_json(library: Library, study_id: str, exact: bool, axes: tuple[str | None, str | None]) -> bytes:
-    """The figure of the designs of a search, as JSON text; dragging selects designs."""
-    figure = plotly_figure(front_figure(library.fronts.of(study_id, exact=exact), *axes))
+def explore_json(library: Library, study_id: str, query: ExploreQuery, x: str, y: str, choice: Choice) -> bytes:
+    """The figure of two quantities of all cases, as JSON text; dragging selects a range of each."""
+    figure = _drawn(library, study_id, explore_figure(explored(library, study_id, query), x, y), choice)
     return to_bytes({**figure, "layout": {**figure["layout"], "dragmode": "select"}})
 
 
-def calibration_json(library: Library, study_id: str) -> bytes:
+def map_json(library: Library, study_id: str, query: CurveQuery, choice: Choice, contours: bool) -> bytes:
+    """The figure of a map, as JSON text."""
+    drawn = read_map(map_of(library, study_id, query), reading_of(library.store, study_id, choice))
+    return to_bytes(map_figure(drawn, contours))
+
+
+def front_json(
+    library: Library, study_id: str, exact: bool, axes: tuple[str | None, str | None], choice: Choice
+) -> bytes:
+    """The figure of the designs of a search, as JSON text; dragging selects designs."""
+    figure = _drawn(library, study_id, front_figure(library.fronts.of(study_id, exact=exact), *axes), choice)
+    return to_bytes({**figure, "layout": {**figure["layout"], "dragmode": "select"}})
+
+
+def calibration_json(library: Library, study_id: str, choice: Choice, columns: int) -> bytes:
     """The figure of a calibration, as JSON text."""
-    return to_bytes(plotly_figure(calibration_figure(library.calibrations.of(study_id))))
+    figure = calibration_figure(library.calibrations.of(study_id), columns)
+    return to_bytes(_drawn(library, study_id, figure, choice))
 
 
-def search_json(library: Library, study_id: str) -> bytes:
+def search_json(library: Library, study_id: str, choice: Choice, columns: int) -> bytes:
     """The figure of how a search has come to its designs, as JSON text."""
-    return to_bytes(plotly_figure(history_figure(library.fronts.of(study_id, exact=False))))
+    figure = history_figure(library.fronts.of(study_id, exact=False), columns)
+    return to_bytes(_drawn(library, study_id, figure, choice))
 
 
-def ribbon_json(library: Library, study_id: str, query: RibbonQuery) -> bytes:
+def ribbon_json(library: Library, study_id: str, query: RibbonQuery, choice: Choice) -> bytes:
     """The figure of ribbons, as JSON text."""
-    return to_bytes(plotly_figure(ribbon_figure(ribbon_of(library, study_id, query))))
+    return to_bytes(_drawn(library, study_id, ribbon_figure(ribbon_of(library, study_id, query)), choice))
 
 
-def yield_json(library: Library, study_id: str, query: YieldQuery) -> bytes:
+def yield_json(library: Library, study_id: str, query: YieldQuery, choice: Choice) -> bytes:
     """The figure of yields, as JSON text."""
-    return to_bytes(plotly_figure(yield_figure(yield_of(library, study_id, query))))
+    return to_bytes(_drawn(library, study_id, yield_figure(yield_of(library, study_id, query)), choice))
 
 
-def motion_figures(study: Study, case: int, start: float, end: float, columns: int) -> dict[str, Data]:
+def motion_figures(
+    study: Study, case: int, start: float, end: float, columns: int, reading: Reading
+) -> dict[str, Data]:
     """Run the case again and draw it, over the angle with so many panels in a row. For the computing process."""
     made = models.run_trajectory(study, case, start, end, SAMPLES)
     shown = models.presentation_of(study)
     if made.times.size == 0 or made.times[-1] == start < end:
-        told = {"data": [], "layout": {}, "note": _no_motion(study, case, made.ending)}
-        return {"motion": told, **({"phase": told} if shown.portrait else {})}
+        empty = {"data": [], "layout": {}, "note": _no_motion(study, case, made.ending)}
+        return {"motion": empty, **({"phase": empty} if shown.portrait else {})}
     figures = {"motion": motion_figure(made, shown, columns=columns)}
     if shown.portrait:
         figures["phase"] = phase_figure(made, shown)
-    return {name: plotly_figure(figure) for name, figure in figures.items()}
+    return {name: plotly_figure(read_figure(figure, reading)) for name, figure in figures.items()}
 
 
-def strobes_figure(study: Study, case: int, columns: int) -> Data:
+def strobes_figure(study: Study, case: int, columns: int, reading: Reading) -> Data:
     """The strobes and the orbit of a case that is run again for them. For the computing process."""
     made = models.run_portrait(study, case)
-    return plotly_figure(portrait_figure(made, models.presentation_of(study), columns))
+    return plotly_figure(read_figure(portrait_figure(made, models.presentation_of(study), columns), reading))
 
 
-def basin_plot(study: Study, case: int, query: BasinQuery) -> Data:
+def basin_plot(study: Study, case: int, query: BasinQuery, reading: Reading) -> Data:
     """The basin of a case that is run from every start for it. For the computing process."""
     made = basin_of(study, case, query)
-    return plotly_figure(basin_figure(made, query.paths, units_of(study, query)))
+    return plotly_figure(read_figure(basin_figure(made, query.paths, units_of(study, query)), reading))
 
 
 def _no_motion(study: Study, case: int, ending: str) -> str:
     """Why a part has no motion: the run stopped earlier."""
     extent = models.extent(study, case)
     if extent.along == "angle":
-        return f"There is no motion: the case ended with {ending}."
+        return gettext("There is no motion: the case ended with {ending}.", ending=motion_text(ending))
     times = models.run_trajectory(study, case, 0.0, extent.end, SAMPLES).times
     last = float(times[-1]) if times.size else 0.0
-    when = f"about t = {number(last, 3)} s" if last > 0.0 else "t = 0"
-    return f"There is no motion in this part: the run stopped at {when} with {ending}."
+    when = gettext("about t = {time} s", time=number(last, 3)) if last > 0.0 else "t = 0"
+    return gettext(
+        "There is no motion in this part: the run stopped at {when} with {ending}.",
+        when=when,
+        ending=motion_text(ending),
+    )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.results.figures.read import read_figure
 from sprag.service.results.figures.turn import turn_figure
 from sprag.service.results.trajectories import trajectory_csv
 from sprag.worker import models
@@ -14,6 +15,8 @@ from sprag.worker.models.turns import CaseTurn, case_turn
 
 if TYPE_CHECKING:
     from sprag.service.results.figures.figure import Figure
+    from sprag.service.results.quantities import Units
+    from sprag.service.results.reading import Reading
     from sprag.worker.models import Trajectory
     from sprag.worker.study import Study
 
@@ -25,13 +28,16 @@ _TRAVEL: Final = 14.0
 _FREQUENCY: Final = "excitation.frequency"
 
 
-def drive_case(study: Study, held: Study | None) -> dict[str, Any]:
-    """Results, figure, frames and next state of a drive, and results of one that is held. For the computing process."""
+def drive_case(study: Study, held: Study | None, reading: Reading) -> dict[str, Any]:
+    """Results, figure, frames and next state of a drive, and results of one that is held. For the computing process.
+
+    The results are in SI, the figure in the units of ``reading``.
+    """
     made = case_turn(study, 0, _SAMPLES)
     other = None if held is None else case_turn(held, 0, _SAMPLES)
-    found = _told(made) | {"held": None if other is None else _told(other), "figure": None, "frames": None}
+    found = _turn_json(made) | {"held": None if other is None else _turn_json(other), "figure": None, "frames": None}
     if made.motion.times.size:
-        found["figure"] = plotly_figure(_figure(study, made, held, other))
+        found["figure"] = plotly_figure(read_figure(_figure(study, made, held, other), reading))
         found["frames"] = frames(made.motion, study.base[_FREQUENCY])
     return found
 
@@ -43,10 +49,10 @@ def curves_of(study: Study, held: Study | None) -> Figure | None:
     return _figure(study, made, held, other) if made.motion.times.size else None
 
 
-def turn_table(study: Study) -> bytes | None:
-    """The settled motion of a drive as CSV; None where there is none. For the computing process."""
+def turn_table(study: Study, units: Units) -> bytes | None:
+    """The settled motion of a drive as CSV in a reader's units; None where there is none. For the computing process."""
     motion = case_turn(study, 0, _SAMPLES).motion
-    return trajectory_csv(motion) if motion.times.size else None
+    return trajectory_csv(motion, units) if motion.times.size else None
 
 
 def _figure(study: Study, made: CaseTurn, held: Study | None, other: CaseTurn | None) -> Figure:
@@ -57,7 +63,7 @@ def _figure(study: Study, made: CaseTurn, held: Study | None, other: CaseTurn | 
     return turn_figure(made.motion, study.base[_FREQUENCY], shown, beside)
 
 
-def _told(made: CaseTurn) -> dict[str, Any]:
+def _turn_json(made: CaseTurn) -> dict[str, Any]:
     return {
         "ending": made.ending, "flags": made.flags, "results": made.results, "regime": made.regime,
         "order": made.order, "state": made.state,

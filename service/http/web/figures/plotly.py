@@ -10,9 +10,12 @@ import numpy as np
 
 from sprag.service.http.web.figures.thinning import thin
 from sprag.service.json_text import numbers
+from sprag.service.languages import decimal, gettext
 from sprag.service.results.figures.figure import BANDS, NEUTRAL, NOTES, PALETTE, shortened
+from sprag.service.results.figures.orders import motion_text
+from sprag.service.results.phrases import shown
 from sprag.service.results.regimes import MARKS
-from sprag.service.results.wording import unit_text, words
+from sprag.service.results.wording import unit_text
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -79,6 +82,7 @@ def plotly_figure(figure: Figure) -> Data:
         "legend": _legend(figure, beside=beside),
         MOTIONS: {**BELOW, "title": {"text": _motion_title(figure), "side": "top"}},
         "uirevision": "keep",
+        **separators(),
     }
     if figure.heading:
         # A narrow picture has one column, and no room for a long line.
@@ -134,11 +138,18 @@ def plotly_figure(figure: Figure) -> Data:
     return {"data": traces, "layout": layout, **({"below": figure.below} if figure.below else {}), **kind}
 
 
+def separators() -> Data:
+    """The decimal mark of the language and the sign between thousands, where they are not those of plotly."""
+    mark = decimal(".")
+    return {} if mark == "." else {"separators": f"{mark}\N{NARROW NO-BREAK SPACE}"}
+
+
 def _motion_title(figure: Figure) -> str:
     """What the legend of marks and strips is about."""
     if not figure.regimes:
         return figure.states if figure.spans or not (figure.banded or figure.noted) else ""
-    return f"Regime; {figure.states.lower()}" if figure.spans else "Regime"
+    regime = gettext("Regime")
+    return f"{regime}; {figure.states.lower()}" if figure.spans else regime
 
 
 def _suffix(number: int) -> str:
@@ -147,9 +158,9 @@ def _suffix(number: int) -> str:
 
 
 def axis_title(quantity: Quantity) -> str:
-    """The title of an axis: words and unit."""
+    """The title of an axis: what it is called, and its unit."""
     shown = unit_text(quantity.unit)
-    return f"{escaped(words(quantity.name))} ({shown})" if shown else escaped(words(quantity.name))
+    return f"{escaped(quantity.name)} ({shown})" if shown and quantity.name else escaped(quantity.name) or shown
 
 
 def escaped(text: str) -> str:
@@ -188,7 +199,7 @@ def _legend(figure: Figure, *, beside: bool) -> Data:
     """The legend: above the panels for few lines, which leaves them the whole width; beside them for many or
     families.
     """
-    text = ", ".join(map(axis_title, figure.family)) or ("Study" if figure.studies > 1 else "")
+    text = ", ".join(map(axis_title, figure.family)) or (gettext("Study") if figure.studies > 1 else "")
     # plotly ignores the height of a title beside the entries, so the last entries would be cut off.
     title: Data = {"text": text, "side": "top"}
     if beside:
@@ -208,7 +219,7 @@ def _line_trace(line: Line, panel: Panel, figure: Figure, headings: set[str]) ->
     trace: Data = {
         "type": "scatter",
         "mode": "+".join(["lines"] * line.joined + ["markers"] * marked),
-        "name": name or escaped(words(panel.y.name)),
+        "name": name or escaped(panel.y.name),
         "legendgroup": line.key,
         "legendgrouptitle": {"text": title},
         "showlegend": line.listed,
@@ -219,14 +230,14 @@ def _line_trace(line: Line, panel: Panel, figure: Figure, headings: set[str]) ->
     }
     if line.cases is None:
         return trace if line.joined else trace | _points(line, kept, panel, figure.scale)
-    told = ", ".join(text for text in (heading, name) if text) or escaped(words(panel.y.name))
+    label = ", ".join(text for text in (heading, name) if text) or escaped(panel.y.name)
     size: int | list[int] = 6
     if not marked and any(stretch.size == 1 for stretch in line.stretches or ()):
         trace["mode"], size = "lines+markers", _lone(places)
     return trace | {
         "customdata": [None if place is None else int(line.cases[place]) for place in places],
         "marker": {"color": line.colour, "symbol": SYMBOLS[int(line.key) % len(SYMBOLS)], "size": size},
-        "hovertemplate": _hover(panel.y, told),
+        "hovertemplate": _hover(panel.y, label),
     }
 
 
@@ -242,12 +253,17 @@ def _points(line: Line, kept: NDArray[np.int64], panel: Panel, scale: str) -> Da
         return {"marker": {"symbol": symbol, "size": 5, "color": line.colour}, "hovertemplate": where}
     numbers = line.shades[kept].tolist()
     marker = {"symbol": symbol, "size": 6, "color": numbers, "colorscale": "Viridis", "showscale": line.style == 0}
-    marker["colorbar"] = {"title": {"text": words(scale), "side": "right"}, "thickness": 12}
+    marker["colorbar"] = {"title": {"text": escaped(scale), "side": "right"}, "thickness": 12}
     return {"customdata": numbers, "marker": marker, "hovertemplate": f"{scale} %{{customdata}}: {where}"}
 
 
-def _hover(y: Quantity, told: str) -> str:
-    return f"%{{x:.5g}}, %{{y:.5g}} {unit_text(y.unit)}<br>case %{{customdata}}<extra>{told}</extra>"
+def _hover(y: Quantity, label: str) -> str:
+    return f"%{{x:.5g}}, %{{y:.5g}} {unit_text(y.unit)}<br>{case_text()}<extra>{label}</extra>"
+
+
+def case_text() -> str:
+    """The case of a point, which plotly writes into the text."""
+    return gettext("case {case}", case="%{customdata}")
 
 
 def _with_gaps(kept: NDArray[np.int64], stretches: tuple[NDArray[np.int64], ...] | None) -> list[int | None]:
@@ -272,7 +288,7 @@ def marks_trace(marks: Marks, y: Quantity, *, listed: bool) -> Data:
     return {
         "type": "scatter",
         "mode": "markers",
-        "name": marks.regime,
+        "name": motion_text(marks.regime),
         "legend": MOTIONS,
         "legendgroup": f"regime {marks.regime}",
         "showlegend": listed,
@@ -280,7 +296,7 @@ def marks_trace(marks: Marks, y: Quantity, *, listed: bool) -> Data:
         "y": numbers(marks.y) or [None],
         "customdata": marks.cases.tolist() or [None],
         "marker": {"color": MARKS[marks.regime].colour, "symbol": MARKS[marks.regime].symbol, "size": 8},
-        "hovertemplate": _hover(y, marks.regime),
+        "hovertemplate": _hover(y, motion_text(marks.regime)),
     }
 
 
@@ -292,7 +308,7 @@ def note_traces(panel: Panel, kinds: Sequence[NoteKind], *, listed: bool) -> Ite
         yield {
             "type": "scatter",
             "mode": "markers+text",
-            "name": NOTES[kind],
+            "name": shown(NOTES[kind]),
             "legend": MOTIONS,
             "legendgroup": f"note {kind}",
             "showlegend": listed,
@@ -308,7 +324,7 @@ def note_traces(panel: Panel, kinds: Sequence[NoteKind], *, listed: bool) -> Ite
                 "size": 13 if ring else 10,
                 "line": {"width": 2 if ring else 0},
             },
-            "hovertemplate": f"%{{x:.5g}}, %{{y:.5g}} {unit_text(panel.y.unit)}<extra>{NOTES[kind]}</extra>",
+            "hovertemplate": f"%{{x:.5g}}, %{{y:.5g}} {unit_text(panel.y.unit)}<extra>{shown(NOTES[kind])}</extra>",
         }
 
 
@@ -341,7 +357,7 @@ def _band(band: Band) -> Data:
 def _band_entry() -> Data:
     """The entry of the legend for all jumps."""
     return {
-        "type": "scatter", "mode": "markers", "name": BANDS, "legend": MOTIONS, "x": [None], "y": [None],
+        "type": "scatter", "mode": "markers", "name": shown(BANDS), "legend": MOTIONS, "x": [None], "y": [None],
         "showlegend": True, "marker": {"color": "rgba(119, 119, 119, 0.4)", "symbol": "square", "size": 12},
         "hoverinfo": "skip",
     }  # fmt: skip
@@ -361,7 +377,7 @@ def _states(figure: Figure, *, listed: bool) -> Iterator[Data]:
             "base": begins,
             "x": widths,
             "y": rows,
-            "name": words(state).lower(),
+            "name": motion_text(state),
             **_state_group(figure, state, first=place == 0),
             "showlegend": listed and state not in figure.regimes,
             "marker": {
@@ -369,7 +385,7 @@ def _states(figure: Figure, *, listed: bool) -> Iterator[Data]:
                 "pattern": {"shape": pattern, "fgcolor": "#333333", "bgcolor": colour, "size": 6},
                 "line": {"width": 0},
             },
-            "hovertemplate": f"%{{y}}: {words(state).lower()}<extra></extra>",
+            "hovertemplate": f"%{{y}}: {motion_text(state)}<extra></extra>",
         }
 
 

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any, Final
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.json_text import numbers
 from sprag.service.results.figures.motion import motion_figure
+from sprag.service.results.figures.read import read_figure
 from sprag.service.spec.fields import WHICH_CASES
 from sprag.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from sprag.service.results.reading import Reading
     from sprag.worker.models import Trajectory
     from sprag.worker.study import Study
 
@@ -21,10 +23,13 @@ if TYPE_CHECKING:
 SAMPLES: Final = 1441
 
 
-def machine_case(study: Study, held: Sequence[tuple[str, Study]] = (), columns: int = 2) -> dict[str, Any]:
+def machine_case(
+    study: Study, reading: Reading, held: Sequence[tuple[str, Study]] = (), columns: int = 2
+) -> dict[str, Any]:
     """Ending, results and figure of a machine's first case, beside others with their names. For the computing process.
 
-    ``held`` of the answer are ending and results of the others; the figure has ``columns`` panels in a row.
+    ``held`` of the answer are ending and results of the others; the figure, in the units of ``reading``, has
+    ``columns`` panels in a row.
     """
     found = _results(study)
     beside = [_results(other) for _, other in held]
@@ -33,7 +38,8 @@ def machine_case(study: Study, held: Sequence[tuple[str, Study]] = (), columns: 
         motions = [
             (name, _whole(other)) for (name, other), own in zip(held, beside, strict=True) if own["ending"] == models.OK
         ]
-        figure = plotly_figure(motion_figure(_whole(study), models.presentation_of(study), motions, columns))
+        described = motion_figure(_whole(study), models.presentation_of(study), motions, columns)
+        figure = plotly_figure(read_figure(described, reading))
     return {**found, "figure": figure, "held": beside}
 
 

@@ -9,14 +9,21 @@ from urllib.parse import urlencode
 
 from sprag.service.faults import Fault
 from sprag.service.http.web.figures.fit import FitChart, fit_chart
-from sprag.service.http.web.figures.linkage import Drawing, drawings
+from sprag.service.http.web.form.columns import COLUMNS
 from sprag.service.http.web.form.entries import Faults
 from sprag.service.http.web.form.shaft import is_shaft
 from sprag.service.http.web.form.shaft_spec import step_of
 from sprag.service.http.web.form.spec import clutch_pointers, field_of, pendulums_of, spec_of
 from sprag.service.jobs.preview import preview_json
+from sprag.service.languages import gettext
+from sprag.service.languages.ranges import allowed_text
+from sprag.service.results.draft_words import draft_words
+from sprag.service.results.fault_texts import fault_text
+from sprag.service.results.figures.linkage import Drawing, drawings
 from sprag.service.results.fits import fit_json
-from sprag.service.results.wording import unit_text
+from sprag.service.results.quantities import TYPED
+from sprag.service.results.reading import Choice, reading_for
+from sprag.service.results.wording import duration, unit_text
 from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
 from sprag.service.spec.derive import with_values
 from sprag.service.spec.document import ParsedSpec, SpecError, load_spec, parse_spec
@@ -46,7 +53,7 @@ class Checked:
     ``faults`` contains the messages by field ("" for general ones); ``preview`` is None while there are any. ``fits``
     contains the report and the picture of each clutch that could be fitted, regardless of other faults; ``notes`` the
     assumptions about measured data. ``finish`` is the deadline, which is not part of the spec. ``sketch`` contains the
-    mechanisms of a machine shaft.
+    mechanisms of a machine shaft, ``words`` the study in a sentence.
     """
 
     spec: dict[str, Any]
@@ -59,6 +66,7 @@ class Checked:
     notes: list[str] = field(default_factory=list)
     empty: frozenset[str] = frozenset()
     sketch: tuple[Drawing, ...] = ()
+    words: str = ""
 
     @property
     def query(self) -> str:
@@ -80,8 +88,13 @@ def _none_known(_study: Study) -> int:
     return 0
 
 
-def look_over(values: Mapping[str, str], chunking: Chunking, known: Known, now: datetime) -> Checked:
-    """Check a form, given by fields or as text, with its deadline; ``known`` as for `check_form`."""
+def look_over(
+    values: Mapping[str, str], chunking: Chunking, known: Known, now: datetime, choice: Choice | None = None
+) -> Checked:
+    """Check a form, given by fields or as text, with its deadline; ``known`` as for `check_form`.
+
+    ``choice`` has the units and names of the sentence about it.
+    """
     text, finish, fault = values.get("finish_by", "").strip(), None, ""
     try:
         finish = finish_at(text, now) if text else None
@@ -95,7 +108,17 @@ def look_over(values: Mapping[str, str], chunking: Chunking, known: Known, now: 
     checked.finish, checked.finish_text = finish, text
     if fault:
         checked.faults["finish_by"], checked.parsed, checked.preview = [fault], None, None
+    if checked.parsed is not None and checked.preview is not None:
+        checked.words = _words(checked.parsed, checked.preview, choice or Choice(TYPED))
     return checked
+
+
+def _words(parsed: ParsedSpec, preview: Preview, choice: Choice) -> str:
+    """The study in a sentence."""
+    reading = reading_for(parsed.study, parsed.spec, choice)
+    seconds = preview["estimated_seconds"]
+    time = gettext("about {time}", time=duration(seconds)) if seconds >= 1.0 else duration(seconds)
+    return draft_words(parsed.study, parsed.spec, preview, reading, time)
 
 
 def check_form(
@@ -118,6 +141,8 @@ def check_form(
                 # One field can stand for several places of the spec, as the value of a parameter at all points does.
                 text = step_of(item.where or "") + message(item)
                 texts += [text] if text not in texts else []
+    if values.get(COLUMNS, "").strip() and "axes" in spec:
+        found.faults[COLUMNS] = ["has columns that are not used yet; make axes of them, or empty the field"]
     if found.faults:
         found.parsed = None
     if found.parsed is not None:
@@ -162,13 +187,13 @@ def check_text(
 
 def message(item: Fault) -> str:
     """A fault as a sentence beside its field."""
-    parts = [item.message]
+    parts = [fault_text(item)]
     if item.value is not None and not isinstance(item.value, list | dict):
-        parts.append(f"got {plainly(item.value)}")
+        parts.append(gettext("got {value}", value=plainly(item.value)))
     if item.allowed:
-        parts.append(f"allowed: {unit_text(item.allowed)}")
+        parts.append(gettext("allowed: {allowed}", allowed=unit_text(allowed_text(item.allowed))))
     elif item.unit and item.unit != "1":
-        parts.append(f"in {unit_text(item.unit)}")
+        parts.append(gettext("in {unit}", unit=unit_text(item.unit)))
     return "; ".join(parts)
 
 

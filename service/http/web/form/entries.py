@@ -6,12 +6,14 @@ import re
 from collections.abc import Mapping
 from typing import Any, Final
 
+from sprag.service.spec.numbers import settled, with_point
+
 Values = dict[str, str]
 Faults = dict[str, list[str]]
 
 _NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _WHOLE: Final = re.compile(r"[+-]?[0-9]{1,18}")
-#: Separator of a list: a comma counts only before a blank, so that a decimal comma is reported as a fault.
+#: Separator of a list: a comma counts only before a blank, otherwise it is decimal.
 _BETWEEN: Final = re.compile(r"[;\n]|,\s")
 
 
@@ -20,12 +22,13 @@ def plain(text: str) -> Any:
     text = text.strip()
     if _WHOLE.fullmatch(text):
         return int(text)
-    return float(text) if _NUMBER.fullmatch(text) else text
+    number = with_point(text)
+    return float(number) if _NUMBER.fullmatch(number) else text
 
 
 def list_of(text: str) -> list[Any]:
-    """The entries of a list."""
-    return [plain(item) for item in _BETWEEN.split(text) if item.strip()]
+    """The entries of a list, whose commas are decimal for all of them where one settles it."""
+    return [plain(item) for item in settled([item for item in _BETWEEN.split(text) if item.strip()])]
 
 
 def names_of(text: str) -> list[str]:

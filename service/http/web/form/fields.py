@@ -10,6 +10,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
+from sprag.service.languages import ENGLISH, N_, _, current
+from sprag.service.results.reading import Reading
 from sprag.service.results.wording import number, words
 from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN, Described
 from sprag.service.spec.fields import placed
@@ -20,7 +22,8 @@ from sprag.worker.models import Parameter
 
 #: The model that the form describes unless another is chosen.
 FORM_MODEL: Final = "vibration-drive"
-_SECTIONS: Final = {"excitation": "Vibration of the base", "shaft": "Output shaft", "gravity": "Surroundings"}
+#: Placeholders in paths of the catalogue.
+_NUMBERED: Final = frozenset({"N", "K", "NAME"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,21 +52,37 @@ class Section:
     fields: tuple[Field, ...]
 
 
-def sections() -> list[Section]:
-    """The sections beside those of the pendulums and the clutch."""
-    catalogue = models.parameter_catalogue(FORM_MODEL)
-    found = []
-    for name, title in _SECTIONS.items():
-        entries = [entry for entry in catalogue if entry.path.split(".")[0] == name]
-        found.append(Section(title, f"/base/{name}", tuple(field_for(entry, entry.path) for entry in entries)))
-    return found
+def sections(model: str = FORM_MODEL) -> list[Section]:
+    """A section for each part of the machine, in the order and with the titles of the model's presentation.
+
+    Parts that it does not name follow, titled by their name. Those with indices (pendulums, clutch) have fields of
+    their own.
+    """
+    titles = models.model_of(model).presentation.sections
+    parts: dict[str, list[Parameter]] = {part: [] for part in titles}
+    for entry in models.parameter_catalogue(model):
+        parts.setdefault(_part(entry), []).append(entry)
+    return [
+        Section(
+            _(titles.get(part, words(part or "other parameters"))),
+            f"/base/{part}".rstrip("/"),
+            tuple(field_for(e, e.path) for e in entries),
+        )
+        for part, entries in parts.items()
+        if entries and not any(_NUMBERED & set(entry.path.split(".")) for entry in entries)
+    ]
+
+
+def _part(entry: Parameter) -> str:
+    """The part of the machine that a parameter belongs to; "" where its path has no parts."""
+    return entry.path.partition(".")[0] if "." in entry.path else ""
 
 
 def pendulum(index: int) -> Section:
     """The section of one pendulum."""
     entries = [entry for entry in models.parameter_catalogue(FORM_MODEL) if entry.path.startswith("pendulums.N.")]
     fields = tuple(field_for(entry, entry.path.replace(".N.", f".{index}.")) for entry in entries)
-    return Section(f"Pendulum {index}", f"/base/pendulums/{index}", fields)
+    return Section(_("Pendulum {number}", number=index), f"/base/pendulums/{index}", fields)
 
 
 def field_for(entry: Parameter, path: str) -> Field:
@@ -71,11 +90,11 @@ def field_for(entry: Parameter, path: str) -> Field:
     text = example(entry.unit).split('"')
     return Field(
         name="/base/" + path.replace(".", "/"),
-        label=words(path.rsplit(".", maxsplit=1)[-1]),
+        label=_(words(path.rsplit(".", maxsplit=1)[-1])),
         symbol=entry.symbol,
         mark=path.rsplit(".", maxsplit=1)[-1],
         unit=entry.unit,
-        help=entry.help,
+        help=_(entry.help),
         range=range_words(entry),
         required=entry.default is None,
         default=_default_text(entry.default),
@@ -87,7 +106,7 @@ def _default_text(value: float | None) -> str:
     """What a field without an entry shows; a parameter without a bound has none."""
     if value is None:
         return ""
-    return number(value, 8) if math.isfinite(value) else "none"
+    return number(value, 8) if math.isfinite(value) else _("none")
 
 
 def run_fields() -> dict[str, Field]:
@@ -104,13 +123,16 @@ def degree_field(pointer: str) -> Field:
 def refine_fields() -> dict[str, Field]:
     """The fields of a refinement, by name."""
 
-    meaning = f"{refine.RESULTS.help}, separated by semicolons"
+    meaning = _("{what}, separated by semicolons", what=_(refine.RESULTS.help))
     own = [
-        Field("/refine/results", "Results", "", "", "", meaning, "", True, "", "shaft.speed.mean; efficiency"),
+        Field("/refine/results", _("Results"), "", "", "", meaning, "", True, "", "shaft.speed.mean; efficiency"),
         described(refine.ERROR, "/refine"),
-        replace(described(refine.START, "/refine"), default=f"{refine.STARTS[1]}, of a map {refine.STARTS[2]}"),
+        replace(
+            described(refine.START, "/refine"),
+            default=_("{number}, of a map {other}", number=refine.STARTS[1], other=refine.STARTS[2]),
+        ),
         described(refine.FINEST, "/refine"),
-        replace(described(refine.MOST, "/refine"), default="no bound"),
+        replace(described(refine.MOST, "/refine"), default=_("no bound")),
     ]
     return {field.name.rpartition("/")[2]: field for field in own}
 
@@ -123,10 +145,11 @@ def search_fields() -> list[Field]:
 def described(entry: Described, pointer: str) -> Field:
     """The field of a described entry of the object at ``pointer``."""
     ends = [number(int(end)) if entry.kind in ("whole", "periods") else f"{end:g}" for end in (entry.low, entry.high)]
-    unit = " periods" if entry.kind == "periods" else ""
-    limits = f"{ends[0]} to {ends[1]}{unit}" if entry.high else entry.limits
+    between = N_("{low} to {high} periods") if entry.kind == "periods" else N_("{low} to {high}")
+    limits = _(between, low=ends[0], high=ends[1]) if entry.high else entry.limits
     name = f"{pointer}/{entry.name}"
-    return Field(name, entry.label, "", "", "", entry.help, limits, False, entry.default_text, "", entry.choices)
+    choices = tuple((value, _(words(word) if word == value else word)) for value, word in entry.choices)
+    return Field(name, _(entry.label), "", "", "", _(entry.help), limits, False, entry.default_text, "", choices)
 
 
 def range_words(entry: Parameter) -> str:
@@ -135,9 +158,11 @@ def range_words(entry: Parameter) -> str:
     low, high = (number(bound, 8) for bound in (entry.low, entry.high))
     if math.isinf(entry.low) or math.isinf(entry.high):
         if math.isinf(entry.low):
-            return "" if math.isinf(entry.high) else f"at most {high}{unit}"
-        return f"{'above' if entry.low_open else 'at least'} {low}{unit}"
-    return f"above {low}, at most {high}{unit}" if entry.low_open else f"{low} … {high}{unit}"
+            return "" if math.isinf(entry.high) else _("at most {high}", high=f"{high}{unit}")
+        return _("above {low}", low=f"{low}{unit}") if entry.low_open else _("at least {low}", low=f"{low}{unit}")
+    if entry.low_open:
+        return _("above {low}, at most {high}", low=low, high=f"{high}{unit}")
+    return f"{low} … {high}{unit}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,8 +186,13 @@ def result_choices(pendulums: int, *, numbers: bool = False, model: str = FORM_M
             parts = name.split(".")
             group = words(".".join(parts[:2] if parts[0] == "pendulums" else parts[:1]))
             if not (numbers and entry.kind == "category"):
-                groups.setdefault(group, []).append(Choice(name, words(name), entry.unit))
+                groups.setdefault(_(group), []).append(Choice(name, label_of(name, model), entry.unit))
     return list(groups.items())
+
+
+def label_of(name: str, model: str = FORM_MODEL) -> str:
+    """What a list of parameters or results calls one; headings of pasted columns are these in English, or paths."""
+    return words(name) if current() == ENGLISH else Reading(model).caption(name)
 
 
 def categories() -> tuple[str, ...]:
@@ -179,17 +209,19 @@ def path_choices(pendulums: int, coefficients: dict[str, int]) -> Groups:
     coefficients : prefix of a clutch law's paths ("clutch.", "pendulums.0.clutch.") -> number of its coefficients
     """
     groups: dict[str, list[Choice]] = {}
+    titles = models.model_of(FORM_MODEL).presentation.sections
     for entry in models.parameter_catalogue(FORM_MODEL):
         if entry.path.startswith("clutch."):
             continue
         for index in range(pendulums if ".N." in entry.path else 1):
             path = entry.path.replace(".N.", f".{index}.")
-            group = words(path.rpartition(".")[0]) or "Surroundings"
-            groups.setdefault(group, []).append(Choice(path, words(path), entry.unit))
+            group = words(path.rpartition(".")[0]) or titles.get("", "")
+            groups.setdefault(_(group), []).append(Choice(path, label_of(path), entry.unit))
     for prefix, count in coefficients.items():
         for index in range(count):
             path = f"{prefix}coefficients.{index}"
             entry = placed(models.CLUTCH_COEFFICIENT, path)
-            choice = Choice(path, f"{words(prefix.rstrip('.'))} coefficient c{index + 1}", entry.unit)
-            groups.setdefault(words(prefix.rstrip(".")), []).append(choice)
+            part = _(words(prefix.rstrip(".")))
+            label = _("{part} coefficient c{number}", part=part, number=index + 1)
+            groups.setdefault(part, []).append(Choice(path, label, entry.unit))
     return list(groups.items())

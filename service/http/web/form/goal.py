@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from sprag.service.http.web.form.entries import Faults, Values, list_of, path_values, paths_of, plain, text_of
 from sprag.service.http.web.form.parts import PARTS, filled
+from sprag.service.languages import N_
 from sprag.service.spec.plan import goal
 
 #: What a search asks for in a form that was not about one.
@@ -24,7 +25,7 @@ GOAL_DEFAULTS: Final[Values] = {
     "/goal/polish": "on",
 }
 #: Kinds of limits with their labels.
-LIMITS: Final = (("at_most", "at most"), ("at_least", "at least"), ("is", "equal to"))
+LIMITS: Final = (("at_most", N_("at most")), ("at_least", N_("at least")), ("is", N_("equal to")))
 _NUMBERS: Final = ("population", "generations", "seed")
 _VARIABLE: Final = {"from": ("from", "to"), "values": ("values",)}
 

@@ -91,9 +91,9 @@ def laboratory_address(spec: Mapping[str, Any], **further: str) -> str:
     given = {"machine": OWN, **{name: text for name, text in texts.items() if text}, **further}
     address = f"{_PAGES[made['model']]}?{urlencode(given)}"
     if not fits(address):
-        told = "is too long for the address of the laboratory: give its tables fewer rows"
+        message = "is too long for the address of the laboratory: give its tables fewer rows"
         allowed = f"an address of at most {MAX_ADDRESS_BYTES:,} characters"
-        raise SpecError([Fault("/base", "out-of-range", told, f"{len(address):,} characters", allowed)])
+        raise SpecError([Fault("/base", "out-of-range", message, f"{len(address):,} characters", allowed)])
     return address
 
 
@@ -119,8 +119,8 @@ def own_spec(given: Mapping[str, str], model: str) -> dict[str, Any]:
     """The spec of a machine that an address describes; ApiError where it does not."""
     long = len(urlencode({name: given.get(name, "") for name in FIELDS}))
     if long > MAX_ADDRESS_BYTES:
-        told = f"base and run must have at most {MAX_ADDRESS_BYTES} characters in an address; got {long}."
-        raise ApiError("invalid-parameter", told)
+        text = f"base and run must have at most {MAX_ADDRESS_BYTES} characters in an address; got {long}."
+        raise ApiError("invalid-parameter", text)
     title = given.get("title", "").strip() or "Own machine"
     spec = {"sprag": 1, "model": model, "name": title, "base": _object(given, "base")}
     return spec | ({"run": _object(given, "run")} if given.get("run") else {})

@@ -8,17 +8,22 @@ import secrets
 from collections.abc import Mapping
 from typing import Annotated, Any, Final
 
-from fastapi import APIRouter, Query, Request
+from fastapi import Query, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.faults import FaultError
 from sprag.service.http.context import Context, Ctx, study_with
 from sprag.service.http.problems import ApiError, api_error
+from sprag.service.http.reading import CHOICE
 from sprag.service.http.respond import json_response
+from sprag.service.http.routers import page_router
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form import study_check
+from sprag.service.http.web.form.cases import kinds, methods
 from sprag.service.http.web.form.check import Checked, message
+from sprag.service.http.web.form.columns import take_columns
+from sprag.service.http.web.form.components import component_groups, take_component
 from sprag.service.http.web.form.entries import Values
 from sprag.service.http.web.form.fields import (
     FORM_MODEL,
@@ -49,17 +54,19 @@ from sprag.service.http.web.form.spec import (
     with_clutch_defaults,
 )
 from sprag.service.http.web.form.tolerances import OWN, distributions, drive_fields, own_name, with_batch
+from sprag.service.http.web.form.undo import history_of, remember, undo
 from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.templates import fragment, page, spec_text
 from sprag.service.http.work import Attended, Work
 from sprag.service.jobs.submission import Submission, take_in
 from sprag.service.presets import preset_names
 from sprag.service.spec.design import design_spec
+from sprag.service.spec.document import UNNAMED
 from sprag.service.spec.report import SpecError
 from sprag.worker import models
 from sprag.worker.models import MAX_PENDULUMS
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
 #: Initial values of an empty form.
 EMPTY_FORM: Final[Values] = {
@@ -82,9 +89,9 @@ EMPTY_SHAFT: Final[Values] = {
     "/refine/results": "irregularity",
 }
 #: Beginnings of the fields of the other question, which the page keeps though it does not show them.
-_OF_AXES: Final = ("/axes/", "/refine/", "/combine")
+_OF_AXES: Final = ("/axes/", "/refine/", "/combine", "/sample/", "/points", "/exclude/")
 _OF_SEARCH: Final = ("/goal/",)
-_OF_BATCH: Final = (OWN, "/drives", "/seed")
+_OF_BATCH: Final = (OWN, "/drives", "/seed", "/draws", "/correlations/")
 
 
 @router.get("/new")
@@ -132,7 +139,9 @@ def _start(
         known = along is None or (along in study.base and along not in study.derive)
         return design_spec(context.store.spec(clone), study, case, along if known else None)
     if clone is not None:
-        return context.store.spec(clone)
+        spec, name = context.store.spec(clone), context.store.get_study(clone).name
+        # A study that was given another name is cloned under that.
+        return spec if spec.get("name", UNNAMED) == name else {**spec, "name": name}
     if preset is None:
         return None
     if preset not in preset_names():
@@ -145,18 +154,28 @@ def _start(
 async def send_form(context: Ctx, work: Attended, request: Request, values: Form) -> Response:
     """Perform the pressed button: check the form, add or remove parts, or submit the study."""
     wanted = values.pop("do", "check")
+    if wanted == "undo":
+        undo(values)
+        return await run_in_threadpool(form_page, request, values, await look_over(context, work, values))
+    before = _as_sent(values)
     share_clutches(values)
     if wanted == "submit":
         checked, made = await work.check(study_check.form_study, context.library, values, context.store.clock.now())
         return await run_in_threadpool(_submit, context, request, values, checked, made)
     reshape(values, wanted)
+    if wanted == "take-component":
+        take_component(values, await run_in_threadpool(context.store.components))
+    taken = wanted == "take-columns"
+    faults = await run_in_threadpool(take_columns, values, _choices(values)) if taken else {}
+    remember(values, before)
     checked = await look_over(context, work, values)
+    checked.faults.update(faults)
     if wanted == "laboratory" and checked.preview is not None:
         try:
             address = await work.check(laboratory_address, checked.spec)
         except SpecError as error:
-            told = "; ".join(f"{item.where or 'the spec'}: {message(item)}" for item in error.faults)
-            checked.faults.setdefault("", []).append(f"The laboratory cannot show this machine: {told}")
+            text = "; ".join(f"{item.where or 'the spec'}: {message(item)}" for item in error.faults)
+            checked.faults.setdefault("", []).append(f"The laboratory cannot show this machine: {text}")
         else:
             return RedirectResponse(address, status_code=303)
     return await run_in_threadpool(form_page, request, values, checked)
@@ -198,7 +217,7 @@ async def check(context: Ctx, work: Attended, request: Request, values: Form) ->
 
 async def look_over(context: Context, work: Work, values: Mapping[str, str]) -> Checked:
     """Check a form, given by fields or as text."""
-    return await work.check(study_check.form, context.library, values, context.store.clock.now())
+    return await work.check(study_check.form, context.library, values, context.store.clock.now(), CHOICE.get())
 
 
 def reshape(values: Values, wanted: str) -> None:
@@ -249,9 +268,7 @@ def _adapt_formulas(values: Values, index: int) -> None:
 def form_page(request: Request, values: Values, checked: Checked | None, status: int = 200) -> Response:
     """The page with the form filled in with ``values``; ``checked`` is None where they were not checked."""
     text_mode, shaft = "/text" in values, is_shaft(values)
-    laws = {} if text_mode else {pointer: _coefficients(values, pointer) for pointer in clutch_pointers(values)}
     model = models.MACHINE_SHAFT if shaft else FORM_MODEL
-    prefixes = {pointer.removeprefix("/base/").replace("/", ".") + ".": count for pointer, count in laws.items()}
     return page(
         "new_text.html" if text_mode else "new.html",
         status=status,
@@ -270,8 +287,9 @@ def form_page(request: Request, values: Values, checked: Checked | None, status:
         rows={name: range(0 if text_mode else count_of(values, name)) for name in PARTS},
         search=is_search(values),
         kept=_kept(values),
-        clutches=list(laws),
-        choices=[] if text_mode else _paths(values, prefixes),
+        choices=[] if text_mode else _choices(values),
+        components=[] if text_mode else component_groups(request.app.state.context.store.components(), shaft=shaft),
+        undoable=bool(history_of(values)),
         presets=[preset for preset in map(preset_of, preset_names()) if text_mode or _fits_form(preset, shaft=shaft)],
         most_coefficients=models.MAX_COEFFICIENTS,
         run=run_fields(),
@@ -286,6 +304,8 @@ def form_page(request: Request, values: Values, checked: Checked | None, status:
         own_name=own_name,
         drive_fields=drive_fields(),
         distributions=distributions(),
+        sample_methods=methods(),
+        exclusion_kinds=kinds(),
     )
 
 
@@ -298,11 +318,20 @@ async def spec_in_form(work: Work, spec: dict[str, Any]) -> Response:
     return await run_in_threadpool(form_page, work.request, values, await look_over(work.context, work, values))
 
 
-def _paths(values: Values, prefixes: dict[str, int]) -> Groups:
+def _choices(values: Values) -> Groups:
     """The parameters that can vary, by group."""
     if is_shaft(values):
         return shaft_paths(base_of(values, {}))
+    laws = {pointer: _coefficients(values, pointer) for pointer in clutch_pointers(values)}
+    prefixes = {pointer.removeprefix("/base/").replace("/", ".") + ".": count for pointer, count in laws.items()}
     return path_choices(pendulums_of(values), prefixes)
+
+
+def _as_sent(values: Values) -> Values:
+    """The form before its buttons change it; sharing or separating the clutches is undone with what it moves."""
+    own, has_common = values.get("clutches") == "own", "/base/clutch/kind" in values
+    moved = own == has_common and not is_shaft(values) and "/text" not in values
+    return {**values, **({"clutches": "common" if own else "own"} if moved else {})}
 
 
 def _kept(values: Values) -> Values:

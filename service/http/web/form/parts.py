@@ -32,6 +32,12 @@ class Part:
     new: Values = field(default_factory=dict)
 
 
+#: Correlations that the form shows; a spec may have more.
+_MOST_CORRELATIONS: Final = 20
+
+#: Conditions that the form shows; a spec may have more.
+_MOST_CONDITIONS: Final = 20
+
 #: By the name of the field with the number of rows.
 PARTS: Final = {
     "axes": Part("/axes", MAX_AXES, ("path", "tied", "values", "from", "to", "count", "step"), {"way": "linspace"}),
@@ -39,6 +45,9 @@ PARTS: Final = {
     "best": Part("/goal/best", goal.BEST.high, ("result",), {"toward": "max"}),
     "subject_to": Part("/goal/subject_to", goal.SUBJECT_TO.high, ("result", "value"), {"kind": "at_most"}),
     "at": Part("/goal/at", MAX_AXES, ("path", "values")),
+    "ranges": Part("/sample/ranges", MAX_AXES, ("path", "tied", "from", "to")),
+    "exclude": Part("/exclude", _MOST_CONDITIONS, ("path", "value", "and/path", "and/value")),
+    "correlations": Part("/correlations", _MOST_CORRELATIONS, ("between/0", "between/1", "coefficient")),
     "stages": Part("/base/drive/stages", machine_shaft.MAX_STAGES, ("kind",)),
     "parts": Part("/base/parts", machine_shaft.MAX_PARTS, ("mechanism",)),
 }

@@ -13,6 +13,8 @@ from typing import Any, Final
 
 from sprag.service.http.web.form.entries import count_in
 from sprag.service.http.web.form.fields import Choice, Field, Groups, described, field_for
+from sprag.service.languages import ENGLISH, N_, _, current
+from sprag.service.results.reading import Reading
 from sprag.service.results.wording import words
 from sprag.service.spec.described import Described
 from sprag.service.spec.machine.shaft import MEAN_SPEED_IS, read_shaft
@@ -33,26 +35,27 @@ from sprag.worker.models import Parameter, machine_shaft
 
 _PART: Final = re.compile(r"parts\.(\d+)\.")
 _GROUPS: Final = (
-    ("drive.flywheel.", "Flywheel"), ("drive.motor.", "Motor"), ("drive.stages.", "Stages"), ("drive.", "Drive"),
-    ("mechanism.", "Mechanism"), ("operation.", "Operation"), ("constants.", "Constants"),
+    ("drive.flywheel.", N_("Flywheel")), ("drive.motor.", N_("Motor")), ("drive.stages.", N_("Stages")),
+    ("drive.", N_("Drive")),
+    ("mechanism.", N_("Mechanism")), ("operation.", N_("Operation")), ("constants.", N_("Constants")),
 )  # fmt: skip
 #: How the driving torque is given, and the fields of each way.
 DRIVE: Final = "drive_is"
 _DRIVES: Final = (
-    ("found", "the constant torque that balances the operation"), ("value", "a constant torque"),
-    ("formula", "a formula of the angle"), ("csv", "a table over the angle"),
+    ("found", N_("the constant torque that balances the operation")), ("value", N_("a constant torque")),
+    ("formula", N_("a formula of the angle")), ("csv", N_("a table over the angle")),
 )  # fmt: skip
 CONSTANTS: Final = "/base/constants"
-_CONSTANTS_HELP: Final = "one a line: name = value"
-_MOTORS: Final = {"kloss": "an induction motor (Kloss)", "linear": "a motor with a linear characteristic",
-                  "table": "a motor with a measured characteristic"}  # fmt: skip
-_FORMULA_HELP: Final = "of phi in rad, such as 40*sin(2*phi)^2; of an operation also of t in s, x and omega"
-_CSV_HELP: Final = "two columns, with units in their headings"
-_STEPS_HELP: Final = "one step a line: from; to; value"
-_NO_CHOICE: Final = (("none", "none"),)
+_CONSTANTS_HELP: Final = N_("one a line: name = value")
+_MOTORS: Final = {"kloss": N_("an induction motor (Kloss)"), "linear": N_("a motor with a linear characteristic"),
+                  "table": N_("a motor with a measured characteristic")}  # fmt: skip
+_FORMULA_HELP: Final = N_("of phi in rad, such as 40*sin(2*phi)^2; of an operation also of t in s, x and omega")
+_CSV_HELP: Final = N_("two columns, with units in their headings")
+_STEPS_HELP: Final = N_("one step a line: from; to; value")
+_NO_CHOICE: Final = (("none", N_("none")),)
 _OPERATIONS: Final = (
-    *_NO_CHOICE, ("value", "constant"), ("steps", "steps"), ("formula", "formula"), ("csv", "table"),
-    ("gas", "gas in a compressor"), ("indicator", "indicator diagram"),
+    *_NO_CHOICE, ("value", N_("constant")), ("steps", N_("steps")), ("formula", N_("formula")), ("csv", N_("table")),
+    ("gas", N_("gas in a compressor")), ("indicator", N_("indicator diagram")),
 )  # fmt: skip
 #: Numbers that a mechanism of two masses, or a four-bar with the weight of its ram only, does not use.
 _BY_MASSES: Final = ("rod_inertia", "coupler_inertia")
@@ -117,14 +120,14 @@ def owners(values: Mapping[str, str]) -> list[str]:
 
 def blocks(values: Mapping[str, str]) -> list[Block]:
     """The blocks of the machine in their order."""
-    found = [Block("Machine", tuple(_machine(values))), Block("Drive", tuple(_drive(values)))]
+    found = [Block(N_("Machine"), tuple(_machine(values))), Block(N_("Drive"), tuple(_drive(values)))]
     for index in range(stages_of(values)):
-        found.append(Block(f"Stage {index + 1}", tuple(_stage(values, index)), ("stages", index)))
+        found.append(Block(_("Stage {number}", number=index + 1), tuple(_stage(values, index)), ("stages", index)))
     for index, owner in enumerate(owners(values)):
-        part = f"Part {index + 1}: " if several(values) else ""
-        title = f"{part}mechanism" if part else "Mechanism"
-        found.append(Block(title, tuple(_mechanism(values, owner)), ("parts", index) if part else None))
-        found.append(Block(f"{part}operation" if part else "Operation", tuple(_operation(values, owner))))
+        part = index + 1 if several(values) else 0
+        titles = [_of_part(part, title) for title in ("Mechanism", "Operation")]
+        found.append(Block(titles[0], tuple(_mechanism(values, owner)), ("parts", index) if part else None))
+        found.append(Block(titles[1], tuple(_operation(values, owner))))
     return found
 
 
@@ -157,8 +160,9 @@ def _text(name: str, label: str, help: str, lines: int, example: str) -> Entry:
 
 def _machine(values: Mapping[str, str]) -> list[Entry]:
     most = max(machine_shaft.REVOLUTIONS)
-    cycle = Field("/base/cycle", "Cycle", "", "", "", f"revolutions until everything repeats, 1 to {most}", "", False,
-                  "1 revolution", "2 revolutions")  # fmt: skip
+    turns = _("revolutions until everything repeats, 1 to {most}", most=most)
+    cycle = Field("/base/cycle", N_("Cycle"), "", "", "", turns, "", False,
+                  N_("1 revolution"), "2 revolutions")  # fmt: skip
     top = numbers_under("")
     names = [name for name in ("mean_speed", "wanted_irregularity", "friction_torque", "gravity") if name in top]
     if values.get(DRIVE) in MOTOR.values:
@@ -168,15 +172,19 @@ def _machine(values: Mapping[str, str]) -> list[Entry]:
         _described(MEAN_SPEED_IS, "/base"),
         Entry(cycle),
         *(_parameter(top[name], "/base") for name in names if name != "mean_speed"),
-        Entry(replace(described(PHI_C, "/base"), label="Reference angle", symbol="phi_c", default="by default")),
-        Entry(Field(CONSTANTS, "Constants of formulas", "", "", "", _CONSTANTS_HELP, "", False, "", "k = 40"), lines=2),
+        Entry(
+            replace(described(PHI_C, "/base"), label=N_("Reference angle"), symbol="phi_c", default=N_("by default"))
+        ),
+        Entry(
+            Field(CONSTANTS, N_("Constants of formulas"), "", "", "", _CONSTANTS_HELP, "", False, "", "k = 40"), lines=2
+        ),
     ]
 
 
 def _drive(values: Mapping[str, str]) -> list[Entry]:
     motors = tuple((kind, _MOTORS.get(kind, f"{kind} motor")) for kind in MOTOR.values)
     found = _numbers("drive.", "/base/drive", only=("inertia",))
-    found.append(_select(DRIVE, "Driving torque", (*_DRIVES, *motors), "or the motor that gives it", own=True))
+    found.append(_select(DRIVE, N_("Driving torque"), (*_DRIVES, *motors), N_("or the motor that gives it"), own=True))
     way = values.get(DRIVE, "found")
     if way in MOTOR.values:
         own = numbers_of({"balance": "motor", "drive": {"motor": way}}, "drive.motor.")
@@ -190,10 +198,12 @@ def _drive(values: Mapping[str, str]) -> list[Entry]:
     if way in {"value", "formula", "csv"}:
         balance = _described(BALANCE, "/base").field
         kept = tuple(pair for pair in balance.choices if pair[0] != "motor")
-        found.append(Entry(replace(balance, choices=(("", "by default"), *kept))))
+        found.append(Entry(replace(balance, choices=(("", N_("by default")), *kept))))
         found.append(_described(BALANCE_SIDE, "/base"))
-    shapes = (*_NO_CHOICE, *((kind, kind) for kind in FLYWHEEL.values))
-    found.append(_select("/base/drive/flywheel", "Flywheel", shapes, "on the main shaft, by its dimensions", own=True))
+    shapes = (*_NO_CHOICE, *((kind, words(kind)) for kind in FLYWHEEL.values))
+    found.append(
+        _select("/base/drive/flywheel", N_("Flywheel"), shapes, N_("on the main shaft, by its dimensions"), own=True)
+    )
     if values.get("/base/drive/flywheel", "none") != "none":
         found += _numbers("drive.flywheel.", "/base/drive/flywheel")
     return found
@@ -209,9 +219,9 @@ def _stage(values: Mapping[str, str], index: int) -> list[Entry]:
 def _mechanism(values: Mapping[str, str], owner: str) -> list[Entry]:
     pointer = f"{owner}/mechanism"
     kinds = (*_NO_CHOICE, *((kind, words(kind)) for kind in MECHANISM_CHOICES),
-             ("formula", "inertia as a formula"), ("csv", "inertia as a table"))  # fmt: skip
+             ("formula", N_("inertia as a formula")), ("csv", N_("inertia as a table")))  # fmt: skip
     found = [] if owner == "/base" else [_parameter(numbers_under("parts.N.")["crank_angle"], owner)]
-    found.append(_select(pointer, "Mechanism", kinds, "", own=True))
+    found.append(_select(pointer, N_("Mechanism"), kinds, "", own=True))
     kind = values.get(pointer, "none")
     if kind in {"formula", "csv"}:
         return found + _diagram(pointer, kind, "angle [deg],inertia [kg*m^2]")
@@ -229,7 +239,7 @@ def _mechanism(values: Mapping[str, str], owner: str) -> list[Entry]:
 def _operation(values: Mapping[str, str], owner: str) -> list[Entry]:
     pointer = f"{owner}/operation"
     form = values.get(pointer, "none")
-    found = [_select(pointer, "Resistance", _OPERATIONS, "", own=True)]
+    found = [_select(pointer, N_("Resistance"), _OPERATIONS, "", own=True)]
     if form == "none":
         return found
     if form == "gas":
@@ -250,7 +260,7 @@ def _operation(values: Mapping[str, str], owner: str) -> list[Entry]:
         if form == "value":
             found += _numbers("operation.", pointer, only=("value",))
         elif form == "steps":
-            found.append(_text(f"{pointer}/steps", "Steps", _STEPS_HELP, 3, "120 deg; 180 deg; 20 kN"))
+            found.append(_text(f"{pointer}/steps", N_("Steps"), _STEPS_HELP, 3, "120 deg; 180 deg; 20 kN"))
         else:
             found += _diagram(pointer, form, "angle [deg],force [kN]")
     return found + _numbers("operation.", pointer, only=("scale", "efficiency"))
@@ -259,8 +269,8 @@ def _operation(values: Mapping[str, str], owner: str) -> list[Entry]:
 def _diagram(pointer: str, form: str, example: str) -> list[Entry]:
     """The field of a formula, or those of a table."""
     if form == "formula":
-        return [_text(f"{pointer}/formula", "Formula", _FORMULA_HELP, 2, "40*sin(2*phi)^2")]
-    table = _text(f"{pointer}/csv", "Table", _CSV_HELP, 5, f"{example}\n0,0\n180,20\n360,0")
+        return [_text(f"{pointer}/formula", N_("Formula"), _FORMULA_HELP, 2, "40*sin(2*phi)^2")]
+    table = _text(f"{pointer}/csv", N_("Table"), _CSV_HELP, 5, f"{example}\n0,0\n180,20\n360,0")
     return [table, _described(INTERPOLATION, pointer)]
 
 
@@ -273,16 +283,20 @@ def part_of(path: str) -> tuple[int, str]:
 def group_of(path: str) -> str:
     """Heading under which a number stands."""
     part, own = part_of(path)
-    title = next((title for prefix, title in _GROUPS if own.startswith(prefix)), "Machine")
-    return f"Part {part}: {title.lower()}" if part else title
+    title = next((title for prefix, title in _GROUPS if own.startswith(prefix)), N_("Machine"))
+    return _of_part(part, title)
+
+
+def _of_part(part: int, title: str) -> str:
+    """A heading in the language of the page; of a part, with its number from 1."""
+    return _("Part {number}: {label}", number=part, label=_(title).lower()) if part else _(title)
 
 
 def shaft_paths(base: Mapping[str, Any]) -> Groups:
     """The parameters of a machine that can vary, by group; none while its structure cannot be read."""
     groups: dict[str, list[Choice]] = {}
     for path, entry in read_shaft(Report(), base).parameters.items():
-        label = words(
-            re.sub(r"^(mechanism\.\w+|operation(\.gas|\.indicator)?|drive|constants)\.", "", part_of(path)[1])
-        )
+        own = re.sub(r"^(mechanism\.\w+|operation(\.gas|\.indicator)?|drive|constants)\.", "", part_of(path)[1])
+        label = words(own) if current() == ENGLISH else Reading(models.MACHINE_SHAFT).caption(path)
         groups.setdefault(group_of(path), []).append(Choice(path, label, entry.unit))
     return list(groups.items())

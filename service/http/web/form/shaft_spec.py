@@ -79,8 +79,8 @@ def _constants(text: str, faults: Faults) -> dict[str, Any]:
     for number, line in enumerate(text.splitlines(), start=1):
         name, equals, value = line.partition("=")
         if line.strip() and not equals:
-            told = f"line {number} has no equals sign; got {line.strip()}; allowed: lines such as k = 40"
-            faults.setdefault(CONSTANTS, []).append(told)
+            message = f"line {number} has no equals sign; got {line.strip()}; allowed: lines such as k = 40"
+            faults.setdefault(CONSTANTS, []).append(message)
         elif line.strip():
             found[name.strip()] = plain(value)
     return found

@@ -7,6 +7,15 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from sprag.service.faults import Fault
+from sprag.service.http.web.form.cases import (
+    blocks_of,
+    case_values,
+    exclusions_of,
+    field_of_block,
+    field_of_exclusion,
+    repeated_limits,
+)
+from sprag.service.http.web.form.correlations import correlation_values, correlations_of, field_of_correlation
 from sprag.service.http.web.form.entries import (
     Faults,
     Values,
@@ -49,7 +58,21 @@ REFINE_DEFAULTS: Final[Values] = {
 #: The form's choice for a run of a given time, which a spec expresses by its duration or window.
 TIMED: Final = "time"
 _FIELDS: Final = frozenset(
-    {"sprag", "model", "name", "base", "run", "axes", "combine", "derive", "refine", "goal", *TOLERANT}
+    {
+        "sprag",
+        "model",
+        "name",
+        "base",
+        "run",
+        "axes",
+        "combine",
+        "derive",
+        "refine",
+        "goal",
+        "correlations",
+        "exclude",
+        *TOLERANT,
+    }
 )
 #: Fields of the spec of a machine shaft that the form has.
 _SHAFT_FIELDS: Final = _FIELDS - {"run"}
@@ -90,11 +113,14 @@ def spec_of(values: Mapping[str, str]) -> tuple[dict[str, Any], Faults]:
         spec["derive"] = derive
     if not shaft:
         spec["run"] = _run(values)
-    spec |= tolerances_of(values)
+    spec |= tolerances_of(values) | correlations_of(values)
     if is_search(values):
         return spec | {"goal": goal_of(values, faults)}, faults
     axes = [_axis(values, index) for index in range(count_of(values, "axes"))]
-    spec["axes"] = [axis for axis in axes if axis is not None]
+    spec["axes"] = [axis for axis in axes if axis is not None] + list(blocks_of(values).values())
+    if conditions := exclusions_of(values):
+        spec["exclude"] = conditions
+        faults |= repeated_limits(values)
     spec["combine"] = values.get("/combine", "grid")
     if any("adaptive" in axis for axis in spec["axes"]):
         spec["refine"] = _refine(values)
@@ -105,11 +131,8 @@ def _drive_base(values: Mapping[str, str], faults: Faults) -> dict[str, Any]:
     """The base of a vibration drive."""
     base: dict[str, Any] = {}
     for section in sections():
-        name = section.pointer.rsplit("/", maxsplit=1)[-1]
-        if [field.name for field in section.fields] == [section.pointer]:
-            base |= _given(values, section.pointer, name)
-        else:
-            base[name] = _object(values, section.pointer, [field.name for field in section.fields])
+        found = _object(values, section.pointer, [field.name for field in section.fields])
+        base |= found if section.pointer == "/base" else {section.pointer.removeprefix("/base/"): found}
     base["pendulums"] = [
         _object(values, f"/base/pendulums/{index}", [field.name for field in pendulum(index).fields])
         for index in range(pendulums_of(values))
@@ -165,7 +188,7 @@ def _clutch(values: Mapping[str, str], pointer: str, faults: Faults) -> dict[str
     if values.get(f"{pointer}/kind", "law") != "data":
         coefficients = values.get(f"{pointer}/coefficients", "")
         # Blanks also separate numbers, where there is no unit among them.
-        if re.fullmatch(r"[-+0-9.eE\s]+", coefficients):
+        if re.fullmatch(r"(?:[-+0-9.eE\s]|,[0-9])+", coefficients):
             coefficients = "; ".join(coefficients.split())
         return {
             **({"coefficients": list_of(coefficients)} if coefficients.strip() else {}),
@@ -233,12 +256,18 @@ def field_of(pointer: str, values: Mapping[str, str]) -> str:
         return field_of_goal(pointer, values)
     if pointer.startswith("/tolerances"):
         return field_of_tolerance(pointer, values)
+    if pointer.startswith("/correlations"):
+        return field_of_correlation(pointer, values)
     if is_shaft(values) and pointer.startswith("/base"):
         return field_of_base(pointer, values)
+    if pointer.startswith("/exclude"):
+        return field_of_exclusion(pointer, values)
     match = re.fullmatch(r"/axes/(\d+)(?:/(.*))?", pointer)
     if match:
         # Axes that are not filled in are not in the spec.
         filled = [index for index in range(count_of(values, "axes")) if _axis(values, index) is not None]
+        if int(match[1]) >= len(filled) and blocks_of(values):
+            return field_of_block(int(match[1]) - len(filled), match[2] or "", values)
         index = filled[int(match[1])] if int(match[1]) < len(filled) else int(match[1])
         rest = match[2] or "path"
         if rest == SWEPT.name:
@@ -265,7 +294,9 @@ def values_of(spec: Mapping[str, Any]) -> Values:
         raise ValueError("the form describes another model")
     if not set(spec) <= (_SHAFT_FIELDS if shaft else _FIELDS) or spec.get("combine", "grid") not in ("grid", "zip"):
         raise ValueError("the form has no fields for all of this spec")
-    if not all(isinstance(axis, Mapping) and _plain_axis(axis) for axis in spec.get("axes", ())):
+    axes = [axis for axis in spec.get("axes", ()) if isinstance(axis, Mapping) and not {"sample", "points"} & set(axis)]
+    blocks = list(spec.get("axes", ()))[len(axes) :]
+    if not all(map(_plain_axis, axes)) or not all({"sample", "points"} & set(block) for block in blocks):
         raise ValueError("the form has no fields for all of these axes")
     values: Values = {"/name": str(spec.get("name", "")), "/combine": str(spec.get("combine", "grid"))}
     formulas = {path: f"{FORMULA} {text}" for path, text in formulas_of(spec).items()}
@@ -275,9 +306,10 @@ def values_of(spec: Mapping[str, Any]) -> Values:
     values |= goal_values(spec["goal"]) if "goal" in spec else GOAL_DEFAULTS
     for key, content in spec.get("refine", {}).items():
         values[f"/refine/{key}"] = "; ".join(content) if key == "results" else text_of(content)
-    values |= tolerance_values(spec, values)
-    values["axes"] = str(len(spec.get("axes", ())))
-    for index, axis in enumerate(spec.get("axes", ())):
+    values |= tolerance_values(spec, values) | correlation_values(spec)
+    values |= case_values(blocks, spec.get("exclude", ()))
+    values["axes"] = str(len(axes))
+    for index, axis in enumerate(axes):
         values |= _axis_values(f"/axes/{index}", axis)
     return values
 

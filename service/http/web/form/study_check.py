@@ -13,12 +13,14 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from datetime import datetime
 
+    from sprag.service.results.reading import Choice
 
-def form(library: Library, values: Mapping[str, str], now: datetime) -> Checked:
-    """Check a filled form."""
+
+def form(library: Library, values: Mapping[str, str], now: datetime, choice: Choice) -> Checked:
+    """Check a filled form; ``choice`` has the units and names of the sentence about it."""
     store = library.store
     # The study itself is not returned: it can be large, and no page shows it.
-    return replace(look_over(values, store.chunking, store.reusable, now), parsed=None)
+    return replace(look_over(values, store.chunking, store.reusable, now, choice), parsed=None)
 
 
 def form_study(library: Library, values: Mapping[str, str], now: datetime) -> tuple[Checked, Submission | None]:

@@ -7,15 +7,16 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from sprag.service.http.web.form.entries import Values, count_in, names_of, plain, text_of
+from sprag.service.http.web.form.entries import Values, count_in, list_of, names_of, plain, text_of
 from sprag.service.http.web.form.fields import Field, described, pendulum, sections
 from sprag.service.http.web.form.shaft import blocks, is_shaft
+from sprag.service.languages import _
 from sprag.service.results.wording import words
 from sprag.service.spec.draws.described import DISTRIBUTION, DRAWS
 from sprag.worker.models import MAX_PENDULUMS
 
 #: Fields of a spec that this part of the form shows.
-FIELDS: Final = ("tolerances", "drives", "seed")
+FIELDS: Final = ("tolerances", "drives", "seed", "draws")
 #: The box by which the form has them.
 BATCH: Final = "batch"
 #: Beginning of the names of these fields.
@@ -23,6 +24,8 @@ OWN: Final = "/tolerances/"
 #: The order of the tolerances in a spec that was cloned: another one would draw other drives.
 ORDER: Final = f"{OWN}order"
 _NORMAL: Final = DISTRIBUTION.values[0]
+#: The form's choice of a distribution by which the field "±" contains measured values.
+MEASURED: Final = "values"
 
 
 def with_batch(values: Mapping[str, str]) -> bool:
@@ -31,13 +34,13 @@ def with_batch(values: Mapping[str, str]) -> bool:
 
 
 def drive_fields() -> list[Field]:
-    """The fields for the number of drives and the seed."""
-    return [replace(described(DRAWS[name], ""), label=words(name)) for name in FIELDS[1:]]
+    """The fields for the number of drives, the seed and how they are drawn."""
+    return [replace(described(DRAWS[name], ""), label=_(words(name))) for name in FIELDS[1:]]
 
 
 def distributions() -> list[tuple[str, str]]:
     """The distributions and their labels."""
-    return [(name, words(name).lower()) for name in DISTRIBUTION.values]
+    return [*((name, _(words(name).lower())) for name in DISTRIBUTION.values), (MEASURED, _("measured values: a list"))]
 
 
 def tolerances_of(values: Mapping[str, str]) -> dict[str, Any]:
@@ -48,17 +51,22 @@ def tolerances_of(values: Mapping[str, str]) -> dict[str, Any]:
     for name, plus_minus in _filled(values):
         path = name.removeprefix(OWN).replace("/", ".")
         others = names_of(values.get(f"{name}/with", ""))
-        distribution = values.get(f"{name}/distribution", _NORMAL)
         items.append(
             {
                 "path": [path, *others] if others else path,
-                "plus_minus": plain(plus_minus),
-                **({} if distribution == _NORMAL else {"distribution": distribution}),
+                **_spread(plus_minus, values.get(f"{name}/distribution", _NORMAL)),
                 **({"shared": True} if others else {}),
             }
         )
     settings = {name: plain(values[f"/{name}"]) for name in FIELDS[1:] if values.get(f"/{name}", "").strip()}
     return {"tolerances": items, **settings}
+
+
+def _spread(text: str, distribution: str) -> dict[str, Any]:
+    """How the drives differ: measured values, or a distance from the nominal value with its distribution."""
+    if distribution == MEASURED:
+        return {"values": list_of(text)}
+    return {"plus_minus": plain(text), **({} if distribution == _NORMAL else {"distribution": distribution})}
 
 
 def _filled(values: Mapping[str, str]) -> Iterator[tuple[str, str]]:
@@ -102,18 +110,17 @@ def tolerance_values(spec: Mapping[str, Any], values: Mapping[str, str]) -> Valu
     shown = {field.removeprefix("/base/").replace("/", "."): field for field in _tolerant(values)}
     order: list[str] = []
     for item in spec["tolerances"]:
-        if "plus_minus" not in item:
-            raise ValueError("the form has no field for measured values")
         given = item["path"] if isinstance(item["path"], list) else [item["path"]]
-        paths = [own for path in given for own in (_matching(path, shown) if "*" in path else [path])]
+        paths = [own for path in given for own in (_matching(path, shown) or [path])]
         groups = [paths] if item.get("shared") else [[path] for path in paths]
         for first, *others in groups:
             if first not in shown:
                 raise ValueError(f"the form has no field for the tolerance of {first}")
             name = own_name(shown[first])
             order.append(name)
-            found[f"{name}/plus_minus"] = text_of(item["plus_minus"])
-            found[f"{name}/distribution"] = item.get("distribution", _NORMAL)
+            measured = "; ".join(map(text_of, item.get("values", ())))
+            found[f"{name}/plus_minus"] = measured or text_of(item["plus_minus"])
+            found[f"{name}/distribution"] = MEASURED if measured else item.get("distribution", _NORMAL)
             if others:
                 found[f"{name}/with"] = ", ".join(others)
     return found | {ORDER: " ".join(order)}

@@ -10,20 +10,27 @@ from fastapi import Depends, Request
 from sprag.service.http.problems import ApiError
 from sprag.service.http.web.form.entries import Values
 
+Pairs = list[tuple[str, str]]
 _FORM_TYPE: Final = "application/x-www-form-urlencoded"
 #: Fields of a form, at most.
 _MOST_FIELDS: Final = 2000
 
 
-async def read_form(request: Request) -> Values:
-    """Read the fields; the last value of a repeated name counts. Raises ApiError."""
+async def read_pairs(request: Request) -> Pairs:
+    """Read the fields, repeated ones too. Raises ApiError."""
     if request.headers.get("content-type", "").partition(";")[0].strip().lower() != _FORM_TYPE:
         raise ApiError("unsupported-media-type", f"A form is sent as {_FORM_TYPE}.")
     try:
         text = (await request.body()).decode("utf-8")
-        return dict(parse_qsl(text, keep_blank_values=True, max_num_fields=_MOST_FIELDS))
+        return parse_qsl(text, keep_blank_values=True, max_num_fields=_MOST_FIELDS)
     except ValueError as error:
         raise ApiError("bad-request", "The form cannot be read.") from error
 
 
+async def read_form(request: Request) -> Values:
+    """Read the fields; the last value of a repeated name counts. Raises ApiError."""
+    return dict(await read_pairs(request))
+
+
+RepeatedForm = Annotated[Pairs, Depends(read_pairs)]
 Form = Annotated[Values, Depends(read_form)]

@@ -5,19 +5,25 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final, Literal
 from urllib.parse import parse_qsl, urlencode
 
-from fastapi import APIRouter
 from starlette.responses import Response
 
 from sprag.service.http.drawing import picture, table
 from sprag.service.http.problems import ApiError
+from sprag.service.http.reading import CHOICE
 from sprag.service.http.respond import json_response
+from sprag.service.http.routers import page_router
 from sprag.service.http.web.figures.drive import curves_of, drive_case, turn_table
 from sprag.service.http.web.form.page import spec_in_form
 from sprag.service.http.web.laboratory.drive_setting import Setting, machines, setting, title_of, written
 from sprag.service.http.web.laboratory.sliders import position
 from sprag.service.http.web.templates import fragment, page
 from sprag.service.http.work import Attended, Work
+from sprag.service.languages import N_
+from sprag.service.results.figures.read import read_figure
+from sprag.service.results.phrases import meanings, shown, term
 from sprag.service.results.pictures.curves import draw_figure
+from sprag.service.results.reading import Reading, reading_for
+from sprag.service.results.regimes import motion_sentence
 from sprag.service.results.wording import number
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
@@ -25,16 +31,17 @@ from sprag.worker import models
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from sprag.service.results.reading import Choice
     from sprag.worker.study import Study
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
 #: Results that are always in sight with their labels, and the others of the table below the picture.
 _MAIN: Final = {
-    "shaft.speed.mean": "Mean speed",
-    "torque.mean": "Mean torque",
-    "power.useful.mean": "Useful power",
-    "efficiency": "Efficiency",
+    "shaft.speed.mean": N_("Mean speed"),
+    "torque.mean": N_("Mean torque"),
+    "power.useful.mean": N_("Useful power"),
+    "efficiency": N_("Efficiency"),
 }
 _FURTHER: Final = (
     "shaft.irregularity", "shaft.speed.min", "shaft.speed.max", "torque.max", "power.input.mean", "power.loss.mean",
@@ -43,24 +50,29 @@ _FURTHER: Final = (
 )  # fmt: skip
 #: Studies that can be made of a setting: what they vary, and the path.
 STUDIES: Final = {
-    "load": ("the load", "shaft.load"),
-    "frequency": ("the frequency", "excitation.frequency"),
-    "amplitude": ("the horizontal amplitude", "excitation.amplitude_x"),
+    "load": (N_("the load"), "shaft.load"),
+    "frequency": (N_("the frequency"), "excitation.frequency"),
+    "amplitude": (N_("the horizontal amplitude"), "excitation.amplitude_x"),
 }
 _VALUES: Final = 41
 _OWN: Final = "/laboratory/drive"
 
 
-def _settings(given: Mapping[str, str]) -> tuple[Setting, Setting | None]:
+def _settings(given: Mapping[str, str], choice: Choice) -> tuple[Setting, Setting | None]:
     """The setting of a URL, and the valid one that it holds for comparison."""
     held = setting(dict(parse_qsl(given["held"]))) if given.get("held") else None
-    return setting(given), None if held is None or held.faults else held
+    return setting(given, choice), None if held is None or held.faults else held
 
 
 def _query(chosen: Setting, held: Setting | None, hold: bool = False) -> str:
     """Both settings as parameters of a URL; with ``hold`` the first one is held."""
     kept = chosen if hold else held
     return chosen.query if kept is None else f"{chosen.query}&{urlencode({'held': kept.query})}"
+
+
+def _reading(chosen: Setting) -> Reading:
+    """How the reader of the page reads the drive."""
+    return reading_for(chosen.study, chosen.spec, CHOICE.get())
 
 
 def _study(held: Setting | None) -> Study | None:
@@ -70,15 +82,18 @@ def _study(held: Setting | None) -> Study | None:
 @router.get(_OWN)
 async def drive_laboratory(work: Attended) -> Response:
     """The laboratory."""
-    chosen, held = await work.check(_settings, dict(work.request.query_params))
+    chosen, held = await work.check(_settings, dict(work.request.query_params), CHOICE.get())
     # The first compilation takes seconds: the page is shown immediately, and its script waits for the numbers.
     ready = models.is_compiled(models.shape_of(chosen.study))
-    case = await work.run_case(drive_case, chosen.study, _study(held)) if ready and not chosen.faults else None
+    case = None
+    if ready and not chosen.faults:
+        case = await work.run_case(drive_case, chosen.study, _study(held), _reading(chosen))
     return page(
         "drive_laboratory.html",
         status=422 if chosen.faults else 200,
         chosen=chosen,
         position=position,
+        reading=_reading(chosen),
         held="" if held is None else held.query,
         machines=[(name, title_of(name)) for name in machines()],
         answer=_answer(chosen, held, case),
@@ -86,6 +101,7 @@ async def drive_laboratory(work: Attended) -> Response:
         state=_next_state(chosen, case),
         frames=None if case is None else case["frames"],
         looks=models.presentation_of(chosen.study).states,
+        words={state: shown(term(state)) for state in models.presentation_of(chosen.study).states},
         pendulums=_pendulums(chosen.study),
         picture=f"{_OWN}/picture.svg?{_query(chosen, held)}" if case is not None and case["figure"] else "",
         hold=f"{_OWN}?{_query(chosen, held, hold=True)}",
@@ -127,8 +143,13 @@ def _details(work: Work, chosen: Setting, held: Setting | None, case: dict[str, 
 def _others(chosen: Setting) -> list[tuple[str, str, str]]:
     """Path, text and unit of each number of a drive that has no slider, with those in which it starts."""
     slid = {slider.path for slider in chosen.sliders}
-    numbers = [(path, value) for path, value in chosen.study.base.items() if path not in slid]
-    return [(path, number(value, 8), unit_of(chosen.study, path)) for path, value in numbers]
+    reading = _reading(chosen)
+    numbers = [(path, value, unit_of(chosen.study, path)) for path, value in chosen.study.base.items()]
+    return [
+        (path, number(reading.value(value, unit), 8), reading.unit(unit))
+        for path, value, unit in numbers
+        if path not in slid
+    ]
 
 
 def _shown(
@@ -143,10 +164,11 @@ def _shown(
     return {
         "chosen": chosen,
         "case": case,
+        "reading": _reading(chosen),
         "rows": rows,
         "beside": beside,
         "results": {} if case is None else case["results"],
-        "sentence": "" if case is None else models.ENDING_SENTENCES.get(case["ending"], ""),
+        "sentence": "" if case is None else meanings(models.ENDING_SENTENCES).get(case["ending"], ""),
         "motion": _motion(case),
         "held_motion": _motion(beside),
         "flags": [] if case is None else _flag_sentences(chosen.study, case),
@@ -157,20 +179,20 @@ def _motion(case: dict[str, Any] | None) -> str:
     """The regime in a sentence."""
     if case is None or not case["regime"]:
         return ""
-    return models.motion_sentence(case["regime"], case["order"] or None)
+    return motion_sentence(case["regime"], case["order"] or None)
 
 
 def _flag_sentences(study: Study, case: dict[str, Any]) -> list[str]:
     """What the flags of a case mean, but for those that its regime says."""
-    known = models.flags_of(study.model)
+    known = meanings(models.flags_of(study.model))
     return [known[flag] for flag in case["flags"] if flag != case["regime"]]
 
 
 @router.get(f"{_OWN}/figure")
 async def drive_figure(work: Attended) -> Response:
     """Figure, frames and numbers of a setting, for the sliders."""
-    chosen, held = await work.check(_settings, dict(work.request.query_params))
-    case = None if chosen.faults else await work.run_case(drive_case, chosen.study, _study(held))
+    chosen, held = await work.check(_settings, dict(work.request.query_params), CHOICE.get())
+    case = None if chosen.faults else await work.run_case(drive_case, chosen.study, _study(held), _reading(chosen))
     return json_response(
         {
             "figure": None if case is None else case["figure"],
@@ -188,31 +210,33 @@ async def drive_figure(work: Attended) -> Response:
 @router.get(f"{_OWN}/picture.{{form}}")
 async def drive_curves(work: Attended, form: Literal["svg", "png", "csv"]) -> Response:
     """The motion as one picture or as a table, also for pages without JavaScript."""
-    chosen, held = await work.check(_settings, dict(work.request.query_params))
+    chosen, held = await work.check(_settings, dict(work.request.query_params), CHOICE.get())
     if chosen.faults:
         raise ApiError("invalid-spec", "; ".join(text for texts in chosen.faults.values() for text in texts))
     if form == "csv":
-        content = await work.run_case(turn_table, chosen.study)
+        content = await work.run_case(turn_table, chosen.study, _reading(chosen).units)
         if content is not None:
             return table(content, "csv", "laboratory")
     else:
         figure = await work.run_case(curves_of, chosen.study, _study(held))
         if figure is not None:
-            return await picture(draw_figure, form, figure, chosen.study.name).response(work)
+            return await picture(draw_figure, form, read_figure(figure, _reading(chosen)), chosen.study.name).response(
+                work
+            )
     raise ApiError("not-found", "The case did not end ok, so it has no motion to draw.")
 
 
 @router.get(f"{_OWN}/form")
 async def drive_form(work: Attended) -> Response:
     """The current drive in the form for a new study."""
-    chosen, _ = await work.check(_settings, dict(work.request.query_params))
+    chosen, _ = await work.check(_settings, dict(work.request.query_params), CHOICE.get())
     return await spec_in_form(work, {**chosen.spec, "axes": []})
 
 
 @router.get(f"{_OWN}/study")
 async def drive_study(work: Attended, along: str = "load") -> Response:
     """The current drive over the range of a slider, as a study to check and submit."""
-    chosen, _ = await work.check(_settings, dict(work.request.query_params))
+    chosen, _ = await work.check(_settings, dict(work.request.query_params), CHOICE.get())
     if along not in STUDIES:
         raise ApiError("not-found", f"Unknown axis; known axes: {', '.join(STUDIES)}.")
     word, path = STUDIES[along]

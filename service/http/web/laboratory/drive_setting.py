@@ -13,8 +13,11 @@ from sprag.service.http.views import preset_of
 from sprag.service.http.web.figures.shaft import overridden
 from sprag.service.http.web.form.entries import plain
 from sprag.service.http.web.form.own_machine import OWN, case_page, machine_of, read_machine
-from sprag.service.http.web.laboratory.sliders import Slider, faults_by_field, quantity_text, value_of
+from sprag.service.http.web.laboratory.sliders import Slider, faults_by_field, is_own, quantity_text, scale, value_of
+from sprag.service.languages import N_, _
 from sprag.service.presets import preset_names
+from sprag.service.results.quantities import TYPED
+from sprag.service.results.reading import Choice, reading_for
 from sprag.service.results.wording import words
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.fields import coefficient_unit
@@ -25,6 +28,7 @@ from sprag.worker.models.parameters import parameter_of
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from sprag.service.results.reading import Reading
     from sprag.worker.study import Study
 
 _PENDULUM: Final = re.compile(r"pendulums\.(\d+)\.")
@@ -51,20 +55,23 @@ class Range:
 
 #: Parameters that have a slider, by the end of their path, in the order of the page.
 _RANGES: Final[dict[str, Range]] = {
-    "excitation.frequency": Range("Excitation", "Frequency", 0.5, 2.0),
-    "excitation.amplitude_x": Range("Excitation", "Horizontal amplitude", 0.0, 2.5, 2e-3, unit="mm", size=1e-3),
-    "excitation.amplitude_y": Range("Excitation", "Vertical amplitude", 0.0, 2.5, 2e-3, unit="mm", size=1e-3),
-    "excitation.phase": Range("Excitation", "Phase of the vertical", 0.0, 0.0, unit="deg", size=math.pi / 180.0),
-    "shaft.load": Range("Shaft", "Load torque", 0.0, 4.0, 1.0),
-    "shaft.inertia": Range("Shaft", "Inertia", 0.1, 10.0, logarithmic=True),
-    "backlash": Range("Clutch", "Backlash", 0.0, 5.0, 0.02),
-    "clutch.coefficients.1": Range("Clutch", "Stiffness", 0.1, 10.0, logarithmic=True),
-    "damping": Range("Pendulum", "Damping", 0.0, 5.0, 0.02),
-    "mass": Range("Pendulum", "Mass", 0.0, 2.0),
-    "arm": Range("Pendulum", "Arm", 0.0, 2.0, unit="mm", size=1e-3),
-    "inertia": Range("Pendulum", "Inertia", 0.5, 2.0, logarithmic=True),
-    "spring_rate": Range("Pendulum", "Spring rate", 0.5, 2.0, logarithmic=True),
+    "excitation.frequency": Range(N_("Excitation"), N_("Frequency"), 0.5, 2.0),
+    "excitation.amplitude_x": Range(N_("Excitation"), N_("Horizontal amplitude"), 0.0, 2.5, 2e-3, unit="mm", size=1e-3),
+    "excitation.amplitude_y": Range(N_("Excitation"), N_("Vertical amplitude"), 0.0, 2.5, 2e-3, unit="mm", size=1e-3),
+    "excitation.phase": Range(
+        N_("Excitation"), N_("Phase of the vertical"), 0.0, 0.0, unit="deg", size=math.pi / 180.0
+    ),
+    "shaft.load": Range(N_("Shaft"), N_("Load torque"), 0.0, 4.0, 1.0),
+    "shaft.inertia": Range(N_("Shaft"), N_("Inertia"), 0.1, 10.0, logarithmic=True),
+    "backlash": Range(N_("Clutch"), N_("Backlash"), 0.0, 5.0, 0.02),
+    "clutch.coefficients.1": Range(N_("Clutch"), N_("Stiffness"), 0.1, 10.0, logarithmic=True),
+    "damping": Range(N_("Pendulum"), N_("Damping"), 0.0, 5.0, 0.02),
+    "mass": Range(N_("Pendulum"), N_("Mass"), 0.0, 2.0),
+    "arm": Range(N_("Pendulum"), N_("Arm"), 0.0, 2.0, unit="mm", size=1e-3),
+    "inertia": Range(N_("Pendulum"), N_("Inertia"), 0.5, 2.0, logarithmic=True),
+    "spring_rate": Range(N_("Pendulum"), N_("Spring rate"), 0.5, 2.0, logarithmic=True),
 }
+_USUAL: Final = Choice(TYPED)
 _STATE: Final = (".initial_angle", ".initial_speed", ".initial_windup", ".initial_clutch")
 _OF_CLUTCH: Final = (".initial_windup", ".initial_clutch")
 
@@ -130,9 +137,10 @@ def title_of(name: str) -> str:
     return words(name)
 
 
-def setting(given: Mapping[str, str]) -> Setting:
-    """The setting of a URL; ApiError for an unknown machine.
+def setting(given: Mapping[str, str], choice: Choice = _USUAL) -> Setting:
+    """The setting of a URL with sliders in its reader's units.
 
+    Raises ApiError for an unknown machine, SelectionError for units that cannot be shown.
     With ``start=rest`` the initial values given do not count.
     """
     machine = machine_of(given, given.get("machine") or next(iter(machines()), ""))
@@ -141,7 +149,11 @@ def setting(given: Mapping[str, str]) -> Setting:
     state = {path: text for path, text in texts.items() if _is_state(path) and given.get("start") != "rest"}
     values = {path: text for path, text in texts.items() if not _is_state(path)}
     # A field with the rounded text of the drive's own number leaves that number as it is.
-    changed = {path: text for path, text in values.items() if not _kind(path) or text != _own_text(own, path)}
+    changed = {
+        path: text
+        for path, text in values.items()
+        if not _kind(path) or not is_own(text, own.base[path], _unit(own, path))
+    }
     study, faults, warnings = _read(spec, own, changed | state)
     freed = False
     if faults and any(path.endswith(_OF_CLUTCH) for path in state):
@@ -149,7 +161,8 @@ def setting(given: Mapping[str, str]) -> Setting:
         kept = {path: text for path, text in state.items() if not path.endswith(_OF_CLUTCH)}
         study, faults, warnings = _read(spec, own, changed | kept)
         state, freed = kept, not faults
-    sliders = [_slider(own, study, path, values.get(path, "")) for path in _in_order(own.base)]
+    reading = reading_for(own, spec, choice)
+    sliders = [_slider(own, study, path, values.get(path, ""), reading, choice) for path in _in_order(own.base)]
     slid = {slider.path for slider in sliders}
     further = {path: text for path, text in values.items() if path not in slid}
     title = own.name if machine[0][1] == OWN else title_of(machine[0][1])
@@ -190,28 +203,31 @@ def _in_order(paths: Iterable[str]) -> list[str]:
     return sorted((path for path in paths if _kind(path)), key=lambda path: (order.index(_kind(path)), path))
 
 
-def _slider(own: Study, study: Study, path: str, text: str) -> Slider:
+def _slider(own: Study, study: Study, path: str, text: str, reading: Reading, choice: Choice) -> Slider:
     kind = _RANGES[_kind(path)]
     entry = parameter_of(own, path)
     stiffness = "coefficients" in path
-    unit = "" if entry is None else coefficient_unit(1) if stiffness else entry.unit
+    unit = _unit(own, path)
+    shown, factor = scale(unit, (kind.unit, kind.size), reading, choice)
     low, high = _limits(own, path, kind)
     found = _PENDULUM.match(path)
     several = sum(other.endswith(f".{path.rsplit('.', 1)[-1]}") for other in own.base if _PENDULUM.match(other)) > 1
-    given = _own_text(own, path)
+    given, label = quantity_text(own.base[path], shown, factor), _(kind.label)
+    typed = given if is_own(text, own.base[path], unit) else text
+    if found and several:
+        label = _("{name} of pendulum {number}", name=label, number=found[1])
     return Slider(
-        path, f"{kind.label} of pendulum {found[1]}" if found and several else kind.label,
+        path, label,
         "" if entry is None else "c2" if stiffness else entry.symbol, unit,
-        "" if entry is None else "slope of the torque at small windup" if stiffness else entry.help,
-        value_of(text, unit, study.base[path]), text or given, given, low, high, kind.logarithmic and low > 0.0,
-        kind.unit, kind.size,
+        "" if entry is None else _("slope of the torque at small windup") if stiffness else _(entry.help),
+        value_of(text, unit, study.base[path]), typed, given, low, high, kind.logarithmic and low > 0.0,
+        shown, factor,
     )  # fmt: skip
 
 
-def _own_text(own: Study, path: str) -> str:
-    """The drive's own number as its field has it."""
-    kind = _RANGES[_kind(path)]
-    return quantity_text(own.base[path], kind.unit, kind.size)
+def _unit(own: Study, path: str) -> str:
+    entry = parameter_of(own, path)
+    return "" if entry is None else coefficient_unit(1) if "coefficients" in path else entry.unit
 
 
 def written(slider: Slider, value: float) -> str | float:

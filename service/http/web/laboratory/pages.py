@@ -5,13 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Query
+from fastapi import Query
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.http.drawing import picture, table
 from sprag.service.http.problems import ApiError
+from sprag.service.http.reading import CHOICE
 from sprag.service.http.respond import json_response
+from sprag.service.http.routers import page_router
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.figures.shaft import SAMPLES, irregularities, machine_case
 from sprag.service.http.web.form.own_machine import fits
@@ -21,7 +23,9 @@ from sprag.service.http.web.laboratory.setting import MOST_HELD, held_settings, 
 from sprag.service.http.web.laboratory.sliders import position
 from sprag.service.http.web.templates import fragment, page
 from sprag.service.http.work import Attended, Work
+from sprag.service.results.phrases import meanings
 from sprag.service.results.pictures.curves import draw_motion
+from sprag.service.results.reading import Reading, reading_for
 from sprag.service.results.trajectories import trajectory_csv
 from sprag.service.results.wording import number
 from sprag.worker import models
@@ -31,7 +35,7 @@ if TYPE_CHECKING:
     from sprag.worker.models import Trajectory
     from sprag.worker.study import Study
 
-router = APIRouter(include_in_schema=False)
+router = page_router()
 
 #: Results that are shown beside the picture.
 _SHOWN: Final = (
@@ -68,13 +72,18 @@ async def laboratory(work: Attended) -> Response:
 async def _chosen(work: Work) -> tuple[Setting, list[Setting]]:
     """The setting of an address, and those that it holds."""
     given = work.request.query_params
-    chosen = await work.check(setting, dict(given))
+    chosen = await work.check(setting, dict(given), CHOICE.get())
     return chosen, await work.check(held_settings, given.getlist("held")) if "held" in given else []
 
 
 async def _case(work: Work, chosen: Setting, held: list[Setting], columns: int = 2) -> dict[str, Any]:
     named = [(_NAMES[index], each.study) for index, each in enumerate(held)]
-    return await work.run_case(machine_case, chosen.study, named, columns)
+    return await work.run_case(machine_case, chosen.study, _reading(chosen), named, columns)
+
+
+def _reading(chosen: Setting) -> Reading:
+    """How the reader of the page reads the machine."""
+    return reading_for(chosen.study, chosen.spec, CHOICE.get())
 
 
 def _query(chosen: Setting, held: list[Setting]) -> str:
@@ -90,6 +99,7 @@ def _parts(work: Work, chosen: Setting, held: list[Setting], case: dict[str, Any
     values = {
         "chosen": chosen,
         "case": case,
+        "reading": _reading(chosen),
         "shown": [
             (infos[name], [each["results"][name] for each in cases]) for name in _SHOWN if name in infos and cases
         ],
@@ -104,7 +114,7 @@ def _parts(work: Work, chosen: Setting, held: list[Setting], case: dict[str, Any
         ],
         "hold": hold if len(held) < MOST_HELD and fits(hold) else "",
         "query": _query(chosen, held),
-        "sentence": "" if case is None else models.ENDING_SENTENCES.get(case["ending"], ""),
+        "sentence": "" if case is None else meanings(models.ENDING_SENTENCES).get(case["ending"], ""),
         "questions": QUESTIONS,
         "now": work.context.store.clock.now().isoformat(),
     }
@@ -140,11 +150,11 @@ async def laboratory_picture(work: Attended, form: Literal["svg", "png", "csv"])
         raise ApiError("invalid-spec", "; ".join(text for texts in chosen.faults.values() for text in texts))
     motions = [await work.run_case(_motion, each.study) for each in (chosen, *held)]
     if form == "csv":
-        return table(await run_in_threadpool(trajectory_csv, motions[0]), "csv", "laboratory")
+        return table(await run_in_threadpool(trajectory_csv, motions[0], _reading(chosen).units), "csv", "laboratory")
     beside = [(_NAMES[index], motion) for index, motion in enumerate(motions[1:]) if motion.times.size]
-    shown = models.presentation_of(chosen.study)
+    shown, reading = models.presentation_of(chosen.study), _reading(chosen)
     at = chosen.angle % chosen.degrees
-    return await picture(draw_motion, form, motions[0], shown, chosen.study.name, beside, at).response(work)
+    return await picture(draw_motion, form, motions[0], shown, reading, chosen.study.name, beside, at).response(work)
 
 
 def _motion(study: Study) -> Trajectory:
@@ -154,7 +164,7 @@ def _motion(study: Study) -> Trajectory:
 @router.get("/laboratory/questions")
 async def laboratory_questions(work: Attended) -> Response:
     """Questions with a blank for an estimate, and the answers to those that have one."""
-    chosen = await work.check(setting, dict(work.request.query_params))
+    chosen = await work.check(setting, dict(work.request.query_params), CHOICE.get())
     asked = [] if chosen.faults else await work.check(estimates, chosen, dict(work.request.query_params))
     answers: list[tuple[str, float | None]] = []
     if asked:
@@ -164,7 +174,7 @@ async def laboratory_questions(work: Attended) -> Response:
         chosen=chosen,
         now=answers[0] if answers else None,
         asked=list(zip(asked, answers[1:], strict=True)),
-        sentences=models.ENDING_SENTENCES,
+        sentences=meanings(models.ENDING_SENTENCES),
         questions=QUESTIONS,
     )
 
@@ -172,14 +182,14 @@ async def laboratory_questions(work: Attended) -> Response:
 @router.get("/laboratory/form")
 async def laboratory_form(work: Attended) -> Response:
     """The current machine in the form for a new study."""
-    chosen = await work.check(setting, dict(work.request.query_params))
+    chosen = await work.check(setting, dict(work.request.query_params), CHOICE.get())
     return await spec_in_form(work, {**chosen.spec, "axes": []})
 
 
 @router.get("/laboratory/study")
 async def laboratory_study(work: Attended, question: str = "inertia") -> Response:
     """One of the questions about the current machine, as a study to check and submit."""
-    chosen = await work.check(setting, dict(work.request.query_params))
+    chosen = await work.check(setting, dict(work.request.query_params), CHOICE.get())
     if question not in QUESTIONS:
         raise ApiError("not-found", f"Unknown question; known questions: {', '.join(QUESTIONS)}.")
     return await spec_in_form(work, question_spec(chosen, question))

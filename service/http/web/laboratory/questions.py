@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from sprag.service.http.web.figures.shaft import overridden
 from sprag.service.http.web.form.shaft import part_of
 from sprag.service.http.web.laboratory.sliders import quantity_text
+from sprag.service.languages import N_
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.numbers import parse_number
 from sprag.service.spec.report import SpecError
@@ -21,12 +22,16 @@ if TYPE_CHECKING:
     from sprag.worker.study import Study
 
 #: Name of each question, and what its study varies.
-QUESTIONS: Final = {"inertia": "the drive's inertia", "masses": "the masses", "load": "the operation's load"}
+QUESTIONS: Final = {
+    "inertia": N_("the drive's inertia"),
+    "masses": N_("the masses"),
+    "load": N_("the operation's load"),
+}
 #: What happens in each question to be estimated, and the factor on the numbers that it is about.
 CHANGES: Final = {
-    "inertia": ("The drive's inertia is doubled.", 2.0),
-    "masses": ("All masses and inertias of the mechanism are halved.", 0.5),
-    "load": ("The load of the operation is halved.", 0.5),
+    "inertia": (N_("The drive's inertia is doubled."), 2.0),
+    "masses": (N_("All masses and inertias of the mechanism are halved."), 0.5),
+    "load": (N_("The load of the operation is halved."), 0.5),
 }
 _VALUES: Final = 25
 _VALUES_EACH: Final = 9

@@ -11,17 +11,20 @@ from urllib.parse import parse_qsl, urlencode
 from sprag.service.faults import shown
 from sprag.service.http.problems import ApiError
 from sprag.service.http.views import preset_of
-from sprag.service.http.web.figures.linkage import Drawing, drawings
 from sprag.service.http.web.figures.shaft import overridden
 from sprag.service.http.web.form.entries import plain
 from sprag.service.http.web.form.own_machine import case_page, machine_of, read_machine
 from sprag.service.http.web.form.shaft import group_of
-from sprag.service.http.web.laboratory.sliders import Slider, faults_by_field, in_order, own_text, slider_of
+from sprag.service.http.web.laboratory.sliders import Slider, faults_by_field, in_order, is_own, slider_of
 from sprag.service.presets import preset_names
+from sprag.service.results.figures.linkage import Drawing, drawings
+from sprag.service.results.quantities import TYPED
+from sprag.service.results.reading import Choice, reading_for
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.report import SpecError
 from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker import models
+from sprag.worker.models.parameters import parameter_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -29,6 +32,7 @@ if TYPE_CHECKING:
     from sprag.worker.study import Study
 
 _QUESTION: Final = "question_"
+_USUAL: Final = Choice(TYPED)
 #: Settings that can be held beside the current one.
 MOST_HELD: Final = 3
 
@@ -97,20 +101,24 @@ def machines() -> tuple[str, ...]:
     return tuple(name for name in shafts if not name.startswith(_QUESTION))
 
 
-def setting(given: Mapping[str, str]) -> Setting:
-    """The setting of a URL; ApiError for an unknown machine."""
+def setting(given: Mapping[str, str], choice: Choice = _USUAL) -> Setting:
+    """The setting of a URL with sliders in its reader's units.
+
+    Raises ApiError for an unknown machine, SelectionError for units that cannot be shown.
+    """
     machine = machine_of(given, given.get("machine") or next(iter(machines()), ""))
     spec, own = read_machine(machine, models.MACHINE_SHAFT, machines())
     # A field with the rounded text of the machine's own number leaves that number as it is.
     texts = {path: given[path] for path in own.base if given.get(path, "").strip()}
-    values = {path: plain(text) for path, text in texts.items() if text.strip() != own_text(own, path)}
+    values = {path: plain(text) for path, text in texts.items() if not is_own(text, own.base[path], _unit(own, path))}
     faults: dict[str, list[str]] = {}
     try:
         study = parse_spec(overridden(spec, values)).study
     except SpecError as error:
         study, faults = own, faults_by_field(error, own.base, values)
     angle = _angle(given.get("angle", ""), faults)
-    sliders = in_order([slider_of(own, study, path, given.get(path, "")) for path in own.base])
+    reading = reading_for(own, spec, choice)
+    sliders = in_order([slider_of(own, study, path, given.get(path, ""), reading, choice) for path in own.base])
     made = overridden(spec, values)
     return Setting(machine, made, study, sliders, faults, angle, drawings(study, angle))
 
@@ -124,6 +132,11 @@ def held_settings(queries: list[str]) -> list[Setting]:
         texts = [f"{path}: {text}" for held in found for path, texts in held.faults.items() for text in texts]
         raise ApiError("invalid-spec", f"A held machine is invalid: {'; '.join(texts)}.")
     return found
+
+
+def _unit(own: Study, path: str) -> str:
+    entry = parameter_of(own, path)
+    return "" if entry is None else entry.unit
 
 
 def _angle(text: str, faults: dict[str, list[str]]) -> float:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Final
 
 from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.shaft import part_of
+from sprag.service.languages import N_, _
+from sprag.service.results.quantities import read_units
 from sprag.service.results.wording import words
 from sprag.service.spec.numbers import parse_number
 from sprag.service.spec.units import QuantityError, has_unit, parse_quantity, split_quantity
@@ -16,6 +18,7 @@ from sprag.worker.models.parameters import parameter_of
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from sprag.service.results.reading import Choice, Reading
     from sprag.service.spec.report import SpecError
     from sprag.worker.study import Study
 
@@ -23,8 +26,9 @@ if TYPE_CHECKING:
 FIRST: Final = {"drive.inertia": (0.05, 20.0), "mean_speed": (0.25, 4.0), "operation.scale": (0.0, 3.0)}
 _MASSES: Final = (0.0, 4.0)
 _OTHERS: Final = (0.5, 2.0)
-#: Units in which a slider moves, and the SI value of one.
+#: Units in which a slider moves unless its reader has chosen others, and the SI value of one.
 _SHOWN: Final = {"rad": ("deg", math.pi / 180.0), "rad/s": ("rpm", math.pi / 30.0)}
+_SI: Final = ("", 1.0)
 #: Angles, in rad, whose sliders do not depend on the machine's own value.
 _ANGLES: Final = {"crank_angle": (-2.0 * math.pi, 2.0 * math.pi), "inclination": (-math.pi, math.pi)}
 
@@ -62,8 +66,10 @@ class Slider:
         return has_unit(self.text)
 
 
-def slider_of(own: Study, study: Study, path: str, text: str) -> Slider:
-    """The slider of a number: of the machine as it comes (``own``) and as it is set (``study``, ``text``)."""
+def slider_of(own: Study, study: Study, path: str, text: str, reading: Reading, choice: Choice) -> Slider:
+    """The slider of a number, as its reader reads it: of the machine as it comes (``own``) and as it is set (``study``,
+    ``text``).
+    """
     entry = parameter_of(own, path)
     unit = "" if entry is None else entry.unit
     factors, is_first = _factors(own, path)
@@ -72,24 +78,42 @@ def slider_of(own: Study, study: Study, path: str, text: str) -> Slider:
     low, high = _ANGLES.get(path.rsplit(".", 1)[-1], (low, high))
     if entry is not None:
         low, high = max(low, entry.low), min(high, entry.high)
-    shown, factor = _SHOWN.get(unit, ("", 1.0))
+    shown, factor = scale(unit, _SHOWN.get(unit, _SI), reading, choice)
     part, name = part_of(path)
-    label = "Load, as a multiple of the diagram" if name == "operation.scale" else words(path.rsplit(".", 1)[-1])
+    label = _("Load, as a multiple of the diagram") if name == "operation.scale" else _(words(path.rsplit(".", 1)[-1]))
     if name.startswith(("operation.steps.", "drive.stages.")):
         place = name.split(".")
-        label = f"{place[1][:-1].capitalize()} {int(place[2]) + 1}: {label.lower()}"
-    given = own_text(own, path)
+        number = int(place[2]) + 1
+        step = name.startswith("operation.")
+        numbered = N_("Step {number}: {label}") if step else N_("Stage {number}: {label}")
+        label = _(numbered, number=number, label=label.lower())
+    given = quantity_text(first, shown, factor)
+    typed = given if is_own(text, first, unit) else text.strip()
     return Slider(
-        path, f"Part {part}: {label}" if part else label, "" if entry is None else entry.symbol, unit,
-        "" if entry is None else entry.help, value_of(text, unit, study.base[path]), text.strip() or given, given,
+        path, _("Part {number}: {label}", number=part, label=label) if part else label,
+        "" if entry is None else entry.symbol, unit,
+        "" if entry is None else _(entry.help), value_of(text, unit, study.base[path]), typed, given,
         low, high, low > 0.0, shown, factor, is_first,
     )  # fmt: skip
 
 
-def own_text(own: Study, path: str) -> str:
-    """The machine's own number as its field has it."""
-    entry = parameter_of(own, path)
-    return quantity_text(own.base[path], *_SHOWN.get("" if entry is None else entry.unit, ("", 1.0)))
+def scale(si: str, usual: tuple[str, float], reading: Reading, choice: Choice) -> tuple[str, float]:
+    """Unit in which a slider moves, "" for SI, and the SI value of one: ``usual`` unless its reader has chosen."""
+    shown = reading.unit(si)
+    if shown != si:
+        return shown, parse_quantity(f"1 {shown}", si)
+    return usual if read_units(choice.units)[0] else _SI
+
+
+def is_own(text: str, own: float, si: str) -> bool:
+    """Whether a text is the machine's own number (SI), rounded as a field has it in whatever unit; also "" is."""
+    try:
+        unit = split_quantity(text)[1] if text.strip() else ""
+        return not text.strip() or text.strip() == quantity_text(
+            own, unit, parse_quantity(f"1 {unit}", si) if unit else 1
+        )
+    except QuantityError:
+        return False
 
 
 def _factors(study: Study, path: str) -> tuple[tuple[float, float], bool]:

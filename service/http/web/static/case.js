@@ -16,10 +16,10 @@ if (motion) {
   const zoomTo = async (address) => {
     motion.classList.add("stale");
     try {
-      await showMotion(address);
+      await sprag.busy(motion, showMotion(address));
       motion.classList.remove("stale");
     } catch (error) {
-      if (!(error instanceof sprag.LostError)) sprag.say(motion, error.message);
+      if (!(error instanceof sprag.LostError)) sprag.note(motion, error.message, () => zoomTo(address));
     }
   };
   const change = (address) => {
@@ -29,9 +29,9 @@ if (motion) {
   };
   document.addEventListener("DOMContentLoaded", async () => {
     try {
-      await showMotion(whole);
+      await sprag.busy(motion, showMotion(whole));
     } catch (error) {
-      sprag.say(motion, error.message);
+      sprag.note(motion, error.message, () => location.reload());
       if (error instanceof sprag.LostError) document.addEventListener("sprag:found", () => location.reload(), { once: true });
       return;
     }
@@ -51,8 +51,8 @@ if (motion) {
 const engagements = document.getElementById("engagements");
 if (engagements) document.addEventListener("DOMContentLoaded", async () => {
   try {
-    sprag.take(await sprag.page(engagements.dataset.engagements), "#engagements");
+    sprag.take(await sprag.busy(engagements, sprag.page(engagements.dataset.engagements)), "#engagements");
   } catch (error) {
-    sprag.say(engagements, error.message);
+    sprag.note(engagements, error.message, () => location.reload());
   }
 });

@@ -9,7 +9,7 @@ let busy = false, again = null, lost = false, own = "";
 const written = () => new URLSearchParams([...new FormData(lab)].filter(([, text]) => text !== "")).toString();
 
 const take = async (found, query) => {
-  history.replaceState(null, "", `/laboratory/drive?${query}`);
+  history.replaceState(null, "", `${sprag.prefix}/laboratory/drive?${query}`);
   for (const place of lab.querySelectorAll(".wrong")) {
     const name = place.id.slice("wrong:".length), texts = found.faults[name] || [];
     place.textContent = texts.join("; ");
@@ -19,8 +19,8 @@ const take = async (found, query) => {
   details.innerHTML = found.details;
   state.replaceChildren(...Object.entries(found.state).map(([name, value]) => Object.assign(document.createElement("input"), { type: "hidden", name, value })));
   own = found.own;
-  hold.href = `/laboratory/drive?${own}&${new URLSearchParams({ held: own })}`;
-  release.href = `/laboratory/drive?${own}`;
+  hold.href = `${sprag.prefix}/laboratory/drive?${own}&${new URLSearchParams({ held: own })}`;
+  release.href = `${sprag.prefix}/laboratory/drive?${own}`;
   release.hidden = !held.value;
   plot.classList.toggle("stale", !found.figure);
   if (found.figure) await sprag.show(plot, found.figure);
@@ -33,7 +33,7 @@ const ask = async (queryOf = written) => {
   busy = true;
   const query = queryOf();
   try {
-    await take(await sprag.fetchJson(`/laboratory/drive/figure?${query}`), query);
+    await take(await sprag.fetchJson(`${sprag.prefix}/laboratory/drive/figure?${query}`), query);
   } catch (error) {
     plot.classList.add("stale");
     lost = true;

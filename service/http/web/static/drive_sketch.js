@@ -5,14 +5,14 @@ sprag.sketch = (() => {
   const SECONDS = 3; // of an excitation period on the page
   const svg = document.getElementById("sketch"), play = document.getElementById("play"), instant = document.getElementById("instant");
   const reading = document.getElementById("reading"), plot = document.getElementById("lab-plot");
-  const looks = JSON.parse(svg.dataset.looks);
+  const looks = JSON.parse(svg.dataset.looks), wording = JSON.parse(svg.dataset.words);
   const parts = (name) => [...svg.querySelectorAll(`[data-${name}]`)];
   const base = parts("base")[0], arms = parts("arm"), springs = parts("spring"), clutches = parts("clutch"), shafts = parts("shaft");
   const words = parts("clutch-word"), shaftWord = parts("shaft-word")[0];
   let frames = null, playing = false, from = 0, began = 0, turned = 0;
 
   const named = (state) => frames.states[state];
-  const worded = (state) => named(state).replaceAll("_", " ");
+  const worded = (state) => wording[named(state)];
 
   const draw = (at) => {
     base.setAttribute("transform", `translate(${frames.x[at]} ${-frames.y[at]})`);
@@ -39,7 +39,10 @@ sprag.sketch = (() => {
   };
 
   const read = (at) => {
-    reading.textContent = `t = ${frames.time[at].toPrecision(4)} ms, ${period(at).toFixed(3)} of ${Math.round(frames.periods)} excitation period${frames.periods > 1.5 ? "s" : ""}; shaft ${frames.shaft.speed[at].toPrecision(4)} rad/s.`;
+    reading.textContent = sprag.say("t = {time} ms, excitation period {at} of {n}; shaft {speed} rad/s.", {
+      time: sprag.decimal(frames.time[at].toPrecision(4)), at: sprag.decimal(period(at).toFixed(3)),
+      n: Math.round(frames.periods), speed: sprag.decimal(frames.shaft.speed[at].toPrecision(4)),
+    });
     instant.setAttribute("aria-valuetext", reading.textContent);
   };
 
@@ -55,12 +58,12 @@ sprag.sketch = (() => {
 
   const run = (on) => {
     playing = on && frames !== null;
-    play.textContent = playing ? "Pause" : "Play";
+    play.textContent = playing ? sprag.say("Pause") : sprag.say("Play");
     play.setAttribute("aria-pressed", String(playing));
     if (!frames) return;
     from = Number(instant.value);
     if (playing) {
-      reading.textContent = `In slow motion: one excitation period takes ${SECONDS} s.`;
+      reading.textContent = sprag.say("In slow motion: one excitation period takes {n} s.", { n: SECONDS });
       began = performance.now() - 1000 * SECONDS * frames.periods * from / last();
       requestAnimationFrame(step);
     } else read(from);

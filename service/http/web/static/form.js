@@ -14,16 +14,21 @@ const encoded = (extra = []) => new URLSearchParams([...new FormData(form), ["ed
 // The input is sent with the button to the login, and comes back from there.
 const ended = () => {
   old = false;
-  document.getElementById("panel").classList.remove("stale");
-  document.getElementById("panel").innerHTML = '<p class="fault" role="alert">Your session has ended. '
-    + '<button name="do" value="check" data-login>Log in</button> What you typed is kept.</p>';
+  const panel = document.getElementById("panel"), note = document.createElement("p"), button = document.createElement("button");
+  note.className = "fault";
+  note.setAttribute("role", "alert");
+  Object.assign(button, { name: "do", value: "check", textContent: sprag.say("Log in") });
+  button.dataset.login = "";
+  note.append(sprag.say("Your session has ended."), " ", button, " ", sprag.say("What you typed is kept."));
+  panel.classList.remove("stale");
+  panel.replaceChildren(note);
 };
 
 const fail = (text) => {
   const note = document.createElement("p");
   note.className = "fault";
   note.setAttribute("role", "alert");
-  note.textContent = `This could not be looked over: ${text}`;
+  note.textContent = sprag.say("The input could not be checked: {why}", { why: text });
   const panel = document.getElementById("panel");
   panel.classList.remove("stale");
   panel.querySelector(".cost")?.remove();
@@ -67,6 +72,17 @@ const check = async () => {
   form.dataset.checked = String(mine);
 };
 
+// The text of a chosen file goes into the field that is sent; the file itself is not.
+const takeFile = async (event) => {
+  const file = event.target.files && event.target.files[0];
+  if (!file || !event.target.dataset.into) return;
+  const field = document.getElementById(event.target.dataset.into);
+  field.value = await file.text();
+  edited = field.name;
+  touched.add(field.name);
+  soon();
+};
+
 const soon = () => { clearTimeout(waiting); waiting = setTimeout(check, 300); };
 
 // Another pendulum or axis: the server rebuilds the form with the current input.
@@ -77,25 +93,38 @@ const reshape = async (extra) => {
   try { await newShape(extra); } finally { reshaping = false; }
 };
 
-const newShape = async (extra) => {
+// After a button: the first new field, the same button, or the one beside it where it has nothing left to do. After a choice: the choice.
+const focusAfter = (asked, known, chosen, type) => {
+  const button = (value) => form.querySelector(`button[value="${CSS.escape(value)}"]:enabled`);
+  const first = [...form.elements].find((element) => element.id && !known.has(element.id));
+  const same = asked ? [asked, asked.replace(/^drop-(\S+).*/, "add-$1"), "check"].map(button).find(Boolean)
+    : chosen ? form.querySelector(`[name="${CSS.escape(chosen)}"]${type === "radio" ? ":checked" : ""}`) : null;
+  (asked ? first || same : same)?.focus();
+};
+
+// Whether the form has come.
+const newShape = async (extra, body = encoded(extra)) => {
   clearTimeout(waiting);
   latest += 1;
   let answer = null;
   try {
-    answer = await sprag.fetch(form.action, { method: "POST", body: encoded(extra), headers: { Accept: "text/html" } });
-  } catch (error) { return; } // the bar reports it; the input is kept
-  if (answer.status === 401) { ended(); return; }
+    answer = await sprag.fetch(form.action, { method: "POST", body, headers: { Accept: "text/html" } });
+  } catch (error) { return false; } // the bar reports it; the input is kept
+  if (answer.status === 401) { ended(); return false; }
   const page = new DOMParser().parseFromString(await answer.text(), "text/html");
   const fresh = page.getElementById("study-form");
-  if (!fresh) { fail(page.querySelector("main p")?.textContent || `status ${answer.status}`); return; }
+  if (!fresh) { fail(page.querySelector("main p")?.textContent || sprag.refusal(answer)); return false; }
   const known = new Set([...form.elements].map((element) => element.id || element.value));
+  const { name: chosen, type } = document.activeElement;
   form.replaceWith(document.adoptNode(fresh));
   form = fresh;
   listen();
-  const first = [...form.elements].find((element) => element.id && !known.has(element.id));
-  const same = extra.length ? form.querySelector(`button[value="${CSS.escape(extra[0][1])}"]`) : null;
-  (first || same || form.querySelector("[name='clutches']:checked"))?.focus();
-  if (!whole) check();
+  focusAfter(extra[0]?.[1], known, chosen, type);
+  const unused = form.querySelector('[id="wrong:/columns"]');
+  if (unused?.textContent) unused.closest("details").scrollIntoView({ block: "nearest" });
+  else if (!whole) check();
+  sprag.drafts.keep(form);
+  return true;
 };
 
 const mark = (event) => {
@@ -110,27 +139,59 @@ const mark = (event) => {
   }
 };
 
-// A pasted column or row of a spreadsheet becomes a list of values.
+// A pasted column or row of a spreadsheet becomes a list of values, several columns become axes.
 const paste = (event) => {
   const text = event.clipboardData.getData("text");
-  if (!event.target.name?.endsWith("/values") || !/[\t\n]/.test(text.trim())) return;
+  const columns = document.getElementById("/columns");
+  if (columns && event.target.name?.startsWith("/axes/") && /\t.*\n.*\t/.test(text.trim())) {
+    event.preventDefault();
+    columns.value = text;
+    form.querySelector('button[value="take-columns"]').click();
+    return;
+  }
+  if (!/\/(values|plus_minus)$/.test(event.target.name ?? "") || !/[\t\n]/.test(text.trim())) return;
   event.preventDefault();
   const field = event.target, list = text.split(/[\t\r\n]+/).map((part) => part.trim()).filter(Boolean).join("; ");
   field.setRangeText(list, field.selectionStart, field.selectionEnd, "end");
   field.dispatchEvent(new Event("input", { bubbles: true }));
+  field.dispatchEvent(new Event("change", { bubbles: true }));
+};
+
+// What a field had before it was changed, for the button that undoes it: service/http/web/form/undo.py.
+let shown = {};
+const snapshot = () => {
+  const { history, key, ...fields } = Object.fromEntries(new FormData(form));
+  return fields;
+};
+const remember = (event) => {
+  const history = form.elements.namedItem("history");
+  if (!history || event.target.name === "clutches") return; // the server moves their fields, and remembers it
+  const fields = snapshot(), change = {};
+  for (const name of new Set([...Object.keys(shown), ...Object.keys(fields)])) {
+    if (shown[name] !== fields[name]) change[name] = shown[name] ?? null;
+  }
+  shown = fields;
+  if (!Object.keys(change).length) return;
+  history.value = JSON.stringify([...JSON.parse(history.value || "[]"), change].slice(-30));
+  form.querySelector('button[value="undo"]').disabled = false;
 };
 
 function listen() {
+  shown = snapshot();
   form.addEventListener("paste", paste);
-  form.addEventListener("input", (event) => { edited = event.target.name; soon(); });
+  form.addEventListener("change", remember);
+  form.addEventListener("input", (event) => { edited = event.target.name; soon(); sprag.drafts.keep(form); });
   form.addEventListener("focusin", mark);
   form.addEventListener("focusout", (event) => { if (event.target.name) { touched.add(event.target.name); soon(); } });
   form.addEventListener("change", (event) => { if (event.target.matches("[data-shape]")) reshape([]); });
+  form.addEventListener("change", takeFile);
   form.addEventListener("submit", (event) => {
     const button = event.submitter;
     if (button && button.matches("[data-shape]")) {
       event.preventDefault();
       reshape([["do", button.value]]);
+    } else if (button?.value === "submit") {
+      sprag.drafts.submitted(form);
     } else if (button && button.value === "check" && !button.matches("[data-login]")) {
       event.preventDefault();
       whole = true;
@@ -148,4 +209,6 @@ if (refused) {
   refused.scrollIntoView({ block: "center" });
 }
 listen();
+const draft = sprag.drafts.waiting(form, Boolean(refused));
+if (draft) sprag.drafts.offer(form, draft, (fields) => newShape([], new URLSearchParams(fields)));
 document.addEventListener("sprag:found", () => { if (old) check(); });

@@ -24,9 +24,12 @@
   const designs = found.designs.filter((design) => !design.failed && near(design));
   // Names as the page writes them: the form above lists every quantity with its unit.
   const titles = new Map([...document.querySelectorAll("select[name=x] option")].map((option) => [option.value, option.textContent]));
+  // And numbers in these units: the data are in SI.
+  const factors = new Map([...document.querySelectorAll("select[name=x] option")].map((option) => [option.value, Number(option.dataset.factor)]));
+  const shown = (name, value) => (value === null ? null : value * (factors.get(name) ?? 1));
   const axes = [
-    ...found.variables.map((one) => ({ name: one.name, unit: one.unit, of: (design) => design.variables[one.name] })),
-    ...found.best.map((goal) => ({ name: goal.result, unit: goal.unit, of: (design) => design.goals[goal.result] })),
+    ...found.variables.map((one) => ({ name: one.name, unit: one.unit, of: (design) => shown(one.name, design.variables[one.name]) })),
+    ...found.best.map((goal) => ({ name: goal.result, unit: goal.unit, of: (design) => shown(goal.result, design.goals[goal.result]) })),
   ];
   for (const axis of axes) {
     const values = designs.map(axis.of).filter(Number.isFinite);
@@ -45,8 +48,8 @@
     for (const design of designs.filter((one) => kind(one) === part)) {
       const points = axes.map((axis, index) => `${EDGE + STEP * index},${at(axis, axis.of(design) ?? axis.low)}`).join(" ");
       const line = make("polyline", { points, class: part });
-      line.append(make("title", {}, `design ${design.design}`));
-      line.addEventListener("click", () => location.assign(`/studies/${found.study}/cases/${design.cases[0]}`));
+      line.append(make("title", {}, sprag.say("design {n}", { n: design.design })));
+      line.addEventListener("click", () => location.assign(`${sprag.prefix}/studies/${found.study}/cases/${design.cases[0]}`));
       lines.set(design.design, line);
       drawing.append(line);
     }
@@ -64,7 +67,7 @@
     const names = new Set(chosen.map((design) => design.design)), cases = new Set(chosen.map((design) => design.cases[0]));
     for (const [name, line] of lines) line.classList.toggle("out", !names.has(name));
     for (const row of document.querySelectorAll("#designs tr[data-design]")) row.hidden = !every && !names.has(Number(row.dataset.design));
-    section.querySelector("output").textContent = `${chosen.length} of ${designs.length} designs shown are selected.`;
+    section.querySelector("output").textContent = sprag.say("{count} of {total} designs shown are selected.", { count: chosen.length, total: designs.length });
     for (const axis of axes) {
       const [low, high] = numbers(axis), top = at(axis, Number.isNaN(high) ? axis.high : Math.min(high, axis.high));
       const bottom = at(axis, Number.isNaN(low) ? axis.low : Math.max(low, axis.low));
@@ -88,7 +91,7 @@
     const halves = words.map((_, index) => [words.slice(0, index).join(" "), words.slice(index).join(" ")]);
     const [above, below] = halves.reduce((best, pair) => (Math.max(...pair.map((part) => part.length)) < Math.max(...best.map((part) => part.length)) ? pair : best));
     drawing.append(make("text", { x, y: 12 }, above), make("text", { x, y: 26 }, below));
-    drawing.append(make("text", { x, y: TOP + HEIGHT + 14 }, short(axis.low)), make("text", { x: x + 8, y: TOP + 10, class: "start" }, short(axis.high)));
+    drawing.append(make("text", { x, y: TOP + HEIGHT + 14 }, sprag.decimal(short(axis.low))), make("text", { x: x + 8, y: TOP + 10, class: "start" }, sprag.decimal(short(axis.high))));
     axis.bar = make("rect", { x: x - 5, width: 10, y: TOP, height: 0, class: "bar" });
     const grip = make("rect", { x: x - MARGIN, width: 2 * MARGIN, y: TOP, height: HEIGHT, class: "grip" });
     let from = null;
@@ -109,7 +112,7 @@
     const field = document.createElement("fieldset"), legend = document.createElement("legend");
     legend.textContent = title;
     field.append(legend);
-    for (const [word, limit] of [["from", axis.low], ["to", axis.high]]) {
+    for (const [word, limit] of [[sprag.say("from"), axis.low], [sprag.say("to"), axis.high]]) {
       const label = document.createElement("label"), input = document.createElement("input");
       input.type = "number";
       input.step = "any";

@@ -19,8 +19,8 @@ const ask = async () => {
   busy = true;
   try {
     const asked = query();
-    const found = await sprag.fetchJson(sprag.narrowed(plot, `/laboratory/figure?columns=2&${asked}`));
-    history.replaceState(null, "", `/laboratory?${asked}`);
+    const found = await sprag.fetchJson(sprag.narrowed(plot, `${sprag.prefix}/laboratory/figure?columns=2&${asked}`));
+    history.replaceState(null, "", `${sprag.prefix}/laboratory?${asked}`);
     for (const place of document.querySelectorAll(".lab .wrong")) {
       const texts = found.faults[place.id.slice("wrong:".length)] || [];
       place.textContent = texts.join("; ");
@@ -105,7 +105,7 @@ const turned = () => {
 
 dial.addEventListener("input", () => {
   angle.value = dial.value;
-  dial.setAttribute("aria-valuetext", `${dial.value} degrees`);
+  dial.setAttribute("aria-valuetext", sprag.say("{angle} degrees", { angle: sprag.decimal(dial.value) }));
   turned();
 });
 angle.addEventListener("input", () => {
@@ -113,16 +113,16 @@ angle.addEventListener("input", () => {
   dial.value = (degrees() % cycle + cycle) % cycle;
   turned();
 });
-dial.addEventListener("change", () => history.replaceState(null, "", `/laboratory?${query()}`));
+dial.addEventListener("change", () => history.replaceState(null, "", `${sprag.prefix}/laboratory?${query()}`));
 
 // A turn of the shaft takes four seconds, until it is stopped.
 const SECONDS = 4;
 turn.addEventListener("click", () => {
   const on = turn.getAttribute("aria-pressed") !== "true", from = Number(dial.value), begin = performance.now();
   turn.setAttribute("aria-pressed", String(on));
-  turn.textContent = on ? "Stop" : "Turn";
+  turn.textContent = on ? sprag.say("Stop") : sprag.say("Turn");
   const run = (now) => {
-    if (turn.getAttribute("aria-pressed") !== "true") { history.replaceState(null, "", `/laboratory?${query()}`); return; }
+    if (turn.getAttribute("aria-pressed") !== "true") { history.replaceState(null, "", `${sprag.prefix}/laboratory?${query()}`); return; }
     dial.value = (from + 0.36 / SECONDS * Math.max(now - begin, 0)) % Number(dial.max);
     angle.value = dial.value;
     turned();

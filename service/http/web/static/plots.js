@@ -80,17 +80,10 @@ sprag.config = {
   modeBarButtonsToRemove: ["toImage", "select2d", "lasso2d", "sendChartToCloud"],
 };
 
-sprag.say = (element, text) => {
-  const note = document.createElement("p");
-  note.className = "failed";
-  note.textContent = text;
-  element.replaceChildren(note);
-};
-
 sprag.show = async (element, figure) => {
   if (figure.note) {
     if (sprag.figures.delete(element)) Plotly.purge(element);
-    sprag.say(element, figure.note);
+    sprag.note(element, figure.note);
     element.firstChild.className = "soft";
     element.dataset.drawn = String(Number(element.dataset.drawn || 0) + 1);
     return;
@@ -109,10 +102,11 @@ sprag.show = async (element, figure) => {
   const width = element.clientWidth, layout = sprag.themed(figure, width);
   await Plotly.react(element, sprag.traces(figure, width, layout), layout, sprag.config);
   element.dataset.drawn = String(Number(element.dataset.drawn || 0) + 1);
+  if (first) element.dispatchEvent(new Event("sprag:drawn", { bubbles: true }));
   if (first && figure.cases && element.dataset.study) {
     element.on("plotly_click", (event) => {
       const number = event.points[0].customdata;
-      if (Number.isInteger(number)) location.assign(`/studies/${element.dataset.study}/cases/${number}`);
+      if (Number.isInteger(number)) location.assign(`${sprag.prefix}/studies/${element.dataset.study}/cases/${number}`);
     });
   }
 };
@@ -122,7 +116,7 @@ sprag.narrowed = (element, address) => element.clientWidth < NARROW ? address.re
 
 sprag.draw = async (element) => {
   try {
-    await sprag.show(element, await sprag.fetchJson(sprag.narrowed(element, element.dataset.figure)));
+    await sprag.show(element, await sprag.busy(element, sprag.fetchJson(sprag.narrowed(element, element.dataset.figure))));
     element.classList.remove("stale");
   } catch (error) {
     if (error instanceof sprag.LostError) { // the picture is out of date until the connection is restored
@@ -130,7 +124,7 @@ sprag.draw = async (element) => {
       return;
     }
     sprag.figures.delete(element);
-    sprag.say(element, error.message);
+    sprag.note(element, error.message, () => sprag.draw(element));
   }
 };
 
@@ -149,5 +143,19 @@ window.addEventListener("afterprint", () => redraw());
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => redraw());
 for (const width of [NARROW, BESIDE]) matchMedia(`(max-width: ${width}px)`).addEventListener("change", () => redraw());
 
-document.addEventListener("DOMContentLoaded", () => sprag.drawAll(document));
+// Back to a page shows it as it was left: scrolled as far, with figures zoomed as they were, which are drawn later than a browser scrolls.
+const PLACE = `sprag.place:${location.pathname}`;
+const zoomed = (plot) => Object.fromEntries(Object.entries(plot.layout ?? {})
+  .filter(([key, axis]) => /^[xy]axis\d*$/.test(key) && axis.autorange === false).map(([key, axis]) => [`${key}.range`, [...axis.range]]));
+const figures = () => [...document.querySelectorAll(".plot[data-figure]")];
+window.addEventListener("pagehide", () => {
+  sessionStorage.setItem(PLACE, JSON.stringify({ search: location.search, top: scrollY, views: figures().map(zoomed) }));
+});
+const returned = async () => {
+  const place = JSON.parse(sessionStorage.getItem(PLACE));
+  if (performance.getEntriesByType("navigation")[0]?.type !== "back_forward" || place?.search !== location.search) return;
+  await Promise.all(figures().map((plot, at) => plot.layout && Plotly.relayout(plot, place.views[at] ?? {})));
+  scrollTo({ top: place.top, behavior: "instant" });
+};
+document.addEventListener("DOMContentLoaded", async () => { await sprag.drawAll(document); await returned(); });
 document.addEventListener("sprag:found", () => { for (const plot of document.querySelectorAll(".stale[data-figure]")) sprag.draw(plot); });

@@ -1,69 +1,63 @@
-// Pages of a study: choices take effect immediately, and a running study shows its progress. The server makes every part.
+// Choices take effect immediately. The server makes every part.
 "use strict";
 
-// A form with data-swap: a change shows the new page's part, and puts its address into the window.
+// A form with data-swap: a change shows the new page's part (and that of data-also, above the form), and puts its address
+// into the window. What is chosen is an entry of the history, as it is without scripts; what is typed or dragged replaces
+// the current one.
 for (const form of document.querySelectorAll("form[data-swap]")) {
-  let latest = 0, asked = null;
-  const swap = async () => {
-    const mine = ++latest;
-    const chosen = new URLSearchParams([...new FormData(form)].filter(([, value]) => value !== ""));
-    const address = asked = `${location.pathname}?${chosen}`;
-    const old = document.querySelector(form.dataset.swap);
+  let latest = 0, asked = null, shown = location.search;
+  const CHOSEN = "select, [type=checkbox], [type=radio]";
+
+  // The page of an address, if no later one is wanted; a failure is said in the old part, where it can be tried again.
+  const fetched = async (address, again) => {
+    const mine = ++latest, old = document.querySelector(form.dataset.swap);
+    asked = again;
     old.classList.add("stale"); // it does not match the current choices
-    let page = null;
     try {
-      page = await sprag.page(address);
+      const page = await sprag.busy(old, sprag.page(address));
+      if (mine !== latest) return null;
+      asked = null;
+      return page;
     } catch (error) {
-      if (mine === latest && !(error instanceof sprag.LostError)) { asked = null; sprag.say(old, error.message); old.classList.remove("stale"); }
-      return;
+      if (mine === latest && !(error instanceof sprag.LostError)) { asked = null; sprag.note(old, error.message, again); old.classList.remove("stale"); }
+      return null;
     }
-    if (mine !== latest) return;
-    asked = null;
-    const focused = document.activeElement;
-    const place = focused && focused.name ? [focused.name, focused.value] : null;
+  };
+  // Saved views and the report use the choices too; what is typed in their forms stays.
+  const FOLLOW = ["#view-query", "#report-curves"];
+  const show = async (page) => {
     const part = sprag.take(page, form.dataset.swap);
     part.classList.remove("stale");
+    for (const also of [form.dataset.also, ...FOLLOW]) if (also) sprag.take(page, also);
+    shown = location.search;
+    if (window.Plotly) await sprag.drawAll(part);
+  };
+
+  const swap = async (push) => {
+    const chosen = new URLSearchParams([...new FormData(form)].filter(([, value]) => value !== ""));
+    const address = `${location.pathname}?${chosen}`, page = await fetched(address, () => swap(push));
+    if (!page) return;
+    const focused = document.activeElement;
+    const place = focused && focused.name ? [focused.name, focused.value] : null;
     if (!(focused && focused.closest && focused.closest("#held"))) sprag.take(page, "#held");
     const summary = form.querySelector("details.results summary"), fresh = page.querySelector("details.results summary");
     if (summary && fresh) summary.textContent = fresh.textContent;
-    history.replaceState(null, "", address);
+    history[push && address !== location.pathname + location.search ? "pushState" : "replaceState"](null, "", address);
+    const drawn = show(page);
     if (place && document.activeElement === document.body) {
       const again = form.elements.namedItem(place[0]);
       if (again && again.focus) again.focus();
     }
-    if (window.Plotly) await sprag.drawAll(part);
+    await drawn;
   };
-  form.addEventListener("change", swap);
-  document.addEventListener("sprag:found", () => { if (asked) swap(); });
-}
-
-// A running study: each progress event updates the page, at most once a second.
-const running = document.querySelector("[data-events]");
-if (running) {
-  const address = running.dataset.events;
-  let source = null, timer = null, lastDrawn = 0, ended = false;
-  const refresh = async () => {
-    timer = null;
-    const last = ended, here = location.href;
-    const page = await sprag.page(here).catch(() => null);
-    if (!page || here !== location.href) return;
-    for (const part of ["#head", "#progress", "#tiles", "#family", "#endings", "#particulars"]) sprag.take(page, part);
-    if (!last && Date.now() - lastDrawn < 3000) return;
-    lastDrawn = Date.now();
-    if (!document.querySelector(".stale")) sprag.take(page, "#cases");
-    for (const plot of document.querySelectorAll(".plot[data-figure]")) if (window.Plotly) sprag.draw(plot);
+  // Back and forward: the choices are those of the address.
+  const go = async () => {
+    const page = await fetched(location.href, go), fresh = page?.querySelector("form[data-swap]");
+    if (!fresh) return;
+    form.replaceChildren(...document.adoptNode(fresh).childNodes);
+    await show(page);
   };
-  const listen = () => {
-    source = new EventSource(address);
-    source.addEventListener("progress", () => { timer = timer || setTimeout(refresh, 700); });
-    source.addEventListener("end", () => { ended = true; source.close(); clearTimeout(timer); refresh(); });
-    // A stream ends when the service stops or the connection is cut; a request shows which.
-    source.addEventListener("error", () => { if (!ended) sprag.fetch("/livez", { cache: "no-store" }).catch(() => {}); });
-  };
-  document.addEventListener("sprag:found", () => {
-    if (!ended && source.readyState === EventSource.CLOSED) listen();
-    lastDrawn = 0;
-    refresh();
-  });
-  listen();
+  form.addEventListener("change", (event) => swap(event.target.matches(CHOSEN)));
+  window.addEventListener("popstate", () => { if (location.search !== shown) go(); });
+  document.addEventListener("sprag:found", () => asked?.());
 }

@@ -25,7 +25,7 @@ def wrong(page: Page, name: str) -> Any:
 
 def drawn(page: Page, selector: str = ".plot") -> list[dict[str, Any]]:
     """The lines of a picture, once it is drawn."""
-    page.wait_for_function("selector => document.querySelector(selector).dataset.drawn", arg=selector)
+    page.wait_for_function("selector => document.querySelector(selector)?.dataset.drawn", arg=selector)
     lines: list[dict[str, Any]] = page.evaluate(
         "selector => document.querySelector(selector).data.map(({name, x, y, type}) => ({name, x, y, type}))", selector
     )

@@ -33,20 +33,20 @@ def test_a_working_point_is_typed_and_marked(visitor: Visitor, office: Office, t
     assert len([line for line in drawn(page) if line["name"] == "25"]) == 4
     page.get_by_label("Working point").fill("150 N*mm")
     page.get_by_label("Working point").press("Tab")
-    expect(page.locator("h2.minor")).to_contain_text("150 N*mm")
+    expect(page.locator("h2.minor")).to_contain_text("150 N·mm")
     assert "point=150" in page.url
     told = office.get(f"/studies/{ten}/answers", point="150 N*mm")
     (curve,) = [curve for curve in told["curves"] if curve["by"] == {"excitation.frequency": 25.0}]
     torque = next(item for item in curve["working_point"] if item["name"] == "torque.mean")
     assert f"{torque['value']:.4g}" in page.locator(".tiles.small").inner_text()
-    page.wait_for_function("() => document.querySelector('.plot').layout?.shapes[0].x0 === 0.15")
+    page.wait_for_function("() => document.querySelector('.plot')?.layout?.shapes[0].x0 === 0.15")
     page.get_by_label("Answers of the curve").select_option("20 Hz")
     expect(page.locator("h2.minor")).to_contain_text("20 Hz")
     page.reload()
     expect(page.get_by_label("Answers of the curve")).to_have_value("20 Hz")
     page.get_by_text("6 of 10 curves").click()
     page.get_by_role("checkbox", name="21 Hz").click()
-    page.wait_for_function("() => document.querySelector('.plot').data?.some((line) => line.name === '21')")
+    page.wait_for_function("() => document.querySelector('.plot')?.data?.some((line) => line.name === '21')")
     expect(page.locator("#family tbody").first.locator("tr")).to_have_count(7)
 
 

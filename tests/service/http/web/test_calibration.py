@@ -15,17 +15,26 @@ def test_the_page_shows_values_points_and_figure(service: Service) -> None:
         assert service.http.get(address).status_code == 200, address
     overview = service.http.get(f"/studies/{study_id}").text
     assert f'href="/studies/{study_id}/calibration"' in overview
-    assert f'data-figure="/studies/{study_id}/figures/calibration"' in overview
+    assert f'data-figure="/studies/{study_id}/figures/calibration?columns=2&amp;units=typed"' in overview
     answer = service.http.get(f"/studies/{study_id}/calibration")
     assert answer.status_code == 200
     found = service.get(f"/studies/{study_id}/calibration")
-    for sentence in found["sentences"]:
-        assert sentence in answer.text.replace("&#39;", "'")
+    listed = re.search(r"<ul>(<li>.*?</li>)</ul>\s*<h2>Values", answer.text)
+    assert listed is not None
+    assert listed[1].count("<li>") == len(found["sentences"])
+    # For people: captions, and units as typed, 0.03 N*m as mN*m or N*mm.
+    assert "A further measurement says most at load torque = " in listed[1]
+    assert "pendulums.0.damping" in found["sentences"][-1]
+    assert "pendulums.0.damping" not in listed[1]
     assert len(re.findall(r"<tr><td class=\"num\">\d+</td>", answer.text)) == len(found["points"])
-    assert f'<img src="{API}/studies/{study_id}/calibration?format=svg"' in answer.text
+    assert f'<img src="{API}/studies/{study_id}/calibration?units=typed&amp;format=svg"' in answer.text
     figure = service.http.get(f"/studies/{study_id}/figures/calibration").json()
     measured = [trace for trace in figure["data"] if trace.get("name", "").endswith("measured")]
     assert sum(len(trace["y"]) for trace in measured) == 2 * len(found["points"])
+    narrow = service.http.get(f"/studies/{study_id}/figures/calibration?columns=1").json()["layout"]
+    wide = figure["layout"]
+    for layout, beside in ((wide, True), (narrow, False)):
+        assert (layout["xaxis"]["domain"] != layout["xaxis2"]["domain"]) is beside, "in a narrow place one per row"
     picture = service.http.get(f"{API}/studies/{study_id}/calibration?format=svg")
     assert ElementTree.fromstring(picture.text).tag.endswith("svg")
 

@@ -76,12 +76,12 @@ def test_a_refusal_of_the_form_is_told(visitor: Visitor) -> None:
 
 
 def test_a_running_study_is_followed_on_every_page_and_through_a_lost_connection(
-    visitor: Visitor, office: Office
+    visitor: Visitor, office: Office, example: str
 ) -> None:
     page = visitor.page
     page.goto("/")
     study_id = office.submit(wait=False, name="Followed", **LONG)
-    row = page.locator("#studies tr", has_text="Followed")
+    row = page.locator("#studies tr", has=page.locator(f"a[href='/studies/{study_id}']"))
     expect(row.locator(".state")).to_have_text("running")
 
     page.goto(f"/studies/{study_id}/curves?x=shaft.load&y=shaft.speed.mean&at=excitation.frequency=20")
@@ -89,10 +89,40 @@ def test_a_running_study_is_followed_on_every_page_and_through_a_lost_connection
     page.goto(f"/studies/{study_id}/map")
     page.wait_for_function("() => Number(document.querySelector('.plot')?.dataset.drawn) >= 3")
 
-    page.goto(f"/studies/{study_id}/cases")
+    page.goto(f"/studies/{study_id}/cases?where=shaft.load+%3E%3D+0")
     page.evaluate("() => { document.querySelector('#cases').dataset.mine = '1'; }")
-    page.wait_for_function("() => !document.querySelector('#cases').dataset.mine")
+    page.wait_for_function("() => document.querySelector('#cases:not([data-mine])')")
+    # A view that is saved now has the present choices, under the name that is half typed.
+    name = page.get_by_label("Name of this view")
+    name.fill("Half")
+    named(page, "ending").select_option("ok")
+    expect(page.locator("#view-query input")).to_have_value(re.compile("ending=ok"))
+    expect(name).to_have_value("Half")
 
+    page.goto(f"/studies/{study_id}/explore")
+    page.evaluate("() => { document.querySelector('#selected').dataset.mine = '1'; }")
+    page.wait_for_function("() => document.querySelector('#selected:not([data-mine])')")
+
+    for address, part in (
+        (f"/studies/{study_id}/cases/249999", "#outcome"),
+        (f"/studies/{study_id}/explore/compare?case=0&case=249999", "#beside"),
+        (f"/compare?study={example}&study={study_id}&x=shaft.load", "#head"),
+    ):
+        page.goto(address)
+        events = page.locator("[data-events]")
+        expect(events).to_have_attribute("data-events", f"/api/v1/studies/{study_id}/events")
+        expect(page.locator(f"{part}[data-live]")).to_have_count(1)
+
+    # Where the stream is refused, the page itself is requested: it says why.
+    page.route("**/events", lambda route: route.fulfill(status=401))
+    page.goto(f"/studies/{study_id}")
+    page.evaluate("() => { document.querySelector('#progress').dataset.mine = '1'; }")
+    page.wait_for_function("() => document.querySelector('#progress:not([data-mine])')")
+    page.unroute("**/events")
+
+    waiting = page.context.new_page()
+    waiting.goto(f"/studies/{study_id}/cases/249999")
+    expect(waiting.locator("#outcome .ending")).to_have_text("pending")
     page.goto(f"/studies/{study_id}")
     expect(page.locator("#progress")).to_contain_text("left")
     cut(page)
@@ -102,5 +132,8 @@ def test_a_running_study_is_followed_on_every_page_and_through_a_lost_connection
     office.wait(study_id)
     mend(page)
     expect(page.locator("#progress .state")).to_have_text("cancelled")
+    expect(waiting.locator("#outcome .ending")).to_have_text("cancelled")
+    expect(waiting.locator("[data-events]")).to_have_count(0)
+    waiting.close()
     page.goto("/")
     expect(row.locator(".state")).to_have_text("cancelled")

@@ -21,6 +21,7 @@ from sprag.service.http.web.form.page import EMPTY_FORM, reshape, share_clutches
 from sprag.service.http.web.form.spec import field_of, spec_of, values_of, with_clutch_defaults
 from sprag.service.http.web.templates import duration, fragment, time_left
 from sprag.service.presets import preset_names, preset_text
+from sprag.service.results.reading import Reading
 from sprag.service.results.wording import number, symbol, unit_text
 from sprag.service.spec.document import format_of, load_spec, parse_spec
 from sprag.worker import models
@@ -151,7 +152,7 @@ def test_a_copied_pendulum_follows_from_its_own_parameters() -> None:
         {"axes": [{"path": "shaft.load", "uniform": [0, 1]}]},
         {"axes": {"sample": "sobol"}},
         {"combine": "union"},
-        {"exclude": []},
+        {"exclude": [{"shaft.load": {"above": 1, "below": 2, "is": 3}}]},
     ],
 )
 def test_specs_that_the_form_cannot_show_are_not_forced_into_it(changes: dict[str, Any]) -> None:
@@ -166,7 +167,8 @@ def test_specs_that_the_form_cannot_show_are_not_forced_into_it(changes: dict[st
         (" 0.1 ", 0.1),
         ("1e-9", 1e-9),
         ("25 Hz", "25 Hz"),
-        ("1,5", "1,5"),
+        ("1,5", 1.5),
+        ("1,500", "1,500"),
         ("nan", "nan"),
         ("1e999", "1e999"),
     ],
@@ -192,7 +194,7 @@ def filled(**changes: str) -> dict[str, str]:
         ("/base/gravity", "much", "must begin with a number"),
         ("/axes/0/count", "0", "out of range"),
         ("/axes/0/from", "16 mm", "not a unit of this field"),
-        ("/axes/1/values", "1,5 mm", "decimal point"),
+        ("/axes/1/values", "1,500 mm", "decimal point"),
         ("/axes/2/path", "shaft.lod", "shaft.load"),
         ("/run/tolerance", "1", "out of range"),
         ("/run/at_most", "1000", "number of excitation periods"),
@@ -378,7 +380,7 @@ def test_a_part_after_the_run_stopped_is_a_sentence(monkeypatch: pytest.MonkeyPa
         return models.Trajectory(times, (), (), np.zeros((times.size, 0)), {}, "chatter")
 
     monkeypatch.setattr(models, "run_trajectory", stopped)
-    figures = motion_figures(study, 0, 0.5, 0.6, 2)
+    figures = motion_figures(study, 0, 0.5, 0.6, 2, Reading(study.model))
     sentence = "There is no motion in this part: the run stopped at about t = 0.012 s with chatter."
     assert {name: figure["note"] for name, figure in figures.items()} == {"motion": sentence, "phase": sentence}
     assert figures["motion"]["layout"] == {}

@@ -21,7 +21,7 @@ from tests.service.searching import rows_of, search
 def test_the_page_shows_the_best_designs_with_their_links(service: Service) -> None:
     study_id = search(service)
     overview = service.http.get(f"/studies/{study_id}").text
-    assert f'data-figure="/studies/{study_id}/figures/front"' in overview
+    assert f'data-figure="/studies/{study_id}/figures/front?units=typed"' in overview
     assert f'href="/studies/{study_id}/front"' in overview
     answer = service.http.get(f"/studies/{study_id}/front")
     assert answer.status_code == 200
@@ -31,7 +31,8 @@ def test_the_page_shows_the_best_designs_with_their_links(service: Service) -> N
     for link in (f"/studies/{study_id}/cases/{first}", f"/new?clone={study_id}&amp;case={first}&amp;along=shaft.load"):
         assert f'href="{link}"' in answer.text
     assert (
-        f'<img src="{API}/studies/{study_id}/front?x=efficiency&amp;y=shaft.irregularity&amp;format=svg"' in answer.text
+        f'<img src="{API}/studies/{study_id}/front?x=efficiency&amp;y=shaft.irregularity&amp;units=typed&amp;'
+        'format=svg"' in answer.text
     )
     for path in (f"{API}/studies/{study_id}/front?format=svg", f"/studies/{study_id}/front/search.svg"):
         assert ElementTree.fromstring(service.http.get(path).text).tag.endswith("svg")
@@ -59,6 +60,17 @@ def test_the_scatter_has_every_design_that_has_not_failed(service: Service) -> N
     assert progress["data"][0]["y"][-1] == history[-1]["best"][0]
 
 
+def test_designs_that_serve_the_derivatives_of_the_polish_are_not_listed(service: Service) -> None:
+    study_id = search(service)
+    first = next(one for one in service.store.rounds(study_id) if one.summary.get("phase") == "polish")
+    answer = service.get(f"/studies/{study_id}/front")
+    cases = {case for item in answer["designs"] for case in item["cases"]}
+    assert len(first.cases) > 0
+    assert cases | set(first.cases) == set(range(service.store.get_study(study_id).cases))
+    assert not cases & set(first.cases)
+    assert answer["counts"]["known"] == len(answer["designs"])
+
+
 def test_what_no_generation_has_is_not_drawn(service: Service) -> None:
     study_id = search(service, subject_to=[{"result": "shaft.speed.mean", "at_least": "1e6 rad/s"}])
     progress = service.http.get(f"/studies/{study_id}/figures/search").json()
@@ -80,7 +92,9 @@ def test_a_search_without_any_result_has_a_page_and_other_studies_have_none(serv
     study_id = search(service, rounds=0)
     text = service.http.get(f"/studies/{study_id}/front").text
     assert "No design has its results yet." in text
-    assert "Generation 1 of 2. 0 designs: 0 within the limits, 0 on the front, 8 still to be run." in text
+    assert (
+        "Waiting for round 1 of at most 13. 0 designs: 0 within the limits, 0 on the front, 8 still to be run." in text
+    )
     service.store.cancel_study(study_id)
     service.store.settle(service.store.take_over("test"), service.store.get_study(study_id).number)
     assert "8 not run." in service.http.get(f"/studies/{study_id}/front").text

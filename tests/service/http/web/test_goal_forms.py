@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from html.parser import HTMLParser
 from typing import Any
 
 import pytest
@@ -15,6 +14,7 @@ from sprag.service.presets import preset_text
 from sprag.service.spec.document import load_spec, parse_spec
 from sprag.worker.chunking import Chunking
 from tests.service.conftest import Service
+from tests.service.http.web.controls import Controls
 
 GOAL: dict[str, Any] = {
     "vary": [
@@ -120,28 +120,6 @@ def test_rows_are_added_and_removed() -> None:
     for _ in range(9):
         reshape(values, "add-best")
     assert values["best"] == "8"
-
-
-class Controls(HTMLParser):
-    """What a browser would send of the form of a page."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.values: dict[str, str] = {}
-        self._select = ""
-        self.feed(text)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        given = dict(attrs)
-        name, value = given.get("name") or "", given.get("value") or ""
-        if tag == "select":
-            self._select = name
-        elif tag == "option" and (self._select not in self.values or "selected" in given):
-            self.values[self._select] = value
-        elif tag == "input" and name and (given.get("type") not in {"radio", "checkbox"} or "checked" in given):
-            self.values[name] = value or "on"
-            if given.get("type") != "checkbox":
-                self.values[name] = value
 
 
 def test_the_form_is_filled_in_without_javascript(service: Service) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
@@ -131,7 +132,8 @@ def test_the_laboratory_answers_a_moved_slider(visitor: Visitor, office: Office)
     results = office.get(f"/studies/{study_id}/cases/0")["results"]
     assert after == pytest.approx(results["irregularity"], rel=1e-4)  # fields show six digits
     speed, energy = drawn(page, "#lab-plot")[:2]
-    assert max(speed["y"]) == pytest.approx(results["omega.max"], rel=1e-4)
+    # The machine gives its speeds in rpm, and so does the figure.
+    assert max(speed["y"]) == pytest.approx(results["omega.max"] * 30 / math.pi, rel=1e-4)
     assert max(energy["y"]) - min(energy["y"]) == pytest.approx(results["energy.fluctuation"], rel=1e-4)
     page.reload()
     expect(inertia).to_have_value(str(page.url.split("drive.inertia=")[1].split("&")[0]))
@@ -164,7 +166,7 @@ def test_a_machine_of_several_parts_has_sliders_for_each_and_varies_equal_parts_
 
 
 @pytest.mark.parametrize("field", ["?machine=press&drive.inertia=", "/drive?excitation.frequency="])
-@pytest.mark.parametrize("text", ["abc", "25,5", "nan"])
+@pytest.mark.parametrize("text", ["abc", "2,5,5", "nan"])
 def test_a_number_that_cannot_be_read_is_refused_with_a_sentence(office: Office, field: str, text: str) -> None:
     answer = office.http.get(f"/laboratory{field}{text}")
     assert answer.status_code == 422

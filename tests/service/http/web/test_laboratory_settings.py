@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl
 
 import pytest
@@ -11,9 +14,15 @@ import pytest
 from sprag.service.http.problems import ApiError
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.figures.shaft import irregularities, machine_case
+from sprag.service.http.web.laboratory.drive_setting import setting as drive_setting
 from sprag.service.http.web.laboratory.questions import estimates, question_spec
 from sprag.service.http.web.laboratory.setting import MOST_HELD, held_settings, machines, setting
+from sprag.service.results.reading import Choice, Reading
 from sprag.service.spec.document import parse_spec
+from sprag.worker import models
+
+if TYPE_CHECKING:
+    from tests.service.conftest import Service
 
 BASE = json.dumps(preset_of("press")["spec"]["base"])
 
@@ -27,6 +36,49 @@ def test_an_address_gives_the_setting_again() -> None:
     assert [slider.path for slider in chosen.changed] == ["drive.inertia", "mechanism.slider_crank.crank"]
     assert (chosen.angle, chosen.faults) == (400.0, {})
     assert chosen.groups["Mechanism"]
+
+
+def shown(chosen: Any, path: str) -> Any:
+    return next(slider for slider in chosen.sliders if slider.path == path)
+
+
+@pytest.mark.parametrize(
+    ("read", "machine", "path", "unit", "size", "choice"),
+    [
+        (setting, "press", "mechanism.slider_crank.rod", "in", 0.0254, "in"),
+        (setting, "press", "mean_speed", "rad/s", 1.0, "si"),
+        (drive_setting, "one_pendulum", "excitation.amplitude_x", "in", 0.0254, "in"),
+        (drive_setting, "one_pendulum", "excitation.frequency", "rpm", 1 / 60, "frequency=rpm"),
+    ],
+)
+def test_sliders_are_in_the_units_of_the_reader(
+    read: Any, machine: str, path: str, unit: str, size: float, choice: str
+) -> None:
+    plain, mine = read({"machine": machine}), read({"machine": machine}, Choice(choice))
+    slider, si = shown(mine, path), mine.study.base[path]
+    assert slider.text == slider.own == (f"{si:.6g}" if choice == "si" else f"{si / size:.6g} {unit}")
+    assert slider.shown == ("" if choice == "si" else unit)
+    assert (slider.low, slider.high) == (shown(plain, path).low, shown(plain, path).high)
+    # The address has the unit; another reader sees the same machine, the own numbers in the own units.
+    theirs = read(dict(parse_qsl(mine.query)))
+    assert theirs.study == plain.study
+    assert shown(theirs, path).text == shown(plain, path).text
+    # A number that was changed stays as it was typed, with its value.
+    changed = f"{1.25 * float(slider.text.split()[0]):.6g} {slider.shown}".strip()
+    moved = read({"machine": machine, path: changed}, Choice(choice))
+    again = read(dict(parse_qsl(moved.query)))
+    assert again.study.base[path] == moved.study.base[path] == pytest.approx(1.25 * si, rel=1e-5)
+    assert shown(again, path).text == changed
+
+
+def test_tables_of_laboratories_are_in_the_units_of_the_reader(service: Service) -> None:
+    for address in ("/laboratory/picture.csv?machine=press", "/laboratory/drive/picture.csv?machine=one_pendulum"):
+        si, rpm = (service.http.get(f"{address}&units={units}").text.splitlines() for units in ("si", "speed=rpm"))
+        heads = rpm[0].split(",")
+        at = next(place for place, head in enumerate(heads) if head.endswith(" [rpm]"))
+        assert si[0].split(",")[at] == heads[at].removesuffix(" [rpm]")
+        pairs = [(float(a.split(",")[at]), float(b.split(",")[at])) for a, b in zip(si[1:], rpm[1:], strict=True)]
+        assert [b for _, b in pairs] == pytest.approx([a * 30.0 / math.pi for a, _ in pairs], rel=1e-9)
 
 
 @pytest.mark.parametrize("name", machines())
@@ -96,7 +148,7 @@ def test_estimates_are_of_the_machine_with_one_change() -> None:
     assert [each.study.base["drive.inertia"] for each in asked] == [30.0, 15.0, 15.0]
     assert asked[1].study.base["mechanism.slider_crank.rod_inertia"] == pytest.approx(0.06)
     now, *after = irregularities(chosen.study, [each.study for each in asked])
-    doubled = machine_case(setting({"machine": "press", "drive.inertia": "30"}).study)
+    doubled = machine_case(setting({"machine": "press", "drive.inertia": "30"}).study, Reading(models.MACHINE_SHAFT))
     assert after[0] == ("ok", doubled["results"]["irregularity"])
     assert all(value is not None and now[1] is not None and value < now[1] for _, value in (after[0], after[2]))
 
@@ -111,9 +163,39 @@ def test_a_question_is_a_study_of_exactly_what_is_set() -> None:
 def test_held_machines_are_drawn_beside_the_current_one() -> None:
     press = setting({"machine": "press"}).study
     slow = replace(press, base={**press.base, "mean_speed": 2.0})
-    case = machine_case(press, [("A", press), ("B", slow)])
+    case = machine_case(press, Reading(models.MACHINE_SHAFT), [("A", press), ("B", slow)])
     names = {trace["name"] for trace in case["figure"]["data"]}
     assert {"A: ω", "A: T", "A: ω² = S₁ + S₂ + S₃ + S₄"} <= names
     # A machine that stops within the cycle has no lines.
     assert case["held"][1]["ending"] == "inertia_insufficient"
     assert not any(name.startswith("B") for name in names)
+
+
+def cells(answer: dict[str, Any], part: str) -> dict[str, list[str]]:
+    """Cells of a table of results by the name of the result."""
+    rows = re.findall(r'<tr><td title="([^"]+)">[^<]*</td>(.*?)</tr>', answer[part], re.DOTALL)
+    return {name: re.findall(r"<td[^>]*>(.*?)</td>", rest) for name, rest in rows}
+
+
+@pytest.mark.parametrize(
+    ("address", "part", "name", "si", "shown", "factor"),
+    [
+        ("/laboratory/figure?machine=press", "results", "omega.mean", "rad/s", "rpm", 30.0 / math.pi),
+        ("/laboratory/drive/figure?", "details", "torque.mean", "N·m", "N·mm", 1e3),
+    ],
+)
+def test_numbers_and_figures_are_in_the_readers_units(
+    service: Service, address: str, part: str, name: str, si: str, shown: str, factor: float
+) -> None:
+    plain, read = (
+        service.http.get(f"{address}&units={units}").json() for units in ("si", f"{shown.replace('·', '*')},deg")
+    )
+    before, after = cells(plain, part)[name], cells(read, part)[name]
+    assert (before[-1], after[-1]) == (si, shown)
+    assert _number(after[0]) == pytest.approx(factor * _number(before[0]), rel=1e-4)
+    assert shown in json.dumps(read["figure"]["layout"], ensure_ascii=False)
+    assert shown not in json.dumps(plain["figure"]["layout"], ensure_ascii=False)
+
+
+def _number(cell: str) -> float:
+    return float(cell.replace("\u202f", "").replace("−", "-"))

@@ -75,7 +75,7 @@ def test_a_phone_has_the_whole_table_of_a_single_case(visitor: Visitor, motions:
     spec["base"] = {**SPEC["base"], "start": {"study": motions, "case": 0, "start": 0}}
     study_id = office.submit(spec)
     visitor.page.goto(f"/studies/{study_id}")
-    expect(visitor.page.locator("main")).to_contain_text("shaft.speed.mean")
+    expect(visitor.page.locator("main")).to_contain_text("Mean shaft speed")
     assert outside(visitor.page) == []
 
 

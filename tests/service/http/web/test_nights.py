@@ -115,7 +115,7 @@ def test_a_browser_logs_in_looks_and_acts_and_logs_out(house: House, tab: Page) 
     assert (cookie["httpOnly"], cookie["sameSite"], secret in str(cookie["value"])) == (True, "Lax", False)
     expect(tab.get_by_role("heading", level=1)).to_contain_text("Feeder motor")
     tab.goto("/schedules/new")
-    tab.get_by_label("Study").select_option(f"study {house.study}")
+    tab.get_by_label("Study", exact=True).select_option(f"study {house.study}")
     tab.get_by_role("button", name="Create the schedule").click()
     expect(tab.locator("tbody tr")).to_have_count(1)
     tab.get_by_role("link", name="Log in or out").click()
@@ -150,7 +150,15 @@ def test_a_token_to_look_sees_every_page_and_may_change_nothing(house: House, ta
     tab.goto("/login")
     log_in(tab, secret)
     expect(tab).to_have_url(f"{house.address}/")
-    for page in ("/", f"/studies/{house.study}", f"/studies/{house.study}/cases/0", "/schedules", "/new", "/docs"):
+    for page in (
+        "/",
+        f"/studies/{house.study}",
+        f"/studies/{house.study}/cases/0",
+        "/schedules",
+        "/night",
+        "/new",
+        "/docs",
+    ):
         answer = tab.goto(page)
         assert answer is not None
         assert answer.status == 200, page
@@ -159,7 +167,7 @@ def test_a_token_to_look_sees_every_page_and_may_change_nothing(house: House, ta
     assert house.store.list_schedules() == ()
 
 
-def test_a_schedule_is_kept_changed_disabled_and_deleted(house: House, tab: Page) -> None:
+def test_a_schedule_is_kept_changed_paused_and_deleted(house: House, tab: Page) -> None:
     tab.goto(f"/schedules/new?study={house.study}")
     tab.get_by_label("Name of its studies").fill("Every working night")
     tab.get_by_label("Cron expression").fill("0 25 * * *")
@@ -176,21 +184,21 @@ def test_a_schedule_is_kept_changed_disabled_and_deleted(house: House, tab: Page
     tab.get_by_label("Until").fill("06:00")
     tab.get_by_role("button", name="Create the schedule").click()
     row = tab.locator("tbody tr")
-    # 22:00 in Berlin, where it is winter, is 21:00 UTC; the first of January 2026 is a Thursday.
-    expect(row).to_contain_text("2026-01-01 21:00:00 UTC")
-    expect(row).to_contain_text("22:00 to 06:00")
+    # In winter; the first of January 2026 is a Thursday.
+    expect(row).to_contain_text("2026-01-01 22:00 CET (Europe/Berlin)")
+    expect(row).to_contain_text("22:00–06:00")
     row.get_by_role("link", name="Every working night").click()
     tab.get_by_label("Cron expression").fill("30 8 * 7 *")
     for label in ("From", "Until"):
         tab.get_by_label(label).fill("")
     tab.get_by_role("button", name="Save").click()
-    expect(row).to_contain_text("2026-07-01 06:30:00 UTC")  # in summer Berlin is two hours ahead
+    expect(row).to_contain_text("2026-07-01 08:30 CEST (Europe/Berlin)")
     expect(row).to_contain_text("any time")
-    row.get_by_role("button", name="Disable").click()
-    expect(row).to_contain_text("disabled")
+    row.get_by_role("button", name="Pause").click()
+    expect(row).to_contain_text("paused")
     expect(row).not_to_contain_text("2026-07-01")
-    row.get_by_role("button", name="Enable").click()
-    expect(row).to_contain_text("2026-07-01 06:30:00 UTC")
+    row.get_by_role("button", name="Resume").click()
+    expect(row).to_contain_text("2026-07-01 08:30 CEST")
     row.get_by_role("button", name="Delete").click()
     expect(tab.get_by_text("There is no schedule yet.")).to_be_visible()
     assert house.store.list_schedules() == ()
@@ -198,7 +206,7 @@ def test_a_schedule_is_kept_changed_disabled_and_deleted(house: House, tab: Page
 
 def test_a_study_is_run_once_at_a_time_of_a_zone(house: House, tab: Page) -> None:
     tab.goto("/schedules/new")
-    tab.get_by_label("Study").select_option("preset one_pendulum")
+    tab.get_by_label("Study", exact=True).select_option("preset one_pendulum")
     tab.get_by_label("once").check()
     tab.get_by_label("Time", exact=True).fill("2025-12-31T22:00")
     tab.get_by_label("Time zone").fill("Asia/Tokyo")
@@ -208,9 +216,14 @@ def test_a_study_is_run_once_at_a_time_of_a_zone(house: House, tab: Page) -> Non
     tab.get_by_role("button", name="Create the schedule").click()
     row = tab.locator("tbody tr")
     expect(row).to_contain_text("2026-01-02 07:30 Asia/Tokyo")
-    expect(row).to_contain_text("2026-01-01 22:30:00 UTC")
+    expect(row).to_contain_text("2026-01-02 07:30 JST (Asia/Tokyo)")
     house.clock.moment = datetime(2026, 1, 1, 22, 30, 1, tzinfo=UTC)
     Scheduler(house.store).look()
+    tab.goto("/schedules")
+    expect(row).to_contain_text("Its study waits for workers: 0 of")
+    tab.goto("/night?hours=12")
+    expect(tab.get_by_role("heading", level=2)).to_contain_text("2026-01-02 07:30 JST (Asia/Tokyo)")
+    expect(tab.get_by_text("The only run went as planned")).to_be_visible()
     tab.goto("/schedules")
     row.get_by_role("link", name="its study").click()
     expect(tab.get_by_role("heading", level=1)).to_be_visible()

@@ -1,13 +1,16 @@
-"""Pictures on paper and on phones: every entry of the legend is there, and nothing that cannot be used here."""
+"""Pages on paper and on phones: every entry of the legend is there, and nothing that cannot be used here."""
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import pytest
 from playwright.sync_api import expect
 
 from tests.service.http.web.fields import drawn
+from tests.service.http.web.test_accessibility import LONG, PHONE
+from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -57,7 +60,7 @@ def test_paper_has_the_whole_legend_and_table(visitor: Visitor, family: str) -> 
     assert (entries(page), cut_off(page, 1280)) == (8, [])
     page.emulate_media(media="print")
     page.evaluate("() => window.dispatchEvent(new Event('beforeprint'))")
-    page.wait_for_function("() => document.querySelector('.plot .main-svg').getBoundingClientRect().width <= 690")
+    page.wait_for_function("() => document.querySelector('.plot .main-svg')?.getBoundingClientRect().width <= 690")
     assert (entries(page), cut_off(page, 690)) == (8, [])
     page.goto(f"/studies/{family}/cases")
     page.set_viewport_size({"width": 717, "height": 1000})
@@ -65,7 +68,7 @@ def test_paper_has_the_whole_legend_and_table(visitor: Visitor, family: str) -> 
     assert page.evaluate("() => document.querySelector('#cases table').getBoundingClientRect().right <= innerWidth")
 
 
-@pytest.mark.parametrize("visitor", [{"viewport": {"width": 390, "height": 800}}], indirect=True)
+@pytest.mark.parametrize("visitor", [{"viewport": PHONE}], indirect=True)
 def test_a_phone_has_the_whole_legend(visitor: Visitor, family: str) -> None:
     page = visitor.page
     for address in (f"/studies/{family}", f"/studies/{family}/curves?x=shaft.load&by=excitation.amplitude_x"):
@@ -75,6 +78,18 @@ def test_a_phone_has_the_whole_legend(visitor: Visitor, family: str) -> None:
         assert page.evaluate("() => document.documentElement.scrollWidth") == 390, address
 
 
+@pytest.mark.parametrize("visitor", [{"viewport": PHONE}], indirect=True)
+def test_the_list_of_schedules_needs_no_scrolling_to_the_side(visitor: Visitor, office: Office) -> None:
+    schedule = {"spec": SPEC, "at": "2099-12-31T23:59", "name": LONG, "zone": "America/Argentina/ComodRivadavia"}
+    assert office.http.post("/api/v1/schedules", json=schedule).status_code == 201
+    page = visitor.page
+    page.goto("/schedules")
+    widths = page.evaluate("() => [...document.querySelectorAll('.scroll')].map((e) => e.scrollWidth - e.clientWidth)")
+    assert widths == [0]
+    heads = page.locator("#" + office.get("/schedules")["schedules"][0]["id"] + " td[data-head]")
+    assert heads.evaluate_all("(cells) => cells.map((e) => getComputedStyle(e, '::before').content)")[1] == '"Window"'
+
+
 def test_no_button_offers_to_share_a_picture_with_others(visitor: Visitor, family: str) -> None:
     page = visitor.page
     page.goto(f"/studies/{family}")
@@ -82,3 +97,48 @@ def test_no_button_offers_to_share_a_picture_with_others(visitor: Visitor, famil
     titles = page.evaluate("() => [...document.querySelectorAll('.modebar-btn')].map((button) => button.dataset.title)")
     assert "Zoom" in titles
     assert not [title for title in titles if "Share" in title or "cloud" in title.lower()]
+
+
+#: Of a page on paper: size and margins of its sheets, how it is set, and what is shown of it.
+PAPER = """() => {
+  const rules = [...document.styleSheets].flatMap((sheet) => [...sheet.cssRules]);
+  const sheet = rules.filter((rule) => rule instanceof CSSPageRule && !rule.selectorText)[0].style;
+  const set = (query) => getComputedStyle(document.querySelector(query));
+  const shown = (query) => [...document.querySelectorAll(query)].some((e) => e.getClientRects().length > 0);
+  return {
+    sheet: [sheet.size, sheet.margin],
+    text: set("body").fontSize,
+    table: [set("main table").fontSize, set("thead").display],
+    rows: set("main tr").breakInside,
+    heading: set("h2").breakAfter,
+    hidden: ["nav", "form", "button", "input", "footer", ".downloads", "summary"].filter(shown),
+    figures: shown("figure .main-svg, figure img"),
+    facts: shown("#particulars, .particulars"),
+  };
+}"""
+
+
+def test_a_page_on_paper_is_set_as_the_report(visitor: Visitor, office: Office) -> None:
+    family = office.submit(**FAMILY)
+    query = "x=shaft.load&y=efficiency&units=si"
+    saved = office.http.post(
+        "/api/v1/views",
+        json={"page": "curves", "study": family, "name": "Efficiency", "query": query, "in_report": True},
+    )
+    assert saved.status_code == 200
+    page = visitor.page
+    page.emulate_media(media="print")
+    page.goto(f"/studies/{family}")
+    drawn(page)
+    own = page.evaluate(PAPER)
+    assert (own["hidden"], own["figures"], own["facts"]) == ([], True, True)
+    facts = page.locator("#particulars").inner_text()
+    for fact in (family, "vibration-drive", "Submitted", "Printed"):
+        assert fact in facts
+    assert page.get_by_text("Figures of the report").is_visible()
+    pdf = page.pdf(prefer_css_page_size=True)
+    assert re.search(rb"/MediaBox \[0 0 59[45][.\d]* 84[12][.\d]*\]", pdf), "sheets of A4"
+    page.goto(f"/api/v1/studies/{family}/report?format=html&project=Feeder+7")
+    report = page.evaluate(PAPER)
+    assert (report["hidden"], report["figures"], report["facts"]) == ([], True, True)
+    assert own == report

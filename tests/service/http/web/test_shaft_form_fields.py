@@ -73,8 +73,6 @@ def test_a_diagram_over_time_goes_through_the_form(indicated: bool) -> None:
 def test_what_the_form_has_no_field_for_is_given_as_text() -> None:
     with pytest.raises(ValueError, match="no fields"):
         values_of({**PRESS, "base": {**PRESS["base"], "operation": {"quantity": "force", "value": {"odd": 1}}}})
-    with pytest.raises(ValueError, match="no fields"):
-        values_of({**PRESS, "correlations": []})
     with pytest.raises(ValueError, match="no field for the tolerance"):
         values_of({**PRESS, "tolerances": [{"path": "operation.steps.0.value", "plus_minus": "5 %"}]})
 

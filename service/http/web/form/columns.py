@@ -1,0 +1,107 @@
+"""Columns of a spreadsheet, pasted into the form: an axis for each, which go together value by value."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Final
+
+from sprag.service.http.web.form.entries import Faults, Values
+from sprag.service.http.web.form.fields import Groups
+from sprag.service.http.web.form.parts import PARTS, count_of, drop
+from sprag.service.spec.csv_text import HEADING, MAX_HEADING
+from sprag.service.spec.numbers import is_ambiguous, parse_number, settled_rows
+from sprag.service.spec.report import did_you_mean
+
+#: The field into which columns are pasted.
+COLUMNS: Final = "/columns"
+_MOST_ROWS: Final = 2_000
+_AXES: Final = PARTS["axes"]
+
+
+def take_columns(values: Values, choices: Groups) -> Faults:
+    """Replace the axes by the pasted columns, and empty the field; the faults, by field, where that is not possible.
+
+    A first line without numbers names the parameters, by their paths or labels, with a unit in brackets where it is not
+    the one beside the parameter. Without it the columns are values of the axes that there are, in their order.
+    """
+    text = values.get(COLUMNS, "")
+    rows = [_cells(line) for line in text.splitlines() if line.strip()]
+    if not rows:
+        return {COLUMNS: ["has no columns; paste cells of a spreadsheet, with a line of headings"]}
+    headings = rows.pop(0) if all(map(_is_name, rows[0])) else None
+    width = len(headings or rows[0])
+    if not rows or len(rows) > _MOST_ROWS or width > _AXES.most:
+        allowed = f"1 to {_MOST_ROWS:,} lines of 1 to {_AXES.most} columns under the headings"
+        return {COLUMNS: [f"has {len(rows):,} lines of {width} columns; allowed: {allowed}"]}
+    uneven = next((line for line, row in enumerate(rows, 1 if headings is None else 2) if len(row) != width), None)
+    if uneven is not None:
+        return {COLUMNS: [f"line {uneven} has another number of cells than the first one; allowed: {width}"]}
+    rows = settled_rows(rows, decimal=";" in text)
+    columns = list(zip(*rows, strict=True))
+    if headings is None:
+        return _into_axes(values, columns)
+    found = [_named(heading, choices) for heading in headings]
+    faults = [fault for _, _, fault in found if fault]
+    if faults:
+        return {COLUMNS: faults}
+    drop(values, f"{_AXES.pointer}/")
+    values["axes"] = str(width)
+    for index, ((path, unit, _), column) in enumerate(zip(found, columns, strict=True)):
+        _fill(values, index, column, unit)
+        values[f"{_AXES.pointer}/{index}/path"] = path
+    _finish(values, width)
+    return {}
+
+
+def _into_axes(values: Values, columns: list[tuple[str, ...]]) -> Faults:
+    """Columns without headings as the values of the axes that there are."""
+    paths = [values.get(f"{_AXES.pointer}/{index}/path", "") for index in range(count_of(values, "axes"))]
+    if len(paths) != len(columns) or not all(paths):
+        text = f"has {len(columns)} columns without headings; allowed: a column for each of the {len(paths)} axes"
+        return {COLUMNS: [f"{text}, whose parameters are chosen, or headings such as shaft.load [N*m]"]}
+    for index, column in enumerate(columns):
+        _fill(values, index, column, "")
+    _finish(values, len(columns))
+    return {}
+
+
+def _fill(values: Values, index: int, column: tuple[str, ...], unit: str) -> None:
+    pointer = f"{_AXES.pointer}/{index}"
+    cells = [f"{cell.strip()} {unit}" if unit and parse_number(cell) is not None else cell.strip() for cell in column]
+    values |= {f"{pointer}/way": "values", f"{pointer}/values": "; ".join(cells)}
+
+
+def _finish(values: Values, columns: int) -> None:
+    if columns > 1:
+        values["/combine"] = "zip"
+    values[COLUMNS] = ""
+
+
+def _cells(line: str) -> list[str]:
+    separator = next((sign for sign in "\t;" if sign in line), None)
+    return [line.strip()] if separator is None else [cell.strip() for cell in line.split(separator)]
+
+
+def _is_name(cell: str) -> bool:
+    return bool(re.match(r"[^\W\d]", cell)) and parse_number(cell) is None and not is_ambiguous(cell)
+
+
+def _named(heading: str, choices: Groups) -> tuple[str, str, str]:
+    """Path and unit of a column, and the fault of its heading."""
+    if len(heading) > MAX_HEADING:
+        return "", "", f"has a heading of {len(heading):,} characters; allowed: at most {MAX_HEADING}"
+    label = re.fullmatch(r"(.+?)\s*(?:[\[(]([^\])]+)[\])])?", heading)
+    match = HEADING.fullmatch(heading)
+    known: Mapping[str, str] = {
+        name.lower(): choice.path for _, group in choices for choice in group for name in (choice.path, choice.label)
+    }
+    for found in (match, label):
+        if found is not None and found[1].lower() in known:
+            return known[found[1].lower()], found[2] or "", ""
+    paths = [choice.path for _, group in choices for choice in group]
+    return (
+        "",
+        "",
+        f"'{heading}' names no parameter{did_you_mean(heading, paths)}; allowed: a path, its unit in brackets",
+    )

@@ -1,0 +1,76 @@
+"""Streams of events for pages that are not about one study: an event for each change of what a page lists."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+from fastapi import Header, Query, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response
+
+from sprag.service.http import streams
+from sprag.service.http.context import Context, Ctx
+from sprag.service.http.problems import ApiError
+from sprag.service.http.routers import page_router
+from sprag.service.http.schedule_views import summary
+from sprag.service.http.streams import Seen, event_stream
+from sprag.service.http.web.study_list import listed
+from sprag.service.jobs.nights import HOURS, MOST_HOURS, night
+from sprag.service.jobs.workers import worker_list
+from sprag.service.json_text import to_bytes
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from starlette.datastructures import QueryParams
+
+router = page_router()
+
+
+def _studies(context: Context, given: QueryParams) -> Any:
+    return [[study.id, study.revision] for study in listed(context, given).studies]
+
+
+def _schedules(context: Context, _: QueryParams) -> Any:
+    return [summary(record) for record in context.store.list_schedules()]
+
+
+def _night(context: Context, given: QueryParams) -> Any:
+    found = night(context.store, float(given.get("hours", HOURS)))
+    return [found["late"], found["runs"]]  # without the ends of the interval, which move with the clock
+
+
+def _workers(context: Context, _: QueryParams) -> Any:
+    return worker_list(context.store)
+
+
+#: What is listed, by the name of its stream.
+_LISTS: Final[dict[str, Callable[[Context, QueryParams], Any]]] = {
+    "studies": _studies,
+    "schedules": _schedules,
+    "night": _night,
+    "workers": _workers,
+}
+
+LastEventId = Annotated[str | None, Header(alias="Last-Event-ID", max_length=40)]
+
+
+@router.get("/live/{name}")
+async def live(
+    context: Ctx,
+    request: Request,
+    name: str,
+    hours: Annotated[float, Query(ge=1, le=MOST_HOURS)] = HOURS,  # noqa: ARG001 - checked here, read with the rest
+    last_event_id: LastEventId = None,
+) -> Response:
+    """An event when the list has changed; its address has the parameters of the page that shows the list."""
+    if name not in _LISTS:
+        raise ApiError("not-found", "Unknown list.")
+
+    def look() -> Seen:
+        listed_now = to_bytes(_LISTS[name](context, request.query_params))
+        return Seen(hashlib.blake2b(listed_now, digest_size=8).hexdigest(), {})
+
+    await run_in_threadpool(look)  # refuses what the address asks wrongly
+    return await event_stream(context, look, last_event_id, streams.LIST_SECONDS)

@@ -1,0 +1,58 @@
+// Keyboard shortcuts: g and a letter for the pages, digits for the parts of a study, / for the first field, F1 for the explanation
+// of a field, ? for this help.
+"use strict";
+
+(() => {
+  const OFF = "sprag.keys.off", WAIT = 1500; // ms in which the letter follows g
+  const dialog = document.querySelector("#keys"), list = dialog.querySelector("dl"), on = dialog.querySelector("[type=checkbox]");
+  let waiting = 0;
+  on.checked = localStorage.getItem(OFF) === null;
+  on.addEventListener("change", () => { on.checked ? localStorage.removeItem(OFF) : localStorage.setItem(OFF, "1"); });
+
+  const withKey = (prefix, key) => [...document.querySelectorAll(prefix)].find((link) => link.dataset.key === key);
+  const PAGES = "header.site [data-key]", PARTS = ".tabs [data-key]";
+  const field = () => [...document.querySelectorAll("main [type=search], main form.choices :is(input, select), main form :is(input, select, textarea)")]
+    .find((one) => one.type !== "hidden" && one.checkVisibility());
+
+  const help = () => {
+    list.querySelectorAll(".link").forEach((item) => item.remove());
+    for (const [prefix, before] of [[PAGES, "g "], [PARTS, ""]]) {
+      for (const link of document.querySelectorAll(prefix)) {
+        const key = document.createElement("dt"), name = document.createElement("dd"), shown = document.createElement("kbd");
+        shown.textContent = before + link.dataset.key;
+        name.textContent = link.textContent;
+        key.className = name.className = "link";
+        key.append(shown);
+        list.append(key, name);
+      }
+    }
+    dialog.showModal();
+  };
+
+  document.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented || dialog.open) return;
+    if (event.target.closest("input:not([type=checkbox], [type=radio]), select, textarea, [contenteditable]")) return;
+    if (!on.checked) return;
+    const after = waiting > event.timeStamp;
+    waiting = 0;
+    const link = after ? withKey(PAGES, event.key) : withKey(PARTS, event.key);
+    if (link) link.click();
+    else if (event.key === "g") waiting = event.timeStamp + WAIT;
+    else if (event.key === "?") help();
+    else if (event.key === "/" && field()) field().focus();
+    else return;
+    event.preventDefault();
+  });
+
+  // F1 opens the explanation of the current field; its link is no stop of the Tab key then, which would have twice as many.
+  document.addEventListener("focusin", (event) => {
+    for (const link of event.target.closest("form")?.querySelectorAll(".explained:not([tabindex])") ?? []) link.tabIndex = -1;
+  });
+  document.addEventListener("keydown", (event) => {
+    const link = event.key === "F1" && event.target.closest(".field, .slider")?.querySelector(".explained");
+    if (!link) return;
+    event.preventDefault();
+    link.click();
+  });
+  document.querySelector("#keys-help").addEventListener("click", help);
+})();

@@ -1,0 +1,192 @@
+"""The list of studies: searched, sorted, filtered; many of them named, archived, deleted or restored at once."""
+
+from __future__ import annotations
+
+import secrets
+from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import urlencode
+
+from fastapi import Request
+from starlette.datastructures import QueryParams
+from starlette.responses import RedirectResponse, Response
+
+from sprag.service.answers.studies import StudyOrder
+from sprag.service.faults import FaultError, choice_of
+from sprag.service.http import views
+from sprag.service.http.context import Context, Ctx, StudyId
+from sprag.service.http.listing import wanted_studies
+from sprag.service.http.problems import ApiError
+from sprag.service.http.routers import page_router
+from sprag.service.http.views import preset_of
+from sprag.service.http.web import saved_views
+from sprag.service.http.web.form.values import Form, RepeatedForm
+from sprag.service.http.web.templates import page
+from sprag.service.languages import N_
+from sprag.service.presets import preset_names
+from sprag.service.spec.labels import StudyChange, read_change, tags_of
+from sprag.service.spec.report import SpecError
+from sprag.service.storage.errors import StoreError
+from sprag.service.storage.listing import StudyFilter
+from sprag.service.storage.records import StudyPage
+from sprag.worker import models
+from sprag.worker.limits import MAX_PAGE_TOKEN, MAX_SEARCH_LENGTH
+from sprag.worker.states import StudyState
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+
+
+router = page_router()
+
+_LISTED: Final = 50
+#: What can be done with several studies: the label of its button, and what was done.
+ACTIONS: Final = {
+    "archive": (N_("Archive"), N_("archived")),
+    "unarchive": (N_("Take out of the archive"), N_("back in the list")),
+    "tag": (N_("Add tag"), N_("tagged")),
+    "untag": (N_("Remove tag"), N_("without the tag")),
+    "delete": (N_("Delete"), N_("deleted")),
+    "restore": (N_("Restore"), N_("restored")),
+}
+_UNDO: Final = {"archive": "unarchive", "delete": "restore"}
+#: Parameters of the list itself; others of its address say what was done before.
+_OWN: Final = ("search", "state", "tag", "owner", "model", "archived", "deleted", "sort")
+
+
+@router.get("/")
+def index(context: Ctx, request: Request) -> Response:
+    """The studies that are neither archived nor deleted, or those searched for; the examples to start from."""
+    return _list(context, request.query_params)
+
+
+def _list(context: Context, given: QueryParams, refused: Sequence[tuple[str, str]] = (), status: int = 200) -> Response:
+    wanted, order = _asked(given)
+    found = listed(context, given)
+    own = {name: value for name in _OWN if (value := given.get(name))}
+    done, general = given.get("done", ""), context.store.general_views()
+    return page(
+        "index.html",
+        status,
+        key=secrets.token_hex(8),
+        studies=[views.summary(record) for record in found.studies],
+        filtered=bool(set(own) - {"sort"}),
+        own=own,
+        wanted=wanted,
+        order=order.value,
+        more=found.next_token,
+        after=_after(given),
+        states=list(StudyState),
+        tags=context.store.tags(),
+        owners=context.store.owners(),
+        models=models.model_names(),
+        actions=_actions(wanted, context.settings.restore_days),
+        done=ACTIONS[done][1] if done in ACTIONS else "",
+        undo=_UNDO.get(done) if done != "delete" or context.settings.restore_days else None,
+        changed=given.getlist("changed")[:_LISTED],
+        refused=refused,
+        general=general,
+        view_actions=saved_views.view_actions(),
+        here_saved=saved_views.saved_here(general, "studies", None, urlencode(own)),
+        live=_live(given, own),
+        presets=[preset_of(name) for name in preset_names()],
+    )
+
+
+def listed(context: Context, given: QueryParams) -> StudyPage:
+    """The studies that the page of an address lists. FaultError."""
+    return context.store.list_studies(_LISTED, _after(given), *_asked(given))
+
+
+def _after(given: QueryParams) -> str | None:
+    """The token of a further page."""
+    return given.get("after", "")[:MAX_PAGE_TOKEN] or None
+
+
+def _asked(given: QueryParams) -> tuple[StudyFilter, StudyOrder]:
+    """Filter and order of an address; a form sends fields that are left empty too. FaultError."""
+    states, orders = map(str, StudyState), map(str, StudyOrder)
+    state = StudyState(choice_of("state", asked, states)) if (asked := given.get("state")) else None
+    order = StudyOrder(choice_of("sort", asked, orders)) if (asked := given.get("sort")) else StudyOrder.NEWEST
+    texts = (given.get(name, "").strip()[:MAX_SEARCH_LENGTH] for name in ("search", "tag", "owner", "model"))
+    search, tag, owner, model = texts
+    flags = (given.get(name, "") not in ("", "false") for name in ("archived", "deleted"))
+    return wanted_studies(search, state, tag, owner, model, *flags), order
+
+
+def _live(given: QueryParams, own: Mapping[str, str]) -> str:
+    """The address of the stream of changes of a list."""
+    query = urlencode({**own, **({"after": after} if (after := _after(given)) else {})})
+    return f"/live/studies?{query}" if query else "/live/studies"
+
+
+def _actions(wanted: StudyFilter, restore_days: int) -> dict[str, str]:
+    """What can be done with the listed studies, and the labels of the buttons.
+
+    Deleting for good (``restore_days`` 0) is left to the page of each study, which asks first.
+    """
+    if wanted.deleted:
+        names: tuple[str, ...] = ("restore",)
+    else:
+        names = ("unarchive" if wanted.archived else "archive", *(("delete",) if restore_days else ()), "tag", "untag")
+    return {name: ACTIONS[name][0] for name in names}
+
+
+@router.post("/studies")
+def change_many(context: Ctx, request: Request, pairs: RepeatedForm) -> Response:
+    """A button of the list: the same change of every chosen study, each in a transaction of its own.
+
+    The address has the parameters of the list.
+    """
+    fields = dict(pairs)
+    chosen = list(dict.fromkeys(value for name, value in pairs if name == "study"))
+    kept = context.settings.restore_days
+    done: str = choice_of("do", fields.get("do", ""), [name for name in ACTIONS if kept or name != "delete"])
+    back = [(name, value) for name, value in request.query_params.items() if name in _OWN]
+    refused = _changed(chosen, _action(context, done, fields.get("tags", "")))
+    if refused:
+        # The rest is done, and the list shows it.
+        return _list(context, QueryParams(back), refused, 409)
+    said = [("done", done), *(("changed", study_id) for study_id in chosen[:_LISTED])] if chosen else []
+    query = urlencode([*back, *said])
+    return RedirectResponse(f"/?{query}" if query else "/", status_code=303)
+
+
+def _action(context: Context, done: str, tags: str) -> Callable[[str], Any]:
+    """What to do with each study. Raises SpecError for tags that are none."""
+    store = context.store
+    match done:
+        case "delete":
+            return store.delete_study
+        case "restore":
+            return store.restore_study
+        case "archive" | "unarchive":
+            change = StudyChange(archived=done == "archive")
+        case _:
+            change = read_change({"add_tags" if done == "tag" else "remove_tags": tags_of(tags)})
+    return lambda study_id: store.change_study(study_id, change)
+
+
+def _changed(chosen: Iterable[str], act: Callable[[str], Any]) -> list[tuple[str, str]]:
+    """Change every study; returns those that refused, with the reason."""
+    refused = []
+    for study_id in chosen:
+        try:
+            act(study_id)
+        except (StoreError, FaultError) as error:
+            refused.append((study_id, str(error)))
+    return refused
+
+
+@router.post("/studies/{study_id:study}/labels")
+def change_labels(context: Ctx, study_id: StudyId, values: Form) -> Response:
+    """The form for name, notes and tags on the page of a study."""
+    data: dict[str, Any] = {name: values[name] for name in ("name", "notes") if name in values}
+    if "tags" in values:
+        data["tags"] = tags_of(values["tags"])
+    data["archived"] = "archived" in values
+    try:
+        context.store.change_study(study_id, read_change(data))
+    except SpecError as error:
+        detail = "; ".join(f"{fault.message} (allowed: {fault.allowed})" for fault in error.faults)
+        raise ApiError("invalid-body", detail, error.faults) from error
+    return RedirectResponse(f"/studies/{study_id}", status_code=303)

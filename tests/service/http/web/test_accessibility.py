@@ -1,0 +1,202 @@
+"""Every page, in English on a desktop and in Ukrainian on a phone: axe-core finds nothing, and the page fits."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any, Final
+
+from axe_playwright_python.sync_playwright import Axe
+
+from sprag.service.http.roles import ROLES
+from sprag.service.presets import preset_text
+from sprag.service.spec.document import load_spec
+from tests.acceptance.processes import SECONDS
+from tests.service.calibrating import calibration
+from tests.service.http.web.fields import named
+from tests.service.searching import search
+from tests.service.timed_spec import SPEC
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page, Route
+
+    from tests.service.conftest import Service
+
+DESKTOP: Final = {"width": 1280, "height": 900}
+PHONE: Final = {"width": 390, "height": 800}
+TABLET: Final = {"width": 820, "height": 1180}
+DRAWN: Final = "() => [...document.querySelectorAll('[data-figure]')].every((plot) => plot.dataset.drawn)"
+#: One macro writes all operations of the interface: a few show what all would, in a fraction of the time.
+SHORTER: Final = "() => [...document.querySelectorAll('.operation')].slice(5).forEach((one) => one.remove())"
+#: Rules whose findings depend on colours, on the width and on the language.
+NARROW: Final = [
+    "color-contrast", "link-in-text-block", "scrollable-region-focusable", "target-size",
+    "html-has-lang", "html-lang-valid", "valid-lang", "label", "button-name", "link-name",
+]  # fmt: skip
+#: A name of customers that cannot be broken at blanks.
+LONG: Final = "Zuführung_der_Linie_7_mit_weicher_Freilaufkupplung_und_großem_Schwungrad"
+#: What is beside the screen: how far, and the innermost element that is; "" where nothing is.
+BEYOND: Final = """() => {
+  const over = document.documentElement.scrollWidth - innerWidth;
+  if (over <= 0) return "";
+  const wide = [...document.querySelectorAll("main *")].filter((e) => e.getBoundingClientRect().right > innerWidth + 1
+    && !e.closest(".scroll, pre, dialog"));
+  return `${over} px: ${wide.slice(-3).map((e) => e.outerHTML.slice(0, 160)).join(" | ")}`;
+}"""
+#: Addresses of every kind of page, by its route; `{STUDY}` and the like are ids.
+PAGES: Final[dict[str, list[str]]] = {
+    "/": ["/", "/?archived=true", "/?deleted=true", "/?search=nothing"],
+    "/login": ["/login"],
+    "/new": [
+        "/new", "/new?preset=two_pendulums", "/new?preset=press", "/new?preset=tolerances",
+        "/new?preset=fastest_drive", "/new?preset=one_pendulum&mode=text",
+    ],
+    "/calibrate": ["/calibrate?study={STUDY}"],
+    "/components": ["/components"],
+    "/workers": ["/workers"],
+    "/units": ["/units"],
+    "/night": ["/night"],
+    "/docs": ["/docs"],
+    "/docs/{name}": ["/docs/theory", "/docs/guide"],
+    "/problems/{slug}": ["/problems/not-found"],
+    "/audit": ["/audit"],
+    "/users": ["/users"],
+    "/schedules": ["/schedules"],
+    "/schedules/new": ["/schedules/new"],
+    "/schedules/{schedule_id}": ["/schedules/{SCHEDULE}"],
+    "/compare": ["/compare?study={STUDY}&study={OTHER}"],
+    "/laboratory": ["/laboratory?machine=press"],
+    "/laboratory/drive": ["/laboratory/drive"],
+    "/laboratory/questions": ["/laboratory/questions?machine=press"],
+    "/laboratory/form": ["/laboratory/form?machine=press"],
+    "/laboratory/study": ["/laboratory/study?machine=press"],
+    "/laboratory/drive/form": ["/laboratory/drive/form"],
+    "/laboratory/drive/study": ["/laboratory/drive/study"],
+    "/studies/{study_id}": ["/studies/{STUDY}", "/studies/{SHAFT}", "/studies/{RUNNING}", "/studies/none"],
+    "/studies/{study_id}/delete": ["/studies/{STUDY}/delete"],
+    "/studies/{study_id}/front": ["/studies/{GOAL}/front"],
+    "/studies/{study_id}/calibration": ["/studies/{CALIBRATION}/calibration"],
+    "/studies/{study_id}/drives": ["/studies/{DRIVES}/drives"],
+    "/studies/{study_id}/explore": ["/studies/{STUDY}/explore"],
+    "/studies/{study_id}/explore/new": ["/studies/{STUDY}/explore/new?case=0"],
+    "/studies/{study_id}/explore/compare": ["/studies/{STUDY}/explore/compare?case=0&case=1"],
+    "/studies/{study_id}/sensitivity": ["/studies/{STUDY}/sensitivity"],
+    "/studies/{study_id}/curves": ["/studies/{STUDY}/curves", "/studies/{STUDY}/curves?y=nothing"],
+    "/studies/{study_id}/map": ["/studies/{STUDY}/map"],
+    "/studies/{study_id}/cases": ["/studies/{STUDY}/cases"],
+    "/studies/{study_id}/cases/{case}": ["/studies/{STUDY}/cases/0", "/studies/{SHAFT}/cases/0"],
+    "/studies/{study_id}/cases/{case}/laboratory": ["/studies/{STUDY}/cases/0/laboratory"],
+    "/studies/{study_id}/cases/{case}/engagements": ["/studies/{STUDY}/cases/0/engagements"],
+    "/studies/{study_id}/cases/{case}/branch": ["/studies/{STUDY}/cases/0/branch"],
+    "/studies/{study_id}/cases/{case}/diagram": ["/studies/{STUDY}/cases/0/diagram"],
+    "/studies/{study_id}/cases/{case}/basin": ["/studies/{STUDY}/cases/0/basin"],
+    "/studies/{study_id}/cases/{case}/transient": ["/studies/{SHAFT}/cases/0/transient"],
+}  # fmt: skip
+
+
+def preset(name: str) -> Any:
+    """The spec of a preset."""
+    file, text = preset_text(name)
+    return load_spec(text, "toml" if file.endswith("toml") else "json")
+
+
+def studies(service: Service) -> dict[str, str]:
+    """Ids of studies of every kind and of a schedule."""
+    ids = {name: service.submit(preset("one_pendulum")) for name in ("STUDY", "OTHER", "RUNNING")}
+    ids |= {"SHAFT": service.submit(preset("question_masses"))}
+    drives = {**preset("tolerances"), "drives": 8}
+    ids |= {"DRIVES": service.submit(drives)}
+    for name in ("STUDY", "OTHER", "SHAFT", "DRIVES"):
+        service.fill(ids[name])
+    ids |= {"GOAL": search(service), "CALIBRATION": calibration(service)}
+    schedule = {"spec": preset("one_pendulum"), "cron": "0 22 * * 1-5", "name": LONG, "window": ["22:00", "06:00"],
+                "zone": "America/Argentina/ComodRivadavia"}  # fmt: skip
+    ids |= {"SCHEDULE": service.http.post("/api/v1/schedules", json=schedule).json()["id"]}
+    view = {"page": "curves", "study": ids["STUDY"], "name": LONG, "in_report": True}
+    assert service.http.post("/api/v1/views", json=view).status_code == 200
+    return ids
+
+
+def serve(page: Page, service: Service) -> None:
+    """Let the service in this process answer the browser."""
+
+    def answer(route: Route) -> None:
+        request = route.request
+        if request.headers.get("accept") == "text/event-stream":  # has no end
+            route.abort()
+            return
+        found = service.http.request(
+            request.method,
+            request.url,
+            headers=request.headers,
+            content=request.post_data_buffer,
+            follow_redirects=True,
+        )
+        route.fulfill(status=found.status_code, headers=dict(found.headers), body=found.content)
+
+    page.route("**/*", answer)
+
+
+def findings(page: Page, axe: Axe, options: dict[str, Any]) -> list[str]:
+    """What axe finds on the page as it is."""
+    found = axe.run(page, options={"resultTypes": ["violations"], "selectors": False, **options}).response["violations"]
+    return [f"{one['id']}: {node['html'][:200]}" for one in found for node in one["nodes"]]
+
+
+def test_axe_finds_nothing_on_any_page_and_each_fits_the_screen(service: Service, browser: Browser) -> None:
+    """In English, light and wide; in Ukrainian, dark and narrow: these show what any other combination would."""
+    axe, found = Axe(), dict[str, list[str]]()
+    english, ukrainian = (
+        browser.new_context(base_url="http://localhost", locale=locale, viewport=size, color_scheme=scheme).new_page()
+        for locale, size, scheme in (("en-GB", DESKTOP, "light"), ("uk-UA", PHONE, "dark"))
+    )
+    for page in (english, ukrainian):
+        page.set_default_timeout(1000 * SECONDS)
+        serve(page, service)
+
+    def judge(name: str) -> None:
+        if bad := findings(english, axe, {}):
+            found[name] = bad
+        if bad := findings(ukrainian, axe, {"runOnly": NARROW}):
+            found[f"{name}, in Ukrainian, dark and narrow"] = bad
+        for size in (PHONE, TABLET):
+            ukrainian.set_viewport_size(size)
+            if beside := ukrainian.evaluate(BEYOND):
+                found[f"{name}, wider than {size['width']} px"] = [beside]
+        ukrainian.set_viewport_size(PHONE)
+
+    for page in (english, ukrainian):
+        page.goto("/")
+    judge("an empty list")
+    for page in (english, ukrainian):
+        page.goto("/new?preset=one_pendulum")
+        named(page, "/base/shaft/inertia").fill("2 mm")
+        page.locator('button[value="submit"]').first.click()
+    judge("a refused form")
+    ids = studies(service)
+    for address in (address.format(**ids) for addresses in PAGES.values() for address in addresses):
+        for page in (english, ukrainian):
+            answer = page.goto(address)
+            assert answer is not None, address
+            assert answer.headers["content-type"].startswith("text/html"), address
+            page.wait_for_function(DRAWN)
+            page.evaluate(SHORTER)
+        judge(address)
+    assert not found, json.dumps(found, indent=1)
+    assert ukrainian.locator("html").get_attribute("lang") == "uk"
+
+
+def test_no_other_route_answers_with_a_page(service: Service) -> None:
+    """A new page has to be judged too."""
+    study = service.submit()
+    service.fill(study)
+    schedule = service.http.post("/api/v1/schedules", json={"spec": SPEC, "cron": "0 22 * * *"}).json()["id"]
+    ids = {"study_id": study, "case": "0", "schedule_id": schedule, "slug": "x", "name": "live.js", "form": "svg"}
+    programs = ("/api/", "/live/")
+    others = [path for verb, path in map(str.split, ROLES) if verb == "GET" and not path.startswith(programs)]
+    assert set(PAGES) <= set(others)
+    for pattern in others:
+        if pattern not in PAGES:
+            answer = service.http.get(pattern.format(**ids))
+            only_settled = pattern.endswith("/basin/figure")
+            assert only_settled or answer.status_code in (200, 422), pattern
+            assert not answer.headers["content-type"].startswith("text/html"), pattern

@@ -1,0 +1,152 @@
+"""Every text of every page is in the catalogues: in a made-up language all are in brackets."""
+
+from __future__ import annotations
+
+import json
+import re
+from html.parser import HTMLParser
+from typing import TYPE_CHECKING
+
+import pytest
+
+from docs.catalogues import texts
+from sprag.service import languages
+from sprag.service.http.web import manual
+from sprag.service.languages.catalogue import Catalogue, Entry, Key
+from sprag.service.spec.described import ANY_RUN, SETTLED_RUN
+from sprag.service.spec.machine.choices import MEANINGS
+from sprag.worker.models.model import all_models
+from tests.service.http.web.test_accessibility import LONG, PAGES, studies
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from tests.service.conftest import Service
+
+MADE_UP = "qq"
+#: Elements whose text is code, data or in a language of its own.
+_CODE = {"code", "pre", "script", "style", "kbd", "i", "sub", "textarea"}
+#: Elements that have no end.
+_EMPTY = {"meta", "link", "input", "img", "br", "col", "hr", "path", "circle", "line", "rect", "polyline"}
+_ATTRIBUTES = ("title", "aria-label", "placeholder", "alt")
+_WORD = re.compile(r"[A-Za-z]{3,}")
+_BRACKETS = re.compile(r"⟦[^⟦⟧]*⟧")
+#: Names, formats, units and code names, which are the same in all languages.
+_SAME = re.compile(
+    r"\b(Sprag|UTC|csv|json|svg|png|pdf|html|xlsx|netcdf|parquet|arrow|jsonl|curl|JSON|TOML|CSV|PDF|HTML|SVG|PNG|"
+    r"English|Українська|JavaScript|rpm|deg|min|rad|lbf|bar|kPa|MPa|cos|πft|sin|"
+    r"[a-z_][a-z_0-9]*(\.\w+)+|[sv][ctw]_[0-9a-f]{16}|[0-9a-f]{64}|[A-Z]\w+(/[A-Z]\w+)+)\b|\[[^\[\]]*\]|,sigma$|"
+    r"; efficiency$"
+)
+#: Code names in one word, which a title has beside the caption of an element.
+_NAMES = {*MEANINGS, *SETTLED_RUN, *ANY_RUN, "duration"}
+for _model in all_models():
+    _NAMES.add(_model.name)
+    _NAMES |= {*(entry.path for entry in _model.parameters()), *(info.name for info in _model.result_catalogue())}
+
+
+class Texts(HTMLParser):
+    """Visible texts of a page, with those of attributes that people read or hear."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.attributes: list[str] = []
+        self.body: list[str] = []
+        self._outside: list[bool] = []
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        other = tag in _CODE or (given.get("lang") not in (None, MADE_UP)) or given.get("translate") == "no"
+        if not other:
+            known = {name: value for name in _ATTRIBUTES if (value := given.get(name))}
+            if re.fullmatch(r"\d+ periods", known.get("placeholder", "")):  # as it is typed
+                del known["placeholder"]
+            found = (value.partition(": ") for value in known.values())
+            self.attributes += [rest if first in _NAMES else f"{first}{colon}{rest}" for first, colon, rest in found]
+        if tag not in _EMPTY:
+            self._outside.append(other)
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag not in _EMPTY and self._outside:
+            self._outside.pop()
+
+    def handle_data(self, data: str) -> None:
+        if not any(self._outside):
+            self.body.append(data)
+
+
+def rest_of(part: str) -> bool:
+    """Whether there is a word that is not the same in all languages."""
+    return bool(_WORD.search(_SAME.sub("", part)))
+
+
+@pytest.fixture
+def bracketed(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A language in which each text of the catalogues is in brackets, whose inside may hold bracketed texts, too."""
+    keep = {"decimal mark", "date"}
+    entries = {
+        key: Entry((key.text if key.context in keep or not _WORD.search(key.text) else f"⟦{key.text}⟧",) * count, many)
+        for key, many in texts().items()
+        for count in [2 if many else 1]
+    }
+    entries |= {key: Entry((f"⟦{key.text}⟧", f"⟦{many}⟧"), many) for key, many in texts().items() if many}
+    entries[Key("English", "name of this language")] = Entry(("Bracketed",))
+    made_up = Catalogue("Plural-Forms: nplurals=2; plural=(n != 1);\n", entries)
+    real, known = languages.catalogue, languages.available()
+    monkeypatch.setattr(languages, "catalogue", lambda code: made_up if code == MADE_UP else real(code))
+    monkeypatch.setattr(languages, "available", lambda: (*known, MADE_UP))
+    languages.titles.cache_clear()
+    yield
+    languages.titles.cache_clear()
+
+
+def left(page: str, names: Iterable[str] = ()) -> list[str]:
+    """What stands on a page outside all brackets and is not the same in all languages, nor one of ``names``."""
+    texts_of = Texts(page)
+    longest_first = sorted(names, key=len, reverse=True)
+    given = re.compile("|".join(rf"(?<!\w ){re.escape(name)}(?! \w)" for name in longest_first) or "(?!)")
+    # Brackets go around the tags within a text.
+    pieces = [*texts_of.attributes, "\x01".join(texts_of.body)]
+    found = []
+    for text in pieces:
+        while text != (text := _BRACKETS.sub("", text)):
+            pass
+        parts = (given.sub("", part) for part in text.split("\x01"))
+        found += [" ".join(part.split()) for part in parts if rest_of(part)]
+    return found
+
+
+def without_spec(report: str) -> str:
+    """A report without the names of inputs in specs, which are the last cells of their rows, and without its spec."""
+    kept = (part for part in re.split("(?=<table)|(?<=</table>)", report) if "⟦As given⟧" not in part)
+    return "".join(
+        re.sub(r"<td>[^<]*</td>\s*</tr>", "</tr>", part) if "⟦Name in specs⟧" in part else part for part in kept
+    )
+
+
+@pytest.mark.usefixtures("bracketed")
+def test_no_text_of_any_page_is_left_out(service: Service) -> None:
+    ids = studies(service)
+    own = {study["name"] for study in service.get("/studies")["studies"]}
+    names = {LONG, "Nothing", *own, *(f"{name}, design of case 0" for name in own), *manual.titles().values()}
+    found: dict[str, list[str]] = {}
+    for address in (address.format(**ids) for addresses in PAGES.values() for address in addresses):
+        headers = {"Accept": "text/html", "Accept-Language": MADE_UP}
+        answer = service.http.get(address, headers=headers, follow_redirects=True)
+        assert "⟦" in answer.text, address
+        if texts_left := left(answer.text, names):
+            found[address] = texts_left
+    for name in ("STUDY", "SHAFT", "GOAL", "CALIBRATION", "DRIVES"):
+        address = f"/api/v1/studies/{ids[name]}/report"
+        answer = service.http.get(address, params={"format": "html", "language": MADE_UP})
+        assert "⟦" in answer.text, address
+        if texts_left := left(without_spec(answer.text), names):
+            found[f"{address} ({name})"] = texts_left
+    assert json.dumps(found, indent=1, ensure_ascii=False) == "{}"
+
+
+def test_a_text_without_a_translation_is_found() -> None:
+    assert left("<p>⟦Known ⟦within⟧⟧ 12 mm <code>code</code> Sprag</p>") == []
+    assert left('<p title="Unknown">⟦Known⟧</p>') == ["Unknown"]
+    assert left("<p>⟦Known⟧, unknown</p>") == [", unknown"]

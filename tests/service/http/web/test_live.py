@@ -1,0 +1,128 @@
+"""Pages that show what changes: their streams, and what they show after the service was stopped and started."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from typing import TYPE_CHECKING
+
+import httpx
+import pytest
+from playwright.sync_api import expect
+from starlette.concurrency import run_in_threadpool
+
+from benchmarks.faults.harness import free_port
+from sprag.service.http import streams
+from tests.acceptance.processes import SECONDS, service
+from tests.service.timed_spec import SPEC
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from playwright.sync_api import Browser, Page
+
+    from tests.service.conftest import Service
+
+LOST = "The connection to the service is lost"
+LONG = {"axes": [{"path": "shaft.load", "linspace": [0, 1, 100_000]}]}
+SCHEDULE = {"spec": SPEC, "cron": "0 22 * * *", "name": "Nightly"}
+
+
+@pytest.mark.parametrize("name", ["studies", "studies?search=first", "schedules", "night", "workers"])
+def test_a_stream_has_one_event_for_each_change(service: Service, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    service.submit({**SPEC, "name": "first"})
+    changes = {
+        "schedules": lambda: service.http.post("/api/v1/schedules", json=SCHEDULE),
+        "workers": lambda: service.store.take_over("somebody"),
+    }
+    change = changes.get(name, lambda: service.submit({**SPEC, "name": "first again"}))
+    ending, looks = service.app.state.context.ending, itertools.count(1)
+
+    async def between_looks(_: float) -> None:
+        match next(looks):
+            case 2:
+                await run_in_threadpool(change)
+            case 4 | 5:
+                ending.set()
+
+    monkeypatch.setattr(streams.anyio, "sleep", between_looks)
+    marks = re.findall("^id: (.+)$", service.http.get(f"/live/{name}").text, re.MULTILINE)
+    assert len(set(marks)) == len(marks) == (1 if name == "night" else 2)  # no schedule was due
+    ending.clear()
+    again = service.http.get(f"/live/{name}", headers={"Last-Event-ID": marks[-1]})
+    assert "id: " not in again.text  # it has changed no more
+
+
+def test_only_lists_have_streams(service: Service) -> None:
+    assert service.http.get("/live/nothing").status_code == 404
+    assert service.http.get("/live/night?hours=0").status_code == 422
+    assert service.http.get("/live/studies?state=nothing").status_code == 422
+
+
+def began(page: Page, name: str) -> None:
+    """Somebody has typed and ticked something on a page."""
+    if name == "list":
+        page.get_by_label("Choose Before").check()
+        page.locator("[name=tags]").fill("half a ta")
+        page.locator("[name=tags]").evaluate("field => field.setSelectionRange(2, 5)")
+    if name == "form":
+        page.locator('[name="/name"]').fill("Half a na")
+
+
+def kept(page: Page, name: str) -> None:
+    """It is still there."""
+    if name == "list":
+        expect(page.get_by_label("Choose Before")).to_be_checked()
+        expect(page.locator("[name=tags]")).to_have_value("half a ta")
+        assert page.evaluate("() => [document.activeElement.name, document.activeElement.selectionEnd]") == ["tags", 5]
+    if name == "form":
+        expect(page.locator('[name="/name"]')).to_have_value("Half a na")
+
+
+def test_every_kind_of_page_outlives_a_stop_of_the_service(browser: Browser, tmp_path: Path) -> None:
+    """Every page finds the service again; lists show what changed, and what somebody began is kept."""
+    options = ("--port", free_port())
+    with service(tmp_path, *options, SPRAG_PROCESSES="1") as running, httpx.Client(base_url=running.address) as client:
+        client.timeout = SECONDS
+        study = client.post("/api/v1/studies", json={**SPEC, **LONG, "name": "Before"}).json()["id"]
+        client.post(f"/api/v1/studies/{study}:pause")
+        schedule = client.post("/api/v1/schedules", json=SCHEDULE).json()["id"]
+        addresses = {
+            "list": "/",
+            "study": f"/studies/{study}",
+            "cases": f"/studies/{study}/cases",
+            "schedules": "/schedules",
+            "night": "/night",
+            "workers": "/workers",
+            "form": "/new?preset=one_pendulum",
+        }
+        # Each in a window of its own: a browser has few connections to a host, and one window shows one tab.
+        pages = {name: browser.new_context(base_url=running.address).new_page() for name in addresses}
+        for name, page in pages.items():
+            page.set_default_timeout(1000 * SECONDS)
+            page.goto(addresses[name])
+            began(page, name)
+        expect(pages["cases"].locator("#head")).to_contain_text("Cancel the rest")
+        dispatcher = pages["workers"].locator("#workers h2")
+        expect(dispatcher).to_have_count(1)
+        before = dispatcher.inner_text()
+    for name, page in pages.items():
+        if name == "form":
+            page.locator('[name="/axes/0/count"]').fill("7")  # learns it from its next request
+        expect(page.get_by_role("alert").filter(has_text=LOST)).to_be_visible()
+    with service(tmp_path, *options, SPRAG_PROCESSES="1") as running, httpx.Client(base_url=running.address) as client:
+        client.timeout = SECONDS
+        client.post("/api/v1/studies", json={**SPEC, "name": "After"})
+        client.post(f"/api/v1/studies/{study}:cancel")
+        client.patch(f"/api/v1/schedules/{schedule}", json={"name": "Changed"})
+        for page in pages.values():
+            page.get_by_role("button", name="Try now").evaluate_all("buttons => buttons.forEach((one) => one.click())")
+            expect(page.locator(".link-lost")).to_have_count(0)
+        expect(pages["list"].locator("#studies")).to_contain_text("After")
+        expect(pages["schedules"].locator("#schedules")).to_contain_text("Changed")
+        expect(pages["study"].locator("#progress .state")).to_have_text("cancelled")
+        expect(pages["cases"].locator("#head")).not_to_contain_text("Cancel the rest")
+        expect(dispatcher).not_to_have_text(before)
+        for name, page in pages.items():
+            kept(page, name)
+            page.context.close()

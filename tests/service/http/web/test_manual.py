@@ -1,0 +1,112 @@
+"""The manual on pages, and the links that lead there from every field."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+import pytest
+
+from sprag.service.http.prefix import PREFIX
+from sprag.service.http.web.manual import PAGES, manual_page, titles
+from sprag.worker import models
+
+if TYPE_CHECKING:
+    from tests.service.conftest import Service
+
+FORMS = (
+    "/new", "/new?preset=two_pendulums", "/new?preset=tolerances", "/new?preset=fastest_drive",
+    "/new?preset=refined_characteristic", "/new?model=machine-shaft",
+    *(f"/new?preset={name}" for name in ("press", "punching_press", "slotter", "compressor", "cam_machine",
+                                         "four_cylinder_engine", "least_flywheel")),
+)  # fmt: skip
+LABORATORIES = ("/laboratory?machine=punching_press", "/laboratory?machine=four_cylinder_engine", "/laboratory/drive")
+
+
+class Read(HTMLParser):
+    """Ids, addresses of links, what a page loads, and the explanation of each help by the help's id."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.ids: set[str] = set()
+        self.links: list[str] = []
+        self.loaded: list[str] = []
+        self.helps: dict[str, str] = {}
+        self._open = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = {name: value or "" for name, value in attrs}
+        self.ids |= {values["id"]} if "id" in values else set()
+        self.loaded += [values[name] for name in ("src", "srcset", "data") if name in values]
+        if tag == "a" and "href" in values:
+            self.links.append(values["href"])
+        if tag == "small" and values.get("class") == "help" and values.get("id", "").startswith("help:"):
+            self._open = values["id"]
+            self.helps[self._open] = ""
+        if tag == "a" and values.get("class") == "explained":
+            assert self._open, values
+            self.helps[self._open] = values["href"]
+
+    def handle_endtag(self, tag: str) -> None:
+        self._open = "" if tag == "small" else self._open
+
+
+def targets() -> dict[str, set[str]]:
+    """Ids of the headings of each page."""
+    return {name: Read(str(manual_page(name).html)).ids for name in PAGES}
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_links_of_a_page_lead_to_headings_that_exist(service: Service, name: str) -> None:
+    answer = service.http.get(f"/docs/{name}", headers={"Accept-Language": "uk"})
+    assert answer.status_code == 200
+    assert '<html lang="uk"' in answer.text
+    assert '<article class="manual" lang="en">' in answer.text
+    found, known = Read(str(manual_page(name).html)), targets()
+    assert not found.loaded
+    for link in found.links:
+        address = urlsplit(link)
+        assert not address.netloc
+        page = address.path.removeprefix("/docs/") or name
+        assert page in known, link
+        assert not address.fragment or address.fragment in known[page], link
+    assert "&lt;!--" not in str(manual_page(name).html)
+
+
+def test_a_page_has_the_text_of_its_file(service: Service) -> None:
+    page = service.http.get("/docs/theory-machine-shaft").text
+    assert '<h2 id="the-mean-speed-and-t_0">The mean speed and T_0</h2>' in page
+    assert "omega^2 = S1 + S2 + S3 + S4 " in page
+    assert re.search(r"<td><code>midrange</code> \(default\)</td>", page)
+    assert titles()["theory"] == "Theory of the vibration drive"
+    assert service.http.get("/docs/operations").status_code == 404
+
+
+def test_a_service_at_a_path_of_its_own_has_it_in_the_links() -> None:
+    token = PREFIX.set("/sprag")
+    try:
+        assert 'href="/sprag/docs/theory#settled-motion"' in str(manual_page("guide").html)
+    finally:
+        PREFIX.reset(token)
+
+
+@pytest.mark.parametrize("model", [models.VIBRATION_DRIVE, models.MACHINE_SHAFT])
+def test_every_parameter_has_a_section(model: str) -> None:
+    known = targets()
+    for entry in models.parameter_catalogue(model):
+        page, _, heading = models.model_of(model).presentation.explained(entry.path).partition("#")
+        assert page in known, entry.path
+        assert heading in known[page], entry.path
+
+
+@pytest.mark.parametrize("address", [*FORMS, *LABORATORIES])
+def test_every_field_links_to_the_section_that_explains_it(service: Service, address: str) -> None:
+    found, known = Read(service.http.get(address).text), targets()
+    assert len(found.helps) > 10
+    for field, link in found.helps.items():
+        page, _, heading = link.removeprefix("/docs/").partition("#")
+        assert page in known, (field, link)
+        assert not heading or heading in known[page], (field, link)

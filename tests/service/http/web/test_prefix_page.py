@@ -1,0 +1,51 @@
+"""Pages of a service below a path, in a browser: scripts, figures, progress and login find their addresses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import httpx
+from playwright.sync_api import Browser, Response, expect
+
+from tests.acceptance.processes import SECONDS, service
+from tests.service.http.web.conftest import Office
+
+TOKEN = "a-token-of-the-tests"
+
+
+def test_a_designer_works_below_a_path(browser: Browser, tmp_path: Path) -> None:
+    """From the login to an ended study, its curves, the schedules and the laboratory; no request leaves the prefix."""
+    settings = {"SPRAG_URL_PREFIX": "/sprag", "SPRAG_TOKEN": TOKEN, "SPRAG_PROCESSES": "1"}
+    asked: list[Response] = []
+
+    def note(answer: Response) -> None:
+        asked.append(answer)
+
+    with service(tmp_path, **settings) as started:
+        assert urlsplit(started.address).path == "/sprag"
+        headers = {"Authorization": f"Bearer {TOKEN}"}
+        with httpx.Client(base_url=started.address, timeout=SECONDS, headers=headers) as client:
+            office = Office(started.address, client)
+            study = office.submit(wait=False)
+            page = browser.new_page()
+            page.set_default_timeout(1000 * SECONDS)
+            page.on("response", note)
+            page.goto(f"{started.address}/studies/{study}")
+            page.get_by_label("Token").fill(TOKEN)
+            page.get_by_role("button", name="Log in").click()
+            expect(page).to_have_url(f"{started.address}/studies/{study}")
+            office.wait(study)
+            expect(page.locator("#progress .state")).to_have_text("finished")  # told by the events
+            page.goto(f"{started.address}/studies/{study}/curves")
+            plot = page.locator("[data-figure]").first
+            expect(plot).to_have_attribute("data-drawn", "1")
+            page.get_by_role("link", name="Schedules").first.click()
+            expect(page).to_have_url(f"{started.address}/schedules")
+            page.goto(f"{started.address}/laboratory/drive")
+            expect(page.locator("#lab-plot .main-svg").first).to_be_visible()
+            assert page.evaluate("location.pathname") == "/sprag/laboratory/drive"
+            page.close()
+    assert len(asked) > 15
+    assert [(answer.url, answer.status) for answer in asked if answer.status >= 400] == []
+    assert {urlsplit(answer.url).path.split("/")[1] for answer in asked} == {"sprag"}
