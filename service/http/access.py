@@ -1,4 +1,4 @@
-"""Authentication: tokens in headers, browser sessions in cookies; and the rights of each.
+"""Authentication: tokens in headers, browser sessions in cookies, users named by a trusted proxy; and the role of each.
 
 A request carries its token as ``Authorization: Bearer``. A browser logs in once with a token and gets a cookie that
 contains the token's id and the expiry, signed with a key of the database. The cookie is valid on all hosts of that
@@ -14,16 +14,27 @@ import time
 from collections.abc import Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Final, Protocol
 
 from starlette.concurrency import run_in_threadpool
 
+from sprag.service.actor import Actor, Door, Role
+from sprag.service.faults import shown
 from sprag.service.http.attempts import Attempts
-from sprag.service.storage.scopes import TokenScope
+from sprag.service.http.problems import ApiError
+from sprag.service.languages import N_
+from sprag.service.logs import REQUEST_ID
+from sprag.service.storage.part import micros_of
+from sprag.service.storage.scopes import MAX_USER_NAME, TokenScope
 from sprag.service.storage.sessions import SessionSecrets
 from sprag.service.storage.tokens import TokenRecord, digest_of
+from sprag.service.storage.users import UserRecord
 
 if TYPE_CHECKING:
+    from starlette.datastructures import Headers
+    from starlette.types import Scope
+
     from sprag.service.settings import Settings
 
 COOKIE: Final = "sprag_session"
@@ -40,6 +51,12 @@ class TokenStore(Protocol):
     def tokens(self) -> tuple[TokenRecord, ...]:
         """Every token ever created."""
 
+    def users(self) -> tuple[UserRecord, ...]:
+        """Every user, removed ones included."""
+
+    def note_uses(self, uses: Mapping[str, int]) -> None:
+        """Record when tokens were last used."""
+
     def session_secrets(self) -> SessionSecrets:
         """The signing key of sessions, and the sessions that were ended early."""
 
@@ -52,15 +69,41 @@ class TokenStore(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """A token's identity (``id``, ``name``) and scope."""
+    """Who asks: the identity of a token (``id``, ``name``) or of a user, and the role.
+
+    ``user`` is the name of the user, None for a token without a user; ``checks`` is the user's own quota of
+    simultaneous checks, None where the settings have it.
+    """
 
     id: str
     name: str
-    scope: TokenScope
+    role: Role
+    user: str | None = None
+    checks: int | None = None
+
+    @property
+    def label(self) -> str:
+        """Who it is, as the subject of a sentence."""
+        return f"Token {self.name or self.id}" if self.user is None else f"User {self.user}"
+
+    @property
+    def token(self) -> str | None:
+        """Name of the token, or its id where it has none; None where a proxy names the user or no token is needed."""
+        return None if self.id == f"user {self.user}" else self.name or self.id or None
+
+    @property
+    def reading(self) -> str:
+        """The rest of that sentence for a viewer."""
+        return N_("is read-only") if self.user is None else N_("has the role viewer, which cannot change anything")
+
+    @property
+    def share(self) -> str:
+        """Whose share of the service's work a request takes: a user's, with whatever token."""
+        return self.id if self.user is None else f"user {self.user}"
 
 
 #: The grant of everybody where no token is needed.
-OPEN: Final = Grant("", "", TokenScope.WRITE)
+OPEN: Final = Grant("", "", Role.ADMINISTRATOR)
 #: The grant of the current request; None outside a request or where it is unknown.
 ASKING: ContextVar[Grant | None] = ContextVar("asking", default=None)
 
@@ -78,13 +121,17 @@ class Access:
 
     def __init__(self, settings: Settings, store: TokenStore | None = None) -> None:
         self._setting = None if settings.token is None else settings.token.get_secret_value().encode("ascii")
-        self._always = settings.token is not None or not settings.loopback
+        self._always = settings.token is not None or not settings.loopback or bool(settings.user_header)
+        self._user_header = settings.user_header
+        self._user_role = Role(settings.user_role) if settings.user_role else None
         self.attempts = Attempts(settings.trusted_proxies)
         self._store = store
         self._key = secrets.token_bytes(32) if store is None else None
         self._logged_out: dict[str, int] = {}
-        self._by_digest: dict[str, Grant] = {}
-        self._by_id: dict[str, Grant] = {}
+        self._by_digest: dict[str, tuple[TokenRecord, Grant]] = {}
+        self._by_id: dict[str, tuple[TokenRecord, Grant]] = {}
+        self._users: dict[str, UserRecord] = {}
+        self._uses: dict[str, int] = {}
         self._any = False
         self._read_at: float | None = None
 
@@ -93,26 +140,28 @@ class Access:
         now = time.monotonic()
         if self._store is None or (self._read_at is not None and now - self._read_at < BELIEVED_SECONDS):
             return
-        records, found = await run_in_threadpool(_read, self._store)
+        records, users, found = await run_in_threadpool(_read, self._store)
         self._key = found.key or self._key
         now_seconds = time.time()
         self._logged_out = {
             seal: end for seal, end in (*self._logged_out.items(), *found.ended.items()) if end > now_seconds
         }
-        alive = {r.digest: Grant(r.id, r.name, r.scope) for r in records if r.revoked_at is None}
-        self._by_digest, self._by_id = alive, {grant.id: grant for grant in alive.values()}
-        self._any, self._read_at = bool(records), now
+        self._users = {user.name: user for user in users}
+        alive = [(r, grant) for r in records if r.revoked_at is None and (grant := self._of_record(r)) is not None]
+        self._by_digest = {record.digest: (record, grant) for record, grant in alive}
+        self._by_id = {record.id: (record, grant) for record, grant in alive}
+        self._any, self._read_at = bool(records or users), now
 
     @property
     def needed(self) -> bool:
-        """Whether requests need a token, which is the case as soon as one was ever created."""
+        """Whether requests need a token or a user, which is the case as soon as there ever was one."""
         return self._always or self._any
 
     def of_token(self, token: bytes) -> Grant | None:
         """The grant of a token; None when it is invalid."""
         if self._setting is not None and hmac.compare_digest(token, self._setting):
-            return Grant(_SETTING, "SPRAG_TOKEN", TokenScope.WRITE)
-        return self._by_digest.get(digest_of(token))
+            return Grant(_SETTING, "SPRAG_TOKEN", Role.ADMINISTRATOR)
+        return self._used(self._by_digest.get(digest_of(token)))
 
     def of_header(self, header: str) -> Grant | None:
         """The grant of the token in an Authorization header; None when it is invalid."""
@@ -129,8 +178,61 @@ class Access:
         if int(end) <= time.time() or seal in self._logged_out:
             return None
         if token_id == _SETTING and self._setting is not None:
-            return Grant(_SETTING, "SPRAG_TOKEN", TokenScope.WRITE)
-        return self._by_id.get(token_id)
+            return Grant(_SETTING, "SPRAG_TOKEN", Role.ADMINISTRATOR)
+        return self._used(self._by_id.get(token_id))
+
+    def of_proxy(self, scope: Scope, headers: Headers) -> Grant | None:
+        """The grant of the user whom a trusted proxy names; None where none does. Raises ApiError for others."""
+        names = headers.getlist(self._user_header) if self._user_header else []
+        if not names or not self.attempts.from_proxy(scope):
+            return None
+        # Headers are read as Latin-1; proxies write UTF-8.
+        name = names[0].strip().encode("latin-1").decode("utf-8", "replace")
+        if len(names) > 1 or not name or len(name) > MAX_USER_NAME or not name.isprintable():
+            raise ApiError("bad-request", f"The header {self._user_header} does not name one user.")
+        record = self._users.get(name)
+        role = self._user_role if record is None else record.role
+        if role is None or (record is not None and record.removed_at is not None):
+            raise ApiError("not-allowed", f"{shown(name)} is not a user of this service; `sprag user add` adds one.")
+        return Grant(f"user {name}", name, role, name, None if record is None else record.quota.checks)
+
+    def actor(self, grant: Grant, scope: Scope) -> Actor:
+        """Who acts in a request, for the log and the ownership of what is new."""
+        return Actor(
+            Door.API if scope["path"].startswith("/api/") else Door.PAGE,
+            grant.user or grant.name,
+            self.attempts.address_of(scope),
+            grant.user,
+            grant.role is Role.ADMINISTRATOR,
+            grant.id if grant.id in self._by_id or grant.id == _SETTING else None,
+            REQUEST_ID.get() or None,
+        )
+
+    def note_uses(self) -> None:
+        """Write down when tokens were last used; raises StoreError. May run in another thread."""
+        uses, self._uses = self._uses, {}
+        if uses and self._store is not None:
+            self._store.note_uses(uses)
+
+    def _used(self, known: tuple[TokenRecord, Grant] | None) -> Grant | None:
+        """The grant of a token that is being used; None where it has expired."""
+        now = datetime.now(UTC)
+        if known is None or not known[0].valid_at(now):
+            return None
+        minute = now.replace(second=0, microsecond=0)
+        if known[0].used_at is None or known[0].used_at < minute:
+            self._uses[known[0].id] = micros_of(minute)
+        return known[1]
+
+    def _of_record(self, record: TokenRecord) -> Grant | None:
+        """The grant of a token: its user's role, or a viewer's for a token that only reads; None for a removed user."""
+        reads = record.scope is TokenScope.READ
+        if record.owner is None:
+            return Grant(record.id, record.name, Role.VIEWER if reads else Role.DESIGNER)
+        user = self._users.get(record.owner)
+        if user is None or user.removed_at is not None:
+            return None
+        return Grant(record.id, record.name, Role.VIEWER if reads else user.role, user.name, user.quota.checks)
 
     async def log_in(self, grant: Grant) -> str:
         """The value of the session cookie for ``grant``; raises StoreError."""
@@ -157,5 +259,5 @@ class Access:
         return hmac.new(self._key or secrets.token_bytes(32), message, hashlib.sha256).hexdigest()
 
 
-def _read(store: TokenStore) -> tuple[tuple[TokenRecord, ...], SessionSecrets]:
-    return store.tokens(), store.session_secrets()
+def _read(store: TokenStore) -> tuple[tuple[TokenRecord, ...], tuple[UserRecord, ...], SessionSecrets]:
+    return store.tokens(), store.users(), store.session_secrets()

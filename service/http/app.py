@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
-from functools import cache
+from datetime import timedelta
 from importlib.metadata import version
 from typing import Any
 
-from fastapi import APIRouter, FastAPI
+from fastapi import FastAPI
 from fastapi.routing import APIRoute
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp
@@ -27,25 +27,34 @@ from sprag.service.http.api import (
     cases,
     catalogues,
     clutch_fits,
+    components,
     curves,
     events,
     explore,
     fronts,
     health,
     key_answers,
+    people,
+    saved_views,
     schedules,
     sensitivity,
     studies,
+    study_list,
+    workers,
 )
 from sprag.service.http.api.document import build_openapi
+from sprag.service.http.compression import Compression
 from sprag.service.http.computer import Computes, Limits, ProcessComputer
 from sprag.service.http.context import Context
 from sprag.service.http.drain import Drain
 from sprag.service.http.guard import Guard
+from sprag.service.http.language import InLanguage
 from sprag.service.http.metrics import Metrics
+from sprag.service.http.operation_metrics import OperationCollector, Queue
+from sprag.service.http.prefix import Prefixed
+from sprag.service.http.read_ahead import keep_reading_ahead
 from sprag.service.http.request_log import Noted, RequestLog
 from sprag.service.http.shares import Shares
-from sprag.service.http.views import API_PREFIX
 from sprag.service.http.web import basin as basin_pages
 from sprag.service.http.web import branch as branch_pages
 from sprag.service.http.web import (
@@ -56,27 +65,45 @@ from sprag.service.http.web import (
     drives,
     effects,
     front,
+    further,
     login,
     pages,
     results,
+    side_by_side,
     study,
     table,
 )
+from sprag.service.http.web import components as component_pages
 from sprag.service.http.web import diagram as diagram_pages
 from sprag.service.http.web import engagements as engagement_pages
 from sprag.service.http.web import explore as explore_pages
+from sprag.service.http.web import language as language_pages
+from sprag.service.http.web import live as live_pages
+from sprag.service.http.web import people as people_pages
+from sprag.service.http.web import saved_views as view_pages
 from sprag.service.http.web import schedules as schedule_pages
+from sprag.service.http.web import (
+    study_list as list_pages,
+)
 from sprag.service.http.web import transient as transient_pages
+from sprag.service.http.web import units as unit_pages
+from sprag.service.http.web import workers as worker_pages
 from sprag.service.http.web.form import page as form
 from sprag.service.http.web.laboratory import drive as drive_laboratory
 from sprag.service.http.web.laboratory import pages as laboratory
 from sprag.service.jobs import checks
 from sprag.service.jobs.housekeeping import Housekeeping
+from sprag.service.jobs.reports.reporter import Reporter
+from sprag.service.jobs.reports.watchdog import Watchdog, late_runs
 from sprag.service.settings import Settings, UnsafeSettingsError
+from sprag.service.spec import components as component_spec
+from sprag.service.spec import labels
+from sprag.service.spec import saved_views as view_spec
 from sprag.service.spec.schema.axes import extension_schema
 from sprag.service.spec.schema.document import spec_schema
 from sprag.service.storage.readiness import Readiness
 from sprag.service.storage.store import Store
+from sprag.service.storage.users import quota_of
 from sprag.worker.chunking import Chunking
 from sprag.worker.limits import COMPUTATION_BYTES, MAX_CHECKS, MAX_CHECKS_EACH, MAX_COMPUTATIONS
 from sprag.worker.pool.child_pool import JobStoppedError
@@ -101,9 +128,71 @@ TAGS = [
     {"name": "cases", "description": "Single cases and their instantaneous values."},
     {"name": "schedules", "description": "Studies that are submitted on a schedule."},
     {"name": "clutch", "description": "Clutch laws from measured data."},
+    {"name": "components", "description": "The office's own springs, clutches and motors."},
     {"name": "models", "description": "Parameters, results and endings; studies to start from."},
+    {"name": "workers", "description": "The processes that run cases."},
+    {"name": "administration", "description": "Who asks; users and the audit log."},
     {"name": "health", "description": "Whether the service is up."},
 ]
+
+#: Modules with routes; the first route that fits a request answers it.
+_ROUTED = (
+    studies,
+    study_list,
+    events,
+    curves,
+    sensitivity,
+    batches,
+    calibrations,
+    fronts,
+    explore,
+    key_answers,
+    cases,
+    case_branches,
+    case_tables,
+    case_transients,
+    basins,
+    clutch_fits,
+    schedules,
+    components,
+    saved_views,
+    catalogues,
+    workers,
+    people,
+    health,
+    list_pages,
+    further,
+    pages,
+    form,
+    study,
+    front,
+    explore_pages,
+    side_by_side,
+    calibration,
+    calibrate,
+    drives,
+    effects,
+    results,
+    table,
+    case,
+    engagement_pages,
+    branch_pages,
+    diagram_pages,
+    basin_pages,
+    transient_pages,
+    compare,
+    drive_laboratory,
+    laboratory,
+    component_pages,
+    view_pages,
+    schedule_pages,
+    worker_pages,
+    people_pages,
+    login,
+    unit_pages,
+    language_pages,
+    live_pages,
+)
 
 
 class Application(FastAPI):
@@ -118,9 +207,9 @@ class Application(FastAPI):
 
     def build_middleware_stack(self) -> ASGIApp:
         """The framework's layers inside the guard."""
-        guarded = Guard(Noted(super().build_middleware_stack()), self._settings, self._access)
-        self.drain = Drain(RequestLog(guarded, self._metrics.answered))
-        return self.drain
+        guarded = Guard(Noted(Compression(super().build_middleware_stack())), self._settings, self._access)
+        self.drain = Drain(RequestLog(guarded, self._metrics, self._access.attempts.address_of))
+        return Prefixed(InLanguage(self.drain), self._settings.url_prefix)
 
     def openapi(self) -> dict[str, Any]:
         """The OpenAPI document, built once."""
@@ -129,10 +218,14 @@ class Application(FastAPI):
                 "Spec": spec_schema(),
                 "Extension": extension_schema(),
                 "ClutchFitRequest": clutch_fits.SCHEMA,
+                "StudyChange": labels.SCHEMA,
+                "Components": component_spec.SCHEMA,
+                "SavedView": view_spec.SCHEMA,
+                "SavedViewChange": view_spec.CHANGE_SCHEMA,
                 "ScheduleRequest": schedules.SCHEMA,
                 "ScheduleChange": schedules.CHANGE_SCHEMA,
             }
-            self.openapi_schema = build_openapi(self, schemas)
+            self.openapi_schema = build_openapi(self, schemas, self._settings.url_prefix)
         return self.openapi_schema
 
 
@@ -146,9 +239,11 @@ def create_app(
     """The application for ``settings`` (by default from the environment).
 
     A given store, computer or checker stays open when the application ends. Raises UnsafeSettingsError for an address
-    that others can reach without a token, and DatabaseError when the database cannot be used.
+    that others can reach without a token and for a URL prefix that is a path of the service itself, and DatabaseError
+    when the database cannot be used.
     """
     settings = settings or Settings()
+    _require_free(settings.url_prefix)
     own_store = store is None
     used_store = store or _sound_store(settings)
     try:
@@ -157,6 +252,8 @@ def create_app(
         if own_store:
             used_store.close()
         raise
+    used_store.default_quota = quota_of(settings)
+    used_store.restorable = timedelta(days=settings.restore_days)
     access = Access(settings, used_store)
     used_computer, used_checker = computer or _computer(settings), checker or _checker(settings)
 
@@ -166,14 +263,21 @@ def create_app(
         if isinstance(used_checker, ProcessComputer) and checker is None:
             used_checker.start()
             preparing = asyncio.create_task(_make_ready(used_checker, context))
-        housekeeping = Housekeeping(used_store)
+        reading = asyncio.create_task(keep_reading_ahead(context))
+        housekeeping = Housekeeping(used_store, access.note_uses, Watchdog(used_store).look)
         housekeeping.start()
+        reporter = Reporter(used_store, settings.reports)
+        if settings.reports.wanted:
+            reporter.start()
         yield
+        reading.cancel()
         if preparing is not None:
             preparing.cancel()
         if isinstance(running, Application) and running.drain is not None:
             await running.drain.idle()
         await run_in_threadpool(housekeeping.stop)
+        await run_in_threadpool(reporter.stop)
+        context.files.close()
         if computer is None:
             used_computer.close()
         if checker is None:
@@ -181,7 +285,16 @@ def create_app(
         if own_store:
             used_store.close()
 
-    metrics = Metrics(used_store)
+    context = Context(
+        settings,
+        used_store,
+        used_computer,
+        used_checker,
+        checks.Library(used_store),
+        check_shares=Shares(max(settings.check_processes - 1, 1), MAX_CHECKS_EACH),
+    )
+    queues = (Queue("checks", context.check_shares), Queue("computations", context.compute_shares))
+    metrics = Metrics(used_store, OperationCollector(settings, used_store, queues))
     app = Application(
         settings,
         access,
@@ -196,83 +309,34 @@ def create_app(
         redoc_url=None,
         redirect_slashes=False,
         lifespan=lifespan,
-        generate_unique_id_function=_operation_id,
     )
     app.state.access = access
     app.state.metrics = metrics
-    app.state.readiness = Readiness(used_store)
-    app.state.context = context = Context(
-        settings,
-        used_store,
-        used_computer,
-        used_checker,
-        checks.Library(used_store),
-        check_shares=Shares(max(settings.check_processes - 1, 1), MAX_CHECKS_EACH),
-    )
+    app.state.readiness = readiness = Readiness(used_store)
+    readiness.watch_schedules(lambda: len(late_runs(used_store)))
+    app.state.context = context
     if checker is not None:
         context.ready.set()
-    app.router.routes.extend(_routes().routes)
+    app.router.routes.extend(_routes())
     handlers.install(app)
     return app
 
 
-@cache
-def _routes() -> APIRouter:
-    """All routes, independent of the application, so that their signatures are analysed once per process."""
-    routes = APIRouter(generate_unique_id_function=_operation_id)
-    api = APIRouter(prefix=API_PREFIX)
-    for module in (
-        studies,
-        events,
-        curves,
-        sensitivity,
-        batches,
-        calibrations,
-        fronts,
-        explore,
-        key_answers,
-        cases,
-        case_branches,
-        case_tables,
-        case_transients,
-        basins,
-        clutch_fits,
-        schedules,
-        catalogues,
-    ):
-        api.include_router(module.router)
-    routes.include_router(api)
-    routes.include_router(health.router)
-    for page in (
-        pages,
-        form,
-        study,
-        front,
-        explore_pages,
-        calibration,
-        calibrate,
-        drives,
-        effects,
-        results,
-        table,
-        case,
-        engagement_pages,
-        branch_pages,
-        diagram_pages,
-        basin_pages,
-        transient_pages,
-        compare,
-        drive_laboratory,
-        laboratory,
-        schedule_pages,
-        login,
-    ):
-        routes.include_router(page.router)
-    return routes
+def _routes() -> Iterator[APIRoute]:
+    """All routes. They are independent of the application: their signatures are analysed once per process."""
+    for module in _ROUTED:
+        for route in module.router.routes:
+            assert isinstance(route, APIRoute)
+            yield route
 
 
-def _operation_id(route: APIRoute) -> str:
-    return route.name
+def _require_free(prefix: str) -> None:
+    """Raise UnsafeSettingsError for a prefix that begins like an address of the service, as both could be meant."""
+    first = prefix.split("/", 2)[1:2]
+    if any(first == route.path_format.split("/", 2)[1:2] for route in _routes()):
+        raise UnsafeSettingsError(
+            f"SPRAG_URL_PREFIX {prefix!r} begins like an address of the service itself; choose another, such as /sprag."
+        )
 
 
 async def _make_ready(checker: ProcessComputer, context: Context) -> None:

@@ -80,6 +80,11 @@ class Attempts:
             address = str(_parsed(entry.strip()))
         return address
 
+    def from_proxy(self, scope: Scope) -> bool:
+        """Whether the connection comes from a trusted proxy."""
+        client = scope.get("client")
+        return client is not None and self._is_trusted(str(client[0]))
+
     def _is_trusted(self, address: str) -> bool:
         parsed = _parsed(address)
         return parsed is not None and any(parsed in network for network in self._trusted)

@@ -11,6 +11,7 @@ from fastapi import Depends, Path, Query, Request
 from starlette.convertors import Convertor, register_url_convertor
 
 from sprag.service.http.computer import Computes
+from sprag.service.http.kept_files import KeptFiles
 from sprag.service.http.problems import ApiError
 from sprag.service.http.shares import Shares
 from sprag.service.jobs.checks import Library
@@ -35,8 +36,9 @@ CaseNumber = Annotated[
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """Settings, store and computer of one service; ``ending`` is set when the service begins to shut down.
+    """Settings, store and computer of one service, and the ``files`` of ended studies.
 
+    ``ending`` is set when the service begins to shut down.
     ``checker`` runs the functions that read, expand, fit or draw user input, and ``library`` gives them the store.
     Requests use it and the computer through `sprag.service.http.work`, which enforces the share of each token.
     ``unaffected`` finds parameters without effect; ``streams`` are the places for event streams. ``ready`` is set when
@@ -54,6 +56,7 @@ class Context:
     unaffected: Unaffected = field(default_factory=Unaffected)
     compute_shares: Shares = field(default_factory=lambda: Shares(1, MAX_COMPUTATIONS_EACH))
     check_shares: Shares = field(default_factory=lambda: Shares(1, MAX_CHECKS_EACH))
+    files: KeptFiles = field(default_factory=KeptFiles)
 
     def cut(self) -> None:
         """Stop computations and refuse writes; waiting requests are notified. Takes as long as killing the

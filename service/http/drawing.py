@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
+from fastapi import Query
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response
 
+from sprag.service import languages
 from sprag.service.formats import MEDIA_TYPES, Format
 from sprag.service.http.respond import entity_tag, not_modified, tagged
 from sprag.service.http.work import Work
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
     from sprag.service.http.context import Context
     from sprag.service.storage.records import StudyRecord
 
+#: Panels in a row of a figure; a narrow place asks for one.
+Columns = Annotated[int, Query(ge=1, le=2)]
 #: Formats of what is drawn from rows and written as a table too.
 DRAWN_FORMATS: Final = dict[Literal["json", "csv"] | pictures.Picture, str](
     [("json", MEDIA_TYPES["json"]), ("csv", MEDIA_TYPES["csv"]), *pictures.MEDIA_TYPES.items()]
@@ -111,5 +115,5 @@ async def unchanging(work: Work, study_id: str, make: Callable[[], Awaitable[Res
 
 
 def tag_of(request: Request, *parts: object) -> str:
-    """The entity tag of an answer to this address that depends on ``parts``."""
-    return entity_tag(request.url.path, request.url.query, *parts)
+    """The entity tag of an answer to this address, in this language, that depends on ``parts``."""
+    return entity_tag(request.url.path, request.url.query, languages.current(), *parts)

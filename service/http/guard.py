@@ -10,21 +10,24 @@ from starlette.requests import ClientDisconnect, Request, cookie_parser
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from sprag.service.actor import Actor, Role, act_as
 from sprag.service.http.access import ASKING, OPEN, Access, Grant
 from sprag.service.http.problems import ApiError, problem_response
+from sprag.service.http.roles import LOOKING
 from sprag.service.http.web.problem_page import problem_page
 from sprag.service.http.web.way_in import LOGIN_PATH, way_in
+from sprag.service.logs import note_caller
 from sprag.service.settings import Settings
 from sprag.service.storage.errors import StoreError
-from sprag.service.storage.scopes import TokenScope
 from sprag.worker.limits import BODY_SECONDS, MAX_BODY_BYTES
 
 _LOG = logging.getLogger("sprag.service")
 
-#: Paths that need no token: health checks and the login.
-OPEN_PATHS: Final = frozenset({"/livez", "/readyz", LOGIN_PATH, "/static/sprag.css", "/static/sprag.svg"})
-#: Requests that change nothing despite their method.
-_LOOKING: Final = frozenset({"/api/v1/studies:preview", "/api/v1/clutch-fits", "/new/check", LOGIN_PATH, "/logout"})
+#: Paths that need no token: health checks, the login, and what its page has on it.
+OPEN_PATHS: Final = frozenset(
+    {"/livez", "/readyz", LOGIN_PATH, "/language", "/static/sprag.css", "/static/sprag.svg"}
+    | {"/static/link.js", "/static/keys.js"}
+)
 SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 
 #: Hash of an empty style element, which plotly's script fills rule by rule; that needs no further permission.
@@ -43,6 +46,10 @@ SECURITY_HEADERS: Final = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-cache",
 }
+
+
+#: Who asks for a route that needs no login.
+_NOBODY: Final = Grant("", "", Role.VIEWER)
 
 
 class Guard:
@@ -72,17 +79,25 @@ class Guard:
         try:
             await self._check(scope)
         except ApiError as error:
+            self._note(scope)
             answer = await self._refusal(Request(scope, _limited(receive)), error)
             await answer(scope, receive, _with_headers(send))
             return
         if scope["method"] == "HEAD":
             # HEAD is allowed wherever GET is; the server then sends no body.
-            scope = {**scope, "method": "GET"}
+            scope = {**scope, "method": "GET", "sprag.head": True}
         asking = ASKING.set(scope["sprag.grant"])
         try:
-            await self._app(scope, _limited(receive), _with_headers(send))
+            with act_as(self._note(scope)):
+                await self._app(scope, _limited(receive), _with_headers(send))
         finally:
             ASKING.reset(asking)
+
+    def _note(self, scope: Scope) -> Actor:
+        """Who acts in the request, for the log too."""
+        actor = self._access.actor(scope.get("sprag.grant") or _NOBODY, scope)
+        note_caller(token=actor.token, user=actor.user)
+        return actor
 
     async def _refusal(self, request: Request, error: ApiError) -> Response:
         """The answer to a refused request: for pages, the login where that helps."""
@@ -115,7 +130,7 @@ class Guard:
             raise body_too_large()
 
     async def _grant(self, scope: Scope, headers: Headers) -> Grant | None:
-        """The grant of the request; ApiError where a token, or one of higher scope, is required."""
+        """The grant of the request; ApiError where a token or a role is missing."""
         opened, safe = scope["path"] in OPEN_PATHS, scope["method"] in SAFE_METHODS
         try:
             await self._access.refresh()
@@ -126,13 +141,20 @@ class Guard:
         if not self._access.needed:
             return OPEN
         sent = headers.getlist("authorization")
-        if sent:
+        try:
+            grant = self._access.of_proxy(scope, headers) if not any(map(_is_bearer, sent)) else None
+        except ApiError:
+            if not opened:
+                raise
+            grant = None  # the page of the login says who is logged in: nobody
+        if grant is None and sent:
             self._access.attempts.admit(scope)
-        grant = self._access.of_header(sent[0]) if len(sent) == 1 else None
-        if sent and grant is None:
-            await self._access.attempts.failed(scope, "header Authorization")
-        if not sent:
-            grant = self._access.of_cookies(cookie_parser(headers.get("cookie", "")))
+            grant = self._access.of_header(sent[0]) if len(sent) == 1 else None
+            if grant is None:
+                await self._access.attempts.failed(scope, "header Authorization")
+        else:
+            grant = grant or self._access.of_cookies(cookie_parser(headers.get("cookie", "")))
+            # The browser adds the session, or the proxy the user, to whatever page sent the request.
             if grant is not None and not safe and not _names_its_site(headers):
                 raise ApiError("cross-site", "This request does not name the page that sent it, as browsers do.")
         if opened:
@@ -141,9 +163,9 @@ class Guard:
             # Any other challenge would make a browser ask for a password and lose the form that it was to send.
             headers_of_answer = {"WWW-Authenticate": "Bearer"}
             raise ApiError("unauthorized", "This request carries no valid token.", headers=headers_of_answer)
-        if grant.scope is not TokenScope.WRITE and not safe and scope["path"] not in _LOOKING:
-            scope["sprag.grant"] = grant  # the login page shows the name of the token
-            raise ApiError("read-only", f"Token {grant.name or grant.id} is read-only.")
+        if grant.role is Role.VIEWER and not safe and scope["path"] not in LOOKING:
+            scope["sprag.grant"] = grant  # the login page shows who is logged in
+            raise ApiError("read-only", f"{grant.label} {grant.reading}.")
         return grant
 
 
@@ -152,6 +174,11 @@ def body_too_large() -> ApiError:
     return ApiError(
         "body-too-large", f"The body is limited to {MAX_BODY_BYTES} bytes.", headers={"Connection": "close"}
     )
+
+
+def _is_bearer(header: str) -> bool:
+    """Whether an Authorization header has a token; a proxy may pass on another kind that it used itself."""
+    return header.partition(" ")[0].lower() == "bearer"
 
 
 def _names_its_site(headers: Headers) -> bool:

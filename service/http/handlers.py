@@ -70,6 +70,8 @@ def _http(request: Request, error: Exception) -> Response:
         return _answer(request, ApiError("not-found", f"There is nothing at {shown(request.url.path)}."))
     if raised.status_code == 405:
         methods = ", ".join(sorted(_methods_at(request.app, request.url.path)))
+        if request.method == "OPTIONS":
+            return Response(status_code=204, headers={"Allow": methods})
         detail = f"{request.method} is not possible here; possible: {methods}."
         return _answer(request, ApiError("method-not-allowed", detail, headers={"Allow": methods}))
     if raised.status_code < 500:
@@ -89,7 +91,7 @@ def _methods_at(app: FastAPI, path: str) -> set[str]:
         pattern = getattr(route, "path_regex", None)
         if pattern is not None and pattern.match(path):
             found |= route.methods or set()
-    return found | {"HEAD"} if "GET" in found else found
+    return found | {"OPTIONS"} | ({"HEAD"} if "GET" in found else set())
 
 
 def _invalid(request: Request, error: Exception) -> Response:

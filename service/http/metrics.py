@@ -1,4 +1,4 @@
-"""Metrics of the service in the text format of Prometheus. Labels are few and never ids.
+"""Metrics of the service in the text format of Prometheus. Labels are few and never ids of studies or requests.
 
 Other processes run the cases; their outcomes are read from the database when the metrics are requested.
 """
@@ -9,12 +9,15 @@ import bisect
 import threading
 from collections import deque
 from collections.abc import Iterable, Iterator
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Final
 
-from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, Histogram, generate_latest
+from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, Gauge, Histogram, Info, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
 
+from sprag.service.jobs.reports.watchdog import late_runs
+from sprag.worker import models
 from sprag.worker.states import StudyState
 
 if TYPE_CHECKING:
@@ -34,9 +37,9 @@ RATE_SECONDS: Final = 60.0
 
 
 class Metrics:
-    """The metrics of one service on ``store``."""
+    """The metrics of one service on ``store``, and those that ``more`` collects."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Store, *more: Collector) -> None:
         self._registry = CollectorRegistry()
         self._requests = Counter(
             "sprag_http_requests",
@@ -54,11 +57,22 @@ class Metrics:
             buckets=WAIT_BOUNDS,
             registry=self._registry,
         )
-        self._registry.register(StudyCollector(store))
+        self._in_progress = Gauge(
+            "sprag_http_requests_in_progress", "Requests that are being answered.", registry=self._registry
+        )
+        for collector in (StudyCollector(store), *more):
+            self._registry.register(collector)
+        about = Info("sprag", "The program that answers.", registry=self._registry)
+        about.info({"version": version("sprag"), "engine": models.ENGINE_VERSION})
         store.session.on_wait = self.waited
+
+    def begun(self) -> None:
+        """Count a request that is being answered, until `answered`."""
+        self._in_progress.inc()
 
     def answered(self, method: str, route: str, status: int, seconds: float) -> None:
         """Count a request; ``route`` is the pattern of its URL."""
+        self._in_progress.dec()
         # Arbitrary input of clients must not create new series.
         self._requests.labels(method if method in METHODS else "other", route, str(status)).inc()
         self._seconds.labels(route).observe(seconds)
@@ -125,9 +139,15 @@ class StudyCollector(Collector):
         yield GaugeMetricFamily(
             "sprag_reused_cases", "Cases in the database that were taken from other studies.", figures.reused
         )
+        yield GaugeMetricFamily(
+            "sprag_schedules_late",
+            "Due times of schedules at which nothing has run although it should.",
+            len(late_runs(self._store)),
+        )
         if figures.heartbeat is not None:
             age = (now - figures.heartbeat).total_seconds()
-            yield GaugeMetricFamily("sprag_worker_heartbeat_age_seconds", "Since the worker was last heard of.", age)
+            said = "Seconds since the last heartbeat; of several dispatchers, the longest."
+            yield GaugeMetricFamily("sprag_worker_heartbeat_age_seconds", said, age)
 
     def _look(self, now: datetime) -> None:
         for work in self._store.finished_since(self._since):

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any, Final, cast
 
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.responses import Response
@@ -39,7 +39,7 @@ PROBLEM_TYPES: dict[Kind, ProblemType] = _catalogue(
     _P("invalid-spec", 422, "The study spec is not valid", _FIELDS_HELP),
     _P("invalid-body", 422, "The request body is not valid", _FIELDS_HELP),
     _P("invalid-parameter", 422, "A request parameter is not valid", "`errors` lists each one and what is allowed."),
-    _P("invalid-selection", 422, "The selected cases cannot be drawn", "A curve needs a value for every axis."),
+    _P("invalid-selection", 422, "The selection is not possible", "A curve needs a value for every axis."),
     _P(
         "idempotency-conflict",
         422,
@@ -48,6 +48,8 @@ PROBLEM_TYPES: dict[Kind, ProblemType] = _catalogue(
     ),
     _P("study-not-found", 404, "Study not found", "It never existed or was deleted."),
     _P("schedule-not-found", 404, "Schedule not found", "It never existed or was deleted."),
+    _P("component-not-found", 404, "Component not found", "It never existed or was deleted."),
+    _P("view-not-found", 404, "Saved view not found", "It never existed, or was deleted itself or with its study."),
     _P("case-not-found", 404, "Case not found", "Cases are numbered from 0."),
     _P("not-found", 404, "There is nothing at this address", "The addresses of the interface are listed at /docs."),
     _P(
@@ -57,6 +59,12 @@ PROBLEM_TYPES: dict[Kind, ProblemType] = _catalogue(
     _P("wrong-state", 409, "The state of the study does not allow this", "Check the state of the study first."),
     _P("not-computed", 409, "The case cannot be computed", "Running it ends the process that computes it."),
     _P("body-too-large", 413, "The request body is too large", "A study is a small document: give axes as ranges."),
+    _P(
+        "range-not-satisfiable",
+        416,
+        "The file has no such part",
+        "Content-Range says how many bytes it has.",
+    ),
     _P("unsupported-media-type", 415, "The content type is not supported", "Send the type that `detail` names."),
     _P("bad-request", 400, "The request cannot be read", "It is not valid HTTP."),
     _P(
@@ -65,7 +73,14 @@ PROBLEM_TYPES: dict[Kind, ProblemType] = _catalogue(
         "A valid token is needed",
         "Send `Authorization: Bearer <token>`; browsers: /login.",
     ),
-    _P("read-only", 403, "This token is read-only", "A token of scope `write` is needed to change anything."),
+    _P(
+        "read-only",
+        403,
+        "You can look at everything and change nothing",
+        "Changes need a token of scope `write` or, for users, the role designer.",
+    ),
+    _P("not-allowed", 403, "Your role does not allow this", "An administrator can do it, or change your role."),
+    _P("not-owner", 403, "This belongs to somebody else", "Its owner and administrators can change it."),
     _P("too-slow", 408, "The request arrived too slowly", "Send the whole body at once."),
     _P("cross-site", 403, "Requests from other sites are refused", "A browser sent it for a page of another site."),
     _P("wrong-host", 421, "The request is addressed to another host", "SPRAG_ALLOWED_HOSTS allows further names."),
@@ -78,11 +93,16 @@ PROBLEM_TYPES: dict[Kind, ProblemType] = _catalogue(
     _P("too-costly", 422, "This takes too much time or memory", "Request a smaller study, formula or picture."),
     _P("too-many-requests", 429, "Too many requests of one token at once", "Wait for the time given by Retry-After."),
     _P("queue-full", 429, "Too many studies are waiting", "Wait until some have ended, or cancel some."),
+    _P("quota-exceeded", 429, "Your quota is used up", "Wait until studies have ended, or delete some."),
     _P("internal", 500, "The service failed", "This is a bug in the program; the server's log has the details."),
     _P("unavailable", 503, "The service cannot do this now", "Try again later; `sprag doctor` looks for the cause."),
     _P("storage-full", 507, "There is no room for this", "Free space on the disk, or delete studies."),
     _P("timed-out", 504, "The computation took too long", "Request a shorter part of the run."),
 )
+
+
+#: Seconds after which a refused request is worth another attempt, where the refusal itself does not say.
+RETRY_SECONDS: Final = "10"
 
 
 class ApiError(FaultError):
@@ -129,6 +149,8 @@ def problem_response(error: ApiError) -> Response:
     """The HTTP response for ``error``."""
     body = to_bytes(problem_json(error.type, error.detail, error.faults))
     headers = {"Cache-Control": "no-store", **error.headers}
+    if error.type.status in (429, 503):
+        headers.setdefault("Retry-After", RETRY_SECONDS)
     return Response(body, status_code=error.type.status, media_type=PROBLEM_MEDIA_TYPE, headers=headers)
 
 

@@ -6,15 +6,12 @@ import re
 import secrets
 import time
 from collections.abc import Callable
-from typing import Final
+from typing import Final, Protocol
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from sprag.service.logs import REQUEST_ID, REQUESTS, STUDY_ID
-
-#: Called with method, pattern of the URL, status and seconds of every answered request.
-Observer = Callable[[str, str, int, float], None]
+from sprag.service.logs import CALLER, REQUEST_ID, REQUESTS, STUDY_ID, note_caller
 
 REQUEST_HEADER: Final = "X-Request-ID"
 _GIVEN_ID: Final = re.compile(r"[A-Za-z0-9_-]{1,64}")
@@ -23,15 +20,27 @@ NO_ROUTE: Final = "(none)"
 _API: Final = "/api/v1"
 
 
+class Observer(Protocol):
+    """What counts requests."""
+
+    def begun(self) -> None:
+        """A request that will be answered."""
+
+    def answered(self, method: str, route: str, status: int, seconds: float) -> None:
+        """The answer; ``route`` is the pattern of the URL."""
+
+
 class RequestLog:
-    """Outermost ASGI application: gives each request an id and reports its outcome to the log and to ``observe``.
+    """Outermost ASGI application: gives each request an id and reports its outcome to the log and to ``observer``.
 
     The id is taken from the header X-Request-ID where a proxy sent one, and is returned in the same header.
+    ``address_of`` gives the address of the client, which a trusted proxy may forward.
     """
 
-    def __init__(self, app: ASGIApp, observe: Observer) -> None:
+    def __init__(self, app: ASGIApp, observer: Observer, address_of: Callable[[Scope], str]) -> None:
         self._app = app
-        self._observe = observe
+        self._address_of = address_of
+        self._observer = observer
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -53,13 +62,15 @@ class RequestLog:
                 seen["made"] = headers.get("location", "")
             await send(message)
 
-        token = REQUEST_ID.set(request_id)
+        token, caller = REQUEST_ID.set(request_id), CALLER.set({})
+        note_caller(address=self._address_of(scope))
+        self._observer.begun()
         try:
             await self._app(scope, receive, noted)
         finally:
             seconds = time.perf_counter() - began
             route = seen.get("route", NO_ROUTE)
-            self._observe(scope["method"], route, status, seconds)
+            self._observer.answered(scope["method"], route, status, seconds)
             REQUESTS.info(
                 "%s %s %d in %.1f ms", scope["method"], _plain(scope["path"]), status, 1e3 * seconds,
                 extra={
@@ -74,6 +85,7 @@ class RequestLog:
                 },
             )  # fmt: skip
             REQUEST_ID.reset(token)
+            CALLER.reset(caller)
 
 
 class Noted:

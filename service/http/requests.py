@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,7 +12,7 @@ from fastapi.dependencies.models import Dependant
 
 from sprag.service.faults import ParameterFault, shown
 from sprag.service.http.problems import ApiError
-from sprag.service.spec.report import did_you_mean
+from sprag.service.spec.report import SpecError, did_you_mean
 
 BodyFormat = Literal["json", "toml"]
 _FORMATS: dict[str, BodyFormat] = {"application/json": "json", "application/toml": "toml"}
@@ -46,6 +48,15 @@ async def read_body(request: Request) -> Body:
             headers={"Accept": ", ".join(_FORMATS)},
         )
     return Body(await request.body(), form)
+
+
+@contextmanager
+def as_body_problems() -> Iterator[None]:
+    """Convert the faults of a body that is not a spec to an ApiError."""
+    try:
+        yield
+    except SpecError as error:
+        raise ApiError("invalid-body", str(error), error.faults) from error
 
 
 async def strict_query(request: Request) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
+from urllib.parse import urlencode
 
 from starlette.concurrency import iterate_in_threadpool
 from starlette.requests import Request
@@ -31,6 +32,16 @@ def json_response(data: Any, status: int = 200, headers: Mapping[str, str] | Non
     return Response(to_bytes(data), status_code=status, media_type=JSON, headers=dict(headers or {}))
 
 
+def page_response(request: Request, data: Mapping[str, Any]) -> Response:
+    """A page of a list as a JSON answer, whose header Link has the address of the next page."""
+    token = data["next_page_token"]
+    if token is None:
+        return json_response(data)
+    query = [(name, value) for name, value in request.query_params.multi_items() if name != "page_token"]
+    address = f"{request.url.path}?{urlencode([*query, ('page_token', token)])}"
+    return json_response(data, headers={"Link": f'<{address}>; rel="next"'})
+
+
 @cache
 def program_hash() -> str:
     """A hash of the service's sources: after an upgrade no client keeps answers that another version wrote."""
@@ -45,8 +56,10 @@ def entity_tag(*parts: object) -> str:
 
 def not_modified(request: Request, tag: str) -> Response | None:
     """The answer 304 when the client already has the version of ``tag`` (If-None-Match), otherwise None."""
-    if parse_etags(",".join(request.headers.getlist("if-none-match"))).contains_weak(tag.strip('"')):
-        return Response(status_code=304, headers={"ETag": tag, "Vary": "Accept"})
+    known = ",".join(request.headers.getlist("if-none-match"))
+    if parse_etags(known).contains_weak(tag.strip('"')):
+        # A compressed answer has the weak form of the tag (`compression`), and so has what stands for it.
+        return Response(status_code=304, headers={"ETag": f"W/{tag}" if f"W/{tag}" in known else tag, "Vary": "Accept"})
     return None
 
 

@@ -6,34 +6,42 @@ from typing import TYPE_CHECKING
 
 from sprag.service.answers import filled
 from sprag.service.answers.schedules import ScheduleDetail, ScheduleRun, ScheduleSummary
+from sprag.service.http.prefix import here
 from sprag.service.http.views import API_PREFIX, study_address
+from sprag.service.jobs.nights import outcome_json
+from sprag.service.schedules.times import local_time
 
 if TYPE_CHECKING:
-    from sprag.service.storage.schedules import RunRecord, ScheduleRecord
+    from sprag.service.storage.schedule_runs import RunRecord, ScheduleRecord
 
 
 def schedule_address(schedule_id: str) -> str:
     """Address of a schedule in the API."""
-    return f"{API_PREFIX}/schedules/{schedule_id}"
+    return here(f"{API_PREFIX}/schedules/{schedule_id}")
 
 
 def summary(record: ScheduleRecord) -> ScheduleSummary:
     """A schedule without its spec."""
+    zone = record.fields.timing.zone
     own = {
         "cron": None,
         "at": None,
         **record.fields.to_json(),
-        "last_run": None if record.last is None else run_json(record.last),
-        "links": {"self": schedule_address(record.id), "page": f"/schedules#{record.id}"},
+        "next_due_local": None if record.next_due is None else local_time(record.next_due, zone),
+        "last_run": None if record.last is None else run_json(record.last, zone),
+        "links": {"self": schedule_address(record.id), "page": here(f"/schedules#{record.id}")},
     }
     return filled(ScheduleSummary, record, **own)
 
 
 def detail(record: ScheduleRecord, runs: tuple[RunRecord, ...]) -> ScheduleDetail:
     """A schedule with everything."""
-    return {**summary(record), "runs": [run_json(run) for run in runs], "spec": record.fields.spec}
+    zone = record.fields.timing.zone
+    return {**summary(record), "runs": [run_json(run, zone) for run in runs], "spec": record.fields.spec}
 
 
-def run_json(run: RunRecord) -> ScheduleRun:
-    """A due time and its outcome."""
-    return filled(ScheduleRun, run, address=None if run.study is None else study_address(run.study))
+def run_json(run: RunRecord, zone: str) -> ScheduleRun:
+    """A due time of a schedule in ``zone``, and its outcome."""
+    address = None if run.study is None else study_address(run.study)
+    own = {"due_local": local_time(run.due, zone), "address": address, "outcome": outcome_json(run.outcome)}
+    return filled(ScheduleRun, run, **own)

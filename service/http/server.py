@@ -9,6 +9,7 @@ import signal
 import socket
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
@@ -20,6 +21,7 @@ import uvicorn
 from sprag.service import logs
 from sprag.service.http.app import create_app
 from sprag.service.http.timeouts import READING
+from sprag.service.http.tls import LOOK_SECONDS, Certificate
 from sprag.service.jobs.dispatching import start_dispatcher_process, worker_settings
 from sprag.service.settings import Settings
 from sprag.worker.limits import MAX_CONNECTIONS
@@ -33,6 +35,10 @@ _ANSWER_SECONDS = 3
 _FIRST_DELAY = 0.5
 _LONGEST_DELAY = 10.0
 _LONG_LIFE = 10.0
+#: So many ends within so many seconds, and a child younger than this (s): the service is not ready.
+_FAILING = 3
+_FAILING_SECONDS = 600.0
+_YOUNG_SECONDS = 60.0
 
 
 class AddressError(Exception):
@@ -72,6 +78,8 @@ class Supervisor(threading.Thread):
         Set when the shutdown begins: the child is ended while current requests are still answered.
     stop_seconds : float
         Time for the child to end before it is killed.
+    clock : function
+        A monotonic clock (s).
     """
 
     def __init__(
@@ -80,27 +88,41 @@ class Supervisor(threading.Thread):
         delays: tuple[float, float] = (_FIRST_DELAY, _LONGEST_DELAY),
         leaving: threading.Event | None = None,
         stop_seconds: float = 15.0,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         super().__init__(name="sprag-supervisor", daemon=True)
+        self._clock = clock
         self._stop_seconds = stop_seconds
         self._start_child = start
         self._first, self._longest = delays
         self._ending = threading.Event()
         self._leaving = leaving or self._ending
         self._child: Child | None = None
+        self._born = 0.0
+        #: When the child has ended by itself, the last times.
+        self._ends: deque[float] = deque(maxlen=_FAILING)
+
+    def failing(self) -> str | None:
+        """A sentence when the child dies again and again, otherwise None."""
+        child, born, ends, now = self._child, self._born, tuple(self._ends), self._clock()
+        alive = child is not None and child.exitcode is None
+        if len(ends) < _FAILING or now - ends[0] > _FAILING_SECONDS or (alive and now - born > _YOUNG_SECONDS):
+            return None
+        return f"The worker has ended {_FAILING} times within {_FAILING_SECONDS / 60.0:g} minutes; the log says why."
 
     def run(self) -> None:
         """Start the child, and restart it whenever it dies, until `stop` or the shutdown."""
         delay = self._first
         while not self._over():
-            born = time.monotonic()
+            self._born = self._clock()
             self._child = child = self._start_child()
             while child.exitcode is None and not self._over():
                 child.join(0.2)
-            delay = self._first if time.monotonic() - born > _LONG_LIFE else delay
+            delay = delay if self._clock() - self._born <= _LONG_LIFE else self._first
             # The signal that ended it may also be about to reach this process.
             if self._leaving.wait(self._first) or self._over():
                 break
+            self._ends.append(self._clock())
             _LOG.error("The worker ended (exit code %s); it is restarted.", child.exitcode)
             self._ending.wait(delay - self._first)
             delay = min(2.0 * delay, self._longest)
@@ -141,6 +163,8 @@ class Server(uvicorn.Server):
         Called when the service is still running ``last_seconds`` after the signal.
     listening : function
         Called once the service listens.
+    certificate : Certificate, optional
+        Read again when its files change.
     """
 
     def __init__(
@@ -151,10 +175,12 @@ class Server(uvicorn.Server):
         give_up: Callable[[], None],
         listening: Callable[[], None],
         last_seconds: float,
+        certificate: Certificate | None = None,
     ) -> None:
         super().__init__(config)
+        self._certificate = certificate
         self._listening = listening
-        self._told = ending
+        self._ending = ending
         self._cut = cut
         self._last = threading.Timer(last_seconds, give_up)
         self._last.daemon = True
@@ -164,11 +190,19 @@ class Server(uvicorn.Server):
         await super().startup(sockets)
         if self.started:
             self._listening()
+            self._look_for_renewal()
+
+    def _look_for_renewal(self) -> None:
+        """Read the certificate again if it has changed, now and from then on."""
+        context = self.config.ssl
+        if self._certificate is not None and context is not None:
+            self._certificate.renew(context)
+            asyncio.get_running_loop().call_later(LOOK_SECONDS, self._look_for_renewal)
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """A signal requests the shutdown."""
-        if not self._told.is_set():
-            self._told.set()
+        if not self._ending.is_set():
+            self._ending.set()
             self._last.start()
         super().handle_exit(sig, frame)
 
@@ -199,13 +233,14 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
     """Serve until SIGINT or SIGTERM; service and dispatcher have ended when this returns.
 
     ``announce`` is called with the address once the service listens there (by default a line of the log tells it); the
-    dispatcher starts then, so that its imports do not hold up the address. Raises UnsafeSettingsError, DatabaseError
-    and AddressError, each with one sentence, before anything is started.
+    dispatcher starts then, so that its imports do not hold up the address. Raises UnsafeSettingsError, DatabaseError,
+    CertificateError and AddressError, each with one sentence, before anything is started.
     """
     logs.configure(settings.log_format, requests=settings.log_requests)
+    certificate = Certificate.of(settings)
     app = create_app(settings)  # initialises the database before the dispatcher opens it
     listener = _listen(settings)
-    address = _address(settings, listener)
+    address = settings.address(listener.getsockname()[1])
     config = uvicorn.Config(
         app,
         log_config=None,
@@ -218,12 +253,15 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
         proxy_headers=False,
         timeout_graceful_shutdown=int(_GRACE_SECONDS) + _ANSWER_SECONDS,
         lifespan="on",
+        ssl_certfile=None if certificate is None else certificate.file,
+        ssl_keyfile=None if certificate is None else certificate.key,
     )
     supervisor = Supervisor(
         lambda: start_dispatcher_process(worker_settings(settings)),
         leaving=app.state.context.ending,
         stop_seconds=settings.stop_seconds / 2.0,
     )
+    app.state.readiness.watch(supervisor.failing)
     with listener, _outlived_signals():
 
         def listening() -> None:
@@ -231,7 +269,7 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
             supervisor.start()
 
         context = app.state.context
-        server = Server(config, context.ending, context.cut, _give_up, listening, settings.stop_seconds)
+        server = Server(config, context.ending, context.cut, _give_up, listening, settings.stop_seconds, certificate)
         try:
             with suppress(KeyboardInterrupt):
                 server.run(sockets=[listener])
@@ -255,12 +293,6 @@ def _listen(settings: Settings) -> socket.socket:
     # Inherited by connections. Without it the body of a small answer waits 40 ms for the acknowledgement of its head.
     listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return listener
-
-
-def _address(settings: Settings, listener: socket.socket) -> str:
-    host = settings.host.strip("[]")
-    port = listener.getsockname()[1]
-    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
 
 
 @contextmanager

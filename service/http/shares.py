@@ -31,12 +31,20 @@ class Shares:
         self._each = each
         self._owners: dict[str, _Share] = {}
 
+    @property
+    def requests(self) -> int:
+        """Requests of all owners that have a turn or wait for one."""
+        return sum(share.taken for share in list(self._owners.values()))
+
     @asynccontextmanager
-    async def take(self, owner: str) -> AsyncIterator[None]:
-        """Wait for a turn; ApiError immediately when the owner has too many requests."""
-        share = self._owners.setdefault(owner, _Share(self._at_work))
+    async def take(self, owner: str, at_most: int = 0) -> AsyncIterator[None]:
+        """Wait for a turn; ApiError immediately when the owner has too many requests.
+
+        ``at_most`` limits the simultaneous requests of this owner further; 0 does not.
+        """
+        share = self._owners.setdefault(owner, _Share(min(at_most or self._at_work, self._at_work)))
         if share.taken >= self._each:
-            detail = f"{self._each} requests of this token are being worked on, the most that one may have at once."
+            detail = f"{self._each} requests of this user or token are in progress, the most at one time."
             raise ApiError("too-many-requests", detail, headers={"Retry-After": "5"})
         share.taken += 1
         try:

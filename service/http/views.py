@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, cast
 
 from sprag.service.answers import filled
 from sprag.service.answers.catalogue import Preset
-from sprag.service.answers.studies import FullProgress, StudyDetail, StudySummary
+from sprag.service.answers.studies import FullProgress, Origin, StudyDetail, StudySummary
 from sprag.service.faults import warned
+from sprag.service.http.prefix import here
 from sprag.service.presets import ABOUT, preset_text
 from sprag.service.results.rounds import rounds_json
 from sprag.service.spec.catalogue import axes_json
-from sprag.service.spec.document import format_of, load_spec, parse_spec
+from sprag.service.spec.document import format_of, load_spec
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sprag.service.storage.origins import Origin as OriginRecord
     from sprag.service.storage.records import Kinds, Progress, StudyRecord
     from sprag.worker.study import Study
 
@@ -24,7 +28,7 @@ API_PREFIX: Final = "/api/v1"
 
 def study_address(study_id: str) -> str:
     """Address of a study in the API."""
-    return f"{API_PREFIX}/studies/{study_id}"
+    return here(f"{API_PREFIX}/studies/{study_id}")
 
 
 def study_links(study_id: str) -> dict[str, str]:
@@ -34,7 +38,7 @@ def study_links(study_id: str) -> dict[str, str]:
         name: f"{own}/{name}"
         for name in ("cases", "results", "curves", "map", "sensitivity", "report", "rounds", "events")
     }
-    return {"self": own, **parts, "cancel": f"{own}:cancel", "page": f"/studies/{study_id}"}
+    return {"self": own, **parts, "cancel": f"{own}:cancel", "page": here(f"/studies/{study_id}")}
 
 
 def summary(record: StudyRecord) -> StudySummary:
@@ -57,11 +61,18 @@ def progress_json(progress: Progress) -> FullProgress:
         progress,
         seconds_left=None if left is None else {"low": left[0], "high": left[1]},
         passes=None if covered is None else asdict(covered),
-        rounds=None if progress.rounds is None else rounds_json(progress.rounds),
+        rounds=None if progress.rounds is None else rounds_json(progress.rounds, progress.state),
     )
 
 
-def detail(record: StudyRecord, progress: Progress, study: Study, spec: dict[str, Any], kinds: Kinds) -> StudyDetail:
+def detail(
+    record: StudyRecord,
+    progress: Progress,
+    study: Study,
+    spec: dict[str, Any],
+    kinds: Kinds,
+    origins: Sequence[OriginRecord],
+) -> StudyDetail:
     """A study with everything; ``record`` and ``progress`` come from one transaction (`Store.look`)."""
     return {
         **summary(record),
@@ -72,6 +83,7 @@ def detail(record: StudyRecord, progress: Progress, study: Study, spec: dict[str
         "physics_hash": record.physics_hash,
         "regimes": kinds.regimes,
         "flags": kinds.flags,
+        "computed_by": [filled(Origin, origin) for origin in origins],
         "spec": spec,
     }
 
@@ -80,13 +92,13 @@ def detail(record: StudyRecord, progress: Progress, study: Study, spec: dict[str
 def preset_of(name: str) -> Preset:
     """A preset with its spec and description; KeyError for an unknown name."""
     file, text = preset_text(name)
-    spec = parse_spec(load_spec(text, format_of(file)))
+    spec = cast("dict[str, Any]", load_spec(text, format_of(file)))
     return {
         "name": name,
-        "title": spec.study.name,
-        "model": spec.study.model,
+        "title": spec["name"],
+        "model": spec["model"],
         "shows": ABOUT[name].shows,
         "values": ABOUT[name].values,
-        "cases": spec.study.cases,
-        "spec": spec.spec,
+        "cases": ABOUT[name].cases,
+        "spec": spec,
     }

@@ -9,8 +9,10 @@ from fastapi import Depends, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
+from sprag.service import languages
 from sprag.service.http.access import OPEN
 from sprag.service.http.context import study_with
+from sprag.service.languages.elsewhere import speak
 from sprag.service.results.start_states import check_start
 from sprag.service.spec.machine.shaft_check import NotCompiledError
 from sprag.worker import models
@@ -54,12 +56,14 @@ class Work:
 
     async def _check(self, function: Callable[[*Args], R], *args: *Args) -> R:
         context = self.context
-        return await self._attended(self._in_turn(context.check_shares, context.checker, function, *args))
+        quota = self._grant.checks
+        most = (context.settings.user_checks if quota is None else quota) if self._grant.user is not None else 0
+        return await self._attended(self._in_turn(context.check_shares, context.checker, most, function, *args))
 
     async def compute(self, function: Callable[[*Args], R], *args: *Args) -> R:
         """The value of a function of the engine."""
         context = self.context
-        return await self._attended(self._in_turn(context.compute_shares, context.computer, function, *args))
+        return await self._attended(self._in_turn(context.compute_shares, context.computer, 0, function, *args))
 
     async def run_case(self, function: Callable[[Study, *Args], R], study: Study, *args: *Args) -> R:
         """The value of a function that runs a case of ``study``, once its kernel is ready."""
@@ -85,10 +89,16 @@ class Work:
         """Load a kernel, compiling it if necessary; the compilation continues when the client disconnects."""
         await self._attended(self.context.computer.load(shape))
 
-    async def _in_turn(self, shares: Shares, computer: Computes, function: Callable[[*Args], R], *args: *Args) -> R:
-        grant = cast("Grant | None", self.request.scope.get("sprag.grant")) or OPEN
-        async with shares.take(grant.id):
-            return await computer.run(function, *args)
+    @property
+    def _grant(self) -> Grant:
+        return cast("Grant | None", self.request.scope.get("sprag.grant")) or OPEN
+
+    async def _in_turn(
+        self, shares: Shares, computer: Computes, at_most: int, function: Callable[[*Args], R], *args: *Args
+    ) -> R:
+        async with shares.take(self._grant.share, at_most):
+            # The other process begins in English.
+            return await computer.run(speak, languages.current(), function, *args)
 
     async def _attended(self, work: Coroutine[Any, Any, R]) -> R:
         """The value of ``work``, which is cancelled when the client disconnects."""

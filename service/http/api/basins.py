@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends
 from starlette.responses import Response
 
 from sprag.service.answers.results import BasinData
@@ -13,13 +12,14 @@ from sprag.service.http.basin_query import AskedBasin
 from sprag.service.http.context import CaseNumber, StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, picture
 from sprag.service.http.drawing import table as written
-from sprag.service.http.requests import strict_query
 from sprag.service.http.respond import choose_format
+from sprag.service.http.routers import api_router
 from sprag.service.http.work import Attended
 from sprag.service.results import basins
 from sprag.service.results.pictures.curves import draw_basin
+from sprag.service.results.reading import Reading
 
-router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
+router = api_router("cases", "/studies/{study_id:study}/cases")
 
 
 @router.get(
@@ -46,4 +46,4 @@ async def get_basin(
     made = await work.run_case(basins.basin_of, study, case, query)
     units = basins.units_of(study, query)
     title = f"{study.name}, case {case}"
-    return await picture(draw_basin, chosen, made, query.paths, units, title).response(work)
+    return await picture(draw_basin, chosen, made, query.paths, units, Reading(study.model), title).response(work)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Final
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import Query
 from pydantic import Field
 from starlette.responses import Response
 
@@ -15,8 +15,9 @@ from sprag.service.http.api.document import files, format_query, problems
 from sprag.service.http.api.document import not_modified as documented_304
 from sprag.service.http.context import StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture
-from sprag.service.http.requests import strict_query
+from sprag.service.http.reading import FileChoice
 from sprag.service.http.respond import choose_format
+from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
 from sprag.service.jobs import answers, batch_answers
 from sprag.service.jobs.batch_answers import RibbonQuery, YieldQuery
@@ -26,9 +27,10 @@ from sprag.service.results.tolerances.ribbons import MOST_QUANTILES, QUANTILES
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from sprag.service.results.reading import Choice
     from sprag.service.storage.records import StudyRecord
 
-router = APIRouter(prefix="/studies/{study_id:study}", tags=["results"], dependencies=[Depends(strict_query)])
+router = api_router("results", "/studies/{study_id:study}")
 
 #: Most drives in a list of the worst ones.
 MOST_WORST: Final = 1000
@@ -60,6 +62,7 @@ Probability = Annotated[float, Field(gt=0.0, lt=1.0)]
 async def get_ribbon(
     work: Attended,
     study_id: StudyId,
+    choice: FileChoice,
     x: Along = None,
     y: Annotated[
         list[str] | None,
@@ -88,7 +91,7 @@ async def get_ribbon(
         Asked(x, tuple(dict.fromkeys(by or ())), pairs(at)),
         tuple(quantile) if quantile else (0.5,) if mapped else QUANTILES,
     )
-    return await _answered(work, study_id, form, "ribbon", _RIBBON, batch_answers.ribbon_picture, query, mapped)
+    return await _answered(work, study_id, choice, form, "ribbon", _RIBBON, batch_answers.ribbon_picture, query, mapped)
 
 
 @router.get(
@@ -103,6 +106,7 @@ async def get_ribbon(
 async def get_yield(
     work: Attended,
     study_id: StudyId,
+    choice: FileChoice,
     condition: Annotated[
         list[str],
         Query(
@@ -123,12 +127,13 @@ async def get_yield(
 ) -> Response:
     """The share of drives that reach conditions, at each place and at all places, its causes, and the worst drives."""
     query = YieldQuery(tuple(condition), Asked(x, tuple(dict.fromkeys(by or ())), pairs(at)), worst)
-    return await _answered(work, study_id, form, "yield", _YIELD, batch_answers.yield_picture, query, mapped)
+    return await _answered(work, study_id, choice, form, "yield", _YIELD, batch_answers.yield_picture, query, mapped)
 
 
 async def _answered(
     work: Work,
     study_id: str,
+    choice: Choice,
     form: str | None,
     part: str,
     writers: Mapping[str, Callable[..., bytes]],
@@ -143,6 +148,6 @@ async def _answered(
             headers = attached(f"{study_id}-{part}.csv") if chosen == "csv" else {}
             drawing = Drawing(writers[chosen], (work.context.library, study_id, query), DRAWN_FORMATS[chosen], headers)
             return drawing if record.cases > answers.FEW // 10 else drawing.here()
-        return picture(draw, chosen, work.context.library, study_id, query, mapped, record.name or record.model)
+        return picture(draw, chosen, work.context.library, study_id, query, mapped, choice, record.name or record.model)
 
     return await conditional(work, study_id, chosen, make)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Final
 
-from fastapi import APIRouter, Depends
 from starlette.responses import Response
 
 from sprag.service.answers import calibration as m
@@ -12,8 +11,9 @@ from sprag.service.http.api.document import files, format_query, problems
 from sprag.service.http.api.document import not_modified as documented_304
 from sprag.service.http.context import StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture
-from sprag.service.http.requests import strict_query
+from sprag.service.http.reading import FileChoice
 from sprag.service.http.respond import choose_format
+from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import answers
 from sprag.service.results.calibration import plan_of
@@ -21,7 +21,7 @@ from sprag.service.results.calibration import plan_of
 if TYPE_CHECKING:
     from sprag.service.storage.records import StudyRecord
 
-router = APIRouter(prefix="/studies/{study_id:study}", tags=["results"], dependencies=[Depends(strict_query)])
+router = api_router("results", "/studies/{study_id:study}")
 
 _WRITERS: Final = {"json": answers.calibration_as_json, "csv": answers.calibration_as_csv}
 
@@ -36,7 +36,10 @@ _WRITERS: Final = {"json": answers.calibration_as_json, "csv": answers.calibrati
     },
 )
 async def get_calibration(
-    work: Attended, study_id: StudyId, form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None
+    work: Attended,
+    study_id: StudyId,
+    choice: FileChoice,
+    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """What a calibration has found: values with intervals, correlations, residuals, the next point to measure."""
     chosen = choose_format(work.request, form, DRAWN_FORMATS)
@@ -47,6 +50,6 @@ async def get_calibration(
         if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - narrows the type
             headers = attached(f"{study_id}-calibration.csv") if chosen == "csv" else {}
             return Drawing(_WRITERS[chosen], shown, DRAWN_FORMATS[chosen], headers)
-        return picture(answers.calibration_picture, chosen, *shown, record.name or record.model)
+        return picture(answers.calibration_picture, chosen, *shown, choice, record.name or record.model)
 
     return await conditional(work, study_id, chosen, make)

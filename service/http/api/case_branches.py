@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import Query
 from starlette.responses import Response
 
 from sprag.service.answers.results import Branch
@@ -13,13 +13,15 @@ from sprag.service.http.api.document import CASE_PROBLEMS, files, format_query, 
 from sprag.service.http.context import CaseNumber, StartNumber, StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, picture
 from sprag.service.http.drawing import table as written
-from sprag.service.http.requests import strict_query
 from sprag.service.http.respond import choose_format
+from sprag.service.http.routers import api_router
 from sprag.service.http.work import Attended, Work
 from sprag.service.results import branches, sections
 from sprag.service.results.figures.branch import branch_figure
+from sprag.service.results.figures.read import read_figure
 from sprag.service.results.figures.sections import diagram_figure, section_figure
 from sprag.service.results.pictures.curves import draw_figure
+from sprag.service.results.reading import Reading
 from sprag.worker.models.branches import run_branch
 from sprag.worker.models.sections import run_sections
 from sprag.worker.models.starts import motion_of
@@ -31,7 +33,7 @@ if TYPE_CHECKING:
     from sprag.worker.models.sections import Sampling
     from sprag.worker.study import Study
 
-router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
+router = api_router("cases", "/studies/{study_id:study}/cases")
 
 Paths = Annotated[
     str,
@@ -160,4 +162,5 @@ async def get_section(
 
 
 async def _drawn(work: Work, form: Picture, figure: Figure, study: Study, case: int) -> Response:
+    figure = read_figure(figure, Reading(study.model))
     return await picture(draw_figure, form, figure, f"{study.name}, case {case}").response(work)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import Query
 from starlette.responses import Response
 
 from sprag.service.answers.results import EngagementTables, Portrait
@@ -13,15 +13,16 @@ from sprag.service.http.api.document import CASE_PROBLEMS, files, format_query, 
 from sprag.service.http.context import CaseNumber, StartNumber, StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, TABLE_FORMATS, picture
 from sprag.service.http.drawing import table as written
-from sprag.service.http.requests import strict_query
 from sprag.service.http.respond import choose_format
+from sprag.service.http.routers import api_router
 from sprag.service.http.work import Attended
 from sprag.service.results import engagements, portraits
 from sprag.service.results.pictures.curves import draw_portrait
+from sprag.service.results.reading import Reading
 from sprag.worker import models
 from sprag.worker.models.starts import motion_of
 
-router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
+router = api_router("cases", "/studies/{study_id:study}/cases")
 
 
 @router.get(
@@ -81,4 +82,6 @@ async def get_strobes(
         return written(content, chosen, f"{study_id}-case-{case}-{asked}")
     made = await work.run_case(models.run_portrait, *motion_of(study, case, which))
     title = f"{study.name}, case {case}"
-    return await picture(draw_portrait, chosen, made, models.presentation_of(study), title).response(work)
+    return await picture(
+        draw_portrait, chosen, made, models.presentation_of(study), Reading(study.model), title
+    ).response(work)

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import Query
 from starlette.responses import Response
 
 from sprag.service.answers.transients import Transient
 from sprag.service.http.api.document import CASE_PROBLEMS, files, format_query, one_of, problems
 from sprag.service.http.context import CaseNumber, StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, picture, table
-from sprag.service.http.requests import strict_query
 from sprag.service.http.respond import choose_format
+from sprag.service.http.routers import api_router
 from sprag.service.http.work import Attended
 from sprag.service.results import transients
+from sprag.service.results.figures.read import read_figure
 from sprag.service.results.figures.transient import transient_figure
 from sprag.service.results.pictures.curves import draw_figure
+from sprag.service.results.reading import Reading
 from sprag.worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 from sprag.worker.models.transients import KINDS, run_transient, shape_of_transients
 
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from sprag.worker.models.transients import Course
     from sprag.worker.study import Study
 
-router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
+router = api_router("cases", "/studies/{study_id:study}/cases")
 
 Kind = Annotated[
     str,
@@ -87,4 +89,6 @@ async def get_transient(
         content = await work.run_case(transients.transient_file, study, case, course, points, chosen)
         return table(content, chosen, f"{study_id}-case-{case}-{kind}")
     made = await work.run_case(run_transient, study, case, course, points)
-    return await picture(draw_figure, chosen, transient_figure(made), f"{study.name}, case {case}").response(work)
+    return await picture(
+        draw_figure, chosen, read_figure(transient_figure(made), Reading(study.model)), f"{study.name}, case {case}"
+    ).response(work)

@@ -4,44 +4,53 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import Query, Request
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.answers import results as m
-from sprag.service.faults import choice_of, parameter_error
-from sprag.service.http.api.document import files, format_query, one_of, problems
+from sprag.service.faults import parameter_error
+from sprag.service.http.api.curves import pairs
+from sprag.service.http.api.document import Ranges, files, format_query, next_page, one_of, problems
 from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, study_with
 from sprag.service.http.drawing import TABLE_FORMATS, table
-from sprag.service.http.requests import strict_query
-from sprag.service.http.respond import choose_format, json_response
+from sprag.service.http.respond import choose_format, json_response, page_response
+from sprag.service.http.routers import api_router
 from sprag.service.http.views import study_address
-from sprag.service.http.work import Attended
+from sprag.service.http.work import CHECK_PROBLEMS, Attended
+from sprag.service.jobs.answers import FEW
+from sprag.service.jobs.case_pages import by_number, case_page
 from sprag.service.results import trajectories
-from sprag.service.results.directions import case_values
+from sprag.service.results.directions import case_units, case_values
+from sprag.service.results.explore import ExploreQuery
 from sprag.service.results.exports import row_json, rows_json
 from sprag.service.storage.records import CaseRow
 from sprag.worker import models
 from sprag.worker.codes import FLAG_MASKS, PENDING
-from sprag.worker.limits import MAX_PAGE_SIZE, MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
+from sprag.worker.limits import MAX_PAGE_SIZE, MAX_PAGE_TOKEN, MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 from sprag.worker.models.transients import has_transients
 
 if TYPE_CHECKING:
     from sprag.service.http.context import Context
     from sprag.worker.study import Study
 
-router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
+router = api_router("cases", "/studies/{study_id:study}/cases")
 
 _CASE_PROBLEMS = ("invalid-parameter", "study-not-found", "case-not-found")
 
 
-@router.get("", response_model=m.CasePage, responses=problems("invalid-parameter", "study-not-found"))
-def list_cases(
-    context: Ctx,
+@router.get(
+    "",
+    response_model=m.CasePage,
+    responses=next_page() | problems("invalid-parameter", "invalid-selection", "study-not-found", *CHECK_PROBLEMS),
+)
+async def list_cases(
+    work: Attended,
+    request: Request,
     study_id: StudyId,
     page_size: Annotated[int, Query(ge=1, le=MAX_PAGE_SIZE, description="most cases on the page")] = 100,
     page_token: Annotated[
-        str | None,
-        Query(description="`next_page_token` of the page before", json_schema_extra={"pattern": "^[0-9]{1,18}$"}),
+        str | None, Query(min_length=1, max_length=MAX_PAGE_TOKEN, description="`next_page_token` of the page before")
     ] = None,
     ending: Annotated[
         str | None,
@@ -55,7 +64,6 @@ def list_cases(
         str | None,
         Query(
             description="only cases of this regime, of a settled study",
-            examples=["periodic"],
             json_schema_extra=one_of(models.REGIME_SENTENCES),
         ),
     ] = None,
@@ -65,29 +73,39 @@ def list_cases(
             description="only cases that have this flag", examples=["not_settled"], json_schema_extra=one_of(FLAG_MASKS)
         ),
     ] = None,
+    where: Ranges = None,
+    at: Annotated[
+        list[str] | None,
+        Query(
+            description="`path=value`: only cases with this value of an axis, SI or with a unit; may be repeated",
+            examples=[["shaft.load=0.1 N*m"]],
+        ),
+    ] = None,
+    sort: Annotated[
+        str,
+        Query(
+            max_length=100,
+            description='parameter, result, "case" or "ending" to sort all rows by; "-" before it: from the largest '
+            "down; cases without the number come last",
+            examples=["-efficiency"],
+        ),
+    ] = "case",
 ) -> Response:
-    """Finished cases, in order of their numbers; of a cancelled study also those that were never run."""
-    if ending is not None:
-        choice_of("ending", ending, map(str, models.ENDING_SENTENCES))
-    if regime is not None:
-        choice_of("regime", regime, models.REGIME_SENTENCES)
-    if flag is not None:
-        choice_of("flag", flag, FLAG_MASKS)
-    after = _after(page_token)
-    # One more than the page, which shows whether there is another page.
-    block = context.store.case_page(study_id, after, page_size + 1, ending, regime, flag)
-    rows = list(rows_json(context.store.study(study_id), block))
-    token = str(rows[page_size - 1]["case"]) if len(rows) > page_size else None
-    return json_response({"cases": rows[:page_size], "next_page_token": token})
+    """Finished cases, in order of their numbers or sorted over all rows; of a cancelled study also those never run.
 
-
-def _after(page_token: str | None) -> int:
-    if page_token is None:
-        return -1
-    if not (page_token.isascii() and page_token.isdigit() and len(page_token) < 19):
-        allowed = "`next_page_token` of a page"
-        raise parameter_error("page_token", "invalid-text", "not a token of this list", page_token, allowed)
-    return int(page_token)
+    Those that were never run are only in the list by number without `where` and `at`.
+    """
+    for name, chosen in (("ending", ending), ("regime", regime), ("flag", flag)):
+        if chosen == "":
+            raise parameter_error(name, "invalid-choice", "is empty", "", "a name, or no parameter for any")
+    query = ExploreQuery(tuple(where or ()), ending or "", regime or "", flag or "", sort, page_size, at=pairs(at))
+    context = work.context
+    asked = (context.library, study_id, query, page_token)
+    study = await run_in_threadpool(context.store.study, study_id)
+    large = study.cases > FEW and not by_number(query)
+    page = await (work.check(case_page, *asked) if large else run_in_threadpool(case_page, *asked))
+    rows = await run_in_threadpool(lambda: list(rows_json(study, page.block)))
+    return page_response(request, {"cases": rows, "units": case_units(study), "next_page_token": page.next_token})
 
 
 @router.get("/{case:case}", response_model=m.CaseDetail, responses=problems(*_CASE_PROBLEMS))
@@ -111,6 +129,7 @@ def get_case(context: Ctx, study_id: StudyId, case: CaseNumber) -> Response:
     return json_response(
         {
             **row_json(row, parameters),
+            "units": case_units(study),
             "ending_meaning": models.ENDING_SENTENCES.get(row.ending, "The case has not been run yet."),
             "flag_meanings": {flag: models.flags_of(study.model).get(flag, "") for flag in row.flags},
             "regimes": _regimes(context, study_id, study, case),

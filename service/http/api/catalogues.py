@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Path, Request
+from fastapi import Path, Request
 
 from sprag.service.answers import catalogue as m
 from sprag.service.answers import filled
 from sprag.service.http.api.document import not_modified as documented_304
 from sprag.service.http.api.document import problems
 from sprag.service.http.problems import ApiError
-from sprag.service.http.requests import strict_query
 from sprag.service.http.respond import entity_tag, json_response, not_modified, tagged
+from sprag.service.http.routers import api_router
 from sprag.service.http.views import preset_of
 from sprag.service.presets import preset_names
 from sprag.worker import models
 
-router = APIRouter(tags=["models"], dependencies=[Depends(strict_query)])
+router = api_router("models")
 
 ModelName = Annotated[str, Path(description="name of the model", examples=["vibration-drive"])]
 PresetName = Annotated[str, Path(description="name of the preset", examples=["one_pendulum"])]

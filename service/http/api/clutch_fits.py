@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Depends
+from fastapi import Depends
 from starlette.responses import Response
 
 from sprag.service.answers import studies as m
 from sprag.service.http.api import examples
 from sprag.service.http.api.document import body, problems
 from sprag.service.http.problems import ApiError
-from sprag.service.http.requests import Body, read_body, strict_query
+from sprag.service.http.requests import Body, read_body
 from sprag.service.http.respond import JSON
+from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import checks
 from sprag.service.spec.report import SpecError
 from sprag.service.spec.schema.drive import measured_schema
 from sprag.service.spec.schema.quantity import QUANTITY
 
-router = APIRouter(tags=["clutch"], dependencies=[Depends(strict_query)])
+router = api_router("clutch")
 
 SCHEMA: Final = measured_schema(
     {"backlash": {**QUANTITY, "description": "backlash to be taken off the angles (rad)", "default": 0}},

@@ -2,48 +2,72 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import Query
 from starlette.responses import Response
 
-from sprag.service import formats
+from sprag.service import formats, languages
 from sprag.service.answers import results as m
-from sprag.service.faults import parameter_error
-from sprag.service.http.api.document import files, format_query, problems
+from sprag.service.faults import choice_of, parameter_error
+from sprag.service.http.api.document import CONTENT_RANGE, files, format_query, one_of, problems
 from sprag.service.http.api.document import not_modified as documented_304
 from sprag.service.http.context import StudyId
-from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture, placed
-from sprag.service.http.requests import strict_query
+from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture, placed, tag_of
+from sprag.service.http.kept_files import asks_for_part, file_response
+from sprag.service.http.reading import FileChoice, ReportChoice, TableUnits
 from sprag.service.http.respond import JSON, choose_format, streamed
+from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
 from sprag.service.jobs import answers
 from sprag.service.results import exports, report
+from sprag.service.results.chosen_figures import CONTOUR
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import completed
+from sprag.service.results.quantities import SI
 from sprag.service.results.report.content import report_of
+from sprag.service.results.report.document import TitleBlock
 from sprag.worker import models
 from sprag.worker.limits import MAX_STARTS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
+    from sprag.service.results.reading import Choice
     from sprag.service.storage.records import StudyRecord
     from sprag.worker.study import Study
 
-router = APIRouter(prefix="/studies/{study_id:study}", tags=["results"], dependencies=[Depends(strict_query)])
+_LOG = logging.getLogger("sprag.service")
+router = api_router("results", "/studies/{study_id:study}")
 
 #: How each is written as JSON, as a table and as a picture.
-_WRITERS: Final = {
+_WRITERS: Final[Mapping[str, tuple[Callable[..., bytes], ...]]] = {
     "curves": (answers.curves_json, answers.curves_csv, answers.curves_picture),
     "map": (answers.map_json, answers.map_csv, answers.map_picture),
+    "contours": (answers.map_json, answers.map_csv, partial(answers.map_picture, contours=True)),
 }
 #: JSON is what is sent to who asks for nothing.
 _ROW_FORMATS: Final[dict[formats.Format, str]] = {"json": JSON, **formats.MEDIA_TYPES}
+#: Files of rows that can be in other units than SI.
+_IN_UNITS: Final = ("csv", "parquet", "arrow", "xlsx")
 _PROBLEMS = ("invalid-parameter", "invalid-selection", "study-not-found", "not-acceptable", *CHECK_PROBLEMS)
 
+_Language = Annotated[
+    str,
+    Query(
+        max_length=20,
+        description="language of the document",
+        examples=["uk"],
+        json_schema_extra=one_of(languages.available()),
+    ),
+]
 _REPORT_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; sandbox allow-modals"
+
+#: Cases of an ended study whose file is written before its first byte is sent, so that its length is known; of a larger
+#: one only where a part or the length is asked for.
+_AT_ONCE: Final = 100_000
 
 XPath = Annotated[str, Query(description="path of the axis along the curve", examples=["shaft.load"])]
 Fixed = Annotated[
@@ -58,6 +82,15 @@ Chosen = Annotated[
     Query(
         description="`path=value`, such as excitation.frequency=16 Hz: a value of an axis of `by` that has a curve; "
         "may be repeated; default: all of them",
+    ),
+]
+Point = Annotated[
+    str | None,
+    Query(
+        max_length=100,
+        description="working point: a value of the axis along the curves, SI or with a unit; between two cases its "
+        "results are interpolated where a line joins these; default: the value of the base",
+        examples=["0.3 N*m"],
     ),
 ]
 Number = Annotated[
@@ -82,6 +115,7 @@ Number = Annotated[
 async def get_curves(
     work: Attended,
     study_id: StudyId,
+    choice: FileChoice,
     x: Annotated[
         str | None,
         Query(description="path of the axis along the curve; default: that of the page", examples=["shaft.load"]),
@@ -115,7 +149,7 @@ async def get_curves(
         query = completed(study, infos, x, tuple(y or ()), tuple(by or ()), pairs(at), pairs(of, "of"))
         return _numbered(study, query, number)
 
-    return await _drawn(work, study_id, form, "curves", chosen)
+    return await _drawn(work, study_id, choice, form, "curves", chosen)
 
 
 @router.get(
@@ -130,16 +164,21 @@ async def get_curves(
 async def get_map(
     work: Attended,
     study_id: StudyId,
+    choice: FileChoice,
     x: XPath,
     y: Annotated[str, Query(description="path of the other axis", examples=["excitation.frequency"])],
     z: Annotated[str, Query(description="the result", examples=["shaft.speed.mean"])],
     at: Fixed = None,
     number: Number = 0,
+    kind: Annotated[
+        Literal["heatmap", "contour"], Query(description="of a picture: colours, or lines of equal value")
+    ] = "heatmap",
     form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """One result over two axes."""
     query = CurveQuery(x, (z,), (y,), pairs(at))
-    return await _drawn(work, study_id, form, "map", lambda study: _numbered(study, query, number))
+    part: Literal["map", "contours"] = "contours" if kind == CONTOUR else "map"
+    return await _drawn(work, study_id, choice, form, part, lambda study: _numbered(study, query, number))
 
 
 def _numbered(study: Study, query: CurveQuery, number: int) -> CurveQuery:
@@ -153,8 +192,9 @@ def _numbered(study: Study, query: CurveQuery, number: int) -> CurveQuery:
 async def _drawn(
     work: Work,
     study_id: str,
+    choice: Choice,
     form: str | None,
-    part: Literal["curves", "map"],
+    part: Literal["curves", "map", "contours"],
     query: Callable[[Study], CurveQuery],
 ) -> Response:
     chosen = choose_format(work.request, form, DRAWN_FORMATS)
@@ -165,9 +205,9 @@ async def _drawn(
         if chosen == "json":
             return placed(work.context, Drawing(as_json, asked, JSON))
         if chosen == "csv":
-            headers = attached(f"{study_id}-{part}.csv")
-            return placed(work.context, Drawing(as_table, asked, DRAWN_FORMATS["csv"], headers))
-        return picture(as_picture, chosen, *asked, record.name or record.model)
+            headers = attached(f"{study_id}-{'curves' if part == 'curves' else 'map'}.csv")
+            return placed(work.context, Drawing(as_table, (*asked, choice), DRAWN_FORMATS["csv"], headers))
+        return picture(as_picture, chosen, *asked, choice, record.name or record.model)
 
     return await conditional(work, study_id, chosen, make)
 
@@ -177,24 +217,56 @@ async def _drawn(
     response_class=Response,
     responses={
         **files("All finished cases, in the requested format.", formats.MEDIA_TYPES.values()),
-        **problems("invalid-parameter", "study-not-found", "not-acceptable"),
+        206: {"description": "The part of the file that `Range` asks for; of ended studies.", "headers": CONTENT_RANGE},
+        **problems(
+            "invalid-parameter", "invalid-selection", "study-not-found", "not-acceptable", "range-not-satisfiable"
+        ),
         **documented_304(),
     },
 )
 async def get_results(
     work: Attended,
     study_id: StudyId,
+    units: TableUnits = None,
+    header: Annotated[
+        str | None,
+        Query(
+            max_length=20,
+            description="heads of CSV: `names`, with the unit where it is not SI, or `units`, with every unit",
+            examples=["units"],
+            json_schema_extra=one_of(formats.HEADERS),
+        ),
+    ] = None,
     form: Annotated[str | None, format_query(formats.FORMATS, "csv")] = None,
 ) -> Response:
     """Every finished case with all its results, in order of the cases: as a table, a labelled grid, or JSON."""
     chosen = choose_format(work.request, form, _ROW_FORMATS)
+    if units and chosen not in _IN_UNITS:
+        raise parameter_error("units", "not-used", f"{chosen} files are in SI", units, f"in {', '.join(_IN_UNITS)}")
+    if header and chosen != "csv":
+        raise parameter_error("header", "not-used", "only CSV has it", header, "in csv")
+    heads: formats.Header = choice_of("header", "names" if header is None else header, formats.HEADERS)
 
     def make(record: StudyRecord) -> Response:
-        source = exports.stored(work.context.store, record, work.context.store.study(study_id))
-        name = f"{study_id}.{formats.SUFFIXES[chosen][0]}"
-        return streamed(exports.export(source, chosen), formats.MEDIA_TYPES[chosen], name)
+        study = work.context.store.study(study_id)
+        source = exports.stored(work.context.store, record, study, units or SI, heads)
+        pieces = partial(exports.export, source, chosen)
+        name, media_type = f"{study_id}.{formats.SUFFIXES[chosen][0]}", formats.MEDIA_TYPES[chosen]
+        if not record.state.terminal or not (record.cases <= _AT_ONCE or asks_for_part(work.request)):
+            return streamed(pieces(), media_type, name)
+        tag = tag_of(work.request, record.id, record.revision, chosen)
+        try:
+            file = work.context.files.opened(tag, pieces)
+        except OSError as error:  # a full disk, for instance: the rows can be sent all the same
+            _LOG.warning("A file of results cannot be kept: %s", error)
+            return streamed(pieces(), media_type, name)
+        return file_response(work.request, file, tag, media_type, {**attached(name), "Vary": "Accept"})
 
     return await conditional(work, study_id, chosen, make)
+
+
+def _particular(name: str) -> Any:
+    return Query(max_length=200, description=f"{name}, in the title block")
 
 
 @router.get(
@@ -202,24 +274,50 @@ async def get_results(
     response_class=Response,
     responses={
         **files("The study as a printable document.", report.MEDIA_TYPES.values()),
-        **problems("invalid-parameter", "study-not-found", "not-acceptable", *CHECK_PROBLEMS),
+        **problems(*_PROBLEMS),
         **documented_304(),
     },
 )
 async def get_report(
     work: Attended,
     study_id: StudyId,
+    choice: ReportChoice,
+    project: Annotated[str, _particular("project")] = "",
+    author: Annotated[str, _particular("author")] = "",
+    number: Annotated[str, _particular("number of the document")] = "",
+    date: Annotated[str, _particular("date")] = "",
+    x: Annotated[str | None, Query(description="path of the axis along the chosen curves")] = None,
+    by: Annotated[list[str] | None, Query(description="axis with one curve for each of its values")] = None,
+    at: Fixed = None,
+    of: Chosen = None,
+    y: Annotated[list[str] | None, Query(description="result of a chosen curve; may be repeated")] = None,
+    point: Point = None,
+    language: _Language = languages.ENGLISH,
     form: Annotated[str | None, format_query(report.REPORT_FORMATS, "pdf")] = None,
 ) -> Response:
-    """A study as a printable page or a PDF: inputs, endings, ranges of all results, curves."""
+    """A study as a printable page or a PDF: machine, answers, chosen curves, endings, ranges of results, inputs.
+
+    Without `x`, `y`, `by`, `at` and `of` the curves are those that the page of the study shows first. Figures that
+    were put into the report are drawn in their place unless there is `y`.
+    """
     chosen = choose_format(work.request, form, report.MEDIA_TYPES)
+    settings = work.context.settings
+    block = TitleBlock(settings.report_office, project, author, number, date)
 
     def make(_record: StudyRecord) -> Drawing:
         policy = {"Content-Security-Policy": _REPORT_POLICY} if chosen == "html" else {}
-        shown = report_of(work.context.store, study_id), chosen
+        study = work.context.store.study(study_id)
+        query = None
+        if x or y or by or at or of:
+            infos = models.study_results(study)
+            query = completed(study, infos, x, tuple(y or ()), tuple(by or ()), pairs(at), pairs(of, "of"))
+        content = report_of(work.context.store, study_id, choice, query, point, saved=not y)
+        shown = content, block, settings.report_folder, chosen
         return Drawing(report.write_report, shown, report.MEDIA_TYPES[chosen], policy)
 
-    return await conditional(work, study_id, chosen, make)
+    choice_of("language", language, languages.available())
+    with languages.language(language):
+        return await conditional(work, study_id, chosen, make)
 
 
 def pairs(at: list[str] | None, parameter: str = "at") -> tuple[tuple[str, str], ...]:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from http import HTTPStatus
-from typing import Any, Final, cast
+from typing import Annotated, Any, Final, cast
 
 from fastapi import FastAPI, Header, Query
 from fastapi.openapi.utils import get_openapi
 from typing_extensions import is_typeddict
 
-from sprag.service.answers import catalogue, results, schedules, studies
+from sprag.service.answers import catalogue, people, results, saved_views, schedules, studies
 from sprag.service.faults import Fault, Kind, ParameterFault
+from sprag.service.http.api.answer_examples import add_answers
 from sprag.service.http.api.links import add_links
+from sprag.service.http.api.plain_schema import plain_schema
 from sprag.service.http.problems import PROBLEM_MEDIA_TYPE, PROBLEM_TYPES, Problem, ProblemType, problem_json
 from sprag.service.http.views import API_PREFIX
 
@@ -28,11 +30,18 @@ CASE_PROBLEMS: Final = (
 _UNSAFE: Final = ("cross-site", "read-only", "too-slow")
 
 _TEXT: Final = {"type": "string"}
+_RETRY: Final = {
+    "Retry-After": {
+        "description": "seconds after which another attempt is worthwhile",
+        "required": True,
+        "schema": {"type": "integer", "minimum": 0},
+    }
+}
 _TAG: Final = {"ETag": {"description": "entity tag of the version", "required": True, "schema": _TEXT}}
 
 Responses = dict[int | str, dict[str, Any]]
 
-for _module in (catalogue, results, schedules, studies):
+for _module in (catalogue, people, results, saved_views, schedules, studies):
     for _shape in filter(is_typeddict, vars(_module).values()):
         _shape.__pydantic_config__ = {"extra": "forbid"}  # an answer has exactly these fields
 
@@ -52,7 +61,8 @@ def _problem_response(status: int, kinds: Iterable[ProblemType]) -> dict[str, An
         for kind in kinds
     }
     content = {"schema": {"$ref": _SCHEMAS + "Problem"}, "examples": examples}
-    return {"description": HTTPStatus(status).phrase, "content": {PROBLEM_MEDIA_TYPE: content}}
+    answer = {"description": HTTPStatus(status).phrase, "content": {PROBLEM_MEDIA_TYPE: content}}
+    return {**answer, "headers": _RETRY} if status in (429, 503) else answer
 
 
 _EXAMPLE_ERRORS: Final = {
@@ -114,9 +124,20 @@ def not_modified() -> Responses:
     return {304: {"description": "The version named by If-None-Match is current.", "headers": _TAG}}
 
 
+CONTENT_RANGE: Final = {
+    "Content-Range": {"description": "first and last byte, and size of the file", "required": True, "schema": _TEXT}
+}
+
+
 def located(status: int) -> Responses:
     """Documentation of the answer with the location of the new resource."""
     return {status: {"headers": {"Location": {"description": "its address", "required": True, "schema": _TEXT}}}}
+
+
+def next_page() -> Responses:
+    """Documentation of the header of a page that is not the last one."""
+    link = {"description": 'address of the next page, with `rel="next"`; none on the last', "schema": _TEXT}
+    return {200: {"headers": {"Link": link}}}
 
 
 def one_of(names: Iterable[str]) -> dict[str, Any]:
@@ -131,8 +152,19 @@ def format_query(names: Iterable[str], example: str = "json") -> Any:
     return Query(alias="format", description=description, examples=[example], json_schema_extra=one_of(known))
 
 
-def build_openapi(app: FastAPI, extra_schemas: dict[str, Any]) -> dict[str, Any]:
-    """The OpenAPI 3.1 document of ``app``; ``extra_schemas`` are components that its bodies refer to."""
+#: Limits of a selection of cases; a parameter of the lists and files that choose among cases.
+Ranges = Annotated[
+    list[str] | None,
+    Query(
+        description="`NAME >= VALUE` or `NAME <= VALUE` of a parameter that varies or a numeric result, SI or with "
+        "a unit; may be repeated: all must hold",
+        examples=[["shaft.load <= 2 N*m"]],
+    ),
+]
+
+
+def build_openapi(app: FastAPI, extra_schemas: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """The OpenAPI 3.1 document of ``app`` at the path ``prefix``; ``extra_schemas`` are components of its bodies."""
     document = get_openapi(
         title=app.title,
         version=app.version,
@@ -141,25 +173,37 @@ def build_openapi(app: FastAPI, extra_schemas: dict[str, Any]) -> dict[str, Any]
         description=app.description,
         routes=app.routes,
         tags=app.openapi_tags,
+        servers=[{"url": prefix or "/", "description": "this service"}],
+        contact={"name": "whoever runs this service"},
     )
     schemas = document.setdefault("components", {}).setdefault("schemas", {})
     problem = Problem.model_json_schema(ref_template=_SCHEMAS + "{model}")
     schemas.update(problem.pop("$defs"))
     schemas["Problem"] = problem
-    schemas.update(extra_schemas)
+    schemas.update({name: plain_schema(schema) for name, schema in extra_schemas.items()})
     document["components"]["securitySchemes"] = {
         "bearer": {"type": "http", "scheme": "bearer", "description": "needed when the service has a token"}
     }
     for path, operations in document["paths"].items():
         for method, operation in operations.items():
-            if path.startswith(API_PREFIX) or path == _METRICS:
-                operation["security"] = [{"bearer": []}, {}]
+            guarded = path.startswith(API_PREFIX) or path == _METRICS
+            operation["security"] = [{"bearer": []}, {}] if guarded else []
             if path.startswith(API_PREFIX):
-                everywhere = problems(*_EVERYWHERE, *(_UNSAFE if method in ("post", "patch", "delete") else ()))
+                unsafe = method in ("post", "patch", "delete")
+                everywhere = problems(*_EVERYWHERE, *((*_UNSAFE, *_of_owner(path, operation)) if unsafe else ()))
                 for status, response in everywhere.items():
                     _merge(operation["responses"], str(status), response)
     add_links(document)
+    add_answers(document)
     return document
+
+
+def _of_owner(path: str, operation: dict[str, Any]) -> tuple[str, ...]:
+    """Problems of an operation that submits a study, or changes what belongs to somebody."""
+    busy = operation["responses"].get(429, operation["responses"].get("429", {})).get("content", {})
+    if "queue-full" in busy.get(PROBLEM_MEDIA_TYPE, {}).get("examples", {}):
+        return ("quota-exceeded",)
+    return ("not-owner",) if "{" in path else ()
 
 
 def _merge(responses: dict[str, Any], status: str, response: dict[str, Any]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Final
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import Query
 from starlette.responses import Response
 
 from sprag.service.answers import goals as m
@@ -12,8 +12,9 @@ from sprag.service.http.api.document import files, format_query, problems
 from sprag.service.http.api.document import not_modified as documented_304
 from sprag.service.http.context import StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture
-from sprag.service.http.requests import strict_query
+from sprag.service.http.reading import FileChoice
 from sprag.service.http.respond import choose_format
+from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import answers
 from sprag.service.results.fronts import DESIGNS, MOST_DESIGNS, goal_of
@@ -21,7 +22,7 @@ from sprag.service.results.fronts import DESIGNS, MOST_DESIGNS, goal_of
 if TYPE_CHECKING:
     from sprag.service.storage.records import StudyRecord
 
-router = APIRouter(prefix="/studies/{study_id:study}", tags=["results"], dependencies=[Depends(strict_query)])
+router = api_router("results", "/studies/{study_id:study}")
 
 _WRITERS: Final = {"json": answers.front_as_json, "csv": answers.front_as_csv}
 
@@ -38,6 +39,7 @@ _WRITERS: Final = {"json": answers.front_as_json, "csv": answers.front_as_csv}
 async def get_front(
     work: Attended,
     study_id: StudyId,
+    choice: FileChoice,
     exact: Annotated[
         bool, Query(description="designs must meet equalities of real numbers to 1e-6 to be feasible")
     ] = False,
@@ -57,6 +59,6 @@ async def get_front(
             headers = attached(f"{study_id}-front.csv") if chosen == "csv" else {}
             drawing = Drawing(_WRITERS[chosen], (*shown, limit), DRAWN_FORMATS[chosen], headers)
             return drawing if study.cases > answers.FEW // 10 else drawing.here()
-        return picture(answers.front_picture, chosen, *shown, (x, y), record.name or record.model)
+        return picture(answers.front_picture, chosen, *shown, (x, y), choice, record.name or record.model)
 
     return await conditional(work, study_id, chosen, make)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, cast
 
-from fastapi import APIRouter, Depends, Request
+from fastapi import Request
 from starlette.responses import Response
 
 from sprag.service.answers.catalogue import Health
@@ -12,11 +12,11 @@ from sprag.service.http.api.document import files, problems
 from sprag.service.http.context import Context
 from sprag.service.http.metrics import CONTENT_TYPE, Metrics
 from sprag.service.http.problems import ApiError
-from sprag.service.http.requests import strict_query
 from sprag.service.http.respond import json_response
+from sprag.service.http.routers import api_router
 from sprag.service.storage.readiness import Readiness
 
-router = APIRouter(tags=["health"], dependencies=[Depends(strict_query)])
+router = api_router("health", prefix="")
 
 
 @router.get("/livez", response_model=Health, responses=problems("invalid-parameter"))

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Final
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import Query
 from starlette.responses import Response
 
 from sprag.service.answers import key as m
-from sprag.service.http.api.curves import Chosen, Fixed, pairs
+from sprag.service.http.api.curves import Chosen, Fixed, Point, pairs
 from sprag.service.http.api.document import files, format_query, problems
 from sprag.service.http.api.document import not_modified as documented_304
 from sprag.service.http.context import StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture
-from sprag.service.http.requests import strict_query
+from sprag.service.http.reading import FileChoice
 from sprag.service.http.respond import choose_format
+from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import key_answers
 from sprag.service.jobs.answers import FEW
@@ -26,19 +28,12 @@ if TYPE_CHECKING:
     from sprag.service.storage.records import StudyRecord
     from sprag.worker.study import Study
 
-router = APIRouter(prefix="/studies/{study_id:study}", tags=["results"], dependencies=[Depends(strict_query)])
+router = api_router("results", "/studies/{study_id:study}")
 
-_WRITERS: Final = {"json": key_answers.answers_as_json, "csv": key_answers.answers_as_csv}
-
-Point = Annotated[
-    str | None,
-    Query(
-        max_length=100,
-        description="working point: a value of the axis along the curves, SI or with a unit; between two cases its "
-        "results are interpolated where a line joins these; default: the value of the base",
-        examples=["0.3 N*m"],
-    ),
-]
+_WRITERS: Final[dict[str, Callable[..., bytes]]] = {
+    "json": key_answers.answers_as_json,
+    "csv": key_answers.answers_as_csv,
+}
 
 
 @router.get(
@@ -53,6 +48,7 @@ Point = Annotated[
 async def get_answers(
     work: Attended,
     study_id: StudyId,
+    choice: FileChoice,
     x: Annotated[
         str | None,
         Query(description="path of the axis along the curves; default: that of the page", examples=["shaft.load"]),
@@ -81,8 +77,9 @@ async def get_answers(
         shown = (work.context.library, study_id, query(study), point)
         if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - narrows the type
             headers = attached(f"{study_id}-answers.csv") if chosen == "csv" else {}
-            drawing = Drawing(_WRITERS[chosen], shown, DRAWN_FORMATS[chosen], headers)
+            more = (choice,) if chosen == "csv" else ()
+            drawing = Drawing(_WRITERS[chosen], (*shown, *more), DRAWN_FORMATS[chosen], headers)
             return drawing if study.cases > FEW // 2 else drawing.here()
-        return picture(key_answers.answers_picture, chosen, *shown, record.name or record.model)
+        return picture(key_answers.answers_picture, chosen, *shown, choice, record.name or record.model)
 
     return await conditional(work, study_id, chosen, make)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Annotated, Any, Final
 
-from fastapi import APIRouter, Depends, Path
+from fastapi import Depends, Path, Query
 from starlette.concurrency import run_in_threadpool
 from starlette.convertors import register_url_convertor
 from starlette.responses import Response
@@ -15,20 +13,23 @@ from sprag.service.answers import schedules as m
 from sprag.service.http.api import examples
 from sprag.service.http.api.document import body, key_header, located, problems
 from sprag.service.http.context import ID_PATTERN, Context, Ctx, StudyIdConvertor
-from sprag.service.http.problems import ApiError
-from sprag.service.http.requests import Body, read_body, strict_query
+from sprag.service.http.requests import Body, as_body_problems, read_body
 from sprag.service.http.respond import json_response
+from sprag.service.http.routers import api_router
 from sprag.service.http.schedule_views import detail, schedule_address, summary
 from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
 from sprag.service.jobs import checks
+from sprag.service.jobs.nights import HOURS, MOST_HOURS, night
 from sprag.service.schedules.deadline import ALLOWED_OF_RUNS
 from sprag.service.schedules.fields import PLAIN, ScheduleFields
+from sprag.service.schedules.policies import GRACE_ALLOWED
+from sprag.service.schedules.report_to import LONGEST_WEBHOOK, MOST_RECIPIENTS, require_deliverable
+from sprag.service.schedules.times import ALIASES
 from sprag.service.spec.described import schemas
-from sprag.service.spec.report import SpecError
-from sprag.service.storage.schedules import ScheduleRecord
+from sprag.service.storage.schedule_runs import ScheduleRecord
 from sprag.worker.limits import MAX_NAME_LENGTH
 
-router = APIRouter(tags=["schedules"], dependencies=[Depends(strict_query)])
+router = api_router("schedules")
 
 _PROBLEMS: Final = ("invalid-parameter", "invalid-body", "body-too-large", "unsupported-media-type")
 _TIME_OF_DAY: Final = {"type": "string", "pattern": "^([01]?[0-9]|2[0-3]):[0-5][0-9]$"}
@@ -42,7 +43,8 @@ _FIELDS: Final[dict[str, Any]] = {
     "spec": {"$ref": "#/components/schemas/Spec"},
     "cron": {
         "type": ["string", "null"],
-        "description": "recurring: minute, hour, day of the month, month, day of the week, in `zone`",
+        "description": "recurring: minute, hour, day of the month, month, day of the week, in `zone`; or "
+        + ", ".join(f"`{name}`" for name in ALIASES),
     },
     "at": {
         "type": ["string", "null"],
@@ -62,7 +64,28 @@ _FIELDS: Final[dict[str, Any]] = {
         "maxLength": 80,
         "description": f"deadline: each study is run coarse to fine and held then: {ALLOWED_OF_RUNS}",
     },
-    "enabled": {"type": "boolean", "default": True},
+    "misfire_grace": {
+        "type": ["string", "null"],
+        "maxLength": 80,
+        "description": f"longest delay with which a due time is still run; null: any; {GRACE_ALLOWED}",
+    },
+    "paused_until": {
+        "type": ["string", "null"],
+        "description": "the schedule is not due before: a future time, in `zone` unless it has its own offset",
+    },
+    "report_email": {
+        "type": "array",
+        "maxItems": MOST_RECIPIENTS,
+        "items": {"type": "string", "format": "email", "maxLength": 254},
+        "default": [],
+        "description": "addresses to which its runs are reported; needs `SPRAG_SMTP_URL`",
+    },
+    "report_webhook": {
+        "type": ["string", "null"],
+        "maxLength": LONGEST_WEBHOOK,
+        "description": "address to which its runs are reported by a signed POST; its origin must be allowed by "
+        "`SPRAG_WEBHOOK_ORIGINS`",
+    },
 }
 SCHEMA: Final[dict[str, Any]] = {
     "type": "object",
@@ -122,7 +145,7 @@ async def create_schedule(
     if idempotency_key is None:
         return await run_in_threadpool(keep, await _fields(context, work, received, None), None, "")
     # Before the fields are read: a future time may have passed since the key was first sent.
-    with _as_problems():
+    with as_body_problems():
         body_hash = await work.check(checks.body_hash, received.content, received.format)
     known = await run_in_threadpool(store.schedule_of_key, idempotency_key, body_hash)
     if known is not None:
@@ -136,25 +159,27 @@ def _made(context: Context, record: ScheduleRecord) -> Response:
 
 
 async def _fields(context: Context, work: Work, received: Body, old: ScheduleFields | None) -> ScheduleFields:
-    with _as_problems():
-        return await work.check(
-            checks.schedule_body, context.library, received.content, received.format, context.store.clock.now(), old
-        )
-
-
-@contextmanager
-def _as_problems() -> Iterator[None]:
-    """Convert the faults of a body to an ApiError."""
-    try:
-        yield
-    except SpecError as error:
-        raise ApiError("invalid-body", str(error), error.faults) from error
+    with as_body_problems():
+        now = context.store.clock.now()
+        fields = await work.check(checks.schedule_body, context.library, received.content, received.format, now, old)
+        if old is None or fields.report_to != old.report_to:
+            require_deliverable(fields.report_to, context.settings.reports)
+        return fields
 
 
 @router.get("/schedules", response_model=m.ScheduleList, responses=problems("invalid-parameter"))
 def list_schedules(context: Ctx) -> Response:
     """Every schedule with its last and its next run, newest first."""
     return json_response({"schedules": [summary(record) for record in context.store.list_schedules()]})
+
+
+@router.get("/night", response_model=m.Night, responses=problems("invalid-parameter"))
+def get_night(
+    context: Ctx,
+    hours: Annotated[float, Query(description="hours to look back on", ge=1, le=MOST_HOURS)] = HOURS,
+) -> Response:
+    """Every due time of the last hours with its outcome, those that need attention first: a morning's overview."""
+    return json_response(night(context.store, hours))
 
 
 @router.get(
@@ -171,7 +196,9 @@ def get_schedule(context: Ctx, schedule_id: ScheduleId) -> Response:
     "/schedules/{schedule_id:schedule}",
     response_model=m.ScheduleDetail,
     responses=problems(*_PROBLEMS, *CHECK_PROBLEMS, "schedule-not-found"),
-    openapi_extra=body({"disabled": {"enabled": False}}, {"$ref": "#/components/schemas/ScheduleChange"}),
+    openapi_extra=body(
+        {"paused": {"paused_until": "2027-01-07T00:00"}}, {"$ref": "#/components/schemas/ScheduleChange"}
+    ),
 )
 async def change_schedule(context: Ctx, work: Attended, schedule_id: ScheduleId, received: Fields) -> Response:
     """Change some fields of a schedule; the others are kept. Due times missed before the change are dropped."""

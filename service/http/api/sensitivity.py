@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import Query
 from starlette.responses import Response
 
 from sprag.service.answers import results as m
@@ -14,19 +12,17 @@ from sprag.service.faults import warned
 from sprag.service.http.api.document import files, format_query, problems
 from sprag.service.http.api.document import not_modified as documented_304
 from sprag.service.http.context import StudyId
-from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, conditional, picture, table
-from sprag.service.http.requests import strict_query
-from sprag.service.http.respond import choose_format, json_response
+from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture
+from sprag.service.http.reading import FileChoice
+from sprag.service.http.respond import choose_format
+from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
-from sprag.service.results import exports
-from sprag.service.results.pictures.sensitivity import draw_sensitivity
-from sprag.service.results.sensitivity import Sensitivity, sensitivity
-from sprag.service.results.sensitivity_indices import Indices
+from sprag.service.jobs import sensitivities
 
 if TYPE_CHECKING:
     from sprag.service.storage.records import StudyRecord
 
-router = APIRouter(prefix="/studies/{study_id:study}", tags=["results"], dependencies=[Depends(strict_query)])
+router = api_router("results", "/studies/{study_id:study}")
 
 
 @router.get(
@@ -41,6 +37,7 @@ router = APIRouter(prefix="/studies/{study_id:study}", tags=["results"], depende
 async def get_sensitivity(
     work: Attended,
     study_id: StudyId,
+    choice: FileChoice,
     y: Annotated[
         list[str], Query(description="result; may be repeated", examples=[["shaft.speed.mean"]], min_length=1)
     ],
@@ -49,34 +46,17 @@ async def get_sensitivity(
     """Main effects of every axis on results, and shares of their variance (Sobol indices) or elementary effects."""
     chosen = choose_format(work.request, form, DRAWN_FORMATS)
 
+    names = tuple(dict.fromkeys(y))
+
     def make(record: StudyRecord) -> Response | Drawing:
-        store = work.context.store
-        names = list(dict.fromkeys(y))
-        fetch = partial(store.rows_for_cases, study_id)
-        found = sensitivity(store.study(study_id), store.spec(study_id), names, fetch)
+        asked = (work.context.library, study_id, names)
         if chosen == "json":
-            data = {"study": study_id, "results": [item.to_json() for item in found]}
-            return json_response({**data, **warned(work.context.unaffected.of(store, record))})
+            warnings = warned(work.context.unaffected.of(work.context.store, record))
+            return Drawing(sensitivities.sensitivities_as_json, (*asked, warnings), DRAWN_FORMATS[chosen])
         if chosen == "csv":
-            return table(indices_csv(found), "csv", f"{study_id}-sensitivity")
-        return picture(draw_sensitivity, chosen, found, record.name or record.model)
+            headers = attached(f"{study_id}-sensitivity.csv")
+            return Drawing(sensitivities.sensitivities_as_csv, (*asked, choice), DRAWN_FORMATS[chosen], headers)
+        title = record.name or record.model
+        return picture(sensitivities.sensitivities_picture, chosen, *asked, choice, title)
 
     return await conditional(work, study_id, chosen, make)
-
-
-def indices_csv(found: list[Sensitivity]) -> bytes:
-    """A row for each result and axis: the indices with the half widths of their intervals; then one for each pair."""
-    indices = [field.name for field in fields(Indices)]
-    header = ["result", "paths", *indices, "other_paths", "second_order", "second_order_error"]
-    header += ["method", "cases", "notes"]
-    rows = []
-    for item in found:
-        about = [item.method, item.cases, "; ".join(item.notes)]
-        names = [" ".join(effect.paths) for effect in item.effects]
-        for name, effect in zip(names, item.effects, strict=True):
-            own = [getattr(effect.indices, index) for index in indices]
-            rows.append([item.info.name, name, *own, None, None, None, *about])
-        for pair in item.pairs:
-            first, second, nothing = names[pair.first], names[pair.second], [None] * len(indices)
-            rows.append([item.info.name, first, *nothing, second, pair.index, pair.error, *about])
-    return exports.table_csv(header, zip(*rows, strict=True) if rows else [[] for _ in header])

@@ -1,11 +1,11 @@
-"""Studies: submit, preview, list, read, hold, cancel, delete."""
+"""Studies: submit, preview, read, hold, cancel, submit once more."""
 
 from __future__ import annotations
 
 from datetime import datetime
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query, Request
+from fastapi import Depends, Query, Request
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
@@ -18,8 +18,9 @@ from sprag.service.http.api.curves import pairs
 from sprag.service.http.api.document import body, key_header, located, one_of, problems
 from sprag.service.http.api.document import not_modified as documented_304
 from sprag.service.http.context import Context, Ctx, StudyId
-from sprag.service.http.requests import Body, read_body, strict_query
+from sprag.service.http.requests import Body, read_body
 from sprag.service.http.respond import JSON, entity_tag, json_response, not_modified, tagged
+from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import checks
 from sprag.service.jobs.submission import Submission, take_in
@@ -28,7 +29,6 @@ from sprag.service.results.rounds import round_json
 from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
 from sprag.worker.limits import (
     MAX_NARROW_STEPS,
-    MAX_PAGE_SIZE,
     MAX_PRIORITY,
     MAX_SETTLED_PERIODS,
     MIN_NARROW_STEPS,
@@ -36,9 +36,8 @@ from sprag.worker.limits import (
     NARROW_STEPS,
 )
 from sprag.worker.models import ENDING_SENTENCES, NOT_SETTLED, OK, REGIME_SENTENCES, WorkerEnding, is_settled
-from sprag.worker.states import StudyState
 
-router = APIRouter(tags=["studies"], dependencies=[Depends(strict_query)])
+router = api_router("studies")
 
 _SPEC_BODY = body({"a grid of two axes": examples.SPEC}, {"$ref": "#/components/schemas/Spec"}, toml=examples.SPEC_TOML)
 _FAILED = [str(name) for name in ENDING_SENTENCES if name not in {OK, WorkerEnding.CANCELLED}]
@@ -50,6 +49,7 @@ SpecBody = Annotated[Body, Depends(read_body)]
 _ONCE = "the same key with the same body and parameters submits the study once, however often it is sent"
 IdempotencyKey = Annotated[str | None, key_header("0b6e9a52-feeder", _ONCE)]
 ExtensionKey = Annotated[str | None, key_header("0b6e9a52-further", _ONCE)]
+SelectKey = Annotated[str | None, key_header("0b6e9a52-select", _ONCE)]
 NarrowKey = Annotated[str | None, key_header("0b6e9a52-narrow", _ONCE)]
 Priority = Annotated[
     int,
@@ -105,19 +105,20 @@ async def create_study(
     coarser grids, so that the finished cases form complete curves.
     """
     finish, now = _finish(context, finish_by), context.store.clock.now()
-    given = _given(priority=priority, fresh=fresh, finish_by=finish_by)
+    given = given_options(priority=priority, fresh=fresh, finish_by=finish_by)
     made = await work.check(
         checks.new_study, context.library, received.content, received.format, fresh, finish, now, given
     )
-    return await run_in_threadpool(_take_in, context, made, idempotency_key, priority)
+    return await run_in_threadpool(taken_in, context, made, idempotency_key, priority)
 
 
-def _given(**options: object) -> dict[str, object]:
+def given_options(**options: object) -> dict[str, object]:
     """The given parameters of a request besides its body, as the client wrote them."""
     return {name: value for name, value in options.items() if value}
 
 
-def _take_in(context: Context, made: Submission, idempotency_key: str | None, priority: int) -> Response:
+def taken_in(context: Context, made: Submission, idempotency_key: str | None, priority: int) -> Response:
+    """Store a study and answer with it; errors as of `take_in`."""
     record = take_in(context.store, made, idempotency_key, priority)
     return json_response(views.summary(record), 202, {"Location": views.study_address(record.id)})
 
@@ -135,22 +136,6 @@ async def preview_study(context: Ctx, work: Attended, received: SpecBody, finish
     return Response(text, media_type=JSON)
 
 
-@router.get("/studies", response_model=m.StudyPage, responses=problems("invalid-parameter"))
-def list_studies(
-    context: Ctx,
-    page_size: Annotated[int, Query(ge=1, le=MAX_PAGE_SIZE, description="most studies on the page")] = 50,
-    page_token: Annotated[
-        str | None, Query(min_length=1, max_length=200, description="`next_page_token` of the page before")
-    ] = None,
-    state: Annotated[StudyState | None, Query(description="only studies in this state", examples=["finished"])] = None,
-) -> Response:
-    """Studies, newest first."""
-    page = context.store.list_studies(page_size=page_size, page_token=page_token, state=state)
-    return json_response(
-        {"studies": [views.summary(record) for record in page.studies], "next_page_token": page.next_token}
-    )
-
-
 @router.get(
     "/studies/{study_id:study}",
     response_model=m.StudyDetail,
@@ -163,7 +148,14 @@ def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
     if record.state.terminal and (unchanged := not_modified(request, tag)):
         return unchanged
     study = context.store.study(study_id)
-    data = views.detail(record, progress, study, context.store.spec(study_id), context.store.kinds(study_id))
+    data = views.detail(
+        record,
+        progress,
+        study,
+        context.store.spec(study_id),
+        context.store.kinds(study_id),
+        context.store.origins(study_id),
+    )
     unaffected = warned((*record.warnings, *context.unaffected.of(context.store, record)))
     response = json_response({**data, **unaffected})
     # While it runs, the time left changes with no change of the study.
@@ -178,18 +170,6 @@ def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
 def get_rounds(context: Ctx, study_id: StudyId) -> m.RoundList:
     """The rounds of a study that chooses its own cases, each with what was known before it; none for other studies."""
     return {"study": study_id, "rounds": [round_json(found) for found in context.store.rounds(study_id)]}
-
-
-@router.delete(
-    "/studies/{study_id:study}",
-    status_code=204,
-    response_class=Response,
-    responses=problems("invalid-parameter", "study-not-found", "wrong-state"),
-)
-def delete_study(context: Ctx, study_id: StudyId) -> Response:
-    """Delete a study that has ended, or is held at its deadline, with all its results."""
-    context.store.delete_study(study_id)
-    return Response(status_code=204)
 
 
 def _verb(name: str, sentence: str) -> None:
@@ -261,11 +241,11 @@ async def extend_study(
 ) -> Response:
     """Submit a study with more values on the axes of an old one, or more cases; only new cases are run."""
     finish, now = _finish(context, finish_by), context.store.clock.now()
-    given = _given(priority=priority, finish_by=finish_by)
+    given = given_options(priority=priority, finish_by=finish_by)
     made = await work.check(
         checks.extended_study, context.library, study_id, received.content, received.format, finish, now, given
     )
-    return await run_in_threadpool(_take_in, context, made, idempotency_key, priority)
+    return await run_in_threadpool(taken_in, context, made, idempotency_key, priority)
 
 
 @router.post(
@@ -307,10 +287,10 @@ async def run_longer(
 ) -> Response:
     """Submit a study of the unsettled cases of a study, with more time for each."""
     kind = await run_in_threadpool(_to_run_longer, context, study_id, regime)
-    given = _given(regime=regime, at_most=at_most)
+    given = given_options(regime=regime, at_most=at_most)
     now = context.store.clock.now()
     made = await work.check(checks.longer_study, context.library, study_id, kind, at_most, now, given)
-    return await run_in_threadpool(_take_in, context, made, idempotency_key, 0)
+    return await run_in_threadpool(taken_in, context, made, idempotency_key, 0)
 
 
 def _to_run_longer(context: Context, study_id: str, regime: str | None) -> str:
@@ -369,9 +349,9 @@ async def narrow_study(
     idempotency_key: NarrowKey = None,
 ) -> Response:
     """Submit the sweep of a study once more, with smaller steps where its motion jumps."""
-    now, given = context.store.clock.now(), _given(steps=steps, at=at)
+    now, given = context.store.clock.now(), given_options(steps=steps, at=at)
     made = await work.check(checks.narrowed_study, context.library, study_id, steps, pairs(at), now, given)
-    return await run_in_threadpool(_take_in, context, made, idempotency_key, 0)
+    return await run_in_threadpool(taken_in, context, made, idempotency_key, 0)
 
 
 @router.post(

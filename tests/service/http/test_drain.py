@@ -47,7 +47,7 @@ def test_a_change_that_is_cut_off_comes_to_its_own_answer(portal: BlockingPortal
 
     def commit() -> None:
         committing.set()
-        assert go_on.wait(60)
+        assert go_on.wait(600)
 
     async def app(_scope: Any, _receive: Any, send: Any) -> None:
         await anyio.to_thread.run_sync(commit)
@@ -56,11 +56,11 @@ def test_a_change_that_is_cut_off_comes_to_its_own_answer(portal: BlockingPortal
 
     sent, drain = _Sent(), Drain(app)
     request = portal.start_task_soon(drain, _scope("POST"), _receive, sent)
-    assert committing.wait(60)
+    assert committing.wait(600)
     request.cancel()  # as the server does when its patience is at an end
     idle = portal.start_task_soon(drain.idle)
     go_on.set()
-    idle.result(60)
+    idle.result(600)
     assert sent.status == 202
 
 
@@ -89,7 +89,7 @@ def test_no_write_begins_after_the_cut_and_the_one_under_way_is_kept(service: Se
     def hold() -> None:
         with service.store.session.write():
             inside.set()
-            assert go_on.wait(60)
+            assert go_on.wait(600)
 
     def wait() -> None:
         try:
@@ -100,13 +100,13 @@ def test_no_write_begins_after_the_cut_and_the_one_under_way_is_kept(service: Se
 
     holder, waiter = threading.Thread(target=hold), threading.Thread(target=wait)
     holder.start()
-    assert inside.wait(60)
+    assert inside.wait(600)
     waiter.start()
     service.store.session.refuse_writes()
-    waiter.join(60)
+    waiter.join(600)
     assert refused
     go_on.set()
-    holder.join(60)
+    holder.join(600)
     answer = service.http.post(f"{API}/studies", content=to_bytes(spec), headers={"Content-Type": "application/json"})
     assert answer.status_code == 503
     assert answer.headers["content-type"] == "application/problem+json"

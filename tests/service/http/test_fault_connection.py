@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import httpx
 import pytest
 
-from sprag.service.http.api import sensitivity
 from sprag.service.http.timeouts import TimeoutProtocol
+from sprag.service.jobs import sensitivities
 from tests.service.conftest import API, Service
 from tests.service.http.test_timeouts import serving
 
@@ -23,7 +23,7 @@ def _fail(*_: object) -> NoReturn:
 def test_the_next_request_of_the_same_client_is_answered(
     service: Service, spec: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sensitivity, "sensitivity", _fail)
+    monkeypatch.setattr(sensitivities, "sensitivity", _fail)
     path = f"{API}/studies/{service.submit(spec)}/sensitivity?y=torque.max"
     with (
         serving(service.app, http=TimeoutProtocol) as address,

@@ -21,7 +21,7 @@ def samples(service: Service) -> list[Sample]:
     return [sample for family in text_string_to_metric_families(answer.text) for sample in family.samples]
 
 
-def value(found: list[Sample], name: str, **labels: str) -> float:
+def value(found: list[Sample], name: str, /, **labels: str) -> float:
     """The value of the one sample of that name with those labels."""
     (sample,) = [s for s in found if s.name == name and labels.items() <= s.labels.items()]
     return sample.value

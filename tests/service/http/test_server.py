@@ -11,6 +11,7 @@ import httpx
 import pytest
 
 from sprag.service.http.server import AddressError, Supervisor, serve
+from tests.worker.fakes import HandClock
 
 if TYPE_CHECKING:
     from sprag.service.settings import Settings
@@ -25,6 +26,7 @@ class FakeChild:
         self.obedient = obedient
         self.asked: list[str] = []
         self.gone = threading.Event()
+        self.watched = threading.Event()
 
     def die(self, code: int) -> None:
         """End by itself."""
@@ -33,6 +35,7 @@ class FakeChild:
 
     def join(self, timeout: float | None = None) -> None:
         """Wait for the end; an end that nobody waits for long does not come."""
+        self.watched.set()
         if self.obedient or timeout is None:
             self.gone.wait(timeout)
 
@@ -74,6 +77,28 @@ def test_a_dead_child_is_replaced_and_the_last_one_ended() -> None:
     assert [child.exitcode for child in nursery.children] == [1, 1, 1, 0]
     assert nursery.children[-1].asked == ["terminate"]
     assert not supervisor.is_alive()
+
+
+def test_a_child_that_dies_again_and_again_is_reported() -> None:
+    """Also where each one lives for minutes, but not where it goes on for one, and not an hour later."""
+    nursery, clock = Nursery(), HandClock()
+    supervisor = Supervisor(nursery, delays=(0.0, 0.0), clock=clock.monotonic)
+    supervisor.start()
+    for number in range(3):
+        assert nursery.born.acquire(timeout=600)
+        assert supervisor.failing() is None
+        clock.seconds += 200.0
+        nursery.children[number].die(1)
+    assert nursery.born.acquire(timeout=600)
+    assert supervisor.failing() == "The worker has ended 3 times within 10 minutes; the log says why."
+    assert nursery.children[3].watched.wait(600)
+    clock.seconds += 61.0
+    assert supervisor.failing() is None, "it goes on"
+    clock.seconds += 3600.0
+    nursery.children[3].die(1)
+    assert nursery.born.acquire(timeout=600)
+    assert supervisor.failing() is None
+    supervisor.stop()
 
 
 def test_a_child_that_ends_with_everything_else_is_not_replaced(caplog: pytest.LogCaptureFixture) -> None:

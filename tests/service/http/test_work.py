@@ -16,12 +16,12 @@ import psutil
 import pytest
 from starlette.requests import ClientDisconnect, Request
 
+from sprag.service.actor import Role
 from sprag.service.http.access import Grant
 from sprag.service.http.computer import Limits, ProcessComputer
 from sprag.service.http.problems import ApiError
 from sprag.service.http.shares import Shares
 from sprag.service.http.work import Work
-from sprag.service.storage.scopes import TokenScope
 from sprag.worker import models
 from tests.service.conftest import API, InThread, Service
 from tests.worker import fakes
@@ -79,7 +79,7 @@ def test_what_waits_when_the_service_ends_is_told_so(checker: ProcessComputer, p
 def _request(service: Service, receive: Any, token: str = "one") -> Request:
     scope = {
         "type": "http", "method": "POST", "path": "/", "headers": [], "app": service.app,
-        "sprag.grant": Grant(token, token, TokenScope.READ),
+        "sprag.grant": Grant(token, token, Role.VIEWER),
     }  # fmt: skip
     return Request(scope, receive)
 
@@ -103,7 +103,7 @@ def test_a_client_that_leaves_ends_the_process(
     process = psutil.Process(int(begun.read_text()))
     portal.call(lambda: left[0].set())  # noqa: PLW0108
     with pytest.raises(ClientDisconnect):
-        asked.result(60)
+        asked.result(600)
     psutil.wait_procs([process], timeout=600)
     assert not process.is_running()
 

@@ -11,8 +11,9 @@ import pytest
 from sprag.service.answers.calibration import CalibrationReport
 from sprag.service.results import calibration as calibration_module
 from sprag.service.results.calibration import calibration_json, calibration_of
+from sprag.service.results.report import write_report
 from sprag.service.results.report.content import report_of
-from sprag.service.results.report.html import html_report
+from sprag.service.results.report.document import TitleBlock
 from tests.service.calibrating import DAMPING, INERTIA, calibration
 from tests.service.conftest import API, Service
 from tests.service.shapes import fits
@@ -97,7 +98,7 @@ def test_a_table_and_a_picture(service: Service) -> None:
     assert list(rows[0])[:3] == ["shaft.load", "excitation.frequency", "result"]
     picture = service.http.get(f"{API}/studies/{study_id}/calibration?format=svg")
     assert picture.status_code == 200
-    assert "residual" in picture.text
+    assert "Residual" in picture.text
 
 
 def test_the_report_has_the_calibration(service: Service) -> None:
@@ -108,7 +109,7 @@ def test_the_report_has_the_calibration(service: Service) -> None:
     sentences = service.get(f"/studies/{study_id}/calibration")["sentences"]
     assert set(sentences) < set(report.calibration.sentences)
     assert "pendulums.0.damping = " in report.calibration.sentences[0]
-    assert "<h2>Calibration</h2>" in html_report(report).decode()
+    assert "<h2>Calibration</h2>" in write_report(report, TitleBlock(), "", "html").decode()
     assert report_of(service.store, service.submit()).calibration is None
 
 

@@ -91,7 +91,7 @@ def test_a_machine_without_clutches_has_no_engagements(service: Service) -> None
 
 def test_the_client_gives_the_same(service: Service, one_case: str, portal: Any) -> None:
     with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
-        assert client.study(one_case).engagements(4) == asked(service, one_case).json()
+        assert client.study(one_case).engagements(4).data == asked(service, one_case).json()
 
 
 def test_the_page_of_a_case_shows_the_table(service: Service, one_case: str) -> None:

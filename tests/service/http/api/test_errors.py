@@ -10,6 +10,7 @@ import pytest
 from sprag.service.http.problems import PROBLEM_TYPES, Problem
 from sprag.service.storage.errors import DatabaseBusyError, DatabaseFullError
 from sprag.worker.limits import MAX_BODY_BYTES
+from tests.service.http.routes import every_route
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
@@ -172,12 +173,11 @@ def test_an_unknown_address_is_not_found(service: Service, path: str) -> None:
 @pytest.mark.parametrize(
     ("method", "path", "allowed"),
     [
-        ("PUT", f"{API}/studies", "GET, HEAD, POST"),
-        ("POST", f"{API}/studies/st_1", "DELETE, GET, HEAD"),
-        ("GET", f"{API}/studies:preview", "POST"),
-        ("GET", f"{API}/studies/st_1:cancel", "POST"),
-        ("DELETE", "/", "GET, HEAD"),
-        ("OPTIONS", f"{API}/models", "GET, HEAD"),
+        ("PUT", f"{API}/studies", "GET, HEAD, OPTIONS, POST"),
+        ("POST", f"{API}/studies/st_1", "DELETE, GET, HEAD, OPTIONS, PATCH"),
+        ("GET", f"{API}/studies:preview", "OPTIONS, POST"),
+        ("GET", f"{API}/studies/st_1:cancel", "OPTIONS, POST"),
+        ("DELETE", "/", "GET, HEAD, OPTIONS"),
     ],
 )
 def test_another_method_is_not_allowed(service: Service, method: str, path: str, allowed: str) -> None:
@@ -243,3 +243,16 @@ def test_every_problem_has_a_page(service: Service, connect: Callable[..., httpx
         assert page.status_code == 200
         assert kind.uri in page.text
     assert_problem(service.http.get("/problems/none"), 404)
+
+
+def test_operations_refuse_unknown_parameters_and_pages_ignore_them(service: Service) -> None:
+    operations = {path for path, item in service.http.get("/openapi.json").json()["paths"].items() if "get" in item}
+    plain = {address for method, address in every_route(service.app) if method == "GET" and "x_1" not in address}
+    asked = {path: service.http.get(path, params={"utm_source": "mail"}) for path in operations if "{" not in path}
+    assert len(asked) > 10
+    for path, answer in asked.items():
+        assert assert_problem(answer, 422)["errors"][0]["parameter"] == "utm_source", path
+    pages = {path for path in plain - operations if service.http.get(path).status_code == 200}
+    assert {"/", "/night", "/schedules", "/workers", "/docs", "/compare", "/laboratory"} <= pages
+    for path in pages:
+        assert service.http.get(path, params={"utm_source": "mail"}).status_code == 200, path

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from sprag.service.answers import studies
-from sprag.service.http.api import events
+from sprag.service.http import streams
 from tests.service.shapes import fits
 
 if TYPE_CHECKING:
@@ -53,14 +53,14 @@ def test_a_study_is_followed_to_its_end(service: Service, monkeypatch: pytest.Mo
         return look(*arguments)
 
     monkeypatch.setattr(service.store, "look", noticed)
-    monkeypatch.setattr(events, "LOOK_SECONDS", 0.01)
+    monkeypatch.setattr(streams, "LOOK_SECONDS", 0.01)
     heard: list[str] = []
     listener = threading.Thread(target=lambda: heard.append(service.http.get(f"{STUDIES}/{study_id}/events").text))
     listener.start()
-    assert looked.wait(30)
+    assert looked.wait(600)
     service.fill(study_id, range(2))
     service.fill(study_id)
-    listener.join(30)
+    listener.join(600)
     told = parse(heard[0])
     assert told[0][2]["state"] == "queued"
     assert told[-1][1:] == ("end", {**told[-1][2], "state": "finished"})

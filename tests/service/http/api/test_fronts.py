@@ -29,12 +29,15 @@ def test_designs_of_an_ended_search(service: Service) -> None:
     assert found["at"] == [{"shaft.load": 0.2}, {"shaft.load": 0.3}]
 
     counts = found["counts"]
-    assert counts["known"] == study.cases // 2 == len(designs)
+    # The first round of the polish serves its derivatives only.
+    probes = next(one.cases for one in service.store.rounds(study_id) if one.summary.get("phase") == "polish")
+    listed = set(range(study.cases // 2)) - set(range(probes.start // 2, probes.stop // 2))
+    assert counts["known"] == len(listed) == len(designs)
     assert counts["pending"] == 0
     for name in ("feasible", "failed", "exact"):
         assert counts[name] == sum(design[name] for design in designs)
     assert 0 < counts["exact"] < counts["feasible"] < counts["known"]
-    assert sorted(design["design"] for design in designs) == list(range(len(designs)))
+    assert {design["design"] for design in designs} == listed
     for design in designs:
         assert design["cases"] == [2 * design["design"], 2 * design["design"] + 1]
         row = rows_of(study, range(design["cases"][0], design["cases"][1] + 1))

@@ -13,6 +13,7 @@ from fastapi.routing import iter_route_contexts
 from openapi_spec_validator import OpenAPIV31SpecValidator
 from pydantic import SecretStr
 
+from sprag.service.http.api.components import EXAMPLE as COMPONENTS
 from sprag.service.http.api.examples import SPEC
 from sprag.service.http.api.schedules import EXAMPLE
 from sprag.service.http.app import create_app
@@ -82,9 +83,9 @@ def test_the_document_says_whether_a_token_is_needed(service: Service, settings:
     OpenAPIV31SpecValidator(guarded).validate()
     opened = service.http.get("/openapi.json").json()
     for path, method, operation in operations(guarded):
-        wanted = None if path in OPEN_PATHS else [{"bearer": []}]
-        assert operation.get("security") == wanted, (path, method)
-        assert opened["paths"][path][method].get("security") == (wanted and [*wanted, {}])
+        wanted: list[dict[str, list[str]]] = [] if path in OPEN_PATHS else [{"bearer": []}]
+        assert operation["security"] == wanted, (path, method)
+        assert opened["paths"][path][method]["security"] == (wanted and [*wanted, {}])
 
 
 def test_every_operation_is_documented(service: Service, document: dict[str, Any]) -> None:
@@ -128,20 +129,31 @@ def test_every_operation_documents_its_problems(document: dict[str, Any]) -> Non
     assert undocumented == set()
 
 
-def send(service: Service, path: str, method: str, operation: dict[str, Any], study_id: str) -> list[httpx.Response]:
-    """What the service answers to every documented example of an operation."""
+def sent_to(
+    service: Service, path: str, method: str, operation: dict[str, Any], study_id: str, accept: str | None = None
+) -> list[httpx.Response]:
+    """What the service answers to every documented example of an operation, in the format ``accept`` where given."""
     address = path.replace("{study_id}", study_id)
     if "{schedule_id}" in path:
         kept = service.http.post("/api/v1/schedules", json=EXAMPLE).json()["id"]
         address = address.replace("{schedule_id}", kept)
+    if "{component_id}" in path:
+        made = service.http.post("/api/v1/components", json=COMPONENTS).json()["components"]
+        address = address.replace("{component_id}", made[0]["id"])
+    if "{view_id}" in path:
+        curves = {"page": "curves", "name": "loads", "study": study_id, "in_report": True}
+        saved = service.http.post("/api/v1/views", json=curves).json()["id"]
+        address = address.replace("{view_id}", saved)
     query: list[tuple[str, str]] = []
-    headers: dict[str, str] = {}
+    headers: dict[str, str] = {} if accept is None else {"Accept": accept}
     for parameter in operation.get("parameters", ()):
         for example in parameter["schema"].get("examples", ())[:1]:
             if parameter["in"] == "path":
                 address = address.replace(f"{{{parameter['name']}}}", str(example))
             elif parameter["in"] == "header":
                 headers[parameter["name"]] = str(example)
+            elif accept is not None and parameter["name"] in ("format", "header", "units"):
+                continue
             elif parameter["name"] != "by" or not path.endswith("/curves"):
                 values = example if isinstance(example, list) else [example]
                 query += [
@@ -163,21 +175,27 @@ def send(service: Service, path: str, method: str, operation: dict[str, Any], st
     return answers
 
 
+def studied(service: Service, path: str) -> str:
+    """The id of a study for which the operation of a path has an answer."""
+    # Only cases of settled studies are run longer, only studies with a goal have designs, and so on.
+    spec = SPEC if path.endswith(":longer") else TOLERANT if path.endswith(("/ribbon", "/yield")) else None
+    if path.endswith("/basin"):
+        ranges = {"shaft.initial_speed": [0, 30], "pendulums.0.initial_angle": [-0.1, 0.1]}
+        spec = {**SPEC, "starts": {"count": 2, "ranges": ranges}}
+    if path.endswith("/transient"):
+        spec = tomllib.loads((Path(__file__).resolve().parents[4] / "examples" / "slotter.toml").read_text())
+    kinds = {"front": search, "calibration": calibration, "{study_id}:narrow": swept_study}
+    chosen = kinds.get(path.rpartition("/")[2])
+    study_id = service.submit(spec) if chosen is None else chosen(service)
+    if not path.endswith((":cancel", ":pause", ":resume", ":prioritize")):
+        service.fill(study_id)
+    return study_id
+
+
 def test_every_example_works(service: Service, document: dict[str, Any]) -> None:
     for path, method, operation in operations(document):
-        # Only cases of settled studies are run longer, only studies with a goal have designs, and so on.
-        spec = SPEC if path.endswith(":longer") else TOLERANT if path.endswith(("/ribbon", "/yield")) else None
-        if path.endswith("/basin"):
-            ranges = {"shaft.initial_speed": [0, 30], "pendulums.0.initial_angle": [-0.1, 0.1]}
-            spec = {**SPEC, "starts": {"count": 2, "ranges": ranges}}
-        if path.endswith("/transient"):
-            spec = tomllib.loads((Path(__file__).resolve().parents[4] / "examples" / "slotter.toml").read_text())
-        kinds = {"front": search, "calibration": calibration, "{study_id}:narrow": swept_study}
-        chosen = kinds.get(path.rpartition("/")[2])
-        study_id = service.submit(spec) if chosen is None else chosen(service)
-        if not path.endswith((":cancel", ":pause", ":resume", ":prioritize")):
-            service.fill(study_id)
-        for answer in send(service, path, method, operation, study_id):
+        study_id = studied(service, path)
+        for answer in sent_to(service, path, method, operation, study_id):
             assert answer.status_code < 300, (method, path, answer.text)
             declared = operation["responses"][str(answer.status_code)].get("content", {})
             media = answer.headers.get("content-type", "").partition(";")[0]

@@ -193,7 +193,7 @@ def test_a_study_page_names_values_with_units_and_shows_the_spec_as_given(
         {"path": "shaft.load", "values": [0.1, 0.2]},
     ]
     text, _ = read_page(service, f"/studies/{service.submit(spec)}")
-    assert "against shaft.load (N\u00b7m), a curve for each of 6 values of excitation.frequency (Hz)." in text
+    assert "against load torque, a curve for each of 6 values of excitation frequency." in text
     shown = text.split("<summary>Spec</summary><pre>")[1].split("</pre>")[0]
     assert "a &lt; b \u00b5" in shown
     assert json.loads(html.unescape(shown)) == spec

@@ -159,7 +159,7 @@ def test_a_preview_submits_nothing(service: Service, spec: dict[str, Any]) -> No
 
 
 def test_preview_and_submission_warn_of_cases_that_take_too_long(service: Service, spec: dict[str, Any]) -> None:
-    service.store.chunking = replace(service.store.chunking, timeout=1e-9)
+    service.store.base_chunking = replace(service.store.base_chunking, timeout=1e-9)
     for path, status in ((f"{STUDIES}:preview", 200), (STUDIES, 202)):
         response = service.http.post(path, json=spec)
         assert response.status_code == status

@@ -1,0 +1,93 @@
+"""The office's own springs, clutches and motors."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final, Literal
+
+from fastapi import Depends, Path, Query, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response
+
+from sprag.service.answers import components as m
+from sprag.service.answers import filled
+from sprag.service.http.api.document import body, files, format_query, problems
+from sprag.service.http.context import ID_PATTERN, Ctx
+from sprag.service.http.requests import Body, as_body_problems, read_body
+from sprag.service.http.respond import choose_format, json_response
+from sprag.service.http.routers import api_router
+from sprag.service.http.work import CHECK_PROBLEMS, Attended
+from sprag.service.jobs import checks
+from sprag.service.results.exports.components import COMPONENT_FORMATS, components_csv
+from sprag.service.storage.components import ComponentRecord
+
+router = api_router("components")
+
+_BODY_PROBLEMS: Final = ("invalid-parameter", "invalid-body", "body-too-large", "unsupported-media-type")
+EXAMPLE: Final[dict[str, Any]] = {
+    "components": [
+        {"kind": "spring", "name": "F-120", "note": "store 3", "fields": {"spring_rate": "9 N/mm"}},
+        {"kind": "clutch", "name": "FW 20", "fields": {"coefficients": "0; 200; 0; 20000", "backlash": "0.3 deg"}},
+    ]
+}
+
+
+def entry(record: ComponentRecord) -> m.ComponentEntry:
+    """A component as JSON data."""
+    one = record.component
+    return filled(m.ComponentEntry, record, kind=one.kind, name=one.name, note=one.note, fields=dict(one.fields))
+
+
+@router.get(
+    "/components",
+    response_model=m.ComponentList,
+    responses={
+        **files("The components as JSON or as a CSV file.", COMPONENT_FORMATS.values()),
+        **problems("invalid-parameter", "not-acceptable"),
+    },
+)
+def list_components(
+    context: Ctx,
+    request: Request,
+    kind: Annotated[Literal["spring", "clutch", "motor"] | None, Query(description="only this kind")] = None,
+    form: Annotated[str | None, format_query(COMPONENT_FORMATS)] = None,
+) -> Response:
+    """The office's own springs, clutches and motors, by kind and name; also as CSV."""
+    found = context.store.components(kind)
+    if choose_format(request, form, COMPONENT_FORMATS) == "csv":
+        return Response(
+            components_csv(record.component for record in found),
+            media_type=COMPONENT_FORMATS["csv"],
+            headers={"Content-Disposition": 'attachment; filename="components.csv"'},
+        )
+    return json_response({"components": list(map(entry, found))})
+
+
+@router.post(
+    "/components",
+    response_model=m.ComponentList,
+    responses=problems(*_BODY_PROBLEMS, *CHECK_PROBLEMS, "not-owner", "wrong-state"),
+    openapi_extra=body({"a spring and a clutch": EXAMPLE}, {"$ref": "#/components/schemas/Components"}),
+)
+async def put_components(context: Ctx, work: Attended, received: Annotated[Body, Depends(read_body)]) -> Response:
+    """Add components, all or none; those of the same kind and name are replaced. CSV is sent as `{"csv": text}`."""
+    with as_body_problems():
+        given = await work.check(checks.components, received.content, received.format)
+    made = await run_in_threadpool(context.store.put_components, given)
+    return json_response({"components": list(map(entry, made))})
+
+
+@router.delete(
+    "/components/{component_id}",
+    status_code=204,
+    response_class=Response,
+    responses=problems("component-not-found", "invalid-parameter", "not-owner"),
+)
+def delete_component(
+    context: Ctx,
+    component_id: Annotated[
+        str, Path(description="id of the component", pattern=ID_PATTERN, examples=["cp_0123456789abcdef"])
+    ],
+) -> Response:
+    """Remove a component; studies that took it keep its values."""
+    context.store.remove_component(component_id)
+    return Response(status_code=204)

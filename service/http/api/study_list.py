@@ -1,0 +1,104 @@
+"""Studies as a list: searched and sorted; what people write about them; deleted and restored."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import Depends, Query, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response
+
+from sprag.service.answers import studies as m
+from sprag.service.answers.studies import StudyOrder
+from sprag.service.http import views
+from sprag.service.http.api.document import body, next_page, problems
+from sprag.service.http.context import Ctx, StudyId
+from sprag.service.http.listing import PageToken, Sort, WantedStudies
+from sprag.service.http.requests import Body, as_body_problems, read_body
+from sprag.service.http.respond import json_response, page_response
+from sprag.service.http.routers import api_router
+from sprag.service.http.work import CHECK_PROBLEMS, Attended
+from sprag.service.jobs import checks
+from sprag.worker.limits import MAX_PAGE_SIZE
+
+router = api_router("studies")
+
+
+@router.get("/studies", response_model=m.StudyPage, responses=next_page() | problems("invalid-parameter"))
+def list_studies(
+    context: Ctx,
+    request: Request,
+    wanted: WantedStudies,
+    page_size: Annotated[int, Query(ge=1, le=MAX_PAGE_SIZE, description="most studies on the page")] = 50,
+    page_token: PageToken = None,
+    sort: Sort = StudyOrder.NEWEST,
+) -> Response:
+    """Studies, newest first or in another order: all but archived and deleted ones, or those that are searched for."""
+    page = context.store.list_studies(page_size, page_token, wanted, sort)
+    studies = [views.summary(record) for record in page.studies]
+    return page_response(request, {"studies": studies, "next_page_token": page.next_token})
+
+
+@router.patch(
+    "/studies/{study_id:study}",
+    response_model=m.StudySummary,
+    responses=problems(
+        "invalid-parameter",
+        "invalid-body",
+        "body-too-large",
+        "unsupported-media-type",
+        *CHECK_PROBLEMS,
+        "study-not-found",
+    ),
+    openapi_extra=body(
+        {
+            "a name and a tag": {"name": "Feeder, softer clutch", "add_tags": ["customer 7"]},
+            "archived": {"archived": True},
+        },
+        {"$ref": "#/components/schemas/StudyChange"},
+    ),
+)
+async def change_study(
+    context: Ctx, work: Attended, study_id: StudyId, received: Annotated[Body, Depends(read_body)]
+) -> Response:
+    """Change what people write about a study: name, notes, tags, and whether it is archived.
+
+    Fields that are left out are kept. Nothing that is computed changes, and its spec keeps the name with which it was
+    submitted.
+    """
+    with as_body_problems():
+        change = await work.check(checks.study_change, received.content, received.format)
+        record = await run_in_threadpool(context.store.change_study, study_id, change)
+    return json_response(views.summary(record))
+
+
+@router.delete(
+    "/studies/{study_id:study}",
+    status_code=204,
+    response_class=Response,
+    responses=problems("invalid-parameter", "study-not-found", "wrong-state"),
+)
+def delete_study(
+    context: Ctx,
+    study_id: StudyId,
+    at_once: Annotated[
+        bool, Query(description="remove its results now, to make room on the disk; it cannot be restored")
+    ] = False,
+) -> Response:
+    """Delete a study that has ended, or is held at its deadline, with all its results.
+
+    It can be restored for `SPRAG_RESTORE_DAYS`, unless `at_once` is true.
+    """
+    context.store.delete_study(study_id, at_once=at_once)
+    return Response(status_code=204)
+
+
+@router.post(
+    "/studies/{study_id:study}:restore",
+    response_model=m.StudySummary,
+    responses=problems("invalid-parameter", "study-not-found", "quota-exceeded"),
+)
+def restore_study(context: Ctx, study_id: StudyId) -> Response:
+    """Undo the deletion of a study, with all its results, until `purge_at`."""
+    context.store.restore_study(study_id)
+    return json_response(views.summary(context.store.get_study(study_id)))

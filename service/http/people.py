@@ -1,0 +1,41 @@
+"""Users and their quotas, and the filters of the audit log, for the API and the pages."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+from fastapi import Query
+
+from sprag.service.answers import filled
+from sprag.service.answers.people import QuotaUse, User
+from sprag.service.storage.audit import TIME_ALLOWED
+from sprag.service.storage.users import Quota
+
+if TYPE_CHECKING:
+    from sprag.service.storage.store import Store
+    from sprag.service.storage.users import UserRecord
+
+Since = Annotated[
+    str | None, Query(max_length=40, description=f"from then on: {TIME_ALLOWED}", examples=["2027-01-31"])
+]
+Until = Annotated[str | None, Query(max_length=40, description="up to then; of a date the whole day")]
+Actor = Annotated[str | None, Query(max_length=200, description="only changes by this user, token or schedule")]
+Action = Annotated[str | None, Query(max_length=40, description="only this action", examples=["study.delete"])]
+Target = Annotated[str | None, Query(max_length=200, description="only changes of this study, schedule, token or user")]
+
+
+def quota_json(store: Store, name: str, own: Quota) -> QuotaUse:
+    """The quotas of a user, and what is used of them."""
+    quota, used = own.over(store.default_quota), store.usage(name)
+    return {
+        "cases": used.cases,
+        "most_cases": quota.cases or None,
+        "bytes": used.bytes,
+        "most_bytes": quota.bytes or None,
+        "most_checks": quota.checks or None,
+    }
+
+
+def user_json(store: Store, record: UserRecord) -> User:
+    """A user as JSON data."""
+    return filled(User, record, quota=quota_json(store, record.name, record.quota))

@@ -1,0 +1,112 @@
+"""Which units and names somebody wants to read: in the address, otherwise in a cookie of the browser."""
+
+from __future__ import annotations
+
+from contextvars import ContextVar
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Final
+from urllib.parse import quote, unquote, urlencode, urlsplit
+
+from fastapi import Depends, Query, Request
+
+from sprag.service.results.quantities import SI, TYPED, UNITS_PATTERN, read_units
+from sprag.service.results.reading import CAPTIONS, CODES, Choice
+from sprag.service.results.selection import SelectionError
+
+if TYPE_CHECKING:
+    from starlette.responses import Response
+
+UNITS_COOKIE: Final = "sprag_units"
+NAMES_COOKIE: Final = "sprag_names"
+#: The choice of the current request for a page.
+CHOICE: ContextVar[Choice] = ContextVar("choice", default=Choice(TYPED))  # noqa: B039 - frozen
+#: Address of the page that is made; "" for one that answers a form.
+PAGE: ContextVar[str] = ContextVar("page", default="")
+_YEAR: Final = 365 * 24 * 3600
+
+
+async def page_choice(request: Request) -> Choice:
+    """The choice of a page: that of its address, of the browser, or as typed. Raises SelectionError."""
+    given, kept = request.query_params, request.cookies
+    units, names = given.get("units"), given.get("names")
+    if units is None:
+        units = _valid(unquote(kept.get(UNITS_COOKIE, "")))
+    if names is None:
+        names = CODES if kept.get(NAMES_COOKIE) == CODES else CAPTIONS
+    read_units(units)
+    choice = Choice(units or TYPED, names or CAPTIONS)
+    CHOICE.set(choice)
+    if request.method == "GET":  # the address of a page that answers a form may have no page of its own
+        # What the address says would hide what is chosen next.
+        PAGE.set(str(request.url.remove_query_params(["units", "names", "language"]).replace(scheme="", netloc="")))
+    return choice
+
+
+def _valid(units: str) -> str:
+    """Kept units; "" for those that are no longer known."""
+    try:
+        read_units(units)
+    except SelectionError:
+        return ""
+    return units
+
+
+TableUnits = Annotated[
+    str | None,
+    Query(
+        max_length=400,
+        description="units of tables and pictures: `si`, `typed` (those of the spec), or a list such as "
+        "`rpm,mm,torque=N*mm`, with `typed` in it where the rest is as typed; JSON is always in SI",
+        examples=["rpm,mm"],
+        json_schema_extra={"pattern": UNITS_PATTERN},
+    ),
+]
+
+
+async def file_choice(
+    units: TableUnits = None,
+    names: Annotated[
+        str | None,
+        Query(
+            max_length=20,
+            description="names in pictures: `captions` for people, or `codes`",
+            examples=["codes"],
+            json_schema_extra={"pattern": f"^({CAPTIONS}|{CODES})$"},
+        ),
+    ] = None,
+) -> Choice:
+    """The choice of a file or a figure, whose address has all of it: SI and captions unless it says otherwise."""
+    read_units(units or SI)
+    return Choice(units or SI, CAPTIONS if names is None else names)
+
+
+async def report_choice(choice: Annotated[Choice, Depends(file_choice)], units: TableUnits = None) -> Choice:
+    """The choice of a document for people: as typed unless its address says otherwise."""
+    return replace(choice, units=units or TYPED)
+
+
+PageChoice = Annotated[Choice, Depends(page_choice)]
+ReportChoice = Annotated[Choice, Depends(report_choice)]
+FileChoice = Annotated[Choice, Depends(file_choice)]
+
+
+def address_pairs(choice: Choice) -> list[tuple[str, str]]:
+    """The choice as parameters of the addresses of figures and files."""
+    return [("units", choice.units), *([("names", choice.names)] if choice.names != CAPTIONS else [])]
+
+
+def read_as() -> str:
+    """The choice of the page that is made, as the rest of an address of a figure that has a query already."""
+    return f"&{urlencode(address_pairs(CHOICE.get()))}"
+
+
+def page_query() -> str:
+    """The query of the address of the page that is made, with the choice of how it is read."""
+    own = urlsplit(PAGE.get()).query
+    return "&".join(filter(None, (own, urlencode(address_pairs(CHOICE.get())) if own else "")))
+
+
+def keep(response: Response, choice: Choice) -> None:
+    """Keep the choice in the browser."""
+    for name, value in ((UNITS_COOKIE, quote(choice.units)), (NAMES_COOKIE, choice.names)):
+        response.set_cookie(name, value, max_age=_YEAR, httponly=True, samesite="lax")

@@ -1,0 +1,121 @@
+"""The role that each route needs. A route that is not listed here is for administrators only.
+
+Reading is for everybody who may use the service; what changes something is for designers, who can change their own
+and what has no owner (`sprag.service.storage.audit.require_own`).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, cast
+
+from starlette.requests import Request
+
+from sprag.service.actor import Role
+from sprag.service.http.problems import ApiError
+from sprag.service.http.request_log import pattern_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from sprag.service.http.access import Grant
+
+_S: Final = "/api/v1/studies/{study_id}"
+_CASE: Final = _S + "/cases/{case}"
+_PAGE: Final = "/studies/{study_id}"
+_PAGE_CASE: Final = _PAGE + "/cases/{case}"
+
+#: Routes without a login.
+_ANYONE: Final = (
+    "GET /livez",
+    "GET /readyz",
+    "GET /login",
+    "POST /login",
+    "POST /logout",
+    "GET /static/{name}",
+    "POST /language",
+)
+_VIEWER: Final = (
+    "GET /api/v1/me",
+    "GET /api/v1/studies", "POST /api/v1/studies:preview", "POST /api/v1/clutch-fits",
+    f"GET {_S}",
+    *(f"GET {_S}/{part}" for part in (
+        "rounds", "events", "curves", "map", "results", "report", "sensitivity", "ribbon", "yield", "calibration",
+        "front", "explore", "answers", "cases",
+    )),
+    f"GET {_CASE}",
+    *(f"GET {_CASE}/{part}" for part in (
+        "trajectory", "branch", "diagram", "section", "engagements", "strobes", "transient", "basin",
+    )),
+    "GET /api/v1/night", "GET /night",
+    "GET /api/v1/schedules", "GET /api/v1/schedules/{schedule_id}",
+    "GET /api/v1/components", "GET /components", "GET /api/v1/views",
+    "GET /api/v1/models", "GET /api/v1/models/{name}", "GET /api/v1/presets", "GET /api/v1/presets/{name}",
+    "GET /api/v1/workers", "GET /workers",
+    "GET /metrics", "GET /openapi.json", "GET /docs", "GET /docs/{name}", "GET /problems/{slug}",
+    "GET /live/{name}", "GET /units", "POST /units",  # a cookie of the reader's own
+    "GET /", "GET /new", "POST /new/check", "GET /calibrate",
+    f"GET {_PAGE}",
+    *(f"GET {_PAGE}/{part}" for part in (
+        "delete", "front", "figures/front", "figures/search", "front/search.svg", "explore", "explore/new",
+        "explore/compare", "figures/explore", "calibration", "figures/calibration", "drives", "figures/ribbon",
+        "figures/yield", "sensitivity", "figures/sensitivity", "curves", "map", "figures/curves", "figures/answers",
+        "figures/map", "cases",
+    )),
+    f"GET {_PAGE_CASE}",
+    *(f"GET {_PAGE_CASE}/{part}" for part in (
+        "motion", "laboratory", "motion.svg", "strobes", "engagements", "branch", "branch/figure", "diagram",
+        "diagram/figure", "section/figure", "basin", "basin/figure", "transient", "transient/figure",
+    )),
+    "GET /compare", "GET /compare/figure", "GET /compare/picture.{form}", "GET /compare/curves.csv",
+    *(f"GET /laboratory{drive}{part}" for drive in ("", "/drive") for part in (
+        "", "/figure", "/picture.{form}", "/form", "/study",
+    )),
+    "GET /laboratory/questions",
+    "GET /schedules", "GET /schedules/new", "GET /schedules/{schedule_id}",
+)  # fmt: skip
+_DESIGNER: Final = (
+    "POST /api/v1/studies",
+    f"PATCH {_S}", f"DELETE {_S}",
+    *(f"POST {_S}:{verb}" for verb in (
+        "cancel", "pause", "resume", "retry", "extend", "longer", "narrow", "select", "prioritize", "restore",
+    )),
+    "POST /api/v1/components", "DELETE /api/v1/components/{component_id}",
+    "POST /components", "POST /components/{component_id}/delete",
+    "POST /api/v1/views", "PATCH /api/v1/views/{view_id}", "DELETE /api/v1/views/{view_id}",
+    "POST /views", "POST /views/{view_id}",
+    "POST /api/v1/schedules", "PATCH /api/v1/schedules/{schedule_id}", "DELETE /api/v1/schedules/{schedule_id}",
+    "POST /new", "POST /calibrate", "POST /studies", f"POST {_PAGE}/labels", f"POST {_PAGE}/priority",
+    f"POST {_PAGE}/extend",
+    f"POST {_PAGE}/delete", f"POST {_PAGE}/longer/{{kind}}", f"POST {_PAGE}/narrow", f"POST {_PAGE}/{{verb}}",
+    "POST /schedules/new", "POST /schedules/{schedule_id}", "POST /schedules/{schedule_id}/{verb}",
+)  # fmt: skip
+_ADMINISTRATOR: Final = ("GET /api/v1/audit", "GET /api/v1/users", "GET /audit", "GET /users")
+
+#: Role by method and pattern; None: no login is needed.
+ROLES: Final[Mapping[str, Role | None]] = {
+    **dict.fromkeys(_ANYONE),
+    **dict.fromkeys(_VIEWER, Role.VIEWER),
+    **dict.fromkeys(_DESIGNER, Role.DESIGNER),
+    **dict.fromkeys(_ADMINISTRATOR, Role.ADMINISTRATOR),
+}
+#: Requests that change nothing despite their method.
+LOOKING: Final = frozenset(
+    route.removeprefix("POST ")
+    for route, role in ROLES.items()
+    if role in {None, Role.VIEWER} and route.startswith("POST ")
+)
+
+
+def role_needed(method: str, pattern: str) -> Role | None:
+    """The role that a route needs; None where no login is needed."""
+    return ROLES.get(f"{method} {pattern}", Role.ADMINISTRATOR)
+
+
+async def require_role(request: Request) -> None:
+    """Refuse a request whose role does not suffice for its route; for all routes."""
+    needed = role_needed(request.method, pattern_of(request.scope))
+    grant = cast("Grant | None", request.scope.get("sprag.grant"))
+    if needed is None or (grant is not None and grant.role.allows(needed)):
+        return
+    who = "The sender" if grant is None else grant.label
+    raise ApiError("not-allowed", f"{who} must have the role {needed.value} for this.")

@@ -1,0 +1,91 @@
+"""Server-sent events: what somebody looks at, each time that it has changed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import anyio
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response, StreamingResponse
+
+from sprag.service.http.problems import ApiError
+from sprag.service.json_text import to_bytes
+from sprag.service.storage.errors import StoreError
+from sprag.worker.limits import MAX_STREAMS
+
+if TYPE_CHECKING:
+    from starlette.types import Receive, Scope, Send
+
+    from sprag.service.http.context import Context
+
+MEDIA_TYPE: Final = "text/event-stream"
+#: Seconds between two looks at a study, and at a list, which costs more.
+LOOK_SECONDS = 0.5
+LIST_SECONDS = 2.0
+#: Seconds of silence after which a comment keeps the connection open.
+_SILENCE_SECONDS: Final = 15.0
+#: Milliseconds after which a browser reconnects.
+_RETRY: Final = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A look: ``mark`` differs after every change and is the id of the event; nothing follows the ``last`` one."""
+
+    mark: str
+    data: Any
+    last: bool = False
+
+
+async def event_stream(
+    context: Context, look: Callable[[], Seen], received: str | None, seconds: float | None = None
+) -> Response:
+    """The stream of ``look``, which runs in a thread, to a client that has ``received`` the event of that mark.
+
+    Raises ApiError where too many streams are open.
+    """
+    if context.streams.locked():
+        detail = f"{MAX_STREAMS} streams of events are open already."
+        raise ApiError("unavailable", detail, headers={"Retry-After": "10"})
+    await context.streams.acquire()
+    return _Stream(context, _events(context, look, received, LOOK_SECONDS if seconds is None else seconds))
+
+
+class _Stream(StreamingResponse):
+    """The stream, which releases its place however it ends."""
+
+    def __init__(self, context: Context, content: AsyncIterator[bytes]) -> None:
+        super().__init__(content, media_type=MEDIA_TYPE)
+        self._places = context.streams
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send it."""
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            self._places.release()
+
+
+async def _events(
+    context: Context, look: Callable[[], Seen], received: str | None, seconds: float
+) -> AsyncIterator[bytes]:
+    yield b"retry: %d\n\n" % _RETRY
+    spoke = time.monotonic()
+    while not context.ending.is_set():
+        try:
+            seen = await run_in_threadpool(look)
+        except StoreError:
+            return  # deleted, or a database problem, which a reconnecting client learns
+        if seen.mark != received:
+            received, spoke = seen.mark, time.monotonic()
+            kind = b"end" if seen.last else b"progress"
+            yield b"id: %s\nevent: %s\ndata: %s\n\n" % (seen.mark.encode(), kind, to_bytes(seen.data))
+        if seen.last:
+            return
+        if time.monotonic() - spoke > _SILENCE_SECONDS:
+            spoke = time.monotonic()
+            yield b":\n\n"
+        await anyio.sleep(seconds)

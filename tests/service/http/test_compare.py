@@ -1,0 +1,160 @@
+"""Studies compared on a page: inputs that differ, curves and their differences, files."""
+
+from __future__ import annotations
+
+import copy
+import csv
+import io
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sprag.service.answers.differing import MOST_COMPARED, unique_names
+from tests.service.conftest import Service
+from tests.service.timed_spec import SPEC
+
+X, Y = "shaft.load", "shaft.speed.mean"
+FREQUENCY = {"path": "excitation.frequency", "values": ["20 Hz", "22 Hz"]}
+
+
+def submit(service: Service, name: str, loads: list[float], mass: str = "0.5 kg") -> str:
+    """An ended study of two frequencies over loads."""
+    spec = copy.deepcopy(SPEC)
+    spec["base"]["pendulums"][0]["mass"] = mass
+    made = service.submit({**spec, "name": name, "axes": [{"path": X, "values": loads}, FREQUENCY]})
+    service.fill(made)
+    return made
+
+
+@pytest.fixture
+def three(service: Service) -> list[str]:
+    return [
+        submit(service, "first", [0.1, 0.2, 0.4]),
+        submit(service, "second & best", [0.1, 0.3, 0.4, 0.9], "0.6 kg"),
+        submit(service, "third", [0.1, 0.2, 0.4], "700 g"),
+    ]
+
+
+def rows(service: Service, studies: list[str], **query: Any) -> list[dict[str, str]]:
+    answer = service.http.get("/compare/curves.csv", params={"study": studies, "x": X, "y": Y, **query})
+    assert answer.status_code == 200, answer.text
+    assert "attachment" in answer.headers["content-disposition"]
+    return list(csv.DictReader(io.StringIO(answer.text)))
+
+
+def curve(service: Service, study_id: str, frequency: str) -> tuple[list[float], list[float]]:
+    """Points of one curve, NaN where there is no result."""
+    found = service.get(f"/studies/{study_id}/curves", x=X, y=Y, at=f"excitation.frequency={frequency}")["curves"][0]
+    return found["x"], [np.nan if y is None else y for y in found["y"][Y]]
+
+
+def test_the_page_lists_the_inputs_that_differ(service: Service, three: list[str]) -> None:
+    page = service.http.get("/compare", params={"study": three})
+    assert page.status_code == 200
+    table = page.text[page.text.index('id="inputs"') :]
+    mass = '<th scope="row" title="base.pendulums.0.mass">Mass, pendulum 0</th>'
+    assert f"{mass}<td>0.5 kg</td><td>0.6 kg</td><td>0.7 kg</td>" in table
+    assert '<th scope="row">axes.0.values</th><td>[0.1, 0.2, 0.4]</td>' in table
+    assert "base.shaft" not in table
+    assert "<th>first</th><th>second &amp; best</th><th>third</th>" in table
+    same = service.http.get("/compare", params={"study": [three[0], submit(service, "x", [0.1, 0.2, 0.4])]}).text
+    assert "The inputs of these studies are the same." in same
+
+
+def test_inputs_are_compared_in_the_units_of_the_reader(service: Service) -> None:
+    def stiff(rate: object) -> str:
+        spec = copy.deepcopy(SPEC)
+        spec["base"]["pendulums"][0]["spring_rate"] = rate
+        return service.submit({**spec, "name": f"rate {rate}"})
+
+    def table(*studies: str, units: str) -> str:
+        return str(service.http.get("/compare", params={"study": studies, "units": units}).text.partition("<main")[2])
+
+    soft, other, same = stiff("9 N/mm"), stiff(9500), stiff(9000)
+    caption = '<th scope="row" title="base.pendulums.0.spring_rate">Spring rate, pendulum 0</th>'
+    assert f"{caption}<td>9 N/mm</td><td>9.5 N/mm</td>" in table(soft, other, units="typed")
+    assert f"{caption}<td>9000 N/m</td><td>9500 N/m</td>" in table(soft, other, units="si")
+    assert "spring_rate" not in table(soft, same, units="si")
+
+
+def test_studies_without_a_common_axis_are_compared_by_their_inputs(service: Service, three: list[str]) -> None:
+    other = service.submit({**copy.deepcopy(SPEC), "axes": []})
+    page = service.http.get("/compare", params={"study": [three[0], other]})
+    assert page.status_code == 200
+    assert "no varying parameter in common" in page.text
+    assert '<th scope="row">axes.0.path</th>' in page.text
+
+
+def test_others_are_chosen_beside_those_that_are_compared(service: Service, three: list[str]) -> None:
+    page = service.http.get("/compare", params={"study": three[:2]}).text
+    assert f'href="/compare?choose=1&amp;study={three[0]}&amp;study={three[1]}"' in page
+    ticked = [f'value="{study}" checked' for study in three]
+    page = service.http.get("/compare", params={"study": [*three[:2], "st_nothing"], "choose": 1}).text
+    assert [tick in page for tick in ticked] == [True, True, False]
+    assert page.index(ticked[0]) < page.index(ticked[1]) < page.index(f'value="{three[2]}"')
+    # A search keeps what is ticked.
+    page = service.http.get("/compare", params={"study": three[2], "choose": 1, "search": "best"}).text
+    assert page.index(ticked[2]) < page.index(f'value="{three[1]}"')
+    assert three[0] not in page
+
+
+def test_the_table_has_every_point_of_every_study(service: Service, three: list[str]) -> None:
+    found = rows(service, three, by="excitation.frequency")
+    assert [row["study"] for row in found] == ["first"] * 6 + ["second & best"] * 8 + ["third"] * 6
+    expected = [y for study in three for text in ("20 Hz", "22 Hz") for y in curve(service, study, text)[1]]
+    got = [float(row[Y]) if row[Y] else np.nan for row in found]
+    np.testing.assert_array_equal(got, expected)
+
+
+def test_differences_are_those_of_numpy_at_known_and_interpolated_places(service: Service, three: list[str]) -> None:
+    at = {"at": "excitation.frequency=22 Hz"}
+    found = rows(service, three[:2], less=three[0], **at)
+    assert {row["study"] for row in found} == {"second & best − first"}
+    x, y = curve(service, three[0], "22 Hz")
+    other_x, other_y = curve(service, three[1], "22 Hz")
+    expected = np.array(other_y) - np.interp(other_x, x, y, left=np.nan, right=np.nan)
+    got = np.array([float(row[Y]) if row[Y] else np.nan for row in found])
+    assert np.isnan(got[-1])  # 0.9 N*m is beyond the reference
+    np.testing.assert_allclose(got, expected, rtol=1e-12)
+    family = rows(service, [three[0], three[2]], by="excitation.frequency", less=three[2])
+    assert [float(row["excitation.frequency"]) for row in family] == [20.0] * 3 + [22.0] * 3
+    first = [y for text in ("20 Hz", "22 Hz") for y in curve(service, three[0], text)[1]]
+    third = [y for text in ("20 Hz", "22 Hz") for y in curve(service, three[2], text)[1]]
+    got = np.array([float(row[Y]) if row[Y] else np.nan for row in family])
+    np.testing.assert_allclose(got, np.array(first) - np.array(third), rtol=1e-12)
+
+
+def test_pages_figures_and_pictures_show_differences(service: Service, three: list[str]) -> None:
+    query = {"study": three, "x": X, "y": Y, "less": three[0]}
+    text = service.http.get("/compare", params=query).text
+    assert "Differences from first, whose curves are interpolated" in text
+    assert f'<option value="{three[0]}" selected>differences from first' in text
+    names = {
+        line["name"] for line in service.http.get("/compare/figure", params=query).json()["data"] if "name" in line
+    }
+    assert names == {"second &amp; best − first", "third − first"}
+    for form, start in (("svg", b"<?xml"), ("png", b"\x89PNG"), ("pdf", b"%PDF")):
+        answer = service.http.get(f"/compare/picture.{form}", params=query)
+        assert (answer.status_code, answer.content[: len(start)]) == (200, start), form
+
+
+def test_what_cannot_be_compared_is_refused(service: Service, three: list[str]) -> None:
+    for query in ({"study": three, "less": "st_nothing"}, {"study": three[:1], "less": three[0]}):
+        page = service.http.get("/compare", params=query)
+        assert page.status_code == 422
+        assert "is none of the compared studies" in page.text
+    many = [submit(service, f"number {count}", [0.1, 0.2]) for count in range(MOST_COMPARED + 1)]
+    assert service.http.get("/compare", params={"study": many[:MOST_COMPARED]}).status_code == 200
+    page = service.http.get("/compare", params={"study": many})
+    assert page.status_code == 422
+    assert "at most 10" in page.text
+    assert service.http.get("/compare/picture.gif", params={"study": three}).status_code == 422
+    for part in ("figure", "curves.csv", "picture.svg"):
+        (fault,) = service.http.get(f"/compare/{part}").json()["errors"]
+        assert (fault["parameter"], fault["code"], fault["allowed"]) == ("study", "required", "1 to 10 ids of studies")
+    assert service.http.get("/compare/curves.csv", params={"study": [*three, "st_nothing"]}).status_code == 404
+
+
+def test_names_of_studies_tell_them_apart() -> None:
+    assert unique_names(["a", "b", "a", ""], ["st_1", "st_2", "st_3", "st_4"]) == ["a (st_1)", "b", "a (st_3)", "st_4"]
