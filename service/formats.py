@@ -15,6 +15,11 @@ MEDIA_TYPES: Final[dict[Format, str]] = {
     "xlsx": "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet",
     "netcdf": "application/x-netcdf",
 }
+#: Heads of the columns of CSV: names, with the unit where it is not SI, or names with every unit.
+Header = Literal["names", "units"]
+HEADERS: Final[tuple[Header, ...]] = get_args(Header)
+#: Attribute of the variables of a NetCDF file with the name that they have everywhere else, such as shaft.speed.mean.
+NAME_ATTRIBUTE: Final = "sprag_name"
 #: Formats of a study's report.
 ReportFormat = Literal["html", "pdf"]
 REPORT_FORMATS: Final[tuple[ReportFormat, ...]] = get_args(ReportFormat)

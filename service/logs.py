@@ -1,4 +1,7 @@
-"""Logs: one line per event, as plain text for people or as JSON for machines, with the ids of request and studies."""
+"""Logs: one line per event, as plain text for people or as JSON for machines.
+
+JSON has the ids of request, token and studies, the user and the address of the client, each where it is known.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,8 @@ LogFormat = Literal["text", "json"]
 
 #: The id of the current request; "" outside a request.
 REQUEST_ID: ContextVar[str] = ContextVar("request_id", default="")
+#: Who sent the current request: `address`, then `token` (its id) and `user`, as far as they are known (`note_caller`).
+CALLER: ContextVar[dict[str, str] | None] = ContextVar("caller", default=None)
 #: The logger of requests.
 REQUESTS: Final = logging.getLogger("sprag.requests")
 STUDY_ID: Final = re.compile(r"\bst_[0-9a-f]{16}\b")
@@ -29,6 +34,12 @@ def configure(form: LogFormat, *, requests: bool) -> None:
     logging.basicConfig(level=logging.WARNING, handlers=[handler])
     logging.getLogger("sprag").setLevel(logging.INFO)
     REQUESTS.setLevel(logging.INFO if requests else logging.WARNING)
+
+
+def note_caller(**found: str | None) -> None:
+    """Add to what the lines of the current request say of its sender; None adds nothing."""
+    if (caller := CALLER.get()) is not None:
+        caller.update({name: value for name, value in found.items() if value})
 
 
 def _time(record: logging.LogRecord) -> str:
@@ -47,7 +58,9 @@ class TextFormatter(logging.Formatter):
 
 
 class JsonFormatter(logging.Formatter):
-    """A record as one JSON object on one line: time, level, logger, message, and where known request and studies."""
+    """A record as one JSON object on one line: time, level, logger, message, and where known request, address, token,
+    user and studies.
+    """
 
     def format(self, record: logging.LogRecord) -> str:
         """The line, including fields given as ``extra={"fields": {...}}``."""
@@ -63,6 +76,7 @@ class JsonFormatter(logging.Formatter):
             line |= fields
         if request := REQUEST_ID.get():
             line["request"] = request
+        line |= CALLER.get() or {}
         noted = line.pop("studies", [])
         found = [*STUDY_ID.findall(f"{message} {line.get('path', '')}"), *(noted if isinstance(noted, list) else [])]
         if found:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from ipaddress import IPv4Network, IPv6Network
 from pathlib import Path
 from typing import Annotated, Any, Literal
-from zoneinfo import available_timezones
 
 import platformdirs
 from pydantic import Field, SecretStr, field_validator
@@ -25,7 +24,13 @@ from pydantic_settings import (
     SettingsConfigDict,
 )
 
+from sprag.service.delivery import Delivery, DeliverySettings
+from sprag.service.zones import zones
+
 ENV_PREFIX = "SPRAG_"
+#: What precedes the password of an address, and the password: before the last "@", or among the options.
+_USER = re.compile(r"(://[^:@/]*:).*@")
+_OPTION = re.compile(r"([?&]password=)[^&]*")
 FILE_VARIABLE = "SPRAG_SETTINGS"
 MIN_TOKEN_LENGTH = 16
 LOOPBACK_HOSTS = ("localhost", "127.0.0.1", "[::1]")
@@ -39,10 +44,12 @@ class SettingsFileError(Exception):
     """The file of settings cannot be read; the message is one sentence."""
 
 
-class Settings(BaseSettings):
+class Settings(DeliverySettings):
     """Every setting with its default and its help; see `table`."""
 
-    model_config = SettingsConfigDict(env_prefix=ENV_PREFIX, env_ignore_empty=True, frozen=True, extra="ignore")
+    model_config = SettingsConfigDict(
+        env_prefix=ENV_PREFIX, env_ignore_empty=True, frozen=True, extra="ignore", hide_input_in_errors=True
+    )
 
     database: str = Field(
         default="",
@@ -56,6 +63,14 @@ class Settings(BaseSettings):
         description="address the service listens on; one that other machines can reach needs a token",
     )
     port: int = Field(default=8000, ge=0, le=65535, description="port the service listens on; 0: any free one")
+    tls_certificate: str = Field(
+        default="",
+        description="PEM file with the service's certificate and those of its issuers, for TLS without a proxy; empty: "
+        "plain HTTP",
+    )
+    tls_key: str = Field(
+        default="", description="PEM file with the key of `SPRAG_TLS_CERTIFICATE`; empty: it is in the same file"
+    )
     token: SecretStr | None = Field(
         default=None,
         description=(
@@ -67,9 +82,41 @@ class Settings(BaseSettings):
         default=(),
         description="host names, separated by commas, that clients may use besides localhost and the host",
     )
+    url_prefix: str = Field(
+        default="",
+        max_length=200,
+        pattern="^(/[A-Za-z0-9_-]+)*$",
+        description="path at which a proxy serves the service, such as `/sprag`; empty: the whole host",
+    )
     trusted_proxies: Annotated[tuple[IPv4Network | IPv6Network, ...], NoDecode] = Field(
         default=(IPv4Network("127.0.0.1/32"), IPv6Network("::1/128")),
-        description=("addresses or networks, separated by commas, of proxies whose `X-Forwarded-For` is trusted"),
+        description=(
+            "addresses or networks, separated by commas, of proxies whose `X-Forwarded-For` is trusted, and the "
+            "header of `SPRAG_USER_HEADER`"
+        ),
+    )
+    user_header: str = Field(
+        default="",
+        pattern="^[A-Za-z0-9-]{0,64}$",
+        description="header in which a trusted proxy names the user that it has logged in, such as `X-Forwarded-User`; "
+        "empty: none",
+    )
+    user_role: Literal["", "viewer", "designer", "administrator"] = Field(
+        default="",
+        description="role of users whom the proxy names and `sprag user` does not list; empty: they are refused",
+    )
+    user_cases: int = Field(
+        default=0, ge=0, le=2**63 - 1, description="cases of one user that may wait at the same time; 0: no limit"
+    )
+    user_storage: int = Field(
+        default=0, ge=0, le=2**43 - 1, description="MiB that the results of one user may take, estimated; 0: no limit"
+    )
+    user_checks: int = Field(
+        default=0,
+        ge=0,
+        le=64,
+        description="checks of specs, fits and pictures of one user that run at the same time; 0: all but one of "
+        "`SPRAG_CHECK_PROCESSES`",
     )
     processes: int = Field(default=0, ge=0, le=1024, description="processes of the pool; 0: one for each core")
     executor: str = Field(
@@ -132,6 +179,19 @@ class Settings(BaseSettings):
     keep_days: int = Field(
         default=0, ge=0, le=36_500, description="days after which a study that has ended is deleted; 0: never"
     )
+    restore_days: int = Field(
+        default=7,
+        ge=0,
+        le=36_500,
+        description="days for which a study that somebody deleted can be restored, and takes room on the disk; 0: none",
+    )
+    report_office: str = Field(default="", description="name of the office in the title block of reports")
+    report_folder: str = Field(
+        default="",
+        description="folder with the office's own `report.typ`, `report.html`, `logo.svg` or `logo.png` and fonts for "
+        "reports; empty: the templates of the program",
+    )
+    audit_days: int = Field(default=0, ge=0, le=36_500, description="days for which the audit log is kept; 0: for ever")
     nightly_at: str = Field(default="02:30", description="time of day for the backup and for deleting old studies")
     zone: str = Field(default="UTC", description="time zone of `SPRAG_NIGHTLY_AT`, such as `Europe/Berlin`")
 
@@ -145,7 +205,7 @@ class Settings(BaseSettings):
         file_secret_settings: PydanticBaseSettingsSource,  # noqa: ARG003
     ) -> tuple[PydanticBaseSettingsSource, ...]:
         """Precedence: options, environment, the file named by SPRAG_SETTINGS."""
-        return init_settings, env_settings, InitSettingsSource(settings_cls, _read_file(settings_cls))
+        return init_settings, env_settings, InitSettingsSource(settings_cls, read_file(settings_cls))
 
     @field_validator("nightly_at")
     @classmethod
@@ -157,7 +217,7 @@ class Settings(BaseSettings):
     @field_validator("zone")
     @classmethod
     def _known_zone(cls, value: str) -> str:
-        if value not in available_timezones():
+        if value not in zones():
             raise ValueError("the name of a time zone is needed, such as Europe/Berlin")
         return value
 
@@ -216,19 +276,31 @@ class Settings(BaseSettings):
         own = f"[{host}]" if ":" in host and not host.startswith("[") else host
         return frozenset({*LOOPBACK_HOSTS, own, *(name.lower() for name in self.allowed_hosts)})
 
+    def address(self, port: int) -> str:
+        """The address at which the service answers on ``port``, with its prefix and without a final slash."""
+        host = self.host.strip("[]")
+        scheme = "https" if self.tls_certificate else "http"
+        return f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}{self.url_prefix}"
+
+    @property
+    def reports(self) -> Delivery:
+        """How reports leave the service; without a public address their links have the host and port of it."""
+        return self.delivery(self.address(self.port), self.url_prefix)
+
     def require_safe(self, *, stored: bool = False) -> None:
-        """Raise `UnsafeSettingsError` when another machine could reach the service and there is no token.
+        """Raise `UnsafeSettingsError` when another machine could reach the service and there is no token
+        and no proxy logs users in (SPRAG_USER_HEADER).
 
         ``stored`` states whether the database has one.
         """
-        if not self.loopback and self.token is None and not stored:
+        if not self.loopback and self.token is None and not self.user_header and not stored:
             raise UnsafeSettingsError(
                 f"The host {self.host} can be reached from other machines, so the service needs a token: "
                 f"`sprag token create` makes one, or set {ENV_PREFIX}TOKEN."
             )
 
 
-def _read_file(settings_cls: type[BaseSettings]) -> dict[str, Any]:
+def read_file(settings_cls: type[BaseSettings]) -> dict[str, Any]:
     """The settings in the file named by the environment; raises SettingsFileError."""
     name = os.environ.get(FILE_VARIABLE, "")
     if not name:
@@ -245,6 +317,12 @@ def _read_file(settings_cls: type[BaseSettings]) -> dict[str, Any]:
         known = ", ".join(settings_cls.model_fields)
         raise SettingsFileError(f"The settings {name} have an unknown field {unknown[0]!r}; known are: {known}.")
     return found
+
+
+def is_secret(name: str) -> bool:
+    """Whether the value of a setting must not be shown."""
+    field = Settings.model_fields.get(name)
+    return field is not None and "SecretStr" in str(field.annotation)
 
 
 def available_cores() -> int:
@@ -272,12 +350,15 @@ class SettingRow:
 def table() -> Iterator[SettingRow]:
     """The table of settings, one row each, in order of declaration."""
     for name, field in Settings.model_fields.items():
-        yield SettingRow(f"{ENV_PREFIX}{name.upper()}", _shown(field.default), field.description or "")
+        yield SettingRow(f"{ENV_PREFIX}{name.upper()}", shown(field.default), field.description or "")
 
 
-def _shown(default: Any) -> str:
+def shown(default: Any) -> str:
+    """A value as text, without the password of an address."""
     if default is None or default in ("", ()):
         return ""
     if isinstance(default, tuple):
         return ",".join(map(str, default))
+    if isinstance(default, str):
+        return _OPTION.sub(r"\1***", _USER.sub(r"\1***@", default))
     return f"{default:g}" if isinstance(default, float) else str(default)

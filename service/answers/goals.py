@@ -88,6 +88,12 @@ class FrontReport(TypedDict):
     at: Annotated[list[dict[str, float]], Doc("the operating points, SI; a single empty one for that of the base")]
     over: Annotated[str, Doc("what counts of several operating points: worst or mean")]
     generations: Annotated[int, Doc("generations at most")]
-    counts: Annotated[dict[str, int], Doc("all designs: known, pending, feasible, failed, exact, front (of rank 0)")]
+    counts: Annotated[
+        dict[str, int],
+        Doc(
+            "number of designs: known, feasible, failed, exact and front leave out those for derivatives; "
+            "pending includes them"
+        ),
+    ]
     designs: Annotated[list[Design], Doc("at most `limit` of the known ones")]
     history: list[Generation]

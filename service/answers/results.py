@@ -36,6 +36,7 @@ class RegimeRow(TypedDict):
 class CaseDetail(Case):
     """One case with the meaning of its ending."""
 
+    units: Annotated[dict[str, str], Doc('SI unit of every parameter and number among the results; "1" for none')]
     ending_meaning: str
     flag_meanings: dict[str, str]
     regimes: Annotated[
@@ -56,9 +57,10 @@ class BasinData(TypedDict):
 
 
 class CasePage(TypedDict):
-    """A page of finished cases, in order of their numbers."""
+    """A page of finished cases, in the order that was asked for."""
 
     cases: list[Case]
+    units: Annotated[dict[str, str], Doc('SI unit of every parameter and number among the results; "1" for none')]
     next_page_token: Annotated[str | None, Doc("token of the next page; null on the last")]
 
 

@@ -9,16 +9,40 @@ from typing_extensions import TypedDict
 from sprag.service.answers import Doc, Moment
 
 
+class RunOutcome(TypedDict):
+    """What became of a due time of a schedule."""
+
+    result: Annotated[
+        str,
+        Doc(
+            "of a study: queued, running, held (paused), finished, failed, cancelled, deadline (held by it for good), "
+            "deleted; without one: waiting (about to be submitted), refused, skipped, missed"
+        ),
+    ]
+    trouble: Annotated[bool, Doc("it did not end as planned, some cases failed, or due times before it were not run")]
+    sentence: str
+    cases: int
+    done: Annotated[int, Doc("cases that have an ending")]
+    ok: int
+    endings: Annotated[dict[str, int], Doc("cases by ending other than ok, once the run is over")]
+    flags: Annotated[dict[str, int], Doc("cases by flag, once the run is over")]
+    coverage: Annotated[str | None, Doc("complete part of a study that is run coarse to fine, once the run is over")]
+    ended_at: Moment | None
+    seconds: Annotated[float | None, Doc("from the first chunk of the study to its end, in s")]
+
+
 class ScheduleRun(TypedDict):
     """A due time of a schedule and its outcome."""
 
     due: Moment
-    state: Annotated[str, Doc("taken: about to be submitted; submitted; refused, see `problem`")]
+    due_local: Annotated[str, Doc("the same on the wall clock of the schedule's zone, with its offset")]
+    state: Annotated[str, Doc("taken: about to be submitted; submitted; refused, skipped or missed, see `problem`")]
     missed: Annotated[int, Doc("earlier due times that were missed; they are not run")]
     begun_at: Moment
     study: Annotated[str | None, Doc("id of its study; null where there is none, or it was deleted")]
     address: Annotated[str | None, Doc("address of the study")]
     problem: Annotated[str | None, Doc("why no study was submitted")]
+    outcome: RunOutcome
 
 
 class ScheduleSummary(TypedDict):
@@ -33,10 +57,19 @@ class ScheduleSummary(TypedDict):
     priority: int
     fresh: bool
     finish_by: Annotated[str | None, Doc("deadline at which a study is held: a time of day, or a duration")]
+    overlap: Annotated[str, Doc("while an earlier study has not ended: queue, skip or replace")]
+    catch_up: Annotated[str, Doc("due times that were missed: the latest is run, all, or none")]
+    misfire_grace: Annotated[str | None, Doc("longest delay with which a due time is still run; null: any")]
     enabled: bool
+    paused_until: Annotated[Moment | None, Doc("it is not due before")]
+    report_email: Annotated[list[str], Doc("addresses to which its runs are reported")]
+    report_webhook: Annotated[str | None, Doc("address of a webhook to which its runs are reported")]
+    report_when: Annotated[str, Doc("always; trouble: only runs that need attention")]
     created_at: Moment
     next_due: Annotated[Moment | None, Doc("null when it is disabled or over")]
+    next_due_local: Annotated[str | None, Doc("the same on the wall clock of `zone`, with its offset")]
     last_run: ScheduleRun | None
+    owner: Annotated[str | None, Doc("user to whom it and its studies belong; null: no owner")]
     links: dict[str, str]
 
 
@@ -51,3 +84,52 @@ class ScheduleList(TypedDict):
     """All schedules, newest first."""
 
     schedules: list[ScheduleSummary]
+
+
+class SentReport(TypedDict):
+    """A report about a due time."""
+
+    id: Annotated[str, Doc("in the Message-ID of a mail, and the webhook-id of a webhook")]
+    kind: Annotated[str, Doc("run: about a run that is over; overdue: about a due time at which nothing ran")]
+    channel: Annotated[str, Doc("email or webhook")]
+    target: Annotated[str, Doc("mail address, or origin of the webhook")]
+    state: Annotated[str, Doc("waiting, sent or failed")]
+    attempts: int
+    created_at: Moment
+    ended_at: Annotated[Moment | None, Doc("when it was sent, or given up")]
+    problem: Annotated[str | None, Doc("why the last attempt failed")]
+
+
+class NightRun(TypedDict):
+    """A due time of the last hours, and what became of it."""
+
+    schedule: Annotated[str, Doc("id of the schedule, which may have been deleted since")]
+    name: str
+    zone: str
+    due: Moment
+    due_local: Annotated[str, Doc("the same on the wall clock of `zone`, with its offset")]
+    study: Annotated[str | None, Doc("id of its study; null where there is none, or it was deleted")]
+    outcome: RunOutcome
+    reports: list[SentReport]
+
+
+class LateRun(TypedDict):
+    """A due time at which nothing has run although it should."""
+
+    schedule: Annotated[str, Doc("id of the schedule")]
+    name: str
+    zone: str
+    due: Moment
+    due_local: Annotated[str, Doc("the same on the wall clock of `zone`, with its offset")]
+    study: Annotated[str | None, Doc("id of its study, which should run; null where there is none")]
+    sentence: str
+
+
+class Night(TypedDict):
+    """What schedules did in the last hours."""
+
+    since: Moment
+    until: Moment
+    trouble: Annotated[int, Doc("number of due times that need attention")]
+    late: Annotated[list[LateRun], Doc("due times at which nothing has run although it should")]
+    runs: Annotated[list[NightRun], Doc("first those that need attention, each group latest first")]

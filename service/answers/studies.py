@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from typing import Annotated, Any, Literal
 
 from typing_extensions import TypedDict
 
 from sprag.service.answers import Doc, Moment, Number
+
+
+class StudyOrder(StrEnum):
+    """Orders of a list of studies; those that are equal in it are newest first."""
+
+    NEWEST = "newest"
+    NAME = "name"
+    STATE = "state"
+    CASES = "cases"
+    ENDED = "ended"
 
 
 class Interval(TypedDict):
@@ -93,6 +104,11 @@ class _Study(TypedDict):
     finish_by: Annotated[Moment | None, Doc("when the study is held, finished or not")]
     time_over: Annotated[bool, Doc("whether it is held because `finish_by` has passed")]
     engine_version: str
+    owner: Annotated[str | None, Doc("user to whom it belongs; null: no owner, so every designer can change it")]
+    notes: Annotated[str, Doc("what people write about it, plain text")]
+    tags: Annotated[list[str], Doc("its tags, in the order in which they came")]
+    archived_at: Annotated[Moment | None, Doc("since when it is kept out of the usual list")]
+    purge_at: Annotated[Moment | None, Doc("until when it can be restored, if it is deleted")]
     links: Annotated[dict[str, str], Doc("URLs of the study's resources")]
 
 
@@ -112,6 +128,25 @@ class AxisInfo(TypedDict):
     last: Annotated[float, Doc("the last value, SI; of a study that chooses its own cases, the largest")]
 
 
+class Origin(TypedDict):
+    """Finished chunks of a study that the same hosts computed, under one fingerprint."""
+
+    host: Annotated[
+        str | None,
+        Doc("also of rows that were copied from other studies; several with commas; null where not recorded"),
+    ]
+    fingerprint: Annotated[
+        str | None,
+        Doc("SHA-256 of code, libraries and processor: equal ones give equal bits; null where not recorded"),
+    ]
+    chunks: int
+    cases: Annotated[int, Doc("cases of these chunks, including those copied from other studies of the fingerprint")]
+    differs: Annotated[
+        str | None,
+        Doc("how the fingerprint differs from the first one of the study; null where it does not, or is not known"),
+    ]
+
+
 class StudyDetail(_Study):
     """A study with its spec and its progress."""
 
@@ -122,11 +157,12 @@ class StudyDetail(_Study):
     physics_hash: Annotated[str, Doc("SHA-256 of everything that determines the results: equal for equal studies")]
     regimes: Annotated[dict[str, int], Doc("number of cases of each regime; empty where cases have none")]
     flags: Annotated[dict[str, int], Doc("number of cases that have each flag; only flags that some case has")]
+    computed_by: Annotated[list[Origin], Doc("where the rows come from, most cases first")]
     spec: Annotated[dict[str, Any], Doc("the spec as it was submitted")]
 
 
 class StudyPage(TypedDict):
-    """A page of studies, newest first."""
+    """A page of studies in the order that was asked for."""
 
     studies: list[StudySummary]
     next_page_token: Annotated[str | None, Doc("token of the next page; null on the last")]

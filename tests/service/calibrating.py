@@ -75,7 +75,7 @@ def calibration(service: Service, rounds: int = 999, *, kills: bool = False, **f
     With ``kills`` the process ends after every third round, with a chunk that it claimed and did not return.
     """
     store = service.store
-    store.chunking = Chunking(100_000, 1, 60.0)  # one transaction a round
+    store.base_chunking = Chunking(100_000, 1, 60.0)  # one transaction a round
     study_id = service.submit(spec_of(**fields))
     number, epoch, planner = store.get_study(study_id).number, store.take_over("test"), Rounds(store)
     for turn in range(rounds):

@@ -18,6 +18,7 @@ from fastapi import FastAPI
 
 from sprag.service.client.plain import ServiceClient
 from sprag.service.http.app import chunking, create_app
+from sprag.service.languages.elsewhere import speak
 from sprag.service.settings import Settings
 from sprag.service.storage.store import Store
 from sprag.worker import models
@@ -46,7 +47,7 @@ class PortalTransport(httpx.BaseTransport):
 
 
 class InThread:
-    """A computer that runs functions where it is called; what it ran is remembered."""
+    """A computer that runs functions where it is called; what it ran is remembered, without the language."""
 
     def __init__(self) -> None:
         self.calls: list[tuple[Any, ...]] = []
@@ -55,8 +56,9 @@ class InThread:
 
     async def run(self, function: Any, *args: Any, **kwargs: Any) -> Any:
         """The value of the function, or of ``answer`` in its place."""
-        self.calls.append((function, *args))
-        return (self.answer or function)(*args, **kwargs)
+        call = args[1:] if function is speak else (function, *args)
+        self.calls.append(call)
+        return function(*args, **kwargs) if self.answer is None else self.answer(*call[1:], **kwargs)
 
     async def load(self, shape: KernelShape) -> None:
         """Note the kernel: functions load what they need."""

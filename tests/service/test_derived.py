@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -40,11 +41,11 @@ def test_a_derived_value_is_shown_as_such(filled: tuple[Service, str]) -> None:
     own = f"/studies/{study_id}"
     for page in (own, f"{own}/cases/2"):
         text = service.http.get(page).text
-        assert f'{INERTIA} <small class="soft">(derived)</small>' in text
+        assert re.search(rf'title="{INERTIA}[^"]*">Inertia, pendulum 0 <small class="soft">\(derived\)</small>', text)
         assert STORED in text
     assert '<td class="num">derived</td>' in service.http.get(own).text
     rows = service.http.get(f"{own}/cases", params={"sort": INERTIA}).text
-    assert "inertia, derived" in rows
+    assert "Inertia, pendulum 0, derived" in rows
     # The first two cases have the larger mass, and therefore the larger inertia.
     assert [int(part.partition('"')[0]) for part in rows.split(f'<td class="num"><a href="{own}/cases/')[1:]] == [
         2,
@@ -53,7 +54,7 @@ def test_a_derived_value_is_shown_as_such(filled: tuple[Service, str]) -> None:
         1,
     ]
     report = service.http.get(f"/api/v1{own}/report", params={"format": "html"}).text
-    assert f'<td>{INERTIA}</td><td class="number">{STORED}</td>' in report
+    assert f'<td>Inertia, pendulum 0</td><td class="number">{STORED}</td>' in report
     assert "<td>derived</td>" in report
     assert service.http.get(f"/api/v1{own}/report", params={"format": "pdf"}).status_code == 200
     assert service.http.get(f"/new?clone={study_id}").text.count(f'value="= {FORMULA}"') == 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import html
 import io
 import json
 import re
@@ -18,11 +19,14 @@ import pytest
 from anyio.from_thread import BlockingPortal
 
 from sprag.service.cli import explore
-from sprag.service.client import AsyncClient, Client
+from sprag.service.client import AsyncClient, Client, RefusedError
 from sprag.service.http.web import explore as explore_pages
+from sprag.service.http.web.form.spec import spec_of
 from sprag.service.jobs.explore import Columns
-from tests.conftest import Finished
+from sprag.service.results.wording import number
+from tests.conftest import ROOT, Finished
 from tests.service.conftest import API, PortalTransport, Service
+from tests.service.http.web.controls import Controls
 
 AXES = [
     {"path": "excitation.frequency", "linspace": ["20 Hz", "30 Hz", 6]},
@@ -158,7 +162,9 @@ def test_the_page_has_its_choice_in_the_address(filled: tuple[Service, str]) -> 
     shown = [int(case) for case in re.findall(rf'<td class="num"><a href="/studies/{study_id}/cases/(\d+)">', text)]
     assert shown == best(service, study_id, "efficiency", 0.3)[:4]
     assert 'name="max:shaft.load" value="300 N*mm"' in text
-    assert text.count('<svg viewBox="0 0 192 48"') == len(service.get(f"/studies/{study_id}/explore")["quantities"])
+    quantities = service.get(f"/studies/{study_id}/explore")["quantities"]
+    assert text.count('<g class="dimension"') == len(quantities) + 1
+    assert re.search(r'data-name="ending".*?class="end">ok</text>', text, re.DOTALL)
     (figure,) = re.findall(r'data-figure="([^"]+)"', text)
     drawn = service.http.get(figure.replace("&amp;", "&")).json()
     assert [trace["name"] for trace in drawn["data"]][-1] == "first in the table"
@@ -170,10 +176,89 @@ def test_the_page_has_its_choice_in_the_address(filled: tuple[Service, str]) -> 
     assert len(rows) == 18
 
 
-@pytest.mark.parametrize(("query", "parameter"), [("limit=-1", "limit"), ("min:efficiency=3 mm", "where")])
+@pytest.mark.parametrize(
+    ("query", "parameter"), [("limit=-1", "limit"), ("limit=1e999", "limit"), ("min:efficiency=3 mm", "where")]
+)
 def test_the_page_says_what_is_wrong_and_keeps_it(filled: tuple[Service, str], query: str, parameter: str) -> None:
     service, study_id = filled
     page = service.http.get(f"/studies/{study_id}/explore?{query}")
     assert page.status_code == 422
     assert f"<code>{parameter}</code>" in page.text
     assert "of 30 finished cases" in page.text
+
+
+def selection_spec_of(service: Service, study_id: str, query: str) -> dict[str, Any]:
+    """The spec in the form of a new study of a selection."""
+    text = service.http.get(f"/studies/{study_id}/explore/new?{query}").text
+    return spec_of(Controls(text).values)[0]
+
+
+def test_a_selection_becomes_a_new_study_of_its_cases(service: Service, spec: dict[str, Any]) -> None:
+    tied = {"path": ["excitation.amplitude_x", "excitation.amplitude_y"], "values": ["1 mm", "2 mm"]}
+    study_id = service.submit({**spec, "axes": [*AXES, tied]})
+    service.fill(study_id)
+    query = "max:shaft.load=200 N*mm&sort=-efficiency&limit=1"
+    assert f'href="/studies/{study_id}/explore/new?where=' in service.http.get(
+        f"/studies/{study_id}/explore?{query}").text  # fmt: skip
+    wanted = service.get(f"/studies/{study_id}/explore", where="shaft.load <= 0.2", sort="-efficiency", limit=1000)
+    made = service.submit(selection_spec_of(service, study_id, query))
+    study = service.store.study(made)
+    assert study.cases == wanted["selected"] == 36
+    assert [study.case_parameters(case) for case in range(36)] == [row["parameters"] for row in wanted["cases"]]
+    assert study.base.items() >= {k: v for k, v in service.store.study(study_id).base.items()
+                                  if k not in study.column_paths}.items()  # fmt: skip
+    refused = service.http.get(f"/studies/{study_id}/explore/new?min:shaft.load=7")
+    assert refused.status_code == 422
+    assert "no case is selected" in refused.text
+
+
+def test_so_it_does_by_the_client_as_the_documentation_shows(
+    filled: tuple[Service, str], portal: BlockingPortal
+) -> None:
+    service, study_id = filled
+    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    starts = ("found = study.explore", "study.select", "study.side_by_side")
+    ask, select, beside = (re.findall(f"`({re.escape(start)}[^`]*)`", page)[0] for start in starts)
+    with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
+        study = client.study(study_id)
+        names: dict[str, Any] = {"study": study}
+        exec("\n".join((ask, f"made = {select}", f"beside = {beside}")), names)
+        assert study.select(limit=10, key="once").id == study.select(limit=10, key="once").id
+        with pytest.raises(RefusedError, match="no case is selected"):
+            study.select("shaft.load >= 7")
+    made = service.store.study(names["made"].id)
+    wanted = [case["parameters"] for case in names["found"]["cases"]]
+    assert [made.case_parameters(case) for case in range(made.cases)] == wanted
+    assert len(wanted) == 10
+    first, other = (service.get(f"/studies/{study_id}/cases/{case}") for case in (3, 7))
+    table = names["beside"]
+    assert table.columns.tolist() == ["unit", 3, 7]
+    assert table.loc["efficiency"].tolist() == ["1", first["results"]["efficiency"], other["results"]["efficiency"]]
+    assert table.loc["shaft.load"].tolist() == ["N*m", *(row["parameters"]["shaft.load"] for row in (first, other))]
+    assert table.loc["ending", [3, 7]].tolist() == [first["ending"], other["ending"]]
+
+
+def test_cases_side_by_side(filled: tuple[Service, str]) -> None:
+    service, study_id = filled
+    page = service.http.get(f"/studies/{study_id}/explore/compare?case=3&case=7&case=3")
+    assert page.status_code == 200
+    assert re.findall(r'<th class="num"><a href="/studies/[^"]*/cases/(\d+)">', page.text) == ["3", "7"]
+    first, other = (service.get(f"/studies/{study_id}/cases/{case}") for case in (3, 7))
+    change = 100.0 * (other["results"]["efficiency"] - first["results"]["efficiency"]) / first["results"]["efficiency"]
+    assert f"{'+' if change > 0 else ''}{number(change, 3)} %" in page.text
+    assert "No finished case is chosen" in service.http.get(f"/studies/{study_id}/explore/compare").text
+    for wrong in ("case=30", "case=x", "case=1e999", "case=nan", "&".join(f"case={case}" for case in range(11))):
+        assert service.http.get(f"/studies/{study_id}/explore/compare?{wrong}").status_code == 422
+    waiting = service.submit({"axes": AXES} | {k: v for k, v in service.store.spec(study_id).items() if k != "axes"})
+    assert "Not finished: 2." in service.http.get(f"/studies/{waiting}/explore/compare?case=2").text
+
+
+def test_an_empty_database_leads_to_a_study_with_one_button(service: Service) -> None:
+    page = service.http.get("/").text
+    fields = re.findall(r'<input type="hidden" name="([^"]+)" value="([^"]*)">', page)
+    sent = {name: html.unescape(value) for name, value in fields} | {"do": "submit"}
+    answer = service.http.post("/new", data=sent, follow_redirects=False)
+    assert answer.status_code == 303
+    made = answer.headers["location"].removeprefix("/studies/")
+    assert service.get(f"/studies/{made}")["cases"] == 512
+    assert "Run an example" not in service.http.get("/").text

@@ -116,7 +116,7 @@ def test_the_page_says_the_answers_first(filled: tuple[Service, str]) -> None:
     assert text.index('class="tiles"') < text.index("data-figure") < text.index("How cases ended")
     titles = re.findall(r'class="tile"><dt>([^<]+)</dt>', text)
     assert titles[:4] == ["No-load speed", "Largest useful power", "Best efficiency", "Stall torque"]
-    assert "<option selected>22 Hz</option>" in text
+    assert '<option value="22 Hz" selected>22 Hz</option>' in text
     assert "6 of 11 curves" in text
     found = service.get(f"/studies/{study_id}/answers", point="0.2")
     (chosen,) = [curve for curve in found["curves"] if curve["by"] == {"excitation.frequency": 22.0}]
@@ -136,7 +136,7 @@ def test_the_page_keeps_a_wrong_point_and_says_why(filled: tuple[Service, str], 
     page = service.http.get(f"/studies/{study_id}?point={text}")
     assert page.status_code == 422
     assert f'<input name="point" value="{text}"' in page.text
-    assert f"At shaft load {text}" not in page.text
+    assert f"At load torque {text}" not in page.text
     assert "<code>point</code>" in page.text
     assert 'class="tiles"' in page.text
 

@@ -7,15 +7,21 @@ import json
 import logging
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from ipaddress import IPv4Network
 from typing import TYPE_CHECKING, Any
 
+import httpx
 import pytest
+from pydantic import SecretStr
 
+from sprag.service.http.app import create_app
 from sprag.service.http.request_log import REQUEST_HEADER
 from sprag.service.logs import JsonFormatter, configure
+from tests.service.http.people import Office
 
 if TYPE_CHECKING:
+    from sprag.service.settings import Settings
     from tests.service.conftest import Service
 
 
@@ -60,6 +66,52 @@ def test_a_study_that_is_submitted_stands_in_the_line_of_its_request(service: Se
     assert "studies" not in lines(log)[-1]
 
 
+def test_every_line_of_a_request_names_token_user_and_address(
+    settings: Settings, service: Service, connect: Callable[..., httpx.Client], log: io.StringIO,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """The line of the request and those that are written while it is answered, from whatever thread."""
+    office = Office(settings, service, connect)
+    monkeypatch.setattr(service.store, "list_studies", lambda *_, **__: 1 / 0)
+    client = office.program("dora")
+    client.get("/api/v1/studies", headers={"X-Forwarded-For": "10.1.2.3"})
+    client.get("/api/v1/models")
+    office.program(None).get("/api/v1/models")
+    fault, failed, good, nobody = [
+        line for line in lines(log) if line["logger"] == "sprag.requests" or line["level"] == "error"
+    ]
+    who = {"token": office.ids["dora"], "user": "dora"}
+    assert {name: fault.get(name) for name in ("address", *who)} == {"address": "10.1.2.3", **who}
+    assert fault["request"] == failed["request"]
+    assert {name: failed.get(name) for name in ("address", *who)} == {"address": "10.1.2.3", **who}
+    assert {name: good.get(name) for name in ("address", *who)} == {"address": "127.0.0.1", **who}
+    assert nobody["status"] == 401
+    assert nobody["address"] == "127.0.0.1"
+    assert not {"token", "user"} & {*nobody}
+    assert office.tokens["dora"] not in log.getvalue()
+
+
+def test_an_address_that_no_trusted_proxy_forwards_is_not_believed(
+    settings: Settings, service: Service, connect: Callable[..., httpx.Client], log: io.StringIO
+) -> None:
+    office = Office(settings, service, connect, trusted_proxies=(IPv4Network("10.0.0.0/8"),))
+    office.program("vera").get("/livez", headers={"X-Forwarded-For": "192.0.2.1"})
+    assert lines(log)[-1]["address"] == "127.0.0.1"
+
+
+def test_the_token_of_the_settings_has_an_id_too(
+    settings: Settings, service: Service, connect: Callable[..., httpx.Client], log: io.StringIO
+) -> None:
+    secret = SecretStr("a-token-of-the-settings")
+    app = create_app(
+        settings.model_copy(update={"token": secret}),
+        store=service.store, computer=service.computer, checker=service.checker,
+    )  # fmt: skip
+    connect(app, headers={"Authorization": f"Bearer {secret.get_secret_value()}"}).get("/api/v1/models")
+    assert lines(log)[-1]["token"] == "setting"
+    assert secret.get_secret_value() not in log.getvalue()
+
+
 @pytest.mark.parametrize("given", ["", "x" * 65, "a b", "é", '"}', "a\tb"])
 def test_an_id_that_is_none_is_replaced(service: Service, log: io.StringIO, given: str) -> None:
     answer = service.http.get("/livez", headers={REQUEST_HEADER: given.encode("utf-8")})
@@ -78,7 +130,7 @@ def test_no_address_breaks_a_line(service: Service, log: io.StringIO, path: str)
 def test_a_fault_is_told_with_its_trace_and_request(
     service: Service, log: io.StringIO, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(service.store, "list_studies", lambda **_: 1 / 0)
+    monkeypatch.setattr(service.store, "list_studies", lambda *_, **__: 1 / 0)
     answer = service.http.get("/api/v1/studies")
     assert answer.status_code == 500
     told = [line for line in lines(log) if line["level"] == "error"]

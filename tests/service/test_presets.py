@@ -31,9 +31,11 @@ def run(name: str) -> tuple[Study, list[str], dict[str, NDArray[np.float64]]]:
 def test_every_study_is_described() -> None:
     assert list(preset_names()) == list(ABOUT)
     assert {"press", "shaper", "slotter", "compressor", "conveyor", "cam_machine", "one_pendulum"} <= set(ABOUT)
-    for about in ABOUT.values():
+    for name, about in ABOUT.items():
         assert about.shows
         assert about.values
+        file, text = preset_text(name)
+        assert about.cases == parse_spec(load_spec(text, format_of(file))).study.cases, name
 
 
 @pytest.mark.parametrize("name", MACHINES)

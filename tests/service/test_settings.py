@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from sprag.service.cli.console import WrongInputError
 from sprag.service.cli.settings import read_settings
-from sprag.service.settings import Settings, available_cores, default_database_path, table
+from sprag.service.settings import Settings, available_cores, default_database_path, shown, table
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -58,6 +58,8 @@ def test_loopback_is_recognised(settings: Settings, host: str, loopback: bool) -
     "wrong",
     [
         {"port": -1},
+        {"user_storage": 2**43},
+        {"user_cases": 2**63},
         {"port": "x"},
         {"processes": -1},
         {"chunk_timeout": 0},
@@ -76,6 +78,21 @@ def test_commands_say_what_is_wrong_with_a_setting(settings: Settings) -> None:
         read_settings(token="short")
     (problem,) = caught.value.faults
     assert str(problem).startswith("SPRAG_TOKEN: a token needs at least 16 ASCII characters")
+
+
+@pytest.mark.parametrize(
+    ("given", "missing"),
+    [
+        ({"smtp_url": "smtps://mail.example"}, "SPRAG_MAIL_FROM"),
+        ({"webhook_origins": "https://hooks.example"}, "SPRAG_WEBHOOK_SECRET"),
+    ],
+)
+def test_a_setting_that_another_one_needs_is_named(settings: Settings, given: dict[str, object], missing: str) -> None:
+    with pytest.raises(WrongInputError) as caught:
+        read_settings(**given)
+    (problem,) = caught.value.faults
+    assert problem.where == missing
+    assert f"SPRAG_{next(iter(given)).upper()} needs" in problem.message
 
 
 def test_the_table_has_every_setting_with_its_help() -> None:
@@ -120,3 +137,35 @@ def test_a_wrong_file_is_told(
     with pytest.raises(WrongInputError) as caught:
         read_settings()
     assert caught.value.code == "invalid-settings"
+
+
+def test_the_names_of_time_zones_are_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    from sprag.service import zones
+
+    reads: list[int] = []
+
+    def names() -> set[str]:
+        reads.append(1)
+        return {"UTC", "Europe/Kyiv"}
+
+    monkeypatch.setattr(zones, "available_timezones", names)
+    zones.zones.cache_clear()
+    try:
+        assert (Settings(zone="UTC").zone, Settings(zone="Europe/Kyiv").zone) == ("UTC", "Europe/Kyiv")
+    finally:
+        zones.zones.cache_clear()
+    assert len(reads) == 1
+
+
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [
+        ("postgresql://sprag:a/b:c@d@host/sprag", "postgresql://sprag:***@host/sprag"),
+        ("postgresql:///sprag?user=a&password=x/y@z:1&host=/run", "postgresql:///sprag?user=a&password=***&host=/run"),
+        ("postgresql://a:b@host/sprag?password=c", "postgresql://a:***@host/sprag?password=***"),
+        ("postgresql://sprag@host/sprag", "postgresql://sprag@host/sprag"),
+        ("sqlite:////data/a:b.sqlite3", "sqlite:////data/a:b.sqlite3"),
+    ],
+)
+def test_no_part_of_a_password_is_shown(address: str, said: str) -> None:
+    assert shown(address) == said

@@ -17,6 +17,8 @@ from sprag.engine import Ending
 from sprag.engine.catalogue import Parameter, ResultInfo
 from sprag.engine.outcome import Trajectory
 from sprag.service.formats import MEDIA_TYPES
+from sprag.service.http.web.form.fields import FORM_MODEL, path_choices, sections
+from sprag.service.http.web.form.spec import spec_of
 from sprag.service.settings import Settings
 from sprag.service.spec.document import SpecError, parse_spec
 from sprag.service.spec.extend import parse_extended
@@ -25,7 +27,7 @@ from sprag.service.storage.part import SystemClock
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.inline import InlineExecutor
 from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
-from sprag.worker.models.model import Model
+from sprag.worker.models.model import Model, model_of
 from sprag.worker.models.presentation import Presentation
 from sprag.worker.study import Study
 from tests.service.registered import create_table, registered
@@ -168,6 +170,38 @@ def test_the_catalogues_list_it(service: Service) -> None:
     assert own["then"]["properties"]["base"]["required"] == ["body"]
 
 
+def names_by_title(model: str) -> dict[str, list[str]]:
+    """Titles of the sections of the form with the names of their fields."""
+    return {section.title: [field.name for field in section.fields] for section in sections(model)}
+
+
+def test_the_form_has_a_section_for_each_part_of_a_machine() -> None:
+    assert names_by_title(NAME) == {
+        "Body": ["/base/body/mass", "/base/body/spring_rate"],
+        "Other parameters": ["/base/damping"],
+    }
+
+
+def test_a_new_parameter_of_a_drive_is_in_the_form_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    drive, before = model_of(FORM_MODEL), names_by_title(FORM_MODEL)
+    assert list(before) == ["Vibration of the base", "Output shaft", "Surroundings"]
+    new = tuple(Parameter(p, "x", "1", 0.0, 9.0, False, 0.0, "new") for p in ("shaft.drag", "housing.mass", "pressure"))
+    more = (*drive.parameters(), *new)
+    monkeypatch.setattr(type(drive), "parameters", lambda _: more)
+    after = names_by_title(FORM_MODEL)
+    assert after == {
+        **before,
+        "Output shaft": [*before["Output shaft"], "/base/shaft/drag"],
+        "Surroundings": [*before["Surroundings"], "/base/pressure"],
+        "Housing": ["/base/housing/mass"],
+    }
+    spec, faults = spec_of({"/base/shaft/drag": "1", "/base/housing/mass": "2", "/base/pressure": "3"})
+    base = spec["base"]
+    assert (faults, base["shaft"]["drag"], base["housing"], base["pressure"]) == ({}, 1.0, {"mass": 2.0}, 3.0)
+    offered = {choice.path for _, group in path_choices(1, {}) for choice in group}
+    assert offered >= {entry.path for entry in new}
+
+
 def test_rows_are_the_models(finished: tuple[Service, str]) -> None:
     service, study_id = finished
     study = service.store.study(study_id)
@@ -223,7 +257,7 @@ def test_pages_pictures_and_the_report_show_it(finished: tuple[Service, str]) ->
     columns = service.http.get(f"{own}/cases").text
     assert re.findall(r'name="col" value="([^"]+)" checked', columns) == ["swings"]
     report = service.http.get(f"/api/v1{own}/report", params={"format": "html"})
-    assert "displacement.end" in report.text
+    assert "Displacement end" in report.text
 
 
 def test_its_cases_are_reused(finished: tuple[Service, str]) -> None:

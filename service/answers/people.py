@@ -1,0 +1,72 @@
+"""Answers about users and the audit log."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from typing_extensions import TypedDict
+
+from sprag.service.answers import Doc, Moment
+
+
+class QuotaUse(TypedDict):
+    """Quotas of a user and what is used of them; a limit that is null does not exist."""
+
+    cases: Annotated[int, Doc("cases that wait")]
+    most_cases: int | None
+    bytes: Annotated[int, Doc("rough size of the results")]
+    most_bytes: int | None
+    most_checks: Annotated[int | None, Doc("checks of specs, fits and pictures at the same time")]
+
+
+class Me(TypedDict):
+    """Who asks."""
+
+    user: Annotated[str | None, Doc("name of the user; null for a token without a user, or where no login is needed")]
+    token: Annotated[str | None, Doc("name of the token, its id where it has no name; null without a token")]
+    role: Annotated[str, Doc("viewer, designer or administrator")]
+    quota: Annotated[QuotaUse | None, Doc("null where there is no user")]
+
+
+class User(TypedDict):
+    """A user."""
+
+    name: str
+    role: Annotated[str, Doc("viewer, designer or administrator")]
+    created_at: Moment
+    removed_at: Annotated[Moment | None, Doc("since then the user may not use the service")]
+    quota: QuotaUse
+
+
+class UserList(TypedDict):
+    """All users, by name."""
+
+    users: list[User]
+
+
+class AuditEntry(TypedDict):
+    """A change: who, what, when, from where."""
+
+    number: int
+    at: Moment
+    door: Annotated[str, Doc("by which way it came: api, page, command, program, schedule, service")]
+    actor: Annotated[str, Doc("user, token, schedule or user of the machine; empty where no login is needed")]
+    token: Annotated[str | None, Doc("id of the token")]
+    address: Annotated[str, Doc("address of the client; of a command the name of its machine")]
+    request: Annotated[str | None, Doc("id of the request, as in the log")]
+    action: Annotated[str, Doc("what was done, such as study.create")]
+    target: Annotated[
+        str,
+        Doc(
+            "id of the study, schedule, component, view or token, or name of the user; "
+            "empty for the database and the log"
+        ),
+    ]
+    detail: Annotated[dict[str, Any], Doc("further details, by action")]
+
+
+class AuditPage(TypedDict):
+    """A page of the audit log, latest first."""
+
+    entries: list[AuditEntry]
+    next_page_token: Annotated[str | None, Doc("null on the last page")]
