@@ -1,8 +1,9 @@
-"""An estimate for 10^9 cases on 1,000 workers with one dispatcher and one database: what saturates first?
+"""An estimate for 10^9 cases on 1,000 workers and one database: what saturates first?
 
-Measures on this machine the dispatcher's time per chunk (claim, conversion of the result to rows, commit) with a real
-store, the size of a chunk's task and result on the network, and the time of Dask's scheduler per task; then simulates
-the queue of chunks with these numbers.
+Measures on this machine the time of a chunk in the transactions that store and claim groups of chunks, with a real
+store: all dispatchers of a database take turns at these, so their number does not matter. Also measured are the size of
+a chunk's task and result on the network, and the time of Dask's scheduler per task. Then it simulates the queue of
+chunks with these numbers.
 
     python -m benchmarks.cluster_simulation [--db URL] [--workers 1000] [--cases 1e9] [--per-case 0.001]
 
@@ -26,17 +27,20 @@ from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
 from sprag.worker.models import ChunkResult
+from sprag.worker.ports import Finished
 from sprag.worker.study import Axis, Study
 
 #: Bytes/s of the dispatcher's link: 10 Gbit/s.
 LINK = 1.25e9
+#: Chunks of a group: of 4,000 cases, as many as the dispatcher stores at once.
+GROUP = 5
 #: Chunks played through for each line: the queue is in its steady state long before.
 PLAYED = 200_000
 
 
 @dataclass(frozen=True)
 class Costs:
-    """What was measured: seconds a chunk and seconds a case at the dispatcher, scheduler seconds a task, bytes."""
+    """What was measured: seconds a chunk and seconds a case at the database, scheduler seconds a task, bytes."""
 
     dispatch_chunk: float
     dispatch_case: float
@@ -59,22 +63,24 @@ def made_up(first: int, count: int) -> ChunkResult:
     return ChunkResult(first, ["ok"] * count, [""] * count, values)
 
 
-def dispatch_seconds(url: str, size: int, chunks: int = 8) -> float:
-    """Least time of a claim and a commit of a chunk of that many cases."""
+def dispatch_seconds(url: str, size: int, groups: int = 6) -> float:
+    """Least time of a chunk of that many cases, when `GROUP` of them are stored and as many claimed at once."""
+    chunks = groups * GROUP
     with Store.open(url, chunking=Chunking(cases=size)) as store:
         record = store.create_study({}, study_of(size * chunks), fresh=True)
         epoch = store.take_over("benchmark")
-        times = []
-        for chunk in store.open_chunks(record.number):
-            result = made_up(chunk.first, chunk.count)
+        waiting, times = store.open_chunks(record.number), []
+        claimed = store.claim(epoch, waiting[:GROUP])
+        for first in range(GROUP, chunks + GROUP, GROUP):
+            finished = [Finished(chunk, made_up(chunk.first, chunk.count)) for chunk in claimed]
             begin = time.perf_counter()
-            assert store.claim(epoch, [chunk])
-            assert store.commit(epoch, chunk, result)
-            times.append(time.perf_counter() - begin)
+            stored, claimed = store.exchange(epoch, finished, waiting[first : first + GROUP])
+            times.append((time.perf_counter() - begin) / GROUP)
+            assert len(stored) == GROUP
         store.settle(epoch, record.number)
         store.delete_study(record.id)
         store.purge()
-    return min(times)
+    return min(times[:-1])  # the last transaction claims nothing
 
 
 def schedule_seconds(tasks: int = 2000) -> float:
@@ -108,12 +114,12 @@ def measured(url: str) -> Costs:
 
 
 def play(costs: Costs, workers: int, seconds: float, size: int) -> tuple[float, dict[str, float]]:
-    """Chunks/s, and how busy each part is: workers feed a scheduler, a link and a dispatcher, one after the other."""
+    """Chunks/s, and how busy each part is: workers feed a scheduler, a link and a database, one after the other."""
     random = np.random.default_rng(1)
     service = {
         "scheduler": costs.schedule,
         "network": (costs.bytes_chunk + costs.bytes_case * size) / LINK,
-        "dispatcher and database": costs.dispatch_chunk + costs.dispatch_case * size,
+        "database": costs.dispatch_chunk + costs.dispatch_case * size,
     }
     free, busy = dict.fromkeys(service, 0.0), dict.fromkeys(service, 0.0)
     lengths = seconds * random.gamma(25.0, 1.0 / 25.0, PLAYED + workers)  # chunks differ by a fifth
@@ -144,7 +150,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         costs = measured(options.db or f"sqlite:///{Path(folder) / 'a.sqlite3'}")
     print(
-        f"measured: dispatch {costs.dispatch_chunk * 1e3:.2f} ms a chunk + {costs.dispatch_case * 1e6:.1f} us a case, "
+        f"measured: database {costs.dispatch_chunk * 1e3:.2f} ms a chunk + {costs.dispatch_case * 1e6:.1f} us a case, "
         f"Dask {costs.schedule * 1e3:.2f} ms a task; "
         f"network {costs.bytes_chunk:.0f} B a chunk + {costs.bytes_case:.0f} B a case"
     )

@@ -23,11 +23,11 @@ from typing import Any
 
 import psutil
 
-from benchmarks.faults.harness import Service, until
+from benchmarks.faults.harness import PATIENCE, Service, until
 from sprag.service.presets import preset_text
 
 _LEAVE = 5.0
-_STAY = 600.0
+_STAY = PATIENCE
 
 
 def press(formula: str) -> dict[str, Any]:
@@ -60,7 +60,7 @@ BOMBS = {
 def ask(port: int, over: Any, told: Any) -> None:
     """Ask /livez again and again until ``over``, then tell how long each answer took (s). For a process of its own."""
     waits = []
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=_STAY)
     told.send(None)
     while not over.wait(0.02):
         began = time.perf_counter()

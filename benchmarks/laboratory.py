@@ -19,6 +19,7 @@ import numpy as np
 from sprag.service.http.web.figures.drive import drive_case
 from sprag.service.http.web.laboratory.drive_setting import machines, setting
 from sprag.service.json_text import to_bytes
+from sprag.service.results.reading import Reading
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def _timed(function: Callable[..., Any], *args: Any) -> tuple[float, Any]:
 
 
 def _bytes_of(study: Any) -> tuple[bytes, dict[str, Any]]:
-    found = drive_case(study, None)
+    found = drive_case(study, None, Reading(study.model))
     return to_bytes(found), found
 
 
@@ -74,7 +75,7 @@ def moves_of(name: str, count: int, random: np.random.Generator) -> list[Move]:
     given = {"machine": name}
     chosen = setting(given)
     models.warm_up(chosen.study)
-    drive_case(chosen.study, None)
+    drive_case(chosen.study, None, Reading(chosen.study.model))
     sliders = [slider for slider in chosen.sliders if slider.high > slider.low]
     found = []
     for _ in range(count):

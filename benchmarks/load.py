@@ -18,6 +18,7 @@ from urllib.parse import urlsplit
 
 import httpx
 
+from benchmarks.faults.harness import PATIENCE
 from sprag.service.http.api.examples import SPEC
 from tests.acceptance.processes import service
 
@@ -76,7 +77,7 @@ async def crowd(address: str, study: str) -> AsyncIterator[None]:
     begun, opened = [[asyncio.Event() for _ in range(count)] for count in (SLOW, STREAMS)]
     tasks = [asyncio.create_task(slow_client(host, port, event)) for event in begun]
     tasks += [asyncio.create_task(stream(address, f"/api/v1/studies/{study}/events", event)) for event in opened]
-    await asyncio.gather(*(asyncio.wait_for(event.wait(), 60) for event in [*begun, *opened]))
+    await asyncio.gather(*(asyncio.wait_for(event.wait(), PATIENCE) for event in [*begun, *opened]))
     try:
         yield
         assert not any(task.done() for task in tasks), "a slow client or a stream of events has ended"
@@ -90,7 +91,7 @@ async def run(address: str, done: str, held: str, seconds: float) -> None:
     """Measure and print."""
     host, port = str(urlsplit(address).hostname), int(urlsplit(address).port or 0)
     curve = f"/api/v1/studies/{done}/{CURVE}"
-    tag = httpx.get(address + curve).headers["etag"]
+    tag = httpx.get(address + curve, timeout=PATIENCE).headers["etag"]
     trivial = await measured(host, port, "/livez", seconds)
     base = len(trivial) / seconds
     print(f"{CLIENTS} clients; {SLOW} slow connections and {STREAMS} streams of events from the second line on")
@@ -115,7 +116,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=10.0, help="for each line")
     seconds = parser.parse_args().seconds
     with tempfile.TemporaryDirectory() as folder, service(Path(folder), "--processes", "1") as running:
-        with httpx.Client(base_url=running.address + "/api/v1", timeout=300) as client:
+        with httpx.Client(base_url=running.address + "/api/v1", timeout=PATIENCE) as client:
             done = client.post("/studies", json=SPEC).json()["id"]
             with client.stream("GET", f"/studies/{done}/events") as events:
                 states = [json.loads(line[5:])["state"] for line in events.iter_lines() if line.startswith("data:")]

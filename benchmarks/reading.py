@@ -1,7 +1,7 @@
 """Reading from a large database: pages and curves, and the whole study in every format, from a running service.
 
 Builds its own database of synthetic rows of one pendulum, then starts `sprag serve` on it and sends requests as a
-client.
+client. Medians are also given relative to a trivial request, for `/livez`.
 
     python -m benchmarks.reading [--cases 1000000] [--requests 200] [--formats parquet,csv] [--folder DIR]
 """
@@ -9,13 +9,11 @@ client.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import random
-import signal
-import socket
 import statistics
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -26,6 +24,7 @@ from pathlib import Path
 import httpx
 import numpy as np
 
+from benchmarks.faults.harness import COMMAND, PATIENCE, environment, kill_family, until
 from sprag.service.formats import FORMATS
 from sprag.service.presets import preset_text
 from sprag.service.spec.document import load_spec, parse_spec
@@ -78,37 +77,24 @@ def build(path: Path, study: Study) -> tuple[str, float]:
 
 @contextmanager
 def serving(path: Path) -> Iterator[tuple[str, int]]:
-    """A service on the database; its address and process id."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    command = [
-        sys.executable,
-        "-m",
-        "sprag.service.cli",
-        "serve",
-        "--db",
-        str(path),
-        "--port",
-        str(port),
-        "--processes",
-        "1",
-    ]
-    process = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
-    address = f"http://127.0.0.1:{port}"
+    """A service on the database, without the user's settings and with one process; its address and process id."""
+    command = [*COMMAND, "serve", "--json", "--port", "0", "--db", str(path), "--processes", "1"]
+    log = path.with_name("service.log")
+    with log.open("wb") as errors:
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, env=environment())
     try:
-        for _ in range(300):
-            try:
-                httpx.get(f"{address}/readyz").raise_for_status()
-                break
-            except httpx.HTTPError:
-                time.sleep(0.1)
-        else:
-            raise AssertionError("the service does not get ready")
+        assert process.stdout is not None
+        with process.stdout as output:
+            line = output.readline()
+        assert line, log.read_text()
+        address = json.loads(line)["address"]
+        with httpx.Client(base_url=address, timeout=PATIENCE, trust_env=False) as client:
+            until(lambda: client.get("/readyz").is_success, "the service is ready")
         yield address, process.pid
+        process.terminate()
+        process.wait(PATIENCE)
     finally:
-        process.send_signal(signal.SIGTERM)
-        process.wait(30)
+        kill_family(process)
 
 
 def peak_mib(pid: int) -> float:
@@ -122,8 +108,11 @@ def forget_peak(pid: int) -> None:
     Path(f"/proc/{pid}/clear_refs").write_text("5")
 
 
-def ask(name: str, requests: int, get: Callable[[], httpx.Response]) -> None:
-    """Time many requests of a kind; print their median and the 95th percentile."""
+def ask(name: str, requests: int, get: Callable[[], httpx.Response], trivial: float = 0.0) -> float:
+    """Time many requests of a kind; print their median, the 95th percentile and the ratio to a trivial one (ms).
+
+    Gives the median.
+    """
     times = []
     for index in range(_WARM + requests):
         start = time.perf_counter()
@@ -131,8 +120,11 @@ def ask(name: str, requests: int, get: Callable[[], httpx.Response]) -> None:
         if index >= _WARM:
             times.append(1e3 * (time.perf_counter() - start))
         response.raise_for_status()
-    p95 = statistics.quantiles(times, n=20)[-1]
-    print(f"{name:52} median {statistics.median(times):6.1f} ms   p95 {p95:6.1f} ms   {len(response.content):9,} bytes")
+    median, p95 = statistics.median(times), statistics.quantiles(times, n=20)[-1]
+    ratio = median / (trivial or median)
+    told = f"median {median:6.1f} ms   p95 {p95:6.1f} ms   {len(response.content):9,} bytes   {ratio:6.1f} x trivial"
+    print(f"{name:32} {told}")
+    return median
 
 
 def read(client: httpx.Client, study_id: str, study: Study, requests: int) -> None:
@@ -149,28 +141,29 @@ def read(client: httpx.Client, study_id: str, study: Study, requests: int) -> No
         query += [("at", at(axis)) for axis in held] + ([("by", by.paths[0])] if by else [])
         return client.get(f"{own}/curves", params=query)
 
-    ask("studies", requests, lambda: client.get("/api/v1/studies"))
-    ask("study", requests, lambda: client.get(own))
-    ask(
-        "100 cases anywhere",
-        requests,
-        lambda: client.get(f"{own}/cases", params={"page_token": draw.randrange(study.cases - 200)}),
-    )
-    ask(f"curve over {len(load)} loads", requests, lambda: curve(load, (frequency, amplitude)))
-    ask(f"curve over {len(frequency)} frequencies", requests, lambda: curve(frequency, (amplitude, load)))
-    ask(f"curve over {len(amplitude)} amplitudes", requests, lambda: curve(amplitude, (frequency, load)))
-    ask(
-        f"{len(frequency)} curves over {len(load)} loads",
-        max(requests // 10, 10),
-        lambda: curve(load, (amplitude,), frequency),
-    )
+    def cases() -> httpx.Response:
+        return client.get(f"{own}/cases", params={"page_token": draw.randrange(study.cases - 200)})
+
+    trivial = ask("trivial: /livez", requests, lambda: client.get("/livez"))
+    questions: dict[str, Callable[[], httpx.Response]] = {
+        "studies": lambda: client.get("/api/v1/studies"),
+        "study": lambda: client.get(own),
+        "100 cases anywhere": cases,
+        f"curve over {len(load)} loads": lambda: curve(load, (frequency, amplitude)),
+        f"curve over {len(frequency)} frequencies": lambda: curve(frequency, (amplitude, load)),
+        f"curve over {len(amplitude)} amplitudes": lambda: curve(amplitude, (frequency, load)),
+    }
+    for name, get in questions.items():
+        ask(name, requests, get, trivial)
+    curves = f"{len(frequency)} curves over {len(load)} loads"
+    ask(curves, max(requests // 10, 10), lambda: curve(load, (amplitude,), frequency), trivial)
 
 
 def export(client: httpx.Client, study_id: str, form: str, pid: int) -> None:
     """Take the whole study in a format; print time, size, and the service's largest memory meanwhile."""
     forget_peak(pid)
     start, size = time.perf_counter(), 0
-    with client.stream("GET", f"/api/v1/studies/{study_id}/results", params={"format": form}, timeout=3600) as answer:
+    with client.stream("GET", f"/api/v1/studies/{study_id}/results", params={"format": form}) as answer:
         answer.raise_for_status()
         for piece in answer.iter_raw(1 << 20):
             size += len(piece)
@@ -195,7 +188,10 @@ def main() -> None:
             f"{study.cases:,} cases of {len(models.study_results(study))} results: {size / study.cases:.0f} bytes a "
             f"case, committed at {study.cases / seconds:,.0f} cases/s"
         )
-        with serving(path) as (address, pid), httpx.Client(base_url=address) as client:
+        with (
+            serving(path) as (address, pid),
+            httpx.Client(base_url=address, timeout=PATIENCE, trust_env=False) as client,
+        ):
             read(client, study_id, study, options.requests)
             for form in options.formats.split(","):
                 export(client, study_id, form, pid)

@@ -5,7 +5,7 @@
 Coverage: the 5, 50 and 95 % quantiles and the yield of a linear function of three normal deviations, whose exact values
 are known, from 512 drives of each seed. Cost: the example of the guide to tolerances, settled, in this process; the
 engine's share is the processor time of the chunks. Memory: the largest resident size of each process of a service that
-has run the same study and has answered its ribbon, yield and page.
+has run the same study and has answered its ribbon, yield and page, and questions of Explore about all of its results.
 """
 
 from __future__ import annotations
@@ -25,11 +25,10 @@ from scipy.stats import norm, qmc
 from sprag.service.client import Client
 from sprag.service.jobs.batch_answers import RibbonQuery, YieldQuery, both
 from sprag.service.jobs.checks import Library
+from sprag.service.results.explore import MOST_SHOWN
 from sprag.service.results.tolerances.quantiles import proportion, quantiles
 from sprag.service.spec.document import parse_spec
-from sprag.service.storage import maintenance
 from sprag.service.storage.part import SystemClock
-from sprag.service.storage.session import Session
 from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.dispatcher import Dispatcher
@@ -89,9 +88,6 @@ def cost(drives: int, loads: int) -> None:
 
     with tempfile.TemporaryDirectory() as folder:
         url = f"sqlite:///{Path(folder) / 'tolerances.sqlite3'}"
-        session = Session(url)
-        maintenance.upgrade(session)
-        session.close()
         with Store.open(url) as store:
             begin = time.process_time()
             record = store.create_study(parsed.spec, parsed.study, fresh=True)
@@ -121,9 +117,19 @@ def memory(drives: int, loads: int) -> None:
                 address = json.loads(service.stdout.readline())["address"]
                 with Client(address) as client:
                     study = client.submit(spec(drives, loads)).wait()
-                    study.ribbon(y="shaft.speed.mean")
-                    study.yields(_CONDITION)
-                    httpx.get(f"{address}/studies/{study.id}/drives", timeout=120.0).raise_for_status()
+                infos = models.study_results(parse_spec(spec(drives, loads)).study)
+                names = [info.name for info in infos if info.kind != "category"]
+                of = f"{address}/api/v1/studies/{study.id}"
+                asked: list[tuple[str, dict[str, Any]]] = [
+                    (f"{of}/ribbon", {"y": "shaft.speed.mean"}),
+                    (f"{of}/yield", {"condition": _CONDITION}),
+                    (f"{address}/studies/{study.id}/drives", {}),
+                ]
+                for first in range(0, len(names), MOST_SHOWN):
+                    shown = names[first : first + MOST_SHOWN]
+                    asked.append((f"{of}/explore", {"sort": f"-{shown[0]}", "show": shown}))
+                for question, query in asked:
+                    httpx.get(question, params=query, timeout=600.0).raise_for_status()
                 for name, size in _sizes(service.pid):
                     print(f"  {name}: {size:.0f} MB")
             finally:

@@ -14,8 +14,10 @@ from benchmarks.faults.cache import cache
 from benchmarks.faults.clients import clients
 from benchmarks.faults.cluster import cluster
 from benchmarks.faults.disk import disk, file_limit
+from benchmarks.faults.dispatchers import dispatchers
 from benchmarks.faults.kills import kills
 from benchmarks.faults.link import link
+from benchmarks.faults.nights import nights
 from benchmarks.faults.powercut import powercut
 from benchmarks.faults.rounds import rounds
 from benchmarks.faults.served_rounds import served_rounds
@@ -34,7 +36,7 @@ def main() -> None:
             command.add_argument(f"--{option}", type=type(default), default=default)
         command.set_defaults(run=run)
 
-    drill("kills", kills, "kill -9 at random moments", cases=20_000, count=100, seed=1, periods=60.0)
+    drill("kills", kills, "kill -9 at random moments", cases=20_000, count=100, seed=1, periods=60.0, drives=0)
     drill(
         "cluster", cluster, "kill -9 of the parts of a Dask cluster at random moments",
         cases=20_000, count=30, seed=1, periods=60.0,
@@ -43,6 +45,10 @@ def main() -> None:
         "link", link, "links between hosts are cut (as root: it makes network namespaces)", cases=2_000, periods=200.0
     )
     drill("powercut", powercut, "the power goes between any two system calls of a commit", studies=12, seed=1)
+    drill(
+        "dispatchers", dispatchers, "kill -9 and lost connections of two dispatchers on one PostgreSQL database",
+        count=50, seed=1, studies=8, cases=200, url="",
+    )  # fmt: skip
     drill("rounds", rounds, "kill -9 in a study that chooses its own cases", count=50, seed=1, url="")
     drill(
         "servedrounds", served_rounds, "kill -9 of processes of a service in a study that chooses its own cases",
@@ -51,6 +57,7 @@ def main() -> None:
     drill(
         "sweeps", sweeps, "kill -9 of processes of a service in the middle of swept lines", count=20, seed=1, lines=30
     )
+    drill("nights", nights, "kill -9 between the due times of schedules and their reports", count=50, seed=1, url="")
     drill("stopped", stopped, "dispatchers are stopped, replaced and woken", cases=4_000, rounds=10, seed=1)
     drill(
         "badcases", badcases, "cases that crash or never return",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import socket
 import subprocess
 import sys
 import time
@@ -29,8 +28,7 @@ class Cluster:
     """A scheduler at ``host`` and its workers, as processes; ``begin`` comes before their commands."""
 
     def __init__(self, host: str = "127.0.0.1", protocol: str = "tcp", **environment: str) -> None:
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            self.port = free.getsockname()[1]
+        self.port = harness.free_port()
         self.host = host
         self._protocol = protocol
         self._environment = environment

@@ -12,26 +12,35 @@ from typing import Any
 from benchmarks.faults import harness
 from sprag.service.jobs.preview import estimated_bytes
 from sprag.service.storage.room import RESERVE_BYTES
+from sprag.service.storage.store import Store
 
-#: At least the size of a database without studies.
-_EMPTY_BYTES = 1_500_000
 _STATE = "SELECT state FROM studies WHERE id = ?"
 
 
 def file_limit(folder: Path, *, cases: int, studies: int) -> dict[str, Any]:
-    """Run studies under a limit of file sizes that is too small for all of them, and raise it when they are held."""
+    """Run three or more studies under a limit of file sizes too small for all, and raise it when they are held."""
     specs = [harness.spec(cases, 20.0 + 0.5 * number) for number in range(studies)]  # none has rows for another
-    room = int(0.6 * studies * estimated_bytes(harness.study_of(specs[0]))) + RESERVE_BYTES + _EMPTY_BYTES
+    empty = folder / "empty.sqlite3"
+    Store.open(f"sqlite:///{empty}").close()
+    # Half of them: enough for each alone, and so little that they are held long before the last one ends.
+    room = int(0.5 * studies * estimated_bytes(harness.study_of(specs[0]))) + RESERVE_BYTES + empty.stat().st_size
     service = harness.Service(folder, "--processes", 1, "--chunk", 250)
     service.before_exec = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
     service.start()
     try:
+        # No rows before all of them are accepted, or the last ones find no room.
+        harness.until(service.dispatcher, "there is a dispatcher")
+        dispatcher = service.dispatcher()
+        assert dispatcher is not None
+        harness.until(lambda: harness.suspended(dispatcher, service.database), "the dispatcher is suspended")
         submitted = [service.submit(made) for made in specs]
+        dispatcher.resume()
         held: dict[str, Any] = {}
 
         def is_held() -> bool:
             # A held study is tried again now and then, without a reason for that while.
             held.update(service.look(submitted[-1]))
+            assert held["state"] != "finished", "there was room for all studies"
             return held["state"] == "paused" and held["reason"] is not None
 
         harness.until(is_held, "the studies are held")

@@ -5,7 +5,9 @@ from __future__ import annotations
 import copy
 import json
 import os
+import random
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -42,6 +44,14 @@ def environment(**more: str) -> dict[str, str]:
     kept = {k: v for k, v in os.environ.items() if not k.startswith("SPRAG_") or k == "SPRAG_KERNEL_CACHE"}
     set_here = {"SPRAG_CHECK_PROCESSES": "1", "SPRAG_STOP_SECONDS": f"{PATIENCE:g}"}
     return {**kept, "PYTHONPATH": str(ROOT), **set_here, **more}
+
+
+def free_port() -> int:
+    """A port that nobody listens on, below those that the system gives to connections in the meantime."""
+    for port in random.SystemRandom().sample(range(20_000, 32_000), 1_000):
+        with suppress(OSError), socket.create_server(("127.0.0.1", port)):
+            return port
+    raise AssertionError("no port is free")
 
 
 def until(condition: Callable[[], object], what: str, patience: float = PATIENCE) -> None:
@@ -132,6 +142,9 @@ class Service:
         self.http.close()
         self.process.kill()
         self.process.wait()
+        for child in family:
+            with suppress(psutil.Error):
+                child.resume()  # a drill may have suspended it, and then it does not notice
         assert psutil.wait_procs(family, timeout=PATIENCE)[1] == [], "a process outlived the service"
 
     def stop(self) -> float:
@@ -191,6 +204,28 @@ def asked(database: Path, query: str, *values: object) -> Any:
         return None if row is None else row[0]
     finally:
         connection.close()
+
+
+def locked(database: Path) -> bool:
+    """Whether another process is writing to the database at this moment."""
+    connection = sqlite_driver().connect(database, timeout=0)
+    try:
+        connection.execute("BEGIN IMMEDIATE")
+        connection.execute("ROLLBACK")
+    except sqlite_driver().OperationalError:
+        return True
+    finally:
+        connection.close()
+    return False
+
+
+def suspended(process: psutil.Process, database: Path) -> bool:
+    """Suspend a process, unless it is in a transaction: the lock that it holds would keep everybody else waiting."""
+    process.suspend()
+    if not locked(database):
+        return True
+    process.resume()
+    return False
 
 
 def done(database: Path, study: str) -> int:

@@ -23,14 +23,33 @@ from sprag.service.storage.sqlite_files import sqlite_driver
 TARGETS = {"pool process": 12, "dispatcher": 5, "service": 3}
 _SOON_SHARE, _SOON_SECONDS, _JITTER_SECONDS = 0.2, 2.0, 0.05
 _ACCEPTED = 5
+#: What differs between drives.
+_TOLERANCES = [
+    {"path": "pendulums.*.backlash", "plus_minus": "60 %"},
+    {"path": "pendulums.*.spring_rate", "plus_minus": "10 %", "distribution": "uniform"},
+]
 
 
 def kills(
-    folder: Path, *, cases: int, count: int, seed: int, periods: float = 60.0, chunk: int = 4, processes: int = 2
+    folder: Path,
+    *,
+    cases: int,
+    count: int,
+    seed: int,
+    periods: float = 60.0,
+    drives: int = 0,
+    chunk: int = 4,
+    processes: int = 2,
 ) -> dict[str, Any]:
-    """Run a study of ``cases`` cases under ``count`` kills; gives the figures."""
+    """Run a study of ``cases`` cases under ``count`` kills; gives the figures.
+
+    With ``drives`` the cases are the nominal drive and that many drawn ones, at as many loads as they suffice for.
+    """
     draw = random.Random(seed)
-    made = harness.spec(cases, periods)
+    made = harness.spec(cases // (drives + 1), periods)
+    if drives:
+        made |= {"tolerances": _TOLERANCES, "drives": drives, "seed": seed}
+    cases = harness.study_of(made).cases
     service = harness.Service(folder, "--processes", processes, "--chunk", chunk)
     service.start()
     study = service.submit(made)
@@ -107,9 +126,10 @@ def kill(service: harness.Service, draw: random.Random) -> str:
 
 def _submit(service: harness.Service, made: dict[str, Any], key: str) -> str:
     """Submit until it is accepted, as a client would that got no answer."""
-    for _ in range(100):
+    deadline = time.monotonic() + harness.PATIENCE
+    while time.monotonic() < deadline:
         try:
             return service.submit(made, **{"Idempotency-Key": key})
         except httpx.TransportError:
             time.sleep(0.1)
-    raise AssertionError("the service takes no study")
+    raise AssertionError(f"the service took no study in {harness.PATIENCE:g} s")

@@ -27,6 +27,7 @@ from pathlib import Path
 from sprag.service.storage.store import Store
 from tests.worker import fakes
 from sprag.worker.chunking import Chunking
+from sprag.worker.ports import Finished
 
 def say(text):
     os.write(1, text.encode() + b"\\n")
@@ -38,12 +39,16 @@ with Store.open(f"sqlite:///{database}", chunking=Chunking(cases=10)) as store:
     sys.stdin.readline()
     epoch = store.take_over("drill")
     for _ in range(studies):
-        record = store.create_study({}, fakes.study(20), idempotency_key=None)
+        record = store.create_study({}, fakes.study(30), idempotency_key=None)
         say(f"accepted {record.number}")
-        for chunk in store.open_chunks(record.number):
-            store.claim(epoch, [chunk])
-            assert store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
-            say(f"committed {record.number} {chunk.first} {chunk.count}")
+        chunks = store.open_chunks(record.number)
+        store.claim(epoch, chunks[:1])
+        # The first alone, with the claim of the others; then these together.
+        for some, wanted in ((chunks[:1], chunks[1:]), (chunks[1:], ())):
+            done = [Finished(chunk, fakes.result(chunk.first, chunk.count)) for chunk in some]
+            assert store.exchange(epoch, done, wanted) == (list(some), list(wanted))
+            for chunk in some:
+                say(f"committed {record.number} {chunk.first} {chunk.count}")
         store.settle(epoch, record.number)
         with store.session.plain() as connection:
             connection.exec_driver_sql("PRAGMA wal_checkpoint(PASSIVE)")
@@ -106,7 +111,7 @@ def _check(place: Path, files: list[Path], state: dict[str, bytes], said: list[l
         assert connection.execute("PRAGMA quick_check").fetchall() == [("ok",)], where
         for kind, number, *chunk in (line for line in said if line[0] != "ready"):
             row = connection.execute("SELECT cases FROM studies WHERE number = ?", (number,)).fetchone()
-            assert row == (20,), f"{kind} study {number} is lost {where}"
+            assert row == (30,), f"{kind} study {number} is lost {where}"
             if kind == "committed":
                 first, count = map(int, chunk)
                 rows = connection.execute(

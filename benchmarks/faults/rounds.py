@@ -8,7 +8,6 @@ an undisturbed one, bit for bit.
 from __future__ import annotations
 
 import json
-import os
 import random
 import signal
 import subprocess
@@ -20,12 +19,11 @@ from typing import Any
 
 import sqlalchemy as sa
 
+from benchmarks.faults.fate import Fate, before_commits, before_writes
 from benchmarks.faults.harness import ROOT, environment
 from sprag.service.presets import preset_text
 from sprag.service.spec.document import load_spec, parse_spec
-from sprag.service.storage import maintenance
 from sprag.service.storage.part import SystemClock
-from sprag.service.storage.session import Session
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import STUDIES, results_table
 from sprag.worker import planning
@@ -37,17 +35,14 @@ from sprag.worker.states import StudyState
 
 #: Events of the whole study, roughly: what is drawn lies within, or the process ends with the study.
 _EVENTS = 60
-#: Events in whose middle a process is killed.
-_PLANNER, _STATEMENT, _COMMIT = "planner", "statement", "commit"
+#: An event in whose middle a process is killed.
+_PLANNER = "planner"
 
 
 def rounds(folder: Path, *, count: int = 50, seed: int = 1, url: str = "") -> dict[str, Any]:
     """Run a refined study under ``count`` kills and compare it with an undisturbed one; gives the figures."""
     draw = random.Random(seed)
     url = url or f"sqlite:///{folder / 'rounds.sqlite3'}"
-    session = Session(url)
-    maintenance.upgrade(session)
-    session.close()
     killed: Counter[str] = Counter()
     studies = 0
     with Store.open(url, chunking=Chunking(cases=8)) as store:
@@ -118,20 +113,7 @@ def _whole_rounds(url: str, study: str) -> list[Any]:
         return [found for found in store.rounds(study) if found.cases]
 
 
-class _Fate:
-    """Counts events and ends the process before one of them."""
-
-    def __init__(self, fatal: int) -> None:
-        self._left = fatal
-
-    def meet(self, event: str) -> None:
-        self._left -= 1
-        if self._left == 0:
-            print(event, flush=True)
-            os.kill(os.getpid(), signal.SIGKILL)
-
-
-def _watched(make: Callable[..., Planner], fate: _Fate) -> Callable[..., Planner]:
+def _watched(make: Callable[..., Planner], fate: Fate) -> Callable[..., Planner]:
     """A planner whose every call is an event."""
 
     def made(plan: Any) -> Planner:
@@ -146,23 +128,15 @@ def _watched(make: Callable[..., Planner], fate: _Fate) -> Callable[..., Planner
 
 def main(url: str, study: str, fatal: int) -> None:
     """Run every study of the database here, until the event that ends the process."""
-    fate = _Fate(fatal)
+    fate = Fate(fatal)
     with Store.open(url, chunking=Chunking(cases=8)) as store:
         if fatal:
             for kind, make in list(planning.PLANNERS.items()):
                 planning.PLANNERS[kind] = _watched(make, fate)
-            sa.event.listen(sa.engine.Engine, "commit", lambda *_: fate.meet(_COMMIT))
-            sa.event.listen(sa.engine.Engine, "before_cursor_execute", _writes(fate))
+            before_commits(fate.meet)
+            before_writes(fate.meet)
         dispatcher = Dispatcher(store, InlineExecutor(), SystemClock(), owner="drill")
         dispatcher.run(lambda: store.get_study(study).over)
-
-
-def _writes(fate: _Fate) -> Callable[..., None]:
-    def meet(_connection: object, _cursor: object, statement: str, *_: object) -> None:
-        if statement.startswith(("INSERT", "UPDATE", "DELETE")):
-            fate.meet(_STATEMENT)
-
-    return meet
 
 
 if __name__ == "__main__":

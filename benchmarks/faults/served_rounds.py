@@ -14,9 +14,7 @@ from typing import Any
 from benchmarks.faults import harness
 from benchmarks.faults.kills import kill
 from benchmarks.faults.rounds import create, spec, whole
-from sprag.service.storage import maintenance
 from sprag.service.storage.part import SystemClock
-from sprag.service.storage.session import Session
 from sprag.service.storage.store import Store
 from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import Dispatcher
@@ -47,9 +45,6 @@ def served_rounds(folder: Path, *, count: int, seed: int, processes: int = 2, ch
 
 
 def _undisturbed(url: str, chunk: int) -> tuple[Any, ...]:
-    session = Session(url)
-    maintenance.upgrade(session)
-    session.close()
     with Store.open(url, chunking=Chunking(cases=chunk)) as store:
         study = create(store)
         Dispatcher(store, InlineExecutor(), SystemClock(), owner="drill").run(lambda: store.get_study(study).over)

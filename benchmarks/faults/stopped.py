@@ -9,13 +9,14 @@ import time
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 from benchmarks.faults import harness
-from sprag.service.storage.errors import DatabaseBusyError
 from sprag.service.storage.session import Session
 from sprag.service.storage.store import Store
 from sprag.worker.chunking import Chunking
 
-_LATEST = "SELECT epoch FROM dispatcher"
+_LATEST = "SELECT max(epoch) FROM dispatchers"
 
 
 def _worker(database: Path, log: Path, *options: str) -> subprocess.Popen[bytes]:
@@ -39,7 +40,10 @@ def stopped(folder: Path, *, cases: int, rounds: int, seed: int, periods: float 
         for number in range(rounds):
             share = (number + draw.random()) / (rounds + 1)
             harness.until(lambda share=share: harness.done(database, study) > share * cases, "the study goes on")
-            _stop(workers[-1], database)
+            current = psutil.Process(workers[-1].pid)
+            harness.until(
+                lambda current=current: harness.suspended(current, database), "the dispatcher is in no transaction"
+            )
             before = harness.asked(database, _LATEST)
             workers.append(_worker(database, logs[number + 1], "--take-over"))
             harness.until(lambda before=before: harness.asked(database, _LATEST) > before, "the second takes over")
@@ -72,21 +76,3 @@ def _watch_commits(database: Path) -> None:
             f"BEGIN INSERT INTO drill_commits SELECT new.epoch, ({_LATEST}); END"
         )
     session.close()
-
-
-def _stop(worker: subprocess.Popen[bytes], database: Path) -> None:
-    """Stop it between two transactions: one that it holds would keep everybody else waiting, not only this drill."""
-    while True:
-        worker.send_signal(signal.SIGSTOP)
-        session = Session(f"sqlite:///{database}")
-        try:
-            with session.plain() as connection:
-                connection.exec_driver_sql("PRAGMA busy_timeout = 0")
-                connection.exec_driver_sql("BEGIN IMMEDIATE")
-                connection.exec_driver_sql("ROLLBACK")
-        except DatabaseBusyError:
-            worker.send_signal(signal.SIGCONT)
-        else:
-            return
-        finally:
-            session.close()

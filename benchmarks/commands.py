@@ -1,0 +1,48 @@
+"""Processor time of a command that only shows something, against that of Python itself.
+
+python -m benchmarks.commands [--times 11]
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import statistics
+import subprocess
+import sys
+
+COMMANDS = {
+    "python -c pass": ["-c", "pass"],
+    "sprag --version": ["-m", "sprag.service.cli", "--version"],
+    "sprag --help": ["-m", "sprag.service.cli", "--help"],
+    "sprag run --help": ["-m", "sprag.service.cli", "run", "--help"],
+}
+
+
+def processor_seconds(arguments: list[str]) -> float:
+    """User and system time of one process."""
+    process = subprocess.Popen([sys.executable, *arguments], stdout=subprocess.DEVNULL)
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    assert process.returncode == 0
+    return used.ru_utime + used.ru_stime
+
+
+def main() -> None:
+    """Measure the commands in turns; print a line for each."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--times", type=int, default=11)
+    times = parser.parse_args().times
+    measured: dict[str, list[float]] = {name: [] for name in COMMANDS}
+    for _ in range(times):
+        for name, arguments in COMMANDS.items():
+            measured[name].append(processor_seconds(arguments))
+    python = statistics.median(measured["python -c pass"])
+    for name, seconds in measured.items():
+        median = statistics.median(seconds)
+        ratio, spread = median / python, f"{min(seconds):.2f} to {max(seconds):.2f}"
+        print(f"{name:18} {median:5.2f} s of processor time ({spread}), {ratio:4.1f} x")
+
+
+if __name__ == "__main__":
+    main()

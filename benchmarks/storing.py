@@ -1,0 +1,213 @@
+"""How fast rows are stored: the real dispatcher and store with an executor that answers at once.
+
+PostgreSQL is compared with a text COPY of the same rows by psql into the same table, one commit, `fsync` on; SQLite
+with an `executemany` of the same rows into the same table, one commit. Both take turns in one run; what counts is the
+ratio.
+
+    python -m benchmarks.storing [--rows 100000] [--chunks 1000,20] [--in-flight 64] [--repeats 3] [--db URL]
+
+``--db`` is a PostgreSQL database of its own with `fsync` on; without it a server is started in a temporary folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from sqlalchemy.engine import make_url
+
+from benchmarks.at_once import AtOnce
+from sprag.service.storage.part import SystemClock
+from sprag.service.storage.records import StudyRecord
+from sprag.service.storage.sqlite_files import sqlite_driver
+from sprag.service.storage.store import Store
+from sprag.service.storage.tables import results_table
+from sprag.worker import fingerprint, models
+from sprag.worker.chunking import Chunking
+from sprag.worker.dispatcher import Dispatcher
+from sprag.worker.study import Axis, Study
+from tests import postgres
+from tests.worker import fakes
+
+#: Settings of the server of the benchmark: those of a server in use.
+_SERVER = {"fsync": "on", "shared_buffers": "512MB", "max_wal_size": "4GB", "autovacuum": "on"}
+
+
+@dataclass(frozen=True, slots=True)
+class Spent:
+    """Elapsed time, and processor time of this process, in s."""
+
+    elapsed: float
+    processor: float
+
+
+class Meter:
+    """Measures what happens in a ``with`` block as ``spent``."""
+
+    def __init__(self) -> None:
+        self.spent = Spent(0.0, 0.0)
+
+    def __enter__(self) -> Self:
+        self.spent = Spent(time.perf_counter(), time.process_time())
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        begin = self.spent
+        self.spent = Spent(time.perf_counter() - begin.elapsed, time.process_time() - begin.processor)
+
+
+def study_of(rows: int) -> Study:
+    """A one-pendulum study over the load."""
+    loads = tuple((np.arange(rows) * 1e-6).tolist())
+    return Study("vibration-drive", "storing", dict(fakes.BASE), dict(fakes.RUN), (Axis(("shaft.load",), loads),))
+
+
+def numbers(rows: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Results with all their digits; counts and categories are small integers."""
+    random = np.random.default_rng(1)
+    infos = models.result_infos("vibration-drive", "1")
+    values = random.normal(size=(rows, len(infos)))
+    for index, info in enumerate(infos):
+        if info.kind != "real":
+            values[:, index] = random.integers(1, 3 if info.kind == "category" else 1000, rows)
+    return values
+
+
+def at_once(values: np.ndarray[Any, np.dtype[np.float64]], in_flight: int) -> AtOnce:
+    """An executor that has the results of all cases."""
+    return AtOnce(lambda first, count: values[first : first + count], in_flight)
+
+
+def through_the_dispatcher(store: Store, record: StudyRecord, executor: AtOnce, meter: Meter) -> Spent:
+    """Run the study to its end."""
+    fingerprint.digest()  # once in a process
+    dispatcher = Dispatcher(store, executor, SystemClock(), news=store.session.news())
+    with meter:
+        # The study is read only when nothing is in flight, so that reading is not measured.
+        dispatcher.run(lambda: not executor.busy and store.get_study(record.id).state.terminal)
+    assert store.get_study(record.id).ok == record.cases
+    return meter.spent
+
+
+def by_psql(url: str, record: StudyRecord, other: StudyRecord, folder: Path, meter: Meter) -> Spent:
+    """The time of a COPY of the rows of one study into the same table as those of another one, in one commit."""
+    found, name = postgres.program("psql"), results_table("vibration-drive", "1").name
+    columns = [column.name for column in results_table("vibration-drive", "1").c]
+    file = folder / "rows"
+    address = make_url(url).set(drivername="postgresql").render_as_string(hide_password=False)
+
+    def psql(*commands: str) -> str:
+        assert found is not None
+        arguments = [part for command in commands for part in ("-c", command)]
+        done = subprocess.run(
+            [found, "-X", "-q", "-A", "-t", "-v", "ON_ERROR_STOP=1", *arguments, address],
+            check=True, capture_output=True, text=True,
+        )  # fmt: skip
+        return done.stdout
+
+    chosen = ", ".join([str(other.number), *columns[1:]])
+    psql(f"\\copy (SELECT {chosen} FROM {name} WHERE study = {record.number}) TO '{file}'", "CHECKPOINT")
+    with meter:
+        psql("BEGIN", f"\\copy {name} ({', '.join(columns)}) FROM '{file}'", "COMMIT")
+    assert int(psql(f"SELECT count(*) FROM {name} WHERE study = {other.number}")) == record.cases
+    return meter.spent
+
+
+def by_executemany(path: Path, record: StudyRecord, other: StudyRecord, meter: Meter) -> Spent:
+    """The time of an `executemany` of the rows of one study into the same table as those of another one."""
+    table = results_table("vibration-drive", "1")
+    connection = sqlite_driver().connect(path, isolation_level=None)
+    connection.execute("PRAGMA synchronous = FULL")
+    rows = connection.execute(f"SELECT * FROM {table.name} WHERE study = ?", (record.number,)).fetchall()
+    rows = [(other.number, *row[1:]) for row in rows]
+    marks = ", ".join("?" * len(table.c))
+    with meter:
+        connection.execute("BEGIN IMMEDIATE")
+        connection.executemany(f"INSERT INTO {table.name} VALUES ({marks})", rows)
+        connection.execute("COMMIT")
+    (stored,) = connection.execute(f"SELECT count(*) FROM {table.name} WHERE study = ?", (other.number,)).fetchone()
+    assert stored == record.cases
+    connection.close()
+    return meter.spent
+
+
+def measure(server: Server, folder: Path, rows: int, size: int, in_flight: int, repeats: int) -> None:
+    """The two in turn; print the least time of each and their ratio."""
+    values, study, meter = numbers(rows), study_of(rows), Meter()
+    ours: list[Spent] = []
+    theirs: list[Spent] = []
+    with Store.open(server.url, chunking=Chunking(cases=size)) as store:
+        for _ in range(repeats):
+            record = store.create_study({}, study, fresh=True)
+            ours.append(through_the_dispatcher(store, record, at_once(values, in_flight), meter))
+            other = store.create_study({}, study, fresh=True)
+            store.cancel_study(other.id)
+            store.settle(store.take_over("benchmark"), other.number)
+            if store.session.on_server:
+                theirs.append(by_psql(server.url, record, other, folder, meter))
+            else:
+                theirs.append(by_executemany(store.session.path, record, other, meter))
+            for done in (record, other):
+                store.delete_study(done.id)
+            store.purge()
+            if store.session.on_server:
+                with store.session.plain() as connection:
+                    connection.exec_driver_sql("VACUUM vibration_drive_1")
+    report(server.rival, rows, size, ours, theirs)
+
+
+def report(rival: str, rows: int, size: int, ours: list[Spent], theirs: list[Spent]) -> None:
+    """Print the least time of each and their ratio."""
+    own, other = (min(spent.elapsed for spent in all_of) for all_of in (ours, theirs))
+    work = min(spent.processor for spent in ours) / rows * 1e6
+    print(
+        f"chunks of {size:5d}: {rows / own:8,.0f} rows/s, {rival} {rows / other:8,.0f} rows/s: {other / own:4.0%}; "
+        f"processor time of the dispatcher {work:5.1f} us a row",
+        flush=True,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Server:
+    """A database, and what it is compared with."""
+
+    url: str
+    rival: str
+
+
+@contextmanager
+def on_server(url: str) -> Iterator[Server]:
+    """The PostgreSQL database to use."""
+    if url:
+        yield Server(url, "psql")
+        return
+    with postgres.running(**_SERVER) as started:
+        yield Server(started.url(started.new_database()), "psql")
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rows", type=int, default=100_000)
+    parser.add_argument("--chunks", default="1000,20", help="cases of a chunk, several separated by commas")
+    parser.add_argument("--in-flight", type=int, default=64, help="chunks in flight, as with about that many workers")
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--db", default="")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name, on_server(options.db) as server:
+        folder = Path(name)
+        for database in (Server(f"sqlite:///{folder / 'storing.sqlite3'}", "executemany"), server):
+            for size in map(int, options.chunks.split(",")):
+                measure(database, folder, options.rows, size, options.in_flight, options.repeats)
+
+
+if __name__ == "__main__":
+    main()
