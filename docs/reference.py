@@ -1,9 +1,9 @@
-"""The tables of docs/reference.md, and of docs/theory.md where it has some, from what the program says of itself.
+"""The tables of docs/reference.md and docs/theory.md, and the manual pages, from what the program says of itself.
 
-The sentences between them are by hand.
+The sentences between the tables are by hand.
 
-python -m docs.reference           write the tables anew
-python -m docs.reference --check   exit code 1 where a table is not what the program says
+python -m docs.reference           write tables and pages anew
+python -m docs.reference --check   exit code 1 where one of them is not what the program says
 """
 
 from __future__ import annotations
@@ -15,9 +15,13 @@ from pathlib import Path
 
 import typer
 
+from docs import manual
 from sprag.engine.machine_shaft.expressions import MAX_LENGTH
 from sprag.engine.vibration_drive.engagements import MAX_PERIODS
 from sprag.service.cli.app import app
+from sprag.service.cli.console import ExitCode
+from sprag.service.cli.settings import VARIABLES
+from sprag.service.fault_meanings import KIND_MEANINGS, MEANINGS, WARNING_MEANINGS
 from sprag.service.settings import table
 from sprag.worker import limits as limit
 from sprag.worker import models
@@ -45,6 +49,11 @@ def _sentence(text: str) -> str:
 def settings() -> Iterator[Row]:
     """Every setting."""
     return ((f"`{row.variable}`", f"`{row.default}`" if row.default else "", row.help) for row in table())
+
+
+def variables() -> Iterator[Row]:
+    """Every variable of commands."""
+    return ((f"`{name}`", sentence) for name, sentence in VARIABLES.items())
 
 
 def parameters(model: str) -> Iterator[Row]:
@@ -92,6 +101,7 @@ def limits() -> Iterator[Row]:
     smaller = f"{limit.MIN_NARROW_STEPS:,} to {limit.MAX_NARROW_STEPS:,}"
     yield "smaller steps into which a step of a sweep is split (`narrow`)", smaller
     yield "tolerance", f"{limit.MIN_TOLERANCE:g} to {limit.MAX_TOLERANCE:g}"
+    yield "cases of a study of a selection (`select`)", f"{limit.MAX_POINTS_SELECTED:,}"
     yield "times of a trajectory", f"{limit.MAX_TRAJECTORY_POINTS:,}"
     told = "excitation periods in the tables of a case's engagements: the last of its run"
     yield told, f"{MAX_PERIODS}"
@@ -122,7 +132,9 @@ STARTS_ONLY = {info.name for info in models.result_catalogue(DRIVE)} - SETTLED
 #: Name of a table, as the page has it in a comment above -> heads of its columns, and its rows.
 TABLES: dict[str, tuple[str, Iterable[Row]]] = {
     "commands": ("command | ", commands()),
+    "exit codes": ("exit code | meaning ", ((str(int(code)), code.sentence) for code in ExitCode)),
     "settings": ("variable | default | ", settings()),
+    "variables": ("variable of commands | ", variables()),
     **{f"parameters of the {WORDS[name]}": (PARAMETER_HEADS, parameters(name)) for name in models.model_names()},
     **{f"results of the {WORDS[name]}": ("result | unit | ", results(name)) for name in models.model_names()},
     "results of settled cases": ("result | unit | meaning ", results(DRIVE, SETTLED_ONLY)),
@@ -138,6 +150,11 @@ TABLES: dict[str, tuple[str, Iterable[Row]]] = {
 #: The tables of each page.
 PAGES: dict[str, dict[str, tuple[str, Iterable[Row]]]] = {
     "reference.md": TABLES,
+    "faults.md": {
+        "codes of faults": ("code | meaning ", meanings({**MEANINGS})),
+        "kinds of faults": ("code | meaning ", meanings({**KIND_MEANINGS})),
+        "codes of warnings": ("code | meaning ", meanings({**WARNING_MEANINGS})),
+    },
     "theory.md": {
         "endings of the vibration drive": ("ending | meaning ", meanings(DRIVE_ENDINGS)),
     },
@@ -159,22 +176,24 @@ def page(text: str, tables: dict[str, tuple[str, Iterable[Row]]]) -> str:
 
 def main() -> int:
     """Write the pages, or check them."""
-    changed = False
-    for name, tables in PAGES.items():
-        file = FOLDER / name
-        text = file.read_text(encoding="utf-8")
-        made = page(text, tables)
-        if "--check" not in sys.argv:
-            file.write_text(made, encoding="utf-8")
-            continue
-        lines = set(text.splitlines())
-        for line in made.splitlines():
+    made = {FOLDER / name: page((FOLDER / name).read_text(encoding="utf-8"), tables) for name, tables in PAGES.items()}
+    made |= {manual.FOLDER / name: text for name, text in manual.pages().items()}
+    kept = {file: file.read_text(encoding="utf-8") for file in [*made, *manual.FOLDER.glob("*.1")] if file.exists()}
+    if "--check" not in sys.argv:
+        for file in kept.keys() - made.keys():
+            file.unlink()
+        for file, text in made.items():
+            file.write_text(text, encoding="utf-8")
+        return 0
+    changed = {file for file in made.keys() | kept.keys() if made.get(file) != kept.get(file)}
+    for file in sorted(changed):
+        name = f"docs/{file.relative_to(FOLDER)}"
+        lines = set(kept.get(file, "").splitlines())
+        for line in made.get(file, "").splitlines():
             if line not in lines:
-                print(f"docs/{name} lacks: {line}")
-        if made != text:
-            print(f"docs/{name} is not what the program says: python -m docs.reference writes it anew.")
-            changed = True
-    return int(changed)
+                print(f"{name} lacks: {line}")
+        print(f"{name} is not what the program says: python -m docs.reference writes it anew.")
+    return int(bool(changed))
 
 
 if __name__ == "__main__":

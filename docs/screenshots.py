@@ -79,6 +79,7 @@ def shots(ids: list[str]) -> list[tuple[str, str, tuple[int, int], bool]]:
         ),
         ("map-order", f"/studies/{one}/map?x=shaft.load&y=excitation.frequency&z=regime.order", DESKTOP, True),
         ("cases", f"/studies/{one}/cases?sort=-power.useful.mean", DESKTOP, False),
+        ("explore", f"/studies/{one}/explore?max:shaft.load=0.15&sort=-efficiency", (1280, 1150), False),
         ("case", f"/studies/{two}/cases/45", DESKTOP, True),
         ("laboratory", "/laboratory?machine=press", (1280, 1000), False),
         ("laboratory-drive", "/laboratory/drive?shaft.load=0.2&held=shaft.load%3D0.4", (1280, 1000), False),
@@ -104,7 +105,8 @@ def main() -> None:
     parser.add_argument("--into", type=Path, default=ROOT / "docs" / "figures" / "pages")
     folder: Path = parser.parse_args().into
     folder.mkdir(parents=True, exist_ok=True)
-    chromium = shutil.which("chromium") or shutil.which("google-chrome")
+    names = ("chromium-headless-shell", "chromium", "google-chrome")
+    chromium = next(filter(None, map(shutil.which, names)), None)
     options: dict[str, Any] = {"executable_path": chromium, "args": ["--no-sandbox"]}
     with tempfile.TemporaryDirectory() as work, service(work) as address, sync_playwright() as playwright:
         ids = submit(address)
