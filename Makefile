@@ -12,7 +12,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input --quiet --qui
 # The tests start many processes: compiling all modules anew in each would be a third of their time.
 unexport PYTHONDONTWRITEBYTECODE
 
-CHECKS := mypy ruff imports reference collect
+CHECKS := mypy ruff imports reference catalogues collect
 
 .PHONY: help demo test check serve clean $(CHECKS)
 
@@ -49,6 +49,9 @@ imports: $(DEV)
 
 reference: $(DEV)
 	$(BIN)/python -m docs.reference --check
+
+catalogues: $(DEV)
+	$(BIN)/python -m docs.catalogues --check
 
 # Every file of tests can be imported. The processes that run them find them compiled, which each of them did anew.
 collect: $(DEV)

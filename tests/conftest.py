@@ -25,6 +25,9 @@ settings.load_profile("sprag")
 
 ROOT = Path(__file__).resolve().parents[1]
 
+# Commands are in English, whatever the language of this machine is.
+os.environ["SPRAG_LANGUAGE"] = "en"
+
 # All modules that are imported stay: looking for garbage among them took a third of the time of collecting the tests.
 gc.disable()
 
@@ -43,11 +46,22 @@ LONG = (
     "service/storage/test_postgres.py",
     "worker/executors/test_dask.py",
     "worker/executors/test_lost_cluster.py",
+    "worker/executors/test_rolling_upgrade.py",
     "acceptance/test_cut_link.py",
     "acceptance/test_same_rows.py",
     "acceptance/test_wheel.py",
+    "acceptance/test_containers.py",
     "engine/test_odd_drives.py",
     "worker/executors/test_executors.py",
+    # By their names these would be among the last.
+    "worker/executors/test_dask_docs.py",
+    "worker/executors/test_job_queue.py",
+    "sprag/test_library.py",
+    "service/test_presets.py",
+    "service/http/web/test_motion_pages.py",
+    "service/http/web/test_prefix_page.py",
+    "service/results/report/test_report.py",
+    "service/schedules/test_two_nights.py",
 )
 
 

@@ -41,9 +41,11 @@ def commands() -> dict[str, set[str]]:
 def mentioned(text: str) -> Iterator[tuple[str, list[str]]]:
     """Every ``sprag ...`` of a page with the options that follow it on its line."""
     text = text.replace("\\\n", " ")
-    for match in re.finditer(
-        r"(?:^|[`$/ ])sprag ((?:(?:db|schedule|token(?= (?:create|list|revoke)\b)) )?[a-z]+)\b([^`\n]*)", text
-    ):
+    groups = (
+        r"component(?= (?:list|put|delete)\b)|view(?= (?:list|save|change|delete)\b)|db|schedule"
+        r"|token(?= (?:create|list|revoke)\b)"
+    )
+    for match in re.finditer(rf"(?:^|[`$/ ])sprag ((?:(?:{groups}) )?[a-z]+)\b([^`\n]*)", text):
         line = match[0]
         if "`" in line or match.string[match.start()] in "$/" or _in_code(text, match.start()):
             yield match[1], re.findall(r"(?<![\w-])(--?[a-z][a-z-]*)", match[2].split("#")[0])
@@ -57,7 +59,9 @@ def _in_code(text: str, position: int) -> bool:
 def test_every_command_and_option_of_the_pages_exists(page: Path) -> None:
     known = commands()
     for name, options in mentioned(page.read_text()):
-        assert name in known or name in {"db", "schedule", "token"}, f"{page.name}: sprag {name}"
+        assert name in known or name in {"component", "db", "schedule", "token", "user", "view"}, (
+            f"{page.name}: sprag {name}"
+        )
         for option in options:
             assert option in known[name], f"{page.name}: sprag {name} {option}"
 

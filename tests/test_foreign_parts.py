@@ -46,6 +46,9 @@ USED = {
     ("XlsxWriter", "xlsxwriter.worksheet", "Worksheet._xml_number_element"): (
         "numbers with 17 digits", "service/results/exports/xlsx.py",
     ),
+    ("XlsxWriter", "xlsxwriter.worksheet", "Worksheet.add_table"): (
+        "tables of sheets written row by row: constant_memory, table, tables", "service/results/exports/xlsx.py",
+    ),
 }  # fmt: skip
 
 #: How the file says it, where not by the attribute's own name.

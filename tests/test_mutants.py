@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.mutants import MUTANTS, ROOT, Mutant, copy_program
+from benchmarks.mutants import MUTANTS, ROOT, Mutant, chosen, copy_program
 
 
 def test_what_runs_in_the_copy_is_the_copy(tmp_path: Path) -> None:
@@ -31,3 +31,11 @@ def test_the_place_to_change_is_there_once(mutant: Mutant) -> None:
     for test in mutant.tests:
         file, _, name = test.partition("::")
         assert f"def {name.partition('[')[0]}" in (ROOT / file).read_text(encoding="utf-8")
+
+
+def test_a_word_that_no_mutant_has_is_an_error() -> None:
+    name = MUTANTS[-1].name
+    assert chosen([]) == list(MUTANTS)
+    assert MUTANTS[-1] in chosen([name])
+    with pytest.raises(SystemExit, match="no such word"):
+        chosen([name, "no such word"])

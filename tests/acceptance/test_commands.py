@@ -254,9 +254,19 @@ def test_doctor_finds_the_installation_sound(tmp_path: Path, sprag: Sprag) -> No
     done = sprag("doctor", "--json", "--db", tmp_path / "x.sqlite3")
     assert done.code == 0, done.data
     assert done.data["sound"] is True
-    assert {"versions", "SQLite", "database", "rights", "disk", "backups", "clock", "kernel cache", "engine"} == {
-        finding["subject"] for finding in done.data["findings"]
-    }
+    assert {
+        "versions",
+        "SQLite",
+        "database",
+        "rights",
+        "disk",
+        "backups",
+        "clock",
+        "workers",
+        "schedules",
+        "kernel cache",
+        "engine",
+    } == {finding["subject"] for finding in done.data["findings"]}
 
 
 def test_doctor_names_files_that_others_may_read(tmp_path: Path, sprag: Sprag) -> None:

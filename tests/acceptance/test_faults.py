@@ -24,16 +24,16 @@ def test_bad_cases_are_named_and_the_others_ok_until_a_retry_mends_them(tmp_path
 
 
 def test_files_that_may_not_grow_hold_the_studies_until_they_may(tmp_path: Path) -> None:
-    file_limit(tmp_path, cases=4_000, studies=2)
+    file_limit(tmp_path, cases=4_000, studies=3)
 
 
 def test_a_power_cut_takes_nothing_that_was_acknowledged(tmp_path: Path) -> None:
     figures = powercut(tmp_path, studies=1, seed=1)
-    assert figures["acknowledged chunks"] == 2
+    assert figures["acknowledged chunks"] == 3
 
 
 def test_clients_do_not_hear_of_locks(tmp_path: Path) -> None:
-    figures = clients(tmp_path, readers=4, writers=4, seconds=2.0, cases=200, periods=60.0)
+    figures = clients(tmp_path, readers=2, writers=3, seconds=1.0, cases=200, periods=60.0)
     assert figures["write: answers"] > 0
     assert figures["read a curve: answers"] > 0
 

@@ -16,6 +16,7 @@ from sprag.service.presets import preset_text
 from sprag.service.results.fronts import designs_of, front_json
 from sprag.service.results.rounds import sentence
 from sprag.service.spec.document import parse_spec
+from sprag.worker.states import StudyState
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "guide-goals.md"
 SMALL = {"population": 8, "generations": 2}
@@ -42,7 +43,7 @@ def test_the_examples_of_the_guide_have_their_designs(section: str) -> None:
         found = designs_of(study, rounds, partial(done.store.rows_for_cases, done.record.id))
         progress = done.store.progress(done.record.id).rounds
     assert progress is not None
-    assert page.split("\n> ")[1].startswith(sentence(progress))
+    assert page.split("\n> ")[1].startswith(sentence(progress, StudyState.FINISHED))
     rows = [
         [float(cell) for cell in line.strip("|").split("|")] for line in re.findall(r"^\| \d.*$", page, re.MULTILINE)
     ]

@@ -8,6 +8,7 @@ from pathlib import Path
 import httpx
 
 from benchmarks.faults import harness
+from benchmarks.faults.dispatchers import dispatchers
 from benchmarks.faults.kills import kills
 from benchmarks.faults.rounds import rounds
 from benchmarks.faults.stopped import stopped
@@ -15,12 +16,19 @@ from tests.conftest import Finished
 
 
 def test_killed_processes_lose_nothing(tmp_path: Path) -> None:
-    figures = kills(tmp_path, cases=60, count=3, seed=9, periods=2000.0, processes=1)
+    """With drives, whose cases are stored, claimed and handed out again as all others are."""
+    figures = kills(tmp_path, cases=60, count=3, seed=9, periods=2000.0, drives=19, processes=1)
+    assert figures["cases"] == 60
     assert figures["kills"] == {"pool process": 1, "dispatcher": 1, "service": 1}
 
 
 def test_a_study_that_chooses_its_cases_ends_as_an_undisturbed_one(tmp_path: Path) -> None:
     assert sum(rounds(tmp_path, count=2, seed=4)["kills"].values()) == 2
+
+
+def test_killed_dispatchers_of_one_database_lose_nothing(tmp_path: Path, postgres_url: str) -> None:
+    figures = dispatchers(tmp_path, count=3, seed=2, studies=3, cases=40, url=postgres_url)
+    assert sum(figures["ends"].values()) >= 3
 
 
 def test_a_dispatcher_that_was_stopped_commits_nothing_and_gives_up(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from tests.acceptance.processes import ROOT
 
 PACKAGES = ("sprag", "engine", "worker", "service", "migrations")  # folders; all are parts of sprag
 #: Extras of the program itself, beside its dependencies.
-RUNTIME = ("tables", "server", "postgres", "cluster")
+RUNTIME = ("tables", "frames", "server", "report", "postgres", "cluster")
 CONSTRAINTS = (ROOT / "constraints.txt").read_text()
 
 
@@ -74,7 +74,7 @@ def test_every_library_that_is_imported_is_named() -> None:
 
 def test_the_base_installation_is_the_client() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert project["dependencies"] == ["httpx", "rich", "typer"]
+    assert project["dependencies"] == ["httpx", "polib", "rich", "typer"]
     assert "'.[server]'" in (ROOT / "Makefile").read_text()
 
 

@@ -13,8 +13,10 @@ from pathlib import Path
 
 import pytest
 
+from sprag.service.http.web.manual import PAGES as MANUAL_PAGES
 from tests.acceptance.processes import ROOT, environment
 
+PACKAGED = ("sprag/", "engine/", "worker/", "service/", "migrations/")
 STUDY = {
     "sprag": 1,
     "model": "vibration-drive",
@@ -41,7 +43,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("wheel")
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     for name in filter(None, listed.split("\0")):
-        if name.startswith(("sprag/", "engine/", "worker/", "service/", "migrations/", "README.md", "pyproject.toml")):
+        if name.startswith((*PACKAGED, "docs/", "MANIFEST.in", "README.md", "pyproject.toml")):
             target = folder / "sources" / name
             target.parent.mkdir(parents=True, exist_ok=True)
             if (ROOT / name).is_symlink():
@@ -119,11 +121,14 @@ def test_the_wheel_has_what_the_program_reads(wheel: Path) -> None:
     wanted = {
         name if name.startswith("sprag/") else f"sprag/{name}"
         for name in listed.split("\0")
-        if name.startswith(("sprag/", "engine/", "worker/", "service/", "migrations/"))
-        and not (ROOT / name).is_symlink()
+        if name.startswith(PACKAGED) and not (ROOT / name).is_symlink()
     }
     assert wanted <= names, sorted(wanted - names)
-    assert {name.partition("/")[0] for name in names if ".dist-info/" not in name} == {"sprag"}
+    pages = {f"sprag/service/http/web/manual/{name}.md" for name in MANUAL_PAGES}
+    assert pages <= names, sorted(pages - names)
+    manual = {name for name in names if ".data/data/share/man/man1/" in name}
+    assert {Path(name).name for name in manual} == {page.name for page in (ROOT / "docs" / "man").iterdir()}
+    assert {name.partition("/")[0] for name in names - manual if ".dist-info/" not in name} == {"sprag"}
     for line in ("Requires-Python: >=3.11", "Provides-Extra: server", "Provides-Extra: tables", "Keywords: "):
         assert line in about
     assert "License" not in about
