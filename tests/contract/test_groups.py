@@ -88,9 +88,9 @@ def test_chunks_keep_where_they_were_computed(store: Store, monkeypatch: pytest.
     store.quarantine(epoch, chunks[4], "crashed", "its process died")
     assert store.origins(study_id) == (
         Origin("left", "one", 2, 20),
-        Origin(None, None, 1, 10),
         Origin("left", "two", 1, 10),
         Origin("right", "one", 1, 10),
+        Origin(None, None, 1, 10),
     )
 
 

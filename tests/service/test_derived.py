@@ -54,7 +54,7 @@ def test_a_derived_value_is_shown_as_such(filled: tuple[Service, str]) -> None:
         1,
     ]
     report = service.http.get(f"/api/v1{own}/report", params={"format": "html"}).text
-    assert f'<td>Inertia, pendulum 0</td><td class="number">{STORED}</td>' in report
+    assert f'<th scope="row">Inertia, pendulum 0</th><td class="number">{STORED}</td>' in report
     assert "<td>derived</td>" in report
     assert service.http.get(f"/api/v1{own}/report", params={"format": "pdf"}).status_code == 200
     assert service.http.get(f"/new?clone={study_id}").text.count(f'value="= {FORMULA}"') == 1

@@ -50,7 +50,8 @@ def pool_processes() -> list[psutil.Process]:
     for child in psutil.Process().children():
         with suppress(psutil.NoSuchProcess):  # a zombie is one, too
             command = child.cmdline()
-            if "spawn_main" in " ".join(command) or command == own:  # of a new process, as long as it is not replaced
+            # A new process has the parent's command until it is replaced, and none for a moment then.
+            if "spawn_main" in " ".join(command) or command in (own, []):
                 found.append(child)
     return found
 

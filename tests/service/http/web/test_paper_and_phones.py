@@ -133,7 +133,7 @@ def test_a_page_on_paper_is_set_as_the_report(visitor: Visitor, office: Office) 
     own = page.evaluate(PAPER)
     assert (own["hidden"], own["figures"], own["facts"]) == ([], True, True)
     facts = page.locator("#particulars").inner_text()
-    for fact in (family, "vibration-drive", "Submitted", "Printed"):
+    for fact in (family, "Vibration drive", "Submitted", "Printed"):
         assert fact in facts
     assert page.get_by_text("Figures of the report").is_visible()
     pdf = page.pdf(prefer_css_page_size=True)

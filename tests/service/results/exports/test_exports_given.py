@@ -126,12 +126,13 @@ def test_a_fitted_clutch_is_told_from_a_given_one_and_the_run_has_its_defaults(s
     assert origins["tolerance"] == ("1e-09", "default")
     page = got(service, spec, "html").decode()
     assert re.search(r"<td[^>]*>9.80665</td><td>m/s²</td><td>default</td><td>gravity</td>", page)
-    assert re.search(r"<td>Run: window</td><td[^>]*>the last third</td><td></td><td>default</td>", page)
+    window = r'<th scope="row">Run: evaluated window</th><td[^>]*>the last third</td><td></td><td>default</td>'
+    assert re.search(window, page)
 
 
 def test_the_report_says_it_too(service: Service) -> None:
     page = got(service, press(mean_speed_is="time"), "html").decode()
-    assert "<td>base.mean_speed_is</td><td>time</td>" in page
+    assert '<th scope="row">base.mean_speed_is</th><td>time</td>' in page
 
 
 def test_a_long_table_is_whole_in_files_and_cut_in_the_report(service: Service) -> None:
