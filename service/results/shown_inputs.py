@@ -48,7 +48,7 @@ def inputs(study: Study, spec: Mapping[str, Any]) -> list[tuple[str, list[dict[s
 def _section(path: str) -> str:
     """What a part of a machine is called: ``Pendulum 0, clutch``."""
     if not path:
-        return _("in general")
+        return _("General")
     names: list[str] = []
     for name in path.split("."):
         if name.isdigit():

@@ -181,7 +181,7 @@ DURATION: Final = Described("duration", "Duration", _DURATION, "time", default="
 #: Fields of every run.
 ANY_RUN: Final = named(
     Described("tolerance", "Tolerance", _TOLERANCE, "number", MIN_TOLERANCE, MAX_TOLERANCE, 1e-9),
-    Described("reset", "Reading of (5)", _RESET, "choice", default="contact", choices=_READINGS),
+    Described("reset", "Windup counts", _RESET, "choice", default="contact", choices=_READINGS),
 )
 #: Options of the fit of measured clutch data, besides the accuracy.
 FIT: Final = named(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
@@ -11,7 +10,7 @@ from urllib.parse import urlencode
 from fastapi import Request
 from starlette.responses import Response
 
-from sprag.service.answers.differing import MOST_COMPARED, differing, unique_names
+from sprag.service.answers.differing import MOST_COMPARED, unique_names
 from sprag.service.formats import MEDIA_TYPES
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx
@@ -30,21 +29,20 @@ from sprag.service.results.curve_cases import draw, select
 from sprag.service.results.curves import CurveQuery, Curves
 from sprag.service.results.defaults import main_query, varying_axes
 from sprag.service.results.differences import compared_csv, differences
+from sprag.service.results.differing_inputs import DifferingInput, differing_inputs
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.read import read_figure
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.pictures.curves import draw_compare
 from sprag.service.results.selection import SelectionError, refused
 from sprag.service.spec.catalogue import unit_of
-from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.service.storage.errors import StudyNotFoundError
 from sprag.service.storage.listing import StudyFilter
 from sprag.worker import models
 from sprag.worker.limits import MAX_SEARCH_LENGTH
-from sprag.worker.models.parameters import parameter_of
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Sequence
+    from collections.abc import Awaitable, Callable
 
     from starlette.datastructures import QueryParams
 
@@ -56,8 +54,6 @@ if TYPE_CHECKING:
 router = page_router()
 
 _LISTED: Final = 50
-#: Characters of an input in the table.
-_LONGEST: Final = 120
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,56 +156,9 @@ def drawn(context: Context, chosen: Comparison) -> list[tuple[str, Curves]]:
     return found
 
 
-@dataclass(frozen=True, slots=True)
-class DifferingInput:
-    """An input in which studies differ: its path in the spec, what it is called, and the value of each study."""
-
-    path: str
-    caption: str
-    values: list[str]
-
-
-def differing_inputs(context: Context, records: list[StudyRecord], reading: Reading) -> list[DifferingInput]:
-    """Inputs in which the studies differ: parameters of the machine as they are read, others as they were written."""
-    studies = [context.store.study(record.id) for record in records]
-    found = differing([context.store.spec(record.id) for record in records])
-    paths = {pointer: pointer[1:].replace("/", ".").replace("~1", "/").replace("~0", "~") for pointer in found}
-    rows = (_differing(paths[pointer], values, studies, reading) for pointer, values in found.items())
-    return [row for row in rows if row is not None]
-
-
-def _differing(path: str, values: Sequence[Any], studies: list[Study], reading: Reading) -> DifferingInput | None:
-    """None where the values differ only in how they were written."""
-    first, _dot, name = path.partition(".")
-    entry = (
-        next((found for study in studies if (found := parameter_of(study, name))), None) if first == "base" else None
-    )
-    numbers = [None if value is None or entry is None else _in_si(value, entry.unit) for value in values]
-    if entry is None or all(number is None for number in numbers):
-        return DifferingInput(path, path, [_written(value) for value in values])
-    if None not in numbers and len(set(numbers)) == 1:
-        return None
-    shown = [
-        _written(value) if number is None else reading.quantity(number, entry.unit, 8)
-        for value, number in zip(values, numbers, strict=True)
-    ]
-    return DifferingInput(path, reading.caption(name), shown)
-
-
-def _in_si(value: object, unit: str) -> float | None:
-    """A quantity of a spec; None for anything else."""
-    try:
-        return parse_quantity(value, unit)
-    except QuantityError:
-        return None
-
-
-def _written(value: object) -> str:
-    """A value of a spec as text, long lists shortened."""
-    if value is None:
-        return "–"
-    text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} …"
+def _differing_inputs(context: Context, records: list[StudyRecord], reading: Reading) -> list[DifferingInput]:
+    specs = [context.store.spec(record.id) for record in records]
+    return differing_inputs(specs, [context.store.study(record.id) for record in records], reading)
 
 
 @router.get("/compare")
@@ -245,7 +194,7 @@ def compare_page(context: Ctx, request: Request) -> Response:
         **_offered(context, given, choosing=choosing or not records),
         most=MOST_COMPARED,
         labels=labels(records),
-        inputs=differing_inputs(context, records, reading_of(context.store, records[0].id, choice)) if differ else [],
+        inputs=_differing_inputs(context, records, reading_of(context.store, records[0].id, choice)) if differ else [],
         faults=faults,
         units={} if chosen is None else {path: unit_of(chosen.studies[0], path) for path in chosen.axes},
         held=[[reading.say(text) for text in texts] for texts in held_at] if reading else [],

@@ -137,6 +137,11 @@ class Panel:
     fills: tuple[Fill, ...] = ()
     notes: tuple[Note, ...] = ()
 
+    def on_the_right(self, note: Note) -> bool:
+        """Whether a note is in the right half of the lines, where its text has more room to its left."""
+        x = np.concatenate([line.x[np.isfinite(line.x)] for line in self.lines] or [np.empty(0)])
+        return bool(x.size) and note.x > 0.5 * (x.min() + x.max())
+
 
 @dataclass(frozen=True, slots=True)
 class Figure:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from sprag.service.results.curves import Curves
     from sprag.service.results.figures.figure import Figure as Described
-    from sprag.service.results.figures.figure import Line, Marks, Note, Panel
+    from sprag.service.results.figures.figure import Line, Marks, Panel
     from sprag.service.results.reading import Reading
     from sprag.worker.models import Basin, Portrait, Presentation, Trajectory
 
@@ -198,7 +198,7 @@ def _paint_panel(figure: Figure, axes: Axes, panel: Panel, drawn: Described) -> 
     if shaded is not None:
         figure.colorbar(shaded, ax=axes, label=drawn.scale)
     paint_marks(axes, panel.marks)
-    paint_notes(axes, panel.notes)
+    paint_notes(axes, panel)
     axes.set_ylabel(quantity_label(panel.y))
     if panel.x is not None:
         axes.set_xlabel(quantity_label(panel.x))
@@ -252,17 +252,19 @@ def paint_marks(axes: Axes, every: Sequence[Marks], *, clipped: bool = True) -> 
             )  # fmt: skip
 
 
-def paint_notes(axes: Axes, notes: Sequence[Note]) -> None:
+def paint_notes(axes: Axes, panel: Panel) -> None:
     """Points that are read off the lines, with their texts."""
-    for note in notes:
+    for note in panel.notes:
         ring = note.kind == "point"
         axes.plot(
             note.x, note.y, color=note.colour, linestyle="none", marker=NOTE_MARKERS[note.kind],
             markersize=9.0 if ring else 7.0, markerfacecolor="none" if ring else note.colour, zorder=3.0,
         )  # fmt: skip
         if note.text:
+            side = -1 if panel.on_the_right(note) else 1
             axes.annotate(
-                note.text, (note.x, note.y), xytext=(7, 7), textcoords="offset points", fontsize=8, color=note.colour,
+                note.text, (note.x, note.y), xytext=(7 * side, 7), textcoords="offset points", fontsize=8,
+                color=note.colour, ha="right" if side < 0 else "left",
             )  # fmt: skip
 
 

@@ -55,7 +55,10 @@ def test_the_page_lists_the_inputs_that_differ(service: Service, three: list[str
     table = page.text[page.text.index('id="inputs"') :]
     mass = '<th scope="row" title="base.pendulums.0.mass">Mass, pendulum 0</th>'
     assert f"{mass}<td>0.5 kg</td><td>0.6 kg</td><td>0.7 kg</td>" in table
-    assert '<th scope="row">axes.0.values</th><td>[0.1, 0.2, 0.4]</td>' in table
+    loads = '<th scope="row" title="shaft.load">Load torque, varied</th>'
+    assert f"{loads}<td>0.1; 0.2; 0.4 N·m</td><td>0.1; 0.3; 0.4; 0.9 N·m</td><td>0.1; 0.2; 0.4 N·m</td>" in table
+    assert "axes." not in table
+    assert "Excitation frequency" not in table
     assert "base.shaft" not in table
     assert "<th>first</th><th>second &amp; best</th><th>third</th>" in table
     same = service.http.get("/compare", params={"study": [three[0], submit(service, "x", [0.1, 0.2, 0.4])]}).text
@@ -78,12 +81,25 @@ def test_inputs_are_compared_in_the_units_of_the_reader(service: Service) -> Non
     assert "spring_rate" not in table(soft, same, units="si")
 
 
+def test_long_axes_are_shortened_and_written_differently_are_the_same(service: Service) -> None:
+    made = submit(service, "long", [0.01 * (place + 1) for place in range(30)])
+    other = submit(service, "longer", [0.01 * (place + 1) for place in range(31)])
+    texts = [f"{0.01 * (place + 1):.8g}" for place in range(10)]
+    cell = f"<td>{'; '.join(texts)}; …; 0.3 N·m (30 values)</td>"
+    assert cell in service.http.get("/compare", params={"study": [made, other]}).text
+    spec = {**copy.deepcopy(SPEC), "axes": [{"path": X, "values": ["100 N*mm", "0.2 N*m"]}]}
+    same = [service.submit(spec), service.submit({**spec, "axes": [{"path": X, "values": [0.1, 0.2]}]})]
+    assert "The inputs of these studies are the same." in service.http.get("/compare", params={"study": same}).text
+
+
 def test_studies_without_a_common_axis_are_compared_by_their_inputs(service: Service, three: list[str]) -> None:
     other = service.submit({**copy.deepcopy(SPEC), "axes": []})
     page = service.http.get("/compare", params={"study": [three[0], other]})
     assert page.status_code == 200
     assert "no varying parameter in common" in page.text
-    assert '<th scope="row">axes.0.path</th>' in page.text
+    assert (
+        '<th scope="row" title="shaft.load">Load torque, varied</th><td>0.1; 0.2; 0.4 N·m</td><td>–</td>' in page.text
+    )
 
 
 def test_others_are_chosen_beside_those_that_are_compared(service: Service, three: list[str]) -> None:

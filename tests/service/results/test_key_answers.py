@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from scipy.interpolate import interp1d
 
+from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.figures.answers import answers_figure
 from sprag.service.results.key_answer_words import note_of, report
@@ -164,6 +166,11 @@ def test_answers_stand_on_their_lines(spec: dict[str, Any]) -> None:
         assert [note.y for note in rings] == pytest.approx([np.interp(0.5, line.x, line.y)])
     (peak,) = [note for panel in figure.panels for note in panel.notes if "W" in note.text]
     assert (peak.x, peak.kind, peak.text) == (0.55, "largest", "4.95 W at 0.55 N·m")
+    # Where its text has room: to the right in the left half, to the left in the other.
+    power = figure.panels[0]
+    assert [power.on_the_right(replace(peak, x=x)) for x in (0.55, 1.3)] == [False, True]
+    texts = [trace for trace in plotly_figure(figure)["data"] if "4.95 W at 0.55 N·m" in trace.get("text", ())]
+    assert [trace["textposition"] for trace in texts] == [["top right"]]
 
 
 def test_chosen_curves_and_wrong_choices(spec: dict[str, Any]) -> None:

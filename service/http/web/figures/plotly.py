@@ -315,7 +315,7 @@ def note_traces(panel: Panel, kinds: Sequence[NoteKind], *, listed: bool) -> Ite
             "x": [note.x for note in notes] or [None],
             "y": [note.y for note in notes] or [None],
             "text": [escaped(note.text) for note in notes],
-            "textposition": "top right",
+            "textposition": [f"top {'left' if panel.on_the_right(note) else 'right'}" for note in notes] or "top right",
             "textfont": {"size": 12},
             "cliponaxis": False,
             "marker": {
