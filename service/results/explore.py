@@ -275,7 +275,11 @@ def histogram(values: NDArray[np.float64], selected: NDArray[np.bool_], bins: in
     if not known.any():
         return None
     low, high = float(values[known].min()), float(values[known].max())
-    every, edges = np.histogram(values[known], bins=bins, range=(low, high) if high > low else None)
+    # Values closer than this are one number but for rounding, and edges between them would not differ.
+    least = float(4 * bins * np.spacing(max(abs(low), abs(high))))
+    if high - low <= least:
+        low, high = low - max(0.5, least), high + max(0.5, least)
+    every, edges = np.histogram(values[known], bins=bins, range=(low, high))
     # Equal intervals by their ends, not as a list of edges: that would be searched for each value.
     own, _ = np.histogram(values[known & selected], bins=bins, range=(edges[0], edges[-1]))
     return {"edges": edges.tolist(), "all": every.tolist(), "selected": own.tolist()}

@@ -25,7 +25,6 @@ from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 from sprag.worker.codes import PENDING
 from sprag.worker.models.presentation import Answer
-from sprag.worker.planning.refine_plan import REFINE
 from sprag.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
@@ -142,7 +141,7 @@ def answers_query(study: Study, infos: Sequence[ResultInfo], chosen: CurveQuery 
 
     None where the cases of the study lie on no curves: nothing varies, or it chooses its own cases.
     """
-    if study.plan is not None and (study.plan["kind"] != REFINE or curve_plan(study) is None):
+    if study.plan is not None and curve_plan(study) is None:
         return None
     query = chosen or main_query(study, infos)
     if query is None:

@@ -27,6 +27,7 @@ from sprag.service.results.pictures.curves import require_drawable
 from sprag.service.results.pictures.sensitivity import MOST_RESULTS
 from sprag.service.results.quantities import TYPED
 from sprag.service.results.reading import Choice, Reading, reading_for
+from sprag.service.results.refined import curve_plan
 from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.regimes import counted
 from sprag.service.results.report.calibration import calibration_part
@@ -316,7 +317,7 @@ def _pictures(
     query = main_query(study, infos)
     if query is None:
         return (), _("Nothing varies in this study, so there is no curve.")
-    if map_plan(study) is not None:
+    if study.plan is not None and curve_plan(study) is None:  # its cases lie on no curves
         return (), ""
     shown = models.presentation_of(study)
     groups = list(_groups([info for info in infos if info.name not in already], shown.checks))

@@ -122,6 +122,15 @@ def test_histograms_count_every_case_once(study: Study, rows: RowColumns) -> Non
     assert (sum(alone["all"]), sum(alone["selected"])) == (3, 2)
 
 
+@pytest.mark.parametrize("value", [0.0, 5e-324, 4.0 * np.pi, -1e18, 1e300])
+def test_values_that_differ_by_rounding_are_one(value: float) -> None:
+    values = value + np.spacing(value) * np.arange(3.0)
+    drawn = histogram(values, np.array([True, False, True]))
+    assert drawn is not None
+    assert (sum(drawn["all"]), sum(drawn["selected"])) == (3, 2)
+    assert np.all(np.diff(drawn["edges"]) > 0.0)
+
+
 def test_points_of_the_picture_are_the_cases(study: Study, rows: RowColumns) -> None:
     shown = found(study, rows, "efficiency >= 0.5", sort="-efficiency", limit=5)
     figure = explore_figure(shown, "shaft.load", "efficiency")

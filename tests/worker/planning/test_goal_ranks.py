@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from sprag.worker.planning.goals import Goal, GoalPlan, Limit, Variable, front
 from sprag.worker.planning.goals.hypervolume import hypervolume
-from sprag.worker.planning.goals.ranking import crowding, fronts, ranks, spread
+from sprag.worker.planning.goals.ranking import crowding, fronts, ranks, spread, undominated
 from sprag.worker.planning.goals.scores import Scores
 from sprag.worker.planning.rounds import Rows
 from tests.worker.planning.searching import plan_of
@@ -132,6 +132,21 @@ def test_hypervolume_of_three_goals_agrees_with_counting() -> None:
     goals, places = rng.random((12, 3)), rng.random((20_000, 3))
     inside = (goals[:, None, :] <= places[None, :, :]).all(axis=2).any(axis=0)
     assert hypervolume(goals, np.ones(3)) == pytest.approx(inside.mean(), abs=0.012)
+
+
+@pytest.mark.parametrize("goals", [2, 3])
+def test_hypervolume_and_front_of_designs_on_a_grid_are_those_of_its_cells(goals: int) -> None:
+    """With many equal goals, taken a few at a time."""
+    rng = np.random.default_rng(goals)
+    places = np.stack(np.meshgrid(*[np.arange(6) + 0.5] * goals), axis=-1).reshape(-1, goals)
+    for _ in range(20):
+        designs = rng.integers(0, 7, (15, goals)).astype(float)
+        cells = (designs[:, None, :] <= places[None, :, :]).all(axis=2).any(axis=0)
+        assert hypervolume(designs, np.full(goals, 6.0)) == cells.sum()
+        front = np.empty((0, goals))
+        for part in np.split(designs, 5):
+            front = undominated(front, part)
+        assert {*map(tuple, front)} == {*map(tuple, designs[fronts(designs) == 0])}
 
 
 def test_crowding_is_the_distance_of_the_neighbours() -> None:

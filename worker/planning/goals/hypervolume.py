@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,11 +45,30 @@ def _area(goals: Floats, reference: Floats) -> float:
 
 
 def _volume(goals: Floats, reference: Floats) -> float:
-    """The areas of the slices between the designs' third goals."""
+    """What is dominated between the third goals of one design and the next, each time an area over the other two.
+
+    The area grows with each design by what that one adds (N. Beume et al., "On the complexity of computing the
+    hypervolume indicator", IEEE Transactions on Evolutionary Computation 13 (2009)).
+    """
     ordered = goals[np.argsort(goals[:, 2], kind="stable")]
-    heights = np.append(ordered[1:, 2], reference[2]) - ordered[:, 2]
-    total = 0.0
-    for i, height in enumerate(heights.tolist()):
-        if height > 0.0:
-            total += height * _area(ordered[: i + 1, :2], reference[:2])
+    right, top, last = reference.tolist()
+    # The edge of the area: from left to right, each point lower than the one before it.
+    across, down = [-np.inf, right], [top, -np.inf]
+    total = area = 0.0
+    heights = [*ordered[1:, 2].tolist(), last]
+    for (x, y, z), above in zip(ordered.tolist(), heights, strict=True):
+        place = bisect_right(across, x)
+        floor = down[place - 1]
+        if y < floor:
+            end = place
+            left = x
+            while down[end] >= y:
+                area += (across[end] - left) * (floor - y)
+                left, floor = across[end], down[end]
+                end += 1
+            area += (across[end] - left) * (floor - y)
+            # A point exactly below or above another replaces it.
+            begin = place - 1 if across[place - 1] == x else place
+            across[begin:end], down[begin:end] = [x], [y]
+        total += area * (above - z)
     return total

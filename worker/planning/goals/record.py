@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sprag.worker.planning.goals.hypervolume import MOST_GOALS, hypervolume
 from sprag.worker.planning.goals.plan import GOAL
 from sprag.worker.planning.goals.polish import MET
-from sprag.worker.planning.goals.ranking import fronts
+from sprag.worker.planning.goals.ranking import undominated
 from sprag.worker.planning.goals.scores import misses, signs
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ Floats = NDArray[np.float64]
 class Record:
     """Counts, best values and hypervolume, and what the polish has reached.
 
+    The hypervolume is that of all designs of the search: survivors are spread evenly and may dominate less than before.
     The reference point of the hypervolume is the worst of each goal among the survivors of the first generation of
     which at least half are within the limits. Of fewer it would lie in a corner that later fronts do not reach, and
     the hypervolume would stay 0.
@@ -35,6 +36,7 @@ class Record:
         self._generation = 0
         self._best = np.full(len(plan.best), np.nan)
         self._best_exact = self._best
+        self._front = np.empty((0, len(plan.best)))
         self._volume: float | None = None
         self._reference: Floats | None = None
         self._polish: dict[str, int] | None = None
@@ -48,10 +50,11 @@ class Record:
             return
         self._best = goals.min(axis=0)
         if 2 <= len(self._signs) <= MOST_GOALS:
+            self._front = undominated(self._front, new.goals[new.feasible])
             if self._reference is None and 2 * len(goals) >= self._plan.population:
                 self._reference = goals.max(axis=0)
             if self._reference is not None:
-                self._volume = hypervolume(goals[fronts(goals) == 0], self._reference)
+                self._volume = hypervolume(self._front, self._reference)
 
     def differentiated(self, new: Scores) -> None:
         """Take the round of the polish whose designs serve derivatives only: they count as no designs of their own."""
@@ -79,7 +82,7 @@ class Record:
 
         ``phase`` is "search", "polish" or "ended". ``best`` has the best value of each goal among the survivors within
         the limits, or once the polish has met the equalities, among the designs that meet them to 1e-6.
-        ``hypervolume`` is what the survivors dominate, up to ``reference`` (two or three goals). Goals have the units
+        ``hypervolume`` is what the designs dominate, up to ``reference`` (two or three goals). Goals have the units
         and signs of the results, and None where there is none. ``polish`` counts its designs, and those that meet the
         equalities to 1e-6.
         """
