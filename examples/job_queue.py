@@ -18,6 +18,7 @@ import threading
 from typing import Any
 
 import dask
+from dask.utils import parse_bytes
 from dask_jobqueue import PBSCluster, SGECluster, SLURMCluster
 from distributed import Security
 
@@ -33,15 +34,31 @@ def word(text: str) -> str:
     return text
 
 
+def positive(text: str) -> int:
+    """A number of cores or jobs."""
+    if not text.isascii() or not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} must be a whole number from 1")
+    return int(text)
+
+
+def memory(text: str) -> str:
+    """An amount of memory as Dask reads it."""
+    try:
+        parse_bytes(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} must be an amount such as '64 GiB'") from None
+    return text
+
+
 def options() -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(description="Workers of Sprag as jobs of a batch system.")
     parser.add_argument("system", choices=SYSTEMS)
     parser.add_argument("--host", type=word, required=True, help="name or address by which jobs reach this machine")
     parser.add_argument("--port", type=int, default=8786, help="port of the scheduler")
-    parser.add_argument("--jobs", type=int, default=1, help="jobs that run at the same time")
-    parser.add_argument("--cores", type=int, required=True, help="cores of a job; each gets a worker")
-    parser.add_argument("--memory", required=True, help='memory of a job, such as "64 GiB"')
+    parser.add_argument("--jobs", type=positive, default=1, help="jobs that run at the same time")
+    parser.add_argument("--cores", type=positive, required=True, help="cores of a job; each gets a worker")
+    parser.add_argument("--memory", type=memory, required=True, help='memory of a job, such as "64 GiB"')
     parser.add_argument("--time", type=word, default="08:00:00", help="time limit of a job")
     parser.add_argument("--queue", type=word, help="queue or partition")
     parser.add_argument("--account", type=word, help="account or project that pays")
@@ -92,7 +109,16 @@ def main() -> None:
     ending = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ending.set())
-    with cluster(chosen) as started:
+    try:
+        starting = cluster(chosen)
+    except (OSError, RuntimeError, TypeError, ValueError) as error:
+        cause: BaseException = error
+        while (
+            before := cause.__cause__ or cause.__context__
+        ) is not None:  # Dask's own failures come on top of the first
+            cause = before
+        sys.exit(f"job_queue.py: the scheduler cannot start at {chosen.host}:{chosen.port}: {cause}")
+    with starting as started:
         if chosen.print:
             print(started.job_script())
             return

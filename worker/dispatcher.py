@@ -172,7 +172,7 @@ class Dispatcher:
         studies = self._opening.studies()
         if not self._has_room(studies):
             studies = self._opening.studies()
-        given = self._opening.given(studies)
+        given = self._opening.given(studies, self._executor.shortage)
         for study in filter(self._opening.chosen, studies):
             over = study.finish_by is not None and study.finish_by <= self._clock.now()
             paused = study.state is StudyState.PAUSED and not (over and study.goes_on)

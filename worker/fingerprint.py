@@ -24,7 +24,7 @@ from typing import Final
 from sprag.worker import models
 from sprag.worker.known_answers import known_answers
 
-_SOURCES: Final = "engine sources"
+_SOURCES: Final = "sources of engine and worker"
 _FEATURES: Final = "processor features"
 _PACKAGES: Final = ("sprag", "numpy", "numba", "llvmlite", "scipy")
 #: Settings of numba that do not affect its code, or are covered by the processor features.
@@ -44,7 +44,8 @@ _NAMED: Final = 6
 
 
 def _sources() -> str:
-    return models.source_hash(models.engine_folder(), Path(models.__file__).parent)[:16]
+    """Of the engine, and of the worker, which decides the parameters of a case: axes, tolerances, derived ones."""
+    return models.source_hash(models.engine_folder(), Path(__file__).parent)[:16]
 
 
 # Hash of the files when this process began to import them: an upgrade changes the files, not the running code.
@@ -54,7 +55,7 @@ _AT_START: Final = _sources()
 def collect() -> dict[str, str]:
     """The fingerprint of this process, by subject.
 
-    Where the engine's files have changed since the process started, it differs from every other fingerprint.
+    Where the files have changed since the process started, it differs from every other fingerprint.
     """
     now = _sources()
     changed = f", changed to {now} while process {os.getpid()} ran"

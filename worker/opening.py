@@ -38,6 +38,8 @@ class Opening:
         #: Number of studies of this dispatcher, and the other dispatchers, at the latest poll.
         self._own = 0
         self._peers: list[Peer] = []
+        #: Whether nothing could be run then.
+        self._stuck = False
 
     def studies(self) -> list[ActiveStudy]:
         """The unfinished studies that belong to this dispatcher or to none."""
@@ -53,14 +55,14 @@ class Opening:
         """Whether the study belonged to this dispatcher when it was polled."""
         return study.dispatcher == self.epoch
 
-    def given(self, studies: Sequence[ActiveStudy]) -> int | None:
-        """The study that is to be given to another dispatcher; None for none."""
+    def given(self, studies: Sequence[ActiveStudy], shortage: str | None) -> int | None:
+        """The study that is to be given to another dispatcher; None for none. ``shortage``: why nothing can be run."""
         ours = [study for study in studies if self.is_ours(study)]
-        self._own = len(ours)
+        self._own, self._stuck = len(ours), shortage is not None
         # Nobody is asked where there is nothing to share.
-        shared = self._only is None and (len(ours) > 1 or len(ours) < len(studies))
+        shared = self._only is None and bool(studies) and (self._stuck or len(ours) > 1 or len(ours) < len(studies))
         self._peers = self._store.peers(self.epoch) if shared else []
-        return gives([study for study in ours if study.state.going], self._peers)
+        return gives([study for study in ours if study.state.going], self._peers, stuck=self._stuck)
 
     def adopted(self, study: ActiveStudy) -> bool:
         """Whether the study belongs to this dispatcher now, however many it has."""
@@ -80,7 +82,9 @@ class Opening:
             return False
         if self.is_ours(study):
             return True
-        if not takes(study, fingerprint.digest(), self._own, self._peers) or not self.adopted(study):
+        if not takes(study, fingerprint.digest(), self._own, self._peers, stuck=self._stuck):
+            return False
+        if not self.adopted(study):
             return False
         self._own += 1
         return True

@@ -2,7 +2,7 @@
 
 Each study has one dispatcher at a time. A dispatcher leaves a new study to another that has fewer, and one with rows to
 a dispatcher of the fingerprint of these rows; of its own, it gives one away where another has two fewer. So the numbers
-of studies differ by one at most once they have settled.
+of studies differ by one at most once they have settled. One that can run nothing leaves its studies to those that can.
 """
 
 from __future__ import annotations
@@ -24,24 +24,28 @@ class Peer:
     studies: int
 
 
-def takes(study: ActiveStudy, fingerprint: str, studies: int, peers: Sequence[Peer]) -> bool:
-    """Whether a dispatcher with this fingerprint and number of studies takes a study that belongs to nobody."""
+def takes(study: ActiveStudy, fingerprint: str, studies: int, peers: Sequence[Peer], *, stuck: bool = False) -> bool:
+    """Whether a dispatcher with this fingerprint and number of studies takes a study that belongs to nobody.
+
+    ``stuck``: whether it can run nothing at present.
+    """
     if study.fingerprint:
         alike = [peer for peer in peers if peer.fingerprint == study.fingerprint]
         if fingerprint != study.fingerprint and alike:
             return False
         peers = alike if fingerprint == study.fingerprint else peers
-    return all(peer.studies >= studies for peer in peers)
+    return not (stuck and peers) and all(peer.studies >= studies for peer in peers)
 
 
-def gives(own: Iterable[ActiveStudy], peers: Sequence[Peer]) -> int | None:
+def gives(own: Iterable[ActiveStudy], peers: Sequence[Peer], *, stuck: bool = False) -> int | None:
     """Number of the study that a dispatcher gives away: its latest of the lowest priority; None for none.
 
-    A study with rows goes to dispatchers of their fingerprint only.
+    A study with rows goes to dispatchers of their fingerprint only. ``stuck``: whether it can run nothing at present,
+    and therefore gives all of them away, one after the other.
     """
     mine = sorted(own, key=lambda study: (study.priority, -study.number))
     for study in mine:
         able = (peer for peer in peers if not study.fingerprint or peer.fingerprint == study.fingerprint)
-        if any(peer.studies + 2 <= len(mine) for peer in able):
+        if any(stuck or peer.studies + 2 <= len(mine) for peer in able):
             return study.number
     return None

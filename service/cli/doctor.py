@@ -144,7 +144,7 @@ def _sqlite() -> tuple[bool, str]:
 
 
 def _database(url: str, file: Path | None) -> tuple[bool, str]:
-    from sprag.service.storage.maintenance import revision
+    from sprag.service.storage.maintenance import MOVING, other_revision, revision
     from sprag.service.storage.session import Session
     from sprag.service.storage.tables import HEAD_REVISION
 
@@ -153,6 +153,8 @@ def _database(url: str, file: Path | None) -> tuple[bool, str]:
     session = Session(url)
     try:
         found, location = revision(session), session.location
+        if found is not None and found.startswith(MOVING):
+            return False, str(other_revision(session, found))
     finally:
         session.close()
     if found not in (None, HEAD_REVISION):

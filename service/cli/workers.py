@@ -40,20 +40,19 @@ def workers(server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonF
             say(_("The dispatcher {name} has not responded since {time}.", name=item["owner"], time=since))
         else:
             _say_at_work(item)
-            if item["dashboard"]:
-                say(_("Dask's dashboard: {url}", url=item["dashboard"]))
-    for item in known:
-        if item["differs"]:
-            say(
-                _(
-                    "Its fingerprint differs from that of the first dispatcher: {difference}.",
-                    difference=item["differs"],
-                )
-            )
-        if item["shortage"]:
-            say(_(item["shortage"]))
-        for worker in item["refused"]:
-            say(_("{worker} is refused: {why}", worker=worker["address"], why=_(worker["reason"])))
+            _say_more(item)
+
+
+def _say_more(item: Dispatcher) -> None:
+    """What is particular about a dispatcher at work, below its own line."""
+    if item["dashboard"]:
+        say(_("Dask's dashboard: {url}", url=item["dashboard"]))
+    if item["differs"]:
+        say(_("Its fingerprint differs from that of the first dispatcher: {difference}.", difference=item["differs"]))
+    if item["shortage"]:
+        say(_(item["shortage"]))
+    for worker in item["refused"]:
+        say(_("{worker} is refused: {why}", worker=worker["address"], why=_(worker["reason"])))
 
 
 def _say_at_work(item: Dispatcher) -> None:

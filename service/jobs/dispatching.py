@@ -166,7 +166,8 @@ def run_dispatcher(
                     _end_silent(store, lock, say)
             if not _stand_by(store, lock, stopping, say):
                 return
-            say(f"worker with {settings.processes} processes is working on {store.session.location}")
+            who = f"{settings.processes} processes" if settings.executor == "pool" else settings.executor
+            say(f"worker with {who} is working on {store.session.location}")
             dispatcher = Dispatcher(
                 store,
                 executor(settings),

@@ -22,6 +22,7 @@ from sprag.worker.executors.inline import InlineExecutor
 from sprag.worker.models import ChunkResult, ChunkTask
 from sprag.worker.opening import OPEN_STUDIES
 from sprag.worker.ports import ActiveStudy, EpochLostError, Executor, Outcome
+from sprag.worker.reports import ExecutorReport
 from sprag.worker.states import StudyState
 from tests.worker import fakes
 from tests.worker.dispatching import Prompt, after, endings, submit, work
@@ -272,6 +273,53 @@ def test_rows_do_not_depend_on_chunks_and_processes(tmp_path: Path, size: int, p
         record = submit(store, 40)
         work(store, fakes.pool(processes))
         np.testing.assert_array_equal(store.case_rows(record.id).values, fakes.values(0, 40))
+
+
+def test_a_study_goes_to_a_dispatcher_with_workers_from_one_that_has_none(store: Store) -> None:
+    class WithoutWorkers(InlineExecutor):
+        capacity, shortage = 0, "No usable worker has joined."  # type: ignore[assignment]
+
+        def ready(self, study: object) -> bool:
+            return False
+
+        def report(self) -> ExecutorReport:
+            return ExecutorReport("dask", (), {}, self.shortage)
+
+    store.presence = Everybody()
+    record = submit(store, 20)
+    clock = fakes.HandClock()
+    poor = Dispatcher(store, WithoutWorkers(), clock, owner="poor:1")
+    rich = Dispatcher(store, InlineExecutor(fakes.run), clock, owner="rich:1")
+    turns = iter(range(100))
+
+    def ended() -> bool:
+        clock.seconds += QUIET_POLL_SECONDS
+        poor.step()
+        return store.get_study(record.id).state.terminal or next(turns) == 50
+
+    def joined() -> bool:
+        """The other one comes once the study belongs to the first."""
+        clock.seconds += QUIET_POLL_SECONDS
+        if not {found.owner: found.studies for found in store.dispatchers()}["poor:1"]:
+            return next(turns) == 50
+        rich.run(ended)
+        return True
+
+    poor.run(joined)
+    assert store.get_study(record.id).state is StudyState.FINISHED
+
+
+class Everybody:
+    """Dispatchers none of which ever leaves."""
+
+    def __init__(self) -> None:
+        self.epochs: set[int] = set()
+
+    def enter(self, epoch: int) -> None:
+        self.epochs.add(epoch)
+
+    def present(self) -> set[int]:
+        return self.epochs
 
 
 class HandNews:

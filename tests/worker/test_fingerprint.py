@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+from sprag.engine.sources import source_hash
 from sprag.worker import fingerprint, known_answers
 from tests.conftest import ROOT
 from tests.worker.fakes import numpy_features
 
+SOURCES = "sources of engine and worker"
 OWN = {"numpy": "2.1", "processor features": "avx avx2 fma", "numba settings": ""}
 
 
@@ -63,8 +67,16 @@ def test_files_that_change_under_a_running_process_change_it(monkeypatch: pytest
     before = fingerprint.collect()
     monkeypatch.setattr(fingerprint, "_sources", lambda: "edited")
     after = fingerprint.collect()
-    assert after["engine sources"].startswith(f"{before['engine sources']}, changed to edited while process ")
-    assert {name for name in before if before[name] != after[name]} == {"engine sources"}
+    assert after[SOURCES].startswith(f"{before[SOURCES]}, changed to edited while process ")
+    assert {name for name in before if before[name] != after[name]} == {SOURCES}
+
+
+def test_the_code_that_decides_what_a_case_is_belongs_to_it(tmp_path: Path) -> None:
+    """Reuse would pair rows with other parameters: those of a changed law of tolerances, for example."""
+    engine, worker = (shutil.copytree(ROOT / name, tmp_path / name) for name in ("engine", "worker"))
+    assert source_hash(engine, worker).startswith(fingerprint.collect()[SOURCES])
+    (worker / "spread.py").write_text("# edited\n", encoding="utf-8")
+    assert not source_hash(engine, worker).startswith(fingerprint.collect()[SOURCES])
 
 
 @pytest.mark.parametrize(

@@ -38,6 +38,18 @@ def test_the_latest_study_of_the_lowest_priority_is_given_away() -> None:
     assert gives([study(1), study(2, fingerprint="b")], [Peer("a", 0)]) == 1
 
 
+def test_one_that_can_run_nothing_leaves_studies_to_those_that_can() -> None:
+    assert takes(study(1), "a", 0, [], stuck=True), "it waits where nobody else could run it"
+    assert not takes(study(1), "a", 0, [Peer("b", 7)], stuck=True)
+    assert gives([study(1)], [Peer("b", 7)], stuck=True) == 1
+    assert gives([study(1)], [], stuck=True) is None
+    begun = study(1, fingerprint="a")
+    assert takes(begun, "a", 0, [Peer("b", 0)], stuck=True), "only one of its fingerprint goes on with it"
+    assert not takes(begun, "a", 0, [Peer("a", 3)], stuck=True)
+    assert gives([begun], [Peer("b", 0)], stuck=True) is None
+    assert gives([begun], [Peer("a", 3)], stuck=True) == 1
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_sharing_comes_to_rest_with_equal_shares(seed: int) -> None:
     draw = Random(seed)

@@ -124,9 +124,10 @@ class DaskExecutor:
 
     @property
     def capacity(self) -> int:
-        """Useful number of chunks in flight; it changes as workers join and leave."""
+        """Useful number of chunks in flight, 0 without usable workers; it changes as workers join and leave."""
         with self._lock:
-            return useful_chunks(sum(worker.usable for worker in self._workers.values()))
+            usable = sum(worker.usable for worker in self._workers.values())
+        return useful_chunks(usable) if usable else 0
 
     @property
     def shortage(self) -> str | None:
@@ -238,6 +239,7 @@ class DaskExecutor:
                         job.dropped = inf
                         ended.append(worker.address)
             self._fill()
+            self._return_waiting()
         for address in ended:
             self._link.end_worker(address)
 
@@ -249,6 +251,7 @@ class DaskExecutor:
                 if (job := worker.job) and job.kind == "chunk" and job.dropped is None:
                     self._outcomes.put(Outcome(job.ticket, Fate.STOPPED, detail="the scheduler was lost"))
         self._disconnect(timeout=1.0)
+        self._return_waiting()
         if self._gone_since is None:
             self._gone_since = now
             _LOG.error("The scheduler %s cannot be reached; retrying: %s", self._link.address, error)
@@ -256,6 +259,15 @@ class DaskExecutor:
             raise ExecutorError(
                 f"the scheduler {self._link.address} could not be reached for {self._scheduler_seconds:g} s: {error}"
             )
+
+    def _return_waiting(self) -> None:
+        """Return the waiting chunks while there is no worker for them: another dispatcher may take their study."""
+        with self._lock:
+            if any(worker.usable for worker in self._workers.values()):
+                return
+            for item in self._waiting:
+                self._outcomes.put(Outcome(item.ticket, Fate.STOPPED, detail="no worker was left for it"))
+            self._waiting.clear()
 
     def _disconnect(self, timeout: float) -> None:
         with self._lock:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import logging
 import socket
 from concurrent.futures import CancelledError
-from contextlib import suppress
+from contextlib import closing, suppress
+from http import HTTPStatus
+from http.client import HTTPConnection, HTTPException
 from threading import Condition
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlsplit
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
 
 #: Seconds within which the scheduler must answer.
 ANSWER_SECONDS: Final = 5
+#: Seconds within which the scheduler's page must answer, once for each connection.
+DASHBOARD_SECONDS: Final = 1.0
 #: Seconds within which the value of a finished task must arrive.
 VALUE_SECONDS: Final = 15.0
 #: Seconds for which the connection is kept open for values being fetched.
@@ -49,6 +53,7 @@ class Link:
         self.trouble = ""
         #: URL of the scheduler's dashboard; "" where it has none.
         self.dashboard = ""
+        self._port: int | None = None
         self._security = security
         self._name = name
         self._client: Client | None = None
@@ -80,10 +85,22 @@ class Link:
             raise OSError("the connection to the scheduler is lost")
         scheduler: Any = self._client.scheduler
         found: dict[str, Any] = self._client.sync(scheduler.identity, n_workers=-1, callback_timeout=ANSWER_SECONDS)
-        port = found.get("services", {}).get("dashboard")
-        self.dashboard = f"http://{urlsplit(self.address).hostname}:{port}/status" if port else ""
+        self._find_dashboard(found.get("services", {}).get("dashboard"))
         present: dict[str, dict[str, Any]] = found["workers"]
         return present
+
+    def _find_dashboard(self, port: int | None) -> None:
+        """Keep the dashboard at that port where it answers: Dask names a port without a dashboard, too."""
+        if port == self._port:
+            return
+        self._port, self.dashboard = port, ""
+        if port is None:
+            return
+        page = HTTPConnection(str(urlsplit(self.address).hostname), port, timeout=DASHBOARD_SECONDS)
+        with closing(page), suppress(OSError, HTTPException):
+            page.request("GET", "/status")
+            if page.getresponse().status == HTTPStatus.OK:
+                self.dashboard = f"http://{page.host}:{port}/status"
 
     def submit(
         self, address: str, key: str, done: Callable[[Future[Any]], None], function: Callable[..., Any], *given: Any

@@ -225,7 +225,7 @@ def test_a_worker_with_another_numpy_is_refused(
     eventually(lambda: executor.wait(0.05) or caplog.text.count("is refused") == 2)
     reason = f"is refused: numpy: {np.__version__} instead of 0.9"
     assert reason in caplog.text
-    assert executor.capacity == SPARE_CHUNKS
+    assert executor.capacity == 0
     assert not executor.ready(fakes.study(1))
     assert (executor.shortage or "").startswith("No usable worker has joined the scheduler tcp://127.0.0.1:")
     assert f"{reason} (and 1 more)." in (executor.shortage or "")
@@ -292,7 +292,7 @@ def test_workers_that_would_give_other_values_run_nothing_and_the_study_says_so(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     others: dict[Callable[[Path], dict[str, str]], str] = {
-        edited_engine: "engine sources: ",
+        edited_engine: "sources of engine and worker: ",
         no_sprag: "it cannot run Sprag (ImportError: there is no Sprag here)",
         no_fma: "processor features: without fma",
     }

@@ -7,6 +7,7 @@ import os
 import re
 import shlex
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -53,6 +54,30 @@ def script_of(system: str, *options: object, **environment: str) -> str:
     out, err = process.communicate()
     assert process.returncode == 0, err
     return out
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (("--cores", 0), "'0' must be a whole number from 1"),
+        (("--jobs", 0), "'0' must be a whole number from 1"),
+        (("--memory", "much"), "'much' must be an amount such as '64 GiB'"),
+        (("--host", "head.example"), "the scheduler cannot start at head.example:0: "),
+    ],
+)
+def test_mistakes_are_one_sentence(wrong: tuple[object, ...], said: str) -> None:
+    process = started("slurm", "--host", "127.0.0.1", "--port", 0, *JOB, *wrong, "--print")
+    _, err = process.communicate()
+    assert process.returncode != 0
+    assert said in err.splitlines()[-1]
+
+
+def test_a_port_in_use_is_one_sentence() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        process = started("slurm", "--host", "127.0.0.1", "--port", port, *JOB, "--print")
+        _, err = process.communicate()
+    assert err.startswith(f"job_queue.py: the scheduler cannot start at 127.0.0.1:{port}: [Errno ")
 
 
 def directives(script: str, mark: str) -> dict[str, str]:
