@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import math
+import re
 import ssl
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, Literal
@@ -12,6 +13,7 @@ from urllib.parse import quote
 import httpx
 
 from sprag.service.client.errors import RefusedError, ServiceError, UnreachableError, UntrustedError
+from sprag.service.languages import N_
 
 #: Seconds without a byte after which an event stream is abandoned; the service sends one every 15 s.
 SILENCE: Final = 30.0
@@ -26,6 +28,8 @@ TIMEOUT: Final = httpx.Timeout(60.0, connect=10.0)
 FILE_TIMEOUT: Final = httpx.Timeout(None, connect=10.0)
 #: Longest silence of an event stream.
 EVENTS_TIMEOUT: Final = httpx.Timeout(SILENCE, connect=10.0)
+#: A token after "Bearer" (RFC 6750, section 2.1).
+_TOKEN: Final = re.compile(r"[A-Za-z0-9._~+/-]+=*")
 
 Query = Sequence[tuple[str, str]]
 #: Parts of a study that the service draws, as numbers and as a picture.
@@ -33,14 +37,20 @@ Drawn = Literal["curves", "map", "sensitivity", "ribbon", "yield"]
 
 
 def connection_options(server: str, token: str | None) -> dict[str, Any]:
-    """Options of an httpx client of the service at ``server``; ValueError when that is not an HTTP address."""
+    """Options of an httpx client of the service at ``server``.
+
+    ValueError when that is not an HTTP address, or ``token``, without the white space around it, cannot be one.
+    """
     try:
         url = httpx.URL(server)
     except httpx.InvalidURL as error:
         raise ValueError(f"{server!r} is not an address: {error}") from error
     if url.scheme not in ("http", "https") or not url.host:
         raise ValueError(f"{server!r} is not the address of a service, such as http://127.0.0.1:8000")
-    headers = {"Authorization": f"Bearer {token}"} if token else {}
+    secret = (token or "").strip()
+    if secret and not _TOKEN.fullmatch(secret):  # the secret itself is in no message
+        raise ValueError(N_("the token is not valid: it has only letters, digits and -._~+/ and may end with ="))
+    headers = {"Authorization": f"Bearer {secret}"} if secret else {}
     # A proxy from the environment is never used for this machine itself.
     found = {"base_url": server, "headers": headers, "timeout": TIMEOUT, "trust_env": not is_loopback(url.host)}
     return found | ({"verify": _trusted()} if url.scheme == "https" else {})
@@ -180,6 +190,8 @@ def _reason(error: httpx.HTTPError) -> str:
         return "cannot connect"
     if isinstance(error, httpx.TimeoutException):
         return "no answer in time"
+    if isinstance(error, httpx.LocalProtocolError):  # its text has the headers, and with them the token
+        return "the request has a header that HTTP does not allow"
     return str(error) or type(error).__name__
 
 

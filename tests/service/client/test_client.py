@@ -8,9 +8,10 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 
-from sprag.service.client import RefusedError, ServiceClient, UnreachableError
+from sprag.service.client import Client, RefusedError, ServiceClient, UnreachableError
 
 Sprag = Callable[..., Any]
 
@@ -72,6 +73,45 @@ def test_every_foreign_answer_is_one_of_two_failures(answering: tuple[str, int])
                 assert all(isinstance(error, dict) for error in caught.value.errors)
             else:
                 assert caught.value.code == "unreachable"
+
+
+@pytest.mark.parametrize("token", ["sprag_ab\ncd", "sprag_ab cd", "sprag_abé", "sprag_ab\x00"])
+def test_a_token_that_cannot_be_one_is_refused_without_showing_it(
+    sprag: Sprag, monkeypatch: pytest.MonkeyPatch, token: str
+) -> None:
+    with pytest.raises(ValueError, match="the token is not valid") as caught:
+        Client("http://127.0.0.1:9", token=token)
+    assert "sprag_ab" not in str(caught.value)
+    monkeypatch.setenv("SPRAG_TOKEN", token.replace("\x00", "\x01"))  # an environment holds no zeros
+    done = sprag("list", "--server", "http://127.0.0.1:9")
+    assert done.code == 2
+    assert "the token is not valid" in done.err
+    assert "sprag_ab" not in done.err
+
+
+def test_white_space_around_a_token_is_not_part_of_it() -> None:
+    sent = []
+
+    def answer(request: httpx.Request) -> httpx.Response:
+        sent.append(request.headers.get("Authorization"))
+        return httpx.Response(200, json={})
+
+    for token in (" sprag_Ab-_1=\r\n", "\n"):
+        with ServiceClient("http://127.0.0.1:9", token=token, transport=httpx.MockTransport(answer)) as client:
+            client.models()
+    assert sent == ["Bearer sprag_Ab-_1=", None]
+
+
+def test_a_header_that_http_does_not_allow_is_not_shown() -> None:
+    def send(request: httpx.Request) -> httpx.Response:
+        raise httpx.LocalProtocolError(f"Illegal header value {request.headers['Idempotency-Key']!r}")
+
+    with (
+        ServiceClient("http://127.0.0.1:9", transport=httpx.MockTransport(send)) as client,
+        pytest.raises(UnreachableError, match="a header that HTTP does not allow") as caught,
+    ):
+        client.create_study({}, key="hidden")
+    assert "hidden" not in str(caught.value)
 
 
 def test_commands_say_so_in_a_sentence(answering: tuple[str, int], sprag: Sprag) -> None:
