@@ -1,7 +1,7 @@
 """The scheduler: submits the studies that are due and holds studies outside their windows. Runs beside a dispatcher.
 
 Each due time becomes one study, with any number of schedulers on one database: the first one writes the row of the due
-time, and the study is submitted under a key of schedule and due time, so a scheduler may die in between.
+time, and one transaction makes the study and closes that row, so a scheduler may die in between.
 """
 
 from __future__ import annotations
@@ -17,14 +17,13 @@ from sprag.service.jobs.nights import conclude_runs
 from sprag.service.jobs.polling import PollingThread
 from sprag.service.languages import recorded
 from sprag.service.schedules.policies import Overlap, due_times
-from sprag.service.storage.errors import StudyNotFoundError
+from sprag.service.storage.errors import RunClosedError, StudyNotFoundError
 from sprag.service.storage.part import moment
 from sprag.worker.states import TransitionError
 
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from sprag.service.storage.records import StudyRecord
     from sprag.service.storage.schedule_runs import OpenRun, ScheduleRecord
     from sprag.service.storage.store import Store
     from sprag.service.storage.windows import BoundStudy
@@ -110,12 +109,6 @@ class Scheduler(PollingThread):
         from sprag.service.spec.document import parse_spec
         from sprag.service.spec.report import SpecError
 
-        # The key contains a blank, which no client can send.
-        key = f"schedule {run.id} {run.due}"
-        known = self._store.study_of_key(key, None)
-        if known is not None:  # the submitting process died before recording it; the schedule may have changed since
-            self._close(run, known)
-            return
         if not self._may_overlap(run):
             return
         try:
@@ -125,7 +118,7 @@ class Scheduler(PollingThread):
             fields = run.fields
             # Relative to the planned beginning: a postponed run must not get the deadline of the next day.
             finish = _finish_of(run)
-            study = accept(self._store, parsed, key, fields.priority, fields.fresh, finish)
+            study = accept(self._store, parsed, fields.priority, fields.fresh, finish, run)
         except (SpecError, FaultError) as error:
             now, end = self._store.clock.now(), _grace_end(run)
             if isinstance(error, FaultError) and error.code in _TRANSIENT and now < end:
@@ -133,7 +126,12 @@ class Scheduler(PollingThread):
                 return
             self._refuse(run, str(error))
             return
-        self._close(run, study)
+        except RunClosedError as error:  # the schedule was paused or deleted, or another process was first
+            self._next_try.pop((run.schedule, run.due), None)
+            _LOG.info("No study is submitted: %s.", error)
+            return
+        self._next_try.pop((run.schedule, run.due), None)
+        _LOG.info("The schedule %s was due: study %s.", run.id, study.id)
 
     def _may_overlap(self, run: OpenRun) -> bool:
         """Apply the policy for earlier studies that have not ended; False where the run is skipped."""
@@ -142,7 +140,7 @@ class Scheduler(PollingThread):
         if earlier and overlap is Overlap.SKIP:
             _LOG.warning("The schedule %s was due and is skipped: study %s has not ended.", run.id, earlier[-1])
             self._next_try.pop((run.schedule, run.due), None)
-            self._store.close_run(run, problem=recorded.EARLIER.format(study=earlier[-1]), skipped=True)
+            self._store.close_run(run, recorded.EARLIER.format(study=earlier[-1]), skipped=True)
             return False
         for study in earlier:
             _LOG.warning("The schedule %s was due: its earlier study %s is cancelled.", run.id, study)
@@ -160,12 +158,7 @@ class Scheduler(PollingThread):
     def _refuse(self, run: OpenRun, problem: str) -> None:
         _LOG.error("The schedule %s was due, but its study was not submitted: %s", run.id, problem)
         self._next_try.pop((run.schedule, run.due), None)
-        self._store.close_run(run, problem=problem)
-
-    def _close(self, run: OpenRun, study: StudyRecord) -> None:
-        self._next_try.pop((run.schedule, run.due), None)
-        self._store.close_run(run, study=study.number)
-        _LOG.info("The schedule %s was due: study %s.", run.id, study.id)
+        self._store.close_run(run, problem)
 
 
 def _actor(schedule_id: str, owner: str | None = None) -> Actor:

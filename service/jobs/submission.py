@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from sprag.service.spec.document import ParsedSpec
     from sprag.service.storage.records import StudyRecord
+    from sprag.service.storage.schedule_runs import OpenRun
     from sprag.service.storage.store import Store
 
 
@@ -85,22 +86,27 @@ def submission(
 def accept(
     store: Store,
     parsed: ParsedSpec,
-    idempotency_key: str | None = None,
     priority: int = 0,
     fresh: bool = False,
     finish_by: datetime | None = None,
-    given: Mapping[str, object] | None = None,
+    run: OpenRun | None = None,
 ) -> StudyRecord:
-    """Accept a study with its warnings; FaultError when its results would not fit on the disk.
+    """Accept a study with its warnings; errors as of `take_in`."""
+    made = submission(parsed, store, store.clock.now(), fresh, finish_by)
+    return take_in(store, made, priority=priority, run=run)
 
-    ``given`` as for `submission`.
+
+def take_in(
+    store: Store,
+    made: Submission,
+    idempotency_key: str | None = None,
+    priority: int = 0,
+    run: OpenRun | None = None,
+) -> StudyRecord:
+    """Store a submission; FaultError when there are too many studies, or no room for its results.
+
+    It is the study of ``run``, the due time of a schedule: RunClosedError where this has an outcome by now.
     """
-    made = submission(parsed, store, store.clock.now(), fresh, finish_by, given)
-    return take_in(store, made, idempotency_key, priority)
-
-
-def take_in(store: Store, made: Submission, idempotency_key: str | None = None, priority: int = 0) -> StudyRecord:
-    """Store a submission; FaultError when there are too many studies, or no room for its results."""
     known = store.study_of_key(idempotency_key, made.body_hash) if idempotency_key else None
     if known is not None:
         return known
@@ -114,6 +120,7 @@ def take_in(store: Store, made: Submission, idempotency_key: str | None = None, 
         priority=priority,
         fresh=made.fresh,
         finish_by=made.finish_by,
+        run=run,
     )
 
 

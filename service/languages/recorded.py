@@ -26,7 +26,8 @@ WAITS_SILENT: Final = N_("its study waits, and no worker has responded for a qua
 WAITS: Final = N_("its study waits; {problem}")
 WAITS_STALLED: Final = N_("its study waits, and no chunk of any study has been finished for two hours")
 EARLIER: Final = N_("The earlier study {study} had not ended.")
-DISABLED: Final = N_("The schedule was disabled before a study was submitted.")
+PAUSED: Final = N_("The schedule was paused before a study was submitted.")
+DELETED: Final = N_("The schedule was deleted before a study was submitted.")
 NOT_IN_TIME: Final = N_("No worker was running until its deadline or the end of its misfire grace had passed.")
 TRIED_AGAIN: Final = N_("{problem} It is tried again until {time}.")
 NOTICED_LATE: Final = N_("No worker was running when it was due, and this was noticed {delay} (h:min:s) later; {rule}.")
@@ -84,9 +85,10 @@ _OF_ERRORS: Final = (
 
 #: The longer of two that begin alike stands first.
 _ALL: Final = (
-    OUTSIDE_WINDOW, WINDOW, NO_ROOM, DISK, LARGEST_FILE, EARLIER, DISABLED, NOT_IN_TIME, TRIED_AGAIN, NOTICED_LATE,
-    NOT_MADE_UP, GRACE, NOTHING_RAN, NOT_TAKEN, NOT_TAKEN_SILENT, NOT_SUBMITTED, NO_WORKER, WAITS_SILENT, WAITS_STALLED,
-    WAITS, MANY_STUDIES, NO_ROOM_FOR_RESULTS, SILENT, LATE_PART, LATE, ROUNDS_DONE, NO_ROUND,
+    OUTSIDE_WINDOW, WINDOW, NO_ROOM, DISK, LARGEST_FILE, EARLIER, PAUSED, DELETED, NOT_IN_TIME, TRIED_AGAIN,
+    NOTICED_LATE, NOT_MADE_UP, GRACE, NOTHING_RAN, NOT_TAKEN, NOT_TAKEN_SILENT, NOT_SUBMITTED, NO_WORKER, WAITS_SILENT,
+    WAITS_STALLED, WAITS, MANY_STUDIES, NO_ROOM_FOR_RESULTS, SILENT, LATE_PART, LATE,
+    ROUNDS_DONE, NO_ROUND,
     *_OF_WORKERS, *_OF_ERRORS,
 )  # fmt: skip
 

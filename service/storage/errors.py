@@ -12,6 +12,7 @@ __all__ = [
     "NotOwnerError",
     "NothingToRetryError",
     "PageTokenError",
+    "RunClosedError",
     "ScheduleNotFoundError",
     "SchemaError",
     "StoreError",
@@ -119,6 +120,12 @@ class TooManyViewsError(StoreError):
 
 class TooManySchedulesError(StoreError):
     """The limit of schedules is reached."""
+
+    code = "wrong-state"
+
+
+class RunClosedError(StoreError):
+    """The due time of a schedule has its outcome already, so it gets no study."""
 
     code = "wrong-state"
 

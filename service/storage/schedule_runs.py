@@ -12,6 +12,7 @@ import sqlalchemy as sa
 from sprag.service.languages import recorded
 from sprag.service.schedules.policies import CatchUp
 from sprag.service.storage.audit import note
+from sprag.service.storage.errors import RunClosedError
 from sprag.service.storage.part import micros_of, moment
 from sprag.service.storage.run_outcomes import COLUMNS, RunOutcomes, outcome_of, runs_with_studies
 from sprag.service.storage.saved_views import inherit_figures
@@ -23,6 +24,7 @@ from sprag.worker.states import StudyState
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from datetime import datetime
+    from typing import Any
 
     from sprag.service.schedules.fields import ScheduleFields
     from sprag.service.schedules.outcomes import Outcome
@@ -141,38 +143,16 @@ class ScheduleRuns(RunOutcomes):
         ]
 
     def put_off_run(self, run: OpenRun, problem: str) -> None:
-        """Record why a due time has no study yet; it stays open."""
+        """Record why a due time has no study yet; it stays open, unless it has an outcome by now."""
         with self.session.write() as connection:
-            connection.execute(
-                sa.update(SCHEDULE_RUNS).where(_R.schedule == run.schedule, _R.due == run.due).values(problem=problem)
-            )
+            _change_open(connection, run.schedule, run.due, problem=problem)
 
-    def close_run(
-        self, run: OpenRun, *, study: int | None = None, problem: str | None = None, skipped: bool = False
-    ) -> None:
-        """Record the outcome of a due time: the number of its study, or why there is none.
-
-        The study has the figures of the report of the one before it.
-        """
-        without = RunState.SKIPPED if skipped else RunState.REFUSED
+    def close_run(self, run: OpenRun, problem: str, *, skipped: bool = False) -> None:
+        """Record why a due time gets no study, unless it has an outcome by now."""
+        state, action = (RunState.SKIPPED, "schedule.skip") if skipped else (RunState.REFUSED, "schedule.refuse")
         with self.session.write() as connection:
-            connection.execute(
-                sa.update(SCHEDULE_RUNS)
-                .where(_R.schedule == run.schedule, _R.due == run.due)
-                .values(state=(without if study is None else RunState.SUBMITTED).value, study=study, problem=problem)
-            )
-            if study is not None:
-                before = (
-                    sa.select(_R.study)
-                    .join_from(SCHEDULE_RUNS, STUDIES, STUDIES.c.number == _R.study)
-                    .where(_R.schedule == run.schedule, _R.due < run.due, STUDIES.c.deleted_at.is_(None))
-                    .order_by(_R.due.desc())
-                    .limit(1)
-                )
-                inherit_figures(connection, connection.execute(before).scalar(), study)
-            else:
-                action = "schedule.skip" if skipped else "schedule.refuse"
-                note(connection, self._now(), action, run.id, due=moment(run.due).isoformat(), problem=problem)
+            if _change_open(connection, run.schedule, run.due, state=state.value, problem=problem):
+                _note_end(connection, self._now(), action, run.id, run.due, problem)
 
     def earlier_studies(self, run: OpenRun) -> list[str]:
         """Ids of the studies of earlier due times of that schedule that run, wait, or continue by themselves."""
@@ -212,6 +192,42 @@ class ScheduleRuns(RunOutcomes):
             )
             for row in rows
         )
+
+
+def submit_run(connection: sa.Connection, run: OpenRun, study: int) -> None:
+    """Give an open due time the study of that number, in the transaction that creates it.
+
+    The study has the figures of the report of the one before it. Raises RunClosedError where the due time has an
+    outcome by now, because its schedule was paused or deleted, or another process submitted it.
+    """
+    if not _change_open(connection, run.schedule, run.due, state=RunState.SUBMITTED.value, study=study, problem=None):
+        raise RunClosedError(f"the due time {moment(run.due).isoformat()} of the schedule {run.id} is no longer open")
+    before = (
+        sa.select(_R.study)
+        .join_from(SCHEDULE_RUNS, STUDIES, STUDIES.c.number == _R.study)
+        .where(_R.schedule == run.schedule, _R.due < run.due, STUDIES.c.deleted_at.is_(None))
+        .order_by(_R.due.desc())
+        .limit(1)
+    )
+    inherit_figures(connection, connection.execute(before).scalar(), study)
+
+
+def refuse_open_runs(connection: sa.Connection, schedule: int, schedule_id: str, now: int, problem: str) -> None:
+    """Refuse every open due time of a schedule at ``now`` (µs since 1970)."""
+    still = sa.select(_R.due).where(_R.schedule == schedule, _R.state == RunState.TAKEN.value).order_by(_R.due)
+    for due in connection.execute(still).scalars().all():
+        if _change_open(connection, schedule, due, state=RunState.REFUSED.value, problem=problem):
+            _note_end(connection, now, "schedule.refuse", schedule_id, due, problem)
+
+
+def _change_open(connection: sa.Connection, schedule: int, due: int, **values: Any) -> bool:
+    """Change a due time that is open; False where it has an outcome by now."""
+    still = sa.update(SCHEDULE_RUNS).where(_R.schedule == schedule, _R.due == due, _R.state == RunState.TAKEN.value)
+    return bool(connection.execute(still.values(values)).rowcount)
+
+
+def _note_end(connection: sa.Connection, now: int, action: str, schedule_id: str, due: int, problem: str) -> None:
+    note(connection, now, action, schedule_id, due=moment(due).isoformat(), problem=problem)
 
 
 def _late(delay: timedelta, record: ScheduleRecord) -> str:

@@ -13,8 +13,8 @@ from sprag.service.storage.audit import note, require_own
 from sprag.service.storage.errors import IdempotencyConflictError, ScheduleNotFoundError, TooManySchedulesError
 from sprag.service.storage.part import micros_of, moment, optional_moment
 from sprag.service.storage.schedule_rows import fields_of, logged_changes, logged_fields, row_values
-from sprag.service.storage.schedule_runs import RunRecord, RunState, ScheduleRecord, ScheduleRuns
-from sprag.service.storage.schedule_tables import SCHEDULE_RUNS, SCHEDULES
+from sprag.service.storage.schedule_runs import RunRecord, ScheduleRecord, ScheduleRuns, refuse_open_runs
+from sprag.service.storage.schedule_tables import SCHEDULES
 from sprag.service.storage.windows import Windows
 from sprag.worker.limits import MAX_SCHEDULES
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from sprag.service.schedules.fields import ScheduleFields
 
-_S, _R = SCHEDULES.c, SCHEDULE_RUNS.c
+_S = SCHEDULES.c
 #: Number of latest runs reported for a schedule.
 SHOWN_RUNS: Final = 20
 _ANY_SCHEDULE: Final = sa.select(sa.exists(sa.select(_S.number)))
@@ -90,7 +90,7 @@ class Schedules(ScheduleRuns, Windows):
     def change_schedule(self, schedule_id: str, fields: ScheduleFields) -> ScheduleRecord:
         """Replace the fields of the schedule by ``fields``; missed due times are forgotten.
 
-        Where the schedule is disabled, runs without a study are no longer tried.
+        Where the schedule is paused, due times without a study are refused.
         """
         with self.session.write() as connection:
             row = self._schedule_row(connection, schedule_id)
@@ -102,20 +102,19 @@ class Schedules(ScheduleRuns, Windows):
             if changes:
                 note(connection, self._now(), "schedule.change", schedule_id, name=fields.name, changes=changes)
             if not fields.enabled:
-                problem = recorded.DISABLED
-                connection.execute(
-                    sa.update(SCHEDULE_RUNS)
-                    .where(_R.schedule == number, _R.state == RunState.TAKEN.value)
-                    .values(state=RunState.REFUSED.value, problem=problem)
-                )
+                refuse_open_runs(connection, number, schedule_id, self._now(), recorded.PAUSED)
             return self._schedule(connection, schedule_id)
 
     def delete_schedule(self, schedule_id: str) -> None:
-        """Delete the schedule; its studies are kept, with their window. Raises ScheduleNotFoundError."""
+        """Delete the schedule; its studies are kept, with their window, and due times without a study are refused.
+
+        Raises ScheduleNotFoundError.
+        """
         with self.session.write() as connection:
             row = self._schedule_row(connection, schedule_id)
             require_own("schedule", schedule_id, row.owner)
             note(connection, self._now(), "schedule.delete", schedule_id, name=row.name, owner=row.owner)
+            refuse_open_runs(connection, row.number, schedule_id, self._now(), recorded.DELETED)
             connection.execute(
                 sa.update(SCHEDULES)
                 .where(_S.number == row.number)

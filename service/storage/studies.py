@@ -33,6 +33,7 @@ from sprag.service.storage.part import (
 from sprag.service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
 from sprag.service.storage.records import Progress, RoundProgress, StudyRecord, record_of
 from sprag.service.storage.round_table import add_round, latest_round
+from sprag.service.storage.schedule_runs import submit_run
 from sprag.service.storage.searching import search_text
 from sprag.service.storage.study_row import study_row
 from sprag.service.storage.tables import (
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from datetime import datetime
 
+    from sprag.service.storage.schedule_runs import OpenRun
     from sprag.service.storage.session import Session
     from sprag.worker.ports import Clock
 
@@ -117,8 +119,12 @@ class Studies(Users, Orders, Dispatchers):
         priority: int = 0,
         fresh: bool = False,
         finish_by: datetime | None = None,
+        run: OpenRun | None = None,
     ) -> StudyRecord:
-        """Accept the study of a `study_row`; otherwise as `create_study`."""
+        """Accept the study of a `study_row`; otherwise as `create_study`.
+
+        It is that of ``run``, the due time of a schedule: RunClosedError where this has an outcome by now.
+        """
         values = {
             **row,
             "id": f"st_{secrets.token_hex(8)}",
@@ -151,6 +157,8 @@ class Studies(Users, Orders, Dispatchers):
                         key=idempotency_key, body_hash=body_hash, study=number, created_at=values["created_at"]
                     )
                 )
+            if run is not None:
+                submit_run(connection, run, number)
             announce(connection)
             note(connection, values["created_at"], "study.create", values["id"], name=row["name"], cases=row["cases"])
             written = connection.execute(sa.select(*RECORD_COLUMNS).where(STUDIES.c.number == number)).one()
@@ -317,11 +325,8 @@ class Studies(Users, Orders, Dispatchers):
             note(connection, self._now(), action, study_id, **detail)
         return record
 
-    def study_of_key(self, idempotency_key: str, body_hash: str | None) -> StudyRecord | None:
-        """The study that was submitted with that key; ``body_hash`` None stands for any body.
-
-        Raises IdempotencyConflictError when it was submitted with another body.
-        """
+    def study_of_key(self, idempotency_key: str, body_hash: str) -> StudyRecord | None:
+        """The study that was submitted with that key; raises IdempotencyConflictError when its body was another."""
         with self.session.read() as connection:
             return _study_of_key(connection, idempotency_key, body_hash)
 
@@ -330,7 +335,7 @@ def _values(study: Study) -> int:
     return sum(map(len, study.axes))
 
 
-def _study_of_key(connection: sa.Connection, key: str, body_hash: str | None) -> StudyRecord | None:
+def _study_of_key(connection: sa.Connection, key: str, body_hash: str) -> StudyRecord | None:
     row = connection.execute(
         sa.select(IDEMPOTENCY_KEYS.c.body_hash, *RECORD_COLUMNS)
         .join_from(IDEMPOTENCY_KEYS, STUDIES)
@@ -338,7 +343,7 @@ def _study_of_key(connection: sa.Connection, key: str, body_hash: str | None) ->
     ).one_or_none()
     if row is None:
         return None
-    if body_hash is not None and row.body_hash != body_hash:
+    if row.body_hash != body_hash:
         raise IdempotencyConflictError(
             f"the idempotency key {key!r} was already used with another body or other parameters"
         )

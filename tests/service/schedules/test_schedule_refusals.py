@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from typing import Any
-from unittest.mock import Mock
 
 import pytest
 
 from sprag.service.jobs.scheduler import Scheduler
 from sprag.service.schedules.fields import ScheduleFields, change_fields, read_fields
 from sprag.service.settings import Settings
-from sprag.service.storage.errors import StoreError
 from sprag.service.storage.schedule_runs import RunState
 from sprag.service.storage.store import Store
 from sprag.worker.dispatcher import Dispatcher
@@ -126,31 +124,31 @@ def test_a_worker_that_starts_after_the_grace_submits_it_no_more(
     assert (run.state, run.problem) == (RunState.REFUSED, "0 studies have not ended yet.")
 
 
-def test_a_disabled_schedule_is_tried_no_more(store: Store, clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_paused_schedule_is_tried_no_more(store: Store, clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
     kept = put_off(store, clock, monkeypatch, cron="0 22 * * *")
     changed = change_fields(store.get_schedule(kept).fields, {"enabled": False}, clock.now())
     store.change_schedule(kept, changed)
     Scheduler(store).look()
     assert store.list_studies().studies == ()
     (run,) = store.schedule_runs(kept)
-    assert (run.state, run.problem) == (RunState.REFUSED, "The schedule was disabled before a study was submitted.")
+    assert (run.state, run.problem) == (RunState.REFUSED, "The schedule was paused before a study was submitted.")
 
 
-def test_a_schedule_that_changed_after_its_study_was_submitted_finds_it(
+def test_a_schedule_that_is_paused_as_its_study_is_checked_gets_none(
     store: Store, clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     kept = store.create_schedule(fields(at="2026-01-01T22:00"))
     clock.set("2026-01-01T22:00")
-    with monkeypatch.context() as patch:
-        patch.setattr(store, "close_run", Mock(side_effect=StoreError("the worker dies here")))
-        with pytest.raises(StoreError):
-            Scheduler(store).look()
-    (study,) = store.list_studies().studies
-    changed = change_fields(store.get_schedule(kept.id).fields, {"spec": {**SPEC, "name": "other"}}, clock.now())
-    store.change_schedule(kept.id, changed)
+
+    def pausing(*_: Any) -> int:
+        store.change_schedule(kept.id, change_fields(kept.fields, {"enabled": False}, clock.now()))
+        return 0
+
+    monkeypatch.setattr(store, "waiting_studies", pausing)
     Scheduler(store).look()
+    assert store.list_studies().studies == ()
     (run,) = store.schedule_runs(kept.id)
-    assert (run.state, run.study) == (RunState.SUBMITTED, study.id)
+    assert (run.state, run.problem) == (RunState.REFUSED, "The schedule was paused before a study was submitted.")
 
 
 def test_a_held_study_follows_the_window_of_its_schedule(store: Store, clock: Clock) -> None:

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Any
+from unittest.mock import Mock
 
 import pytest
 import sqlalchemy as sa
@@ -165,20 +166,23 @@ def test_a_clock_that_is_put_back_comes_to_no_due_time_twice(service: Service, c
     assert service.store.get_schedule(kept.id).next_due == datetime(2026, 1, 1, 2, tzinfo=UTC)
 
 
-def test_a_scheduler_that_died_before_submitting_is_made_up_for_once(
+def test_a_scheduler_that_dies_as_it_submits_is_made_up_for_once(
     service: Service, clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    service.store.create_schedule(fields(at="2026-01-01T02:00"))
+    kept = service.store.create_schedule(fields(at="2026-01-01T02:00"))
     clock.set("2026-01-01T02:00")
-    scheduler = Scheduler(service.store)
     with monkeypatch.context() as patch:
-        patch.setattr(service.store, "close_run", lambda *_, **__: (_ for _ in ()).throw(DatabaseBusyError("busy")))
+        patch.setattr(
+            "sprag.service.storage.schedule_runs.inherit_figures", Mock(side_effect=DatabaseBusyError("busy"))
+        )
         with pytest.raises(DatabaseBusyError):
-            scheduler.look()  # the study is there, and nothing says so
+            Scheduler(service.store).look()
+    assert names(service.store) == [], "neither the study nor its outcome is there"
+    assert service.store.schedule_runs(kept.id)[0].state is RunState.TAKEN
+    for _ in range(2):
+        Scheduler(service.store).look()
     assert len(names(service.store)) == 1
-    Scheduler(service.store).look()
-    assert len(names(service.store)) == 1
-    assert service.store.list_schedules()[0].last.state is RunState.SUBMITTED  # type: ignore[union-attr]
+    assert service.store.schedule_runs(kept.id)[0].state is RunState.SUBMITTED
 
 
 def test_a_spec_that_this_program_does_not_read_is_told(service: Service, clock: Clock) -> None:
