@@ -35,7 +35,8 @@ SUFFIXES: Final[dict[Format, tuple[str, ...]]] = {
 }
 
 
-def format_of(file: str) -> Format | None:
-    """The format by the ending of a file's name; None for an unknown ending."""
+def format_of(file: str) -> Format | ReportFormat | None:
+    """The format of rows or a report by the ending of a file's name; None for an unknown ending."""
     ending = file.rpartition(".")[2].lower()
-    return next((form for form, endings in SUFFIXES.items() if ending in endings), None)
+    report = next((form for form in REPORT_FORMATS if form == ending), None)
+    return report or next((form for form, endings in SUFFIXES.items() if ending in endings), None)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import typer
 
 from sprag.service.cli.console import ExitCode, say, write_json
-from sprag.service.cli.files import is_json, output, to_file
+from sprag.service.cli.file_formats import value_format
+from sprag.service.cli.files import output, to_file
 from sprag.service.cli.motions import naming_options, study_of
 from sprag.service.cli.options import (
     AlongOption,
@@ -19,7 +20,6 @@ from sprag.service.cli.options import (
     SpecFile,
     StartOption,
     ToOption,
-    ValueFormat,
     ValueFormatOption,
 )
 from sprag.service.json_text import to_bytes
@@ -47,13 +47,15 @@ def branch(
     from sprag.worker.models.branches import run_branch
     from sprag.worker.models.starts import motion_of
 
+    written = value_format(form, file, as_json)
     study = study_of(spec, points, case, start)
     with naming_options(study):
         asked = along_of(study, case, along, low, high)
     with output(file) as write:
         made = run_branch(*motion_of(study, case, start), asked)
-        written = is_json(file, as_json) if form is None else form is ValueFormat.JSON
-        content = to_bytes(branch_json(made, study, case, asked)) + b"\n" if written else branch_csv(made, asked)
+        content = (
+            branch_csv(made, asked) if written == "csv" else to_bytes(branch_json(made, study, case, asked)) + b"\n"
+        )
         write(content)
     _report(made, study, asked, case)
     if as_json and to_file(file):

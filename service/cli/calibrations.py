@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from sprag.service.cli.console import WrongInputError, say, show_table, warning_lines, write_json, write_text
+from sprag.service.cli.file_formats import file_format
 from sprag.service.cli.files import MAX_DATA_BYTES, decode, read_bytes, read_spec, spec_failure, write_pieces
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Processes, Server, SpecFile, StudyId, Token
-from sprag.service.cli.pictures import file_format, heading
+from sprag.service.cli.pictures import heading
 from sprag.service.cli.remote import connection
 from sprag.service.cli.running import run_parsed
 from sprag.service.cli.settings import read_settings

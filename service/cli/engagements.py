@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sprag.service.cli.console import ExitCode, say, write_json, wrong_option
-from sprag.service.cli.files import is_json, output, read_study, require_cases, to_file
+from sprag.service.cli.file_formats import value_format
+from sprag.service.cli.files import output, read_study, require_cases, to_file
 from sprag.service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
 from sprag.service.json_text import to_bytes
 from sprag.service.languages import N_, _, decimal
@@ -39,11 +40,12 @@ def engagements(
     from sprag.service.results.engagements import engagements_csv, engagements_json
     from sprag.worker.models import ENDING_SENTENCES, OK, run_engagements
 
+    written = value_format(None, file, as_json)
     study = read_study(spec, points).study
     _require(study, case)
     with output(file) as write:
         made = run_engagements(study, case)
-        if is_json(file, as_json):
+        if written == "json":
             write(to_bytes(engagements_json(made, case, case_values(study, case))) + b"\n")
         else:
             write(engagements_csv(made, table.value))

@@ -8,6 +8,7 @@ import typer
 
 from sprag.service.cli import completion
 from sprag.service.cli.console import Column, say, show_table, write_json
+from sprag.service.cli.file_formats import file_format
 from sprag.service.cli.files import write_pieces
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import (
@@ -24,7 +25,7 @@ from sprag.service.cli.options import (
     WaitTimeout,
     in_units,
 )
-from sprag.service.cli.pictures import file_format, heading
+from sprag.service.cli.pictures import heading
 from sprag.service.cli.remote import connection, submitted
 from sprag.service.languages import _
 from sprag.worker.limits import MAX_POINTS_SELECTED, MAX_SELECTED

@@ -210,12 +210,6 @@ def to_file(path: str | None) -> bool:
     return path not in (None, "-")
 
 
-def is_json(path: str | None, as_json: bool) -> bool:
-    """Whether values are written as JSON: by the ending of the file's name, else by ``--json``."""
-    name = (path or "").lower()
-    return name.endswith(".json") or (as_json and not name.endswith(".csv"))
-
-
 def _replaced(target: Path) -> Iterator[Write]:
     prefix = f".{target.name[:100]}."
     with _naming(target):

@@ -8,10 +8,11 @@ from typing import Annotated, Any
 import typer
 
 from sprag.service.cli.console import say, show_table, write_json
+from sprag.service.cli.file_formats import file_format
 from sprag.service.cli.files import write_pieces
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
-from sprag.service.cli.pictures import file_format, heading
+from sprag.service.cli.pictures import heading
 from sprag.service.cli.remote import connection
 from sprag.service.languages import _
 

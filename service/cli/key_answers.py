@@ -8,10 +8,11 @@ import typer
 
 from sprag.service.cli import completion
 from sprag.service.cli.console import Column, say, show_table, write_json
+from sprag.service.cli.file_formats import file_format
 from sprag.service.cli.files import write_pieces
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, CurveBy, FileUnits, JsonFlag, Server, StudyId, Token, in_units
-from sprag.service.cli.pictures import ChosenOf, HeldAt, file_format, heading, held_text
+from sprag.service.cli.pictures import ChosenOf, HeldAt, heading, held_text
 from sprag.service.cli.remote import connection
 from sprag.service.languages import _
 

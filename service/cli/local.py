@@ -27,7 +27,8 @@ from sprag.service.cli.console import (
     write_text,
     wrong_option,
 )
-from sprag.service.cli.files import is_json, output, read_study, require_cases, to_file
+from sprag.service.cli.file_formats import TableFormat, require_csv, table_format, value_format
+from sprag.service.cli.files import output, read_study, require_cases, to_file
 from sprag.service.cli.options import (
     ChunkCases,
     CsvHeader,
@@ -39,10 +40,8 @@ from sprag.service.cli.options import (
     Processes,
     SpecFile,
     TableFiles,
-    ValueFormat,
     ValueFormatOption,
 )
-from sprag.service.cli.remote import TableFormat, require_csv, table_format
 from sprag.service.cli.running import run_parsed
 from sprag.service.cli.settings import read_settings
 from sprag.service.faults import Fault, warned
@@ -185,11 +184,11 @@ def trajectory(
     """Write the instantaneous values of one case: angles, speeds, torques, powers, states."""
     from sprag.worker.models import ENDING_SENTENCES, OK
 
+    written = value_format(form, file, as_json)
     study = read_study(spec, files=tables).study
     with output(file) as write:
         made = _trajectory(study, case, start, end, points)
-        written = is_json(file, as_json) if form is None else form is ValueFormat.JSON
-        write(_trajectory_bytes(made, study, case, written))
+        write(_trajectory_bytes(made, study, case, written == "json"))
     way = _("{count} points in time") if made.along == "time" else _("{count} points over the angle")
     text = way.format(count=points)
     if not len(made.values):
@@ -266,7 +265,7 @@ def run(
     tables: TableFiles = None,
     file: OutputFile = None,
     form: Annotated[
-        TableFormat | None, typer.Option("--format", help="Default: by the name of FILE, otherwise csv.")
+        TableFormat | None, typer.Option("--format", help="Default: by the ending of FILE; csv where it has none.")
     ] = None,
     header: CsvHeader = None,
     db: Annotated[

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sprag.service.cli.console import WrongInputError, show_table, write_json, wrong_option
-from sprag.service.cli.files import is_json, output, read_study, require_cases
+from sprag.service.cli.file_formats import value_format
+from sprag.service.cli.files import output, read_study, require_cases
 from sprag.service.cli.options import (
     AlongOption,
     CaseOption,
@@ -20,7 +21,6 @@ from sprag.service.cli.options import (
     SpecFile,
     StartOption,
     ToOption,
-    ValueFormat,
     ValueFormatOption,
 )
 from sprag.service.faults import Fault, FaultError
@@ -28,7 +28,6 @@ from sprag.service.languages import N_, _
 from sprag.worker.limits import MAX_BASIN_POINTS
 
 if TYPE_CHECKING:
-    from sprag.service.formats import Format
     from sprag.worker.study import Study
 
 _Phase = Annotated[str | None, typer.Option("--phase", metavar="ANGLE", help="Phase of the excitation; default: 0.")]
@@ -60,10 +59,11 @@ def diagram(
     """Bifurcation diagram: the strobes of the settled motions of one case along a parameter."""
     from sprag.service.results.sections import diagram_of, sections_file
 
+    written = value_format(form, file, as_json)
     study = study_of(spec, points, case, start)
     with naming_options(study):
         asked = diagram_of(study, case, along, (low, high), phase, (values, strobes))
-    _write(file, sections_file(study, case, asked, _form(file, form, as_json), False, start))
+    _write(file, sections_file(study, case, asked, written, False, start))
 
 
 def section(
@@ -80,10 +80,11 @@ def section(
     """Poincare section: the strobes of the settled motion of one case at a phase of the excitation."""
     from sprag.service.results.sections import section_of, sections_file
 
+    written = value_format(form, file, as_json)
     study = study_of(spec, points, case, start)
     with naming_options(study):
         asked = section_of(study, case, phase, strobes)
-    _write(file, sections_file(study, case, asked, _form(file, form, as_json), True, start))
+    _write(file, sections_file(study, case, asked, written, True, start))
 
 
 def basin(
@@ -106,10 +107,11 @@ def basin(
     """Basin: the regime to which one case comes from each start of a grid of two initial values."""
     from sprag.service.results.basins import basin_file, basin_query
 
+    written = value_format(form, file, as_json)
     study = study_of(spec, points, case, None)
     with naming_options(study):
         query = basin_query(study, case, x, y, {"x": (x_from, x_to), "y": (y_from, y_to)}, grid)
-    _write(file, basin_file(study, case, query, _form(file, form, as_json)))
+    _write(file, basin_file(study, case, query, written))
 
 
 def regimes(spec: SpecFile, case: CaseOption = 0, points: PointsFile = None, as_json: JsonFlag = False) -> None:
@@ -170,11 +172,6 @@ def naming_options(study: Study, lacks: str = N_("has no motion that settles")) 
 
 def _option(fault: Fault) -> Fault:
     return Fault(f"--{fault.where}".replace("_", "-"), fault.code, fault.message, fault.value, fault.allowed)
-
-
-def _form(file: str | None, form: ValueFormat | None, as_json: bool) -> Format:
-    written = is_json(file, as_json) if form is None else form is ValueFormat.JSON
-    return "json" if written else "csv"
 
 
 def _write(file: str | None, content: bytes) -> None:

@@ -50,7 +50,7 @@ ToOption = Annotated[
     str | None, typer.Option("--to", metavar="VALUE", help="End of the range; default: that of its axis.")
 ]
 ValueFormatOption = Annotated[
-    ValueFormat | None, typer.Option("--format", help="Default: by the name of FILE, otherwise csv.")
+    ValueFormat | None, typer.Option("--format", help="Default: by the ending of FILE; csv where it has none.")
 ]
 TableFiles = Annotated[
     list[str] | None,

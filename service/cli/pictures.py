@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sprag.service.cli import completion
-from sprag.service.cli.console import OK, cell_text, say, show_table, warning_lines, write_json, wrong_option
+from sprag.service.cli.console import OK, cell_text, say, show_table, warning_lines, write_json
+from sprag.service.cli.file_formats import file_format
 from sprag.service.cli.files import write_pieces
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, CurveBy, FileUnits, JsonFlag, Server, StudyId, Token, in_units
@@ -36,21 +37,6 @@ _PICTURES = ("svg", "png", "pdf")
 #: Indices and the headings of their columns.
 _SHARES = {"first_order": N_("first order"), "first_order_error": "+-", "total": N_("total"), "total_error": "+-"}
 _ELEMENTARY = {"mu": "mu", "mu_star": "mu*", "mu_star_error": "+-", "sigma": "sigma"}
-
-
-def file_format(file: str, allowed: tuple[str, ...]) -> str:
-    """The format given by the ending of ``file``; raises WrongInputError when it is not in ``allowed``."""
-    form = file.rpartition(".")[2].lower()
-    if form not in allowed:
-        names = ", ".join(f".{name}" for name in allowed)
-        raise wrong_option(
-            "--output",
-            "invalid-choice",
-            N_("is not a file of this kind"),
-            file,
-            allowed=_("a name that ends in {endings}", endings=names),
-        )
-    return form
 
 
 def answer(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast, get_args
+from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 
 import typer
 
@@ -26,6 +26,7 @@ from sprag.service.cli.console import (
     write_json,
     wrong_option,
 )
+from sprag.service.cli.file_formats import TableFormat, require_csv, table_format
 from sprag.service.cli.files import naming_points, read_spec, to_file, write_pieces
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import (
@@ -47,7 +48,7 @@ from sprag.service.cli.options import (
     in_units,
 )
 from sprag.service.faults import Fault, Kind
-from sprag.service.formats import REPORT_FORMATS, Format, Header, ReportFormat, format_of
+from sprag.service.formats import Format
 from sprag.service.languages import N_, _, recorded
 from sprag.worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
 from sprag.worker.states import TERMINAL, StudyState
@@ -62,10 +63,6 @@ PriorityOption = Annotated[
     int,
     typer.Option(min=-MAX_PRIORITY, max=MAX_PRIORITY, help="Waiting studies with the highest priority run first."),
 ]
-
-
-#: Formats of a whole study: case rows (`sprag.service.results.exports`) and documents (`sprag.service.results.report`).
-TableFormat = Literal[Format, ReportFormat]
 
 
 @contextmanager
@@ -344,7 +341,7 @@ def _known(summary: dict[str, Any]) -> str:
 def export(
     study_id: StudyId,
     form: Annotated[
-        TableFormat | None, typer.Option("--format", help="Default: by the name of FILE, otherwise csv.")
+        TableFormat | None, typer.Option("--format", help="Default: by the ending of FILE; csv where it has none.")
     ] = None,
     file: OutputFile = None,
     units: FileUnits = None,
@@ -383,18 +380,3 @@ def export(
         say(_("{file}: {size} bytes", file=file, size=written))
         if as_json:
             write_json({"file": file, "format": chosen, "bytes": written})
-
-
-def require_csv(header: Header | None, form: str) -> None:
-    """Raise WrongInputError for ``--header`` where the file is not CSV."""
-    if header is not None and form != "csv":
-        raise wrong_option("--header", "not-used", N_("only CSV files have it"), header, allowed="csv")
-
-
-def table_format(form: TableFormat | None, file: str | None, as_json: bool) -> Format | ReportFormat:
-    """The requested format: by name, by the ending of the file's name, or by ``--json``; csv otherwise."""
-    if form is not None:
-        return form
-    ending = (file or "").rpartition(".")[2].lower()
-    form = next((known for known in REPORT_FORMATS if known == ending), None) or format_of(file or "")
-    return form or ("json" if as_json else "csv")

@@ -8,10 +8,10 @@ from typing import Annotated, Any, Final
 import typer
 
 from sprag.service.cli.console import say, show_table, write_json, wrong_option
+from sprag.service.cli.file_formats import file_format
 from sprag.service.cli.files import to_file, write_pieces
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, OutputFile, Server, StudyId, Token
-from sprag.service.cli.pictures import file_format
 from sprag.service.cli.remote import connection
 from sprag.service.languages import N_, _
 

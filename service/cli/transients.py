@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sprag.service.cli.console import ExitCode, say, write_json, wrong_option
-from sprag.service.cli.files import is_json, output, read_study, require_cases, to_file
+from sprag.service.cli.file_formats import value_format
+from sprag.service.cli.files import output, read_study, require_cases, to_file
 from sprag.service.cli.motions import naming_options
 from sprag.service.cli.options import (
     CaseOption,
@@ -17,7 +18,6 @@ from sprag.service.cli.options import (
     OutputFile,
     SpecFile,
     TableFiles,
-    ValueFormat,
     ValueFormatOption,
 )
 from sprag.service.json_text import to_bytes
@@ -68,6 +68,7 @@ def transient(
     from sprag.service.results.transients import course_of, results_json, transient_json
     from sprag.worker.models.transients import run_transient
 
+    written = value_format(form, file, as_json)
     study = read_study(spec, files=tables).study
     require_cases(study, [case])
     if every and case:
@@ -76,13 +77,14 @@ def transient(
     with naming_options(study, N_("has no transients")):
         course = course_of(study, case, kind, given)
     if every:
-        _write_all(study, course, file, as_json=is_json(file, as_json) if form is None else form is ValueFormat.JSON)
+        _write_all(study, course, file, as_json=written == "json")
         return
     with output(file) as write:
         made = run_transient(study, case, course, points)
-        written = is_json(file, as_json) if form is None else form is ValueFormat.JSON
         content = (
-            to_bytes(transient_json(made, study, case, course)) + b"\n" if written else trajectory_csv(made.motion)
+            trajectory_csv(made.motion)
+            if written == "csv"
+            else to_bytes(transient_json(made, study, case, course)) + b"\n"
         )
         write(content)
     _report(made, case)

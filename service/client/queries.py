@@ -190,8 +190,7 @@ def form_of(path: Path) -> str:
     """The format by the ending of a file's name; ValueError for an unknown ending."""
     from sprag.service.formats import format_of
 
-    ending = path.suffix[1:].lower()
-    form = ending if ending in ("html", "pdf") else format_of(path.name)
+    form = format_of(path.name)
     if form is None:
         raise ValueError(f"cannot tell the format from the name {path.name!r}; pass it as `form`")
     return form

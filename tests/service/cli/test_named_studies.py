@@ -214,6 +214,24 @@ def test_a_file_has_the_header_that_is_asked_for(
 
 
 @pytest.mark.usefixtures("here")
+@pytest.mark.parametrize("name", ["rows.xls", "rows.ods", "rows.csv.gz", "rows.foo"])
+def test_a_file_of_an_unknown_ending_is_refused(
+    service: Service, spec: dict[str, Any], sprag: Sprag, examples: Path, tmp_path: Path, name: str
+) -> None:
+    service.fill(service.submit(spec))
+    local = examples / "one_pendulum.json"
+    for command in (["export", "latest"], ["run", local], ["trajectory", local], ["section", local]):
+        refused = sprag(*command, "-o", tmp_path / name, "--json")
+        (problem,) = refused.failure["problems"]
+        assert (refused.code, problem["pointer"], problem["code"]) == (2, "--output", "invalid-choice"), command
+        assert ".json" in problem["allowed"]
+    assert list(tmp_path.glob("rows*")) == []
+    assert sprag("export", "latest", "-o", tmp_path / name, "--format", "csv").code == 0
+    assert sprag("export", "latest", "-o", tmp_path / "rows").code == 0
+    assert (tmp_path / "rows").read_bytes() == (tmp_path / name).read_bytes()
+
+
+@pytest.mark.usefixtures("here")
 def test_a_study_is_kept_where_the_answer_is_no(
     service: Service, spec: dict[str, Any], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,0 +1,61 @@
+"""Formats of the files that commands write: by name, by the ending of the file's name, or by ``--json``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import PurePath
+from typing import Final, Literal
+
+from sprag.service.cli.console import WrongInputError, wrong_option
+from sprag.service.cli.files import to_file
+from sprag.service.cli.options import ValueFormat
+from sprag.service.formats import REPORT_FORMATS, SUFFIXES, Format, Header, ReportFormat, format_of
+from sprag.service.languages import N_, _
+
+#: Formats of a whole study: case rows (`sprag.service.results.exports`) and documents (`sprag.service.results.report`).
+TableFormat = Literal[Format, ReportFormat]
+#: Endings of their files.
+_TABLES: Final = (*(ending for endings in SUFFIXES.values() for ending in endings), *REPORT_FORMATS)
+
+
+def file_format(file: str, allowed: Sequence[str]) -> str:
+    """The format given by the ending of ``file``; raises WrongInputError when it is not in ``allowed``."""
+    form = file.rpartition(".")[2].lower()
+    if form not in allowed:
+        raise _wrong_ending(file, allowed)
+    return form
+
+
+def table_format(form: TableFormat | None, file: str | None, as_json: bool) -> TableFormat:
+    """The format of a whole study; WrongInputError where only the file's name tells it, by an unknown ending."""
+    if form is not None:
+        return form
+    if file is None or not _has_ending(file):
+        return "json" if as_json else "csv"
+    found = format_of(file)
+    if found is None:
+        raise _wrong_ending(file, _TABLES)
+    return found
+
+
+def value_format(form: ValueFormat | None, file: str | None, as_json: bool) -> Literal["csv", "json"]:
+    """The format of values of one case; WrongInputError where only the file's name tells it, by an unknown ending."""
+    if form is None and file is not None and _has_ending(file):
+        form = ValueFormat(file_format(file, tuple(ValueFormat)))
+    return "json" if (as_json if form is None else form is ValueFormat.JSON) else "csv"
+
+
+def require_csv(header: Header | None, form: str) -> None:
+    """Raise WrongInputError for ``--header`` where the file is not CSV."""
+    if header is not None and form != "csv":
+        raise wrong_option("--header", "not-used", N_("only CSV files have it"), header, allowed="csv")
+
+
+def _has_ending(file: str) -> bool:
+    return to_file(file) and PurePath(file).suffix not in ("", ".")
+
+
+def _wrong_ending(file: str, allowed: Sequence[str]) -> WrongInputError:
+    endings = ", ".join(f".{name}" for name in allowed)
+    message, sentence = N_("is not a file of this kind"), _("a name that ends in {endings}", endings=endings)
+    return wrong_option("--output", "invalid-choice", message, file, allowed=sentence)
