@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -18,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Final
 import typer
 
 from sprag.service import languages
-from sprag.service.cli.layout import Shape, blocks, broken, width_of
+from sprag.service.cli.layout import Shape, blocks, broken, longest_piece, width_of
 from sprag.service.faults import Code, Fault, FaultError
 from sprag.service.languages import N_, _, decimal, pgettext
 
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 #: Width of titles that do not go to a terminal; tables are as wide as they need.
 _PLAIN_WIDTH = 160
+#: Fraction of the seconds of a time (RFC 3339).
+_FRACTION: Final = re.compile(r"(?<=:\d\d)\.\d+")
 #: Name of the normal ending of a case; asking the models would load the engine.
 OK: Final = "ok"
 
@@ -195,16 +198,18 @@ def show_table(title: str, columns: Iterable[Column], rows: Iterable[Sequence[ob
     """Print a table on standard output; None becomes a dash: a value that could not be computed.
 
     On a terminal it is as wide as that: headings and texts are broken into lines, and columns for which there is no
-    room go on below, each time beside the first one. Elsewhere every row is one line. Numbers and ids are never cut.
+    room go on below, each time beside the first one. Elsewhere every row is one line. Numbers and ids are never cut,
+    and names with dots only after these.
     """
     from rich.cells import cell_len
 
     out, headed = console(), list(columns)
     texts = [[cell_text(cell) for cell in row] for row in rows]
-    shapes = [
-        Shape(heading, max((cell_len(row[index]) for row in texts), default=0), numeric or any(whole))
-        for index, (heading, numeric, *whole) in enumerate(headed)
-    ]
+    shapes = []
+    for index, (heading, numeric, *whole) in enumerate(headed):
+        longest = max((cell_len(row[index]) for row in texts), default=0)
+        piece = longest if numeric else max((longest_piece(row[index], cell_len) for row in texts), default=0)
+        shapes.append(Shape(heading, longest, numeric or any(whole), piece))
     parts = blocks(shapes, out.width if sys.stdout.isatty() else None)
     out.width = max(out.width, *(width_of([*part.values()]) for part in parts))
     for number, part in enumerate(parts):
@@ -239,6 +244,11 @@ def cell_text(cell: object) -> str:
     if isinstance(cell, float):
         return decimal(f"{cell:.6g}") if math.isfinite(cell) else "-"
     return str(cell)
+
+
+def time_text(time: str | None) -> str | None:
+    """A time of an answer as people read it, in whole seconds; None where there is none."""
+    return None if time is None else _FRACTION.sub("", time)
 
 
 def ending_lines(endings: Mapping[str, int]) -> Iterator[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -17,11 +17,15 @@ _PIECE: Final = re.compile(r"[^.\s]*\.(?=\S)|\S+\s*")
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A column of a table: its heading, the longest of its texts, and whether these are never broken."""
+    """A column of a table: its heading, the longest of its texts, and whether these are whole: broken after dots only.
+
+    ``piece`` is the longest piece of a whole text. It is broken only where a column has no room beside the first one.
+    """
 
     heading: str
     longest: int
     whole: bool
+    piece: int
 
     @property
     def natural(self) -> int:
@@ -30,9 +34,13 @@ class Shape:
 
     @property
     def least(self) -> int:
+        """The smallest width at which nothing is cut and no whole text is broken."""
+        return max(_longest(self.heading), self.longest if self.whole else min(self.longest, _TEXT))
+
+    @property
+    def narrowest(self) -> int:
         """The smallest width at which nothing is cut."""
-        piece = max((len(piece.rstrip()) for piece in _PIECE.findall(self.heading)), default=0)
-        return max(piece, self.longest if self.whole else min(self.longest, _TEXT))
+        return max(_longest(self.heading), self.piece if self.whole else min(self.longest, _TEXT))
 
 
 def width_of(widths: Sequence[int]) -> int:
@@ -48,11 +56,14 @@ def blocks(shapes: Sequence[Shape], width: int | None) -> list[dict[int, int]]:
     natural = {index: shape.natural for index, shape in enumerate(shapes)}
     if width is None or width_of([*natural.values()]) <= width:
         return [natural]
-    found = [{0: shapes[0].least}]
-    for index, shape in enumerate(shapes[1:], 1):
-        if width_of([*found[-1].values(), shape.least]) > width and len(found[-1]) > 1:
-            found.append({0: shapes[0].least})
-        found[-1][index] = shape.least
+    first, *others = (shape.least for shape in shapes)
+    if width_of([first, max(others, default=0)]) > width:
+        first, *others = (shape.narrowest for shape in shapes)
+    found = [{0: first}]
+    for index, least in enumerate(others, 1):
+        if width_of([*found[-1].values(), least]) > width and len(found[-1]) > 1:
+            found.append({0: first})
+        found[-1][index] = least
     return [_widened(shapes, block, width) for block in found]
 
 
@@ -66,6 +77,15 @@ def _widened(shapes: Sequence[Shape], block: dict[int, int], width: int) -> dict
             widths[index] += min(rest, missing)
             rest -= min(rest, missing)
     return widths
+
+
+def longest_piece(text: str, length: Callable[[str], int]) -> int:
+    """The length of the longest piece of a text that is broken after dots; one of several words is a single piece."""
+    return length(text) if " " in text else max(map(length, _PIECE.findall(text)), default=0)
+
+
+def _longest(heading: str) -> int:
+    return max((len(piece.rstrip()) for piece in _PIECE.findall(heading)), default=0)
 
 
 def broken(heading: str, width: int) -> str:

@@ -22,6 +22,7 @@ from sprag.service.cli.console import (
     say,
     show_table,
     state_text,
+    time_text,
     warning_lines,
     write_json,
     wrong_option,
@@ -329,7 +330,10 @@ def rounds(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = No
         (_("planned"), False),
         (_("known before"), False),
     )
-    rows = [(r["round"], r["first_case"], r["cases"], r["planned_at"], _known(r["summary"])) for r in found["rounds"]]
+    rows = [
+        (r["round"], r["first_case"], r["cases"], time_text(r["planned_at"]), _known(r["summary"]))
+        for r in found["rounds"]
+    ]
     show_table("", columns, rows)
 
 

@@ -10,7 +10,7 @@ import typer
 
 from sprag.service.answers.studies import StudyOrder
 from sprag.service.cli import completion
-from sprag.service.cli.console import confirmed, say, show_table, write_json, wrong_option
+from sprag.service.cli.console import confirmed, say, show_table, time_text, write_json, wrong_option
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
 from sprag.service.cli.remote import act_on, connection, show_study
@@ -57,8 +57,8 @@ def list_studies(
                (_("created"), False), (last, False), (_("name"), False), (_("tags"), False))  # fmt: skip
     rows = [
         (
-            *(s["id"], s["state"], s["progress"]["done"], s["progress"]["total"], s["created_at"]),
-            *(s["purge_at"] if deleted else s["finish_by"], s["name"], ", ".join(s["tags"])),
+            *(s["id"], s["state"], s["progress"]["done"], s["progress"]["total"], time_text(s["created_at"])),
+            *(time_text(s["purge_at" if deleted else "finish_by"]), s["name"], ", ".join(s["tags"])),
         )
         for s in studies
     ]

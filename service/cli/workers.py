@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.service.cli.console import Column, say, show_table, write_json
+from sprag.service.cli.console import Column, say, show_table, time_text, write_json
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, Token
 from sprag.service.cli.remote import connection
 from sprag.service.languages import _
@@ -36,7 +36,7 @@ def workers(server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonF
         if item["ended_at"]:
             say(_("The dispatcher {name} has ended, and no other is at work.", name=item["owner"]))
         elif item["silent"]:
-            since = item["heartbeat_at"]
+            since = time_text(item["heartbeat_at"])
             say(_("The dispatcher {name} has not responded since {time}.", name=item["owner"], time=since))
         else:
             _say_at_work(item)

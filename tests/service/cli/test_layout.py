@@ -98,8 +98,26 @@ def test_a_table_that_is_piped_has_a_line_for_each_row(capsys: pytest.CaptureFix
     assert [line.strip().split(maxsplit=1) for line in lines] == [["1", text.strip()], ["2", text.strip()]]
 
 
+PATHS = ("clutches.0.engagement.windup.longest", "shaft.load")
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_names_are_broken_after_dots_where_nothing_has_room_beside_them(
+    monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
+    columns = [("path", False, True), ("range", False), ("", False)]
+    lines = shown(monkeypatch, width, columns, [(path, "0 to 1, or none at all", "words " * 20) for path in PATHS])
+    assert max(map(cell_len, lines)) <= width
+    assert all(piece in " ".join(lines) for piece in ("clutches.", "engagement.", "longest", "shaft."))
+    assert (PATHS[0] in " ".join(lines)) is (width > 50)
+
+
 SHAPES = st.lists(
-    st.builds(Shape, st.sampled_from([*NAMES, "n", "two words"]), st.integers(0, 24), st.booleans()), min_size=1
+    st.builds(
+        lambda heading, longest, whole, piece: Shape(heading, longest, whole, min(piece, longest)),
+        *(st.sampled_from([*NAMES, "n", "two words"]), st.integers(0, 40), st.booleans(), st.integers(0, 24)),
+    ),
+    min_size=1,
 )
 
 
@@ -111,7 +129,7 @@ def test_every_column_stands_once_and_each_table_fits(shapes: list[Shape], width
         assert next(iter(part)) == 0
         assert width_of([*part.values()]) <= width or len(part) <= 2
         for index, size in part.items():
-            assert shapes[index].least <= size <= shapes[index].natural
+            assert shapes[index].narrowest <= size <= shapes[index].natural
             lines = broken(shapes[index].heading, size).split("\n")
             assert max(map(len, lines)) <= size
             assert "".join(lines).replace(" ", "") == shapes[index].heading.replace(" ", "")

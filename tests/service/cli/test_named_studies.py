@@ -134,12 +134,23 @@ def test_tables_of_commands_fit_the_terminal(
     monkeypatch.setenv("COLUMNS", str(width))
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("NO_COLOR", "1")
-    for command in (("answers", "feeder"), ("case", "feeder", 3), ("cases", "feeder"), ("presets",), ("list",)):
+    listed = [("presets",), ("list",), ("models", "machine-shaft"), ("models", "vibration-drive")]
+    for command in (("answers", "feeder"), ("case", "feeder", 3), ("cases", "feeder"), *listed):
         done = sprag(*command)
         assert done.code == 0, done.err
         lines = re.sub(r"\x1b\[[0-9;]*m", "", done.out).splitlines()
         assert 20 < max(map(cell_len, lines)) <= width, command
         assert "\N{HORIZONTAL ELLIPSIS}" not in done.out
+
+
+def test_times_are_shown_in_seconds(service: Service, sprag: Sprag, here: None, spec: dict[str, Any]) -> None:
+    created = service.get(f"/studies/{submit(service, spec, 'feeder')}")["created_at"]
+    shown = sprag("list").out
+    assert f" {created[:19]}Z " in shown
+    assert json.loads(sprag("list", "--json").out)["studies"][0]["created_at"] == created
+    service.fill(submit(service, spec, "old"))
+    assert sprag("delete", "old", "--yes").code == 0
+    assert re.search(r"T\d\d:\d\d:\d\dZ", sprag("list", "--deleted").out)
 
 
 def test_studies_side_by_side(service: Service, sprag: Sprag, here: None, spec: dict[str, Any]) -> None:
