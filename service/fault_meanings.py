@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 #: Of faults of one place.
 MEANINGS: Final[dict[Code, str]] = {
-    "ambiguous": "It fits several studies.",
+    "ambiguous": "It fits several names or ids.",
     "cannot-assemble": "The mechanism cannot be assembled at some angle.",
     "circular": "Derived parameters need each other's values.",
     "conflict": "Fields contradict each other.",

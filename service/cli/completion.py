@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import typer
@@ -13,6 +13,7 @@ from sprag.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, REGIME_CODES
 
 if TYPE_CHECKING:
     from sprag.service.client import ServiceClient
+    from sprag.service.storage.store import Store
 
 #: Variable in which typer's scripts ask for completions, or people for such a script.
 COMPLETION_VARIABLE: Final = "_SPRAG_COMPLETE"
@@ -22,6 +23,7 @@ _TIMEOUT: Final = 1.0
 _OFFERED: Final = "100"
 #: Names that need no quotes in any shell.
 _PLAIN: Final = re.compile(r"[\w.-]+")
+Kept = TypeVar("Kept")
 Offered = TypeVar("Offered", str, tuple[str, str])
 
 
@@ -33,11 +35,39 @@ def studies(context: typer.Context, incomplete: str) -> list[tuple[str, str]]:
 def _studies(client: ServiceClient, incomplete: str) -> list[tuple[str, str]]:
     found = client.request("GET", "/studies", params={"page_size": _OFFERED})["studies"]
     ids = [(study["id"], f"{study['name'] or study['model']}, {study['state']}") for study in found]
-    names = [(study["name"], study["id"]) for study in found if _PLAIN.fullmatch(study["name"] or "")]
+    names = _names(incomplete, ((study["name"], study["id"]) for study in found))
     from sprag.service.client.synchronous.naming import LATEST
 
     newest = [(LATEST, ids[0][1])] if ids else []
-    return [*newest, *ids, *(names if incomplete else ())]
+    return [*newest, *ids, *names]
+
+
+def schedules(context: typer.Context, incomplete: str) -> list[tuple[str, str]]:
+    """Ids of the schedules, each with its name and times, and names; nothing where no service answers."""
+
+    def asked(client: ServiceClient) -> list[tuple[str, str]]:
+        found = client.schedules()["schedules"]
+        ids = [(s["id"], f"{s['name']}, {s['cron'] or s['at']}") for s in found]
+        return ids + _names(incomplete, ((s["name"], s["id"]) for s in found))
+
+    return _asked(context, asked)
+
+
+def tokens(context: typer.Context, incomplete: str) -> list[tuple[str, str]]:
+    """Ids of the tokens that are not revoked, each with its name, and names."""
+    found = _stored(context, lambda store: [token for token in store.tokens() if token.revoked_at is None])
+    ids = [(token.id, f"{token.name}, {token.scope.value}") for token in found]
+    return ids + _names(incomplete, ((token.name, token.id) for token in found))
+
+
+def users(context: typer.Context) -> list[tuple[str, str]]:
+    """Names of the users, each with the role; a removed one too, who can be restored."""
+    return [(user.name, user.role.value) for user in _stored(context, lambda store: store.users())]
+
+
+def _names(incomplete: str, named: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Names with what they stand for, once somebody has begun to type one."""
+    return [(name, meant) for name, meant in named if incomplete and _PLAIN.fullmatch(name or "")]
 
 
 def endings() -> list[str]:
@@ -114,3 +144,22 @@ def _asked(context: typer.Context, ask: Callable[[ServiceClient], list[Offered]]
             return ask(client)
     except (CommandFailureError, RefusedError, UnreachableError, ValueError):  # ValueError: the address of the service
         return []
+
+
+def _stored(context: typer.Context, read: Callable[[Store], Sequence[Kept]]) -> Sequence[Kept]:
+    """What the database of the command has; nothing where there is none, which is not created."""
+    from sprag.service.cli.console import CommandFailureError
+    from sprag.service.cli.settings import read_settings
+    from sprag.service.storage.errors import StoreError
+    from sprag.service.storage.session import file_of
+    from sprag.service.storage.store import Store
+
+    try:
+        url = read_settings(database=context.params.get("db")).database_url
+        file = file_of(url)
+        if file is not None and not file.exists():
+            return ()
+        with Store.open(url) as store:
+            return read(store)
+    except (CommandFailureError, StoreError):
+        return ()

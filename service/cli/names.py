@@ -1,25 +1,62 @@
-"""Studies named by people: ``latest``, the beginning of an id, or a name."""
+"""What people name: ``latest``, an id or the beginning of one, or a name."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from sprag.service.cli.console import WrongInputError, wrong_option
+from sprag.service.faults import Fault
 from sprag.service.languages import N_, _
 
 if TYPE_CHECKING:
     from sprag.service.client import ServiceClient
+    from sprag.service.storage.store import Store
 
 
 def study_of(client: ServiceClient, text: str) -> str:
     """The id of the study that is meant, as the client finds it; WrongInputError where several fit or none is named."""
-    from sprag.service.client import AmbiguousError
     from sprag.service.client.synchronous import naming
 
-    if not text.strip():
-        allowed = _("the id or name of a study, or latest")
-        raise wrong_option("ID", "required", N_("must not be empty"), text, allowed=allowed)
-    try:
+    with _one("ID", text, _("the id or name of a study, or latest"), _("the study is not unique")):
         return naming.study_of(client, text)
+
+
+def schedule_of(client: ServiceClient, text: str) -> str:
+    """The id of the schedule that is meant; errors as of `study_of`."""
+    from sprag.service.client.synchronous import naming
+
+    with _one("ID", text, _("the id or name of a schedule"), _("the schedule is not unique")):
+        return naming.schedule_of(client, text)
+
+
+def token_of(store: Store, text: str) -> str:
+    """The id of the token that is meant, of one that is revoked by its id only; errors as of `study_of`."""
+    from sprag.service.client.matching import Named, meant
+
+    with _one("ID", text, _("the id or name of a token"), _("the token is not unique")):
+        tokens = [Named(t.id, t.name, f"{t.id} ({t.name})") for t in store.tokens() if t.revoked_at is None]
+        return meant(text, tokens, "tokens", "tk_")
+
+
+def user_of(store: Store, text: str, where: str = "NAME") -> str:
+    """The name of the user who is meant by ``where`` of a command; errors as of `study_of`."""
+    from sprag.service.client.matching import Named, meant
+
+    with _one(where, text, _("the name of a user"), _("the user is not unique")):
+        return meant(text, [Named(user.name, user.name, user.name) for user in store.users()], "users")
+
+
+@contextmanager
+def _one(where: str, text: str, allowed: str, several: str) -> Iterator[None]:
+    """WrongInputError for an empty text, and where several fit."""
+    from sprag.service.client import AmbiguousError
+
+    if not text.strip():
+        raise wrong_option(where, "required", N_("must not be empty"), text, allowed=allowed)
+    try:
+        yield
     except AmbiguousError as error:
-        raise WrongInputError("invalid-parameter", _("the study is not unique"), error.faults) from error
+        faults = [Fault(where, fault.code, fault.message, fault.value, fault.allowed) for fault in error.faults]
+        raise WrongInputError("invalid-parameter", several, faults) from error

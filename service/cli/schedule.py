@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from sprag.service.cli import completion
 from sprag.service.cli.console import ExitCode, WrongInputError, say, show_table, write_json, wrong_option
 from sprag.service.cli.files import read_spec
 from sprag.service.cli.groups import Groups
+from sprag.service.cli.names import schedule_of
 from sprag.service.cli.options import DEFAULT_SERVER, Fresh, JsonFlag, Server, SpecFile, Token
 from sprag.service.cli.remote import PriorityOption, connection
 from sprag.service.languages import N_, _, recorded
@@ -23,7 +25,14 @@ app = typer.Typer(
     cls=Groups,
 )
 
-ScheduleId = Annotated[str, typer.Argument(metavar="ID", help="Id of the schedule.")]
+ScheduleId = Annotated[
+    str,
+    typer.Argument(
+        metavar="ID",
+        help="Id or name of the schedule, or the beginning of one.",
+        autocompletion=completion.schedules,
+    ),
+]
 Cron = Annotated[
     str | None,
     typer.Option(
@@ -152,7 +161,7 @@ def show(
 ) -> None:
     """Show a schedule and the outcome of its latest due times; with --json also its spec."""
     with connection(server, token) as client:
-        schedule = client.schedule(schedule_id)
+        schedule = client.schedule(schedule_of(client, schedule_id))
     if as_json:
         write_json(schedule)
         return
@@ -253,13 +262,14 @@ def resume(
 def delete(schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Token = None) -> None:
     """Delete a schedule; its studies are kept."""
     with connection(server, token) as client:
+        schedule_id = schedule_of(client, schedule_id)
         client.delete_schedule(schedule_id)
     say(_("{what} is deleted", what=schedule_id))
 
 
 def _change(schedule_id: str, fields: Mapping[str, Any], server: str, token: str | None, as_json: bool) -> None:
     with connection(server, token) as client:
-        _show(client.change_schedule(schedule_id, fields), as_json)
+        _show(client.change_schedule(schedule_of(client, schedule_id), fields), as_json)
 
 
 def _given(**fields: Any) -> dict[str, Any]:

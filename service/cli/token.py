@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from sprag.service.cli import completion
 from sprag.service.cli.console import WrongInputError, say, show_table, write_json, wrong_option
 from sprag.service.cli.groups import Groups
+from sprag.service.cli.names import token_of, user_of
 from sprag.service.cli.options import Database, JsonFlag
 from sprag.service.cli.user import users_of
 from sprag.service.languages import N_, _
@@ -47,7 +49,13 @@ def create(
         TokenScope, typer.Option("--scope", help="read: read everything; write: change it too.")
     ] = TokenScope.WRITE,
     user: Annotated[
-        str | None, typer.Option("--user", metavar="NAME", help="User whose token it is; default: nobody's.")
+        str | None,
+        typer.Option(
+            "--user",
+            metavar="NAME",
+            help="User whose token it is; default: nobody's.",
+            autocompletion=completion.users,
+        ),
     ] = None,
     expires: Annotated[
         int | None,
@@ -64,7 +72,8 @@ def create(
         raise wrong_option("--name", "invalid-text", N_("is not the name of a token"), name, allowed=allowed)
     with users_of(db) as store:
         ends = None if expires is None else store.clock.now() + timedelta(days=expires)
-        secret, record = store.create_token(name, scope, owner=user, expires_at=ends)
+        owner = None if user is None else user_of(store, user, "--user")
+        secret, record = store.create_token(name, scope, owner=owner, expires_at=ends)
     if as_json:
         write_json({"token": secret, **_json(record)})
     else:
@@ -90,7 +99,14 @@ def list_tokens(db: Database = None, as_json: JsonFlag = False) -> None:
 
 @app.command()
 def revoke(
-    token_id: Annotated[str, typer.Argument(metavar="ID", help="Id of the token, as `sprag token list` shows it.")],
+    token_id: Annotated[
+        str,
+        typer.Argument(
+            metavar="ID",
+            help="Id or name of the token, or the beginning of one, as `sprag token list` shows them.",
+            autocompletion=completion.tokens,
+        ),
+    ],
     db: Database = None,
     as_json: JsonFlag = False,
 ) -> None:
@@ -99,7 +115,7 @@ def revoke(
 
     with users_of(db) as store:
         try:
-            record = store.revoke_token(token_id)
+            record = store.revoke_token(token_of(store, token_id))
         except TokenNotFoundError as error:
             raise WrongInputError("token-not-found", str(error)) from error
     if as_json:

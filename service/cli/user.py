@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sprag.service.actor import Role
-from sprag.service.cli.console import WrongInputError, say, show_table, write_json, wrong_option
+from sprag.service.cli import completion
+from sprag.service.cli.console import WrongInputError, say, show_table, time_text, write_json, wrong_option
 from sprag.service.cli.groups import Groups
+from sprag.service.cli.names import user_of
 from sprag.service.cli.options import Database, JsonFlag
 from sprag.service.cli.settings import read_settings
 from sprag.service.languages import N_, _
@@ -28,6 +30,10 @@ app = typer.Typer(
 )
 
 Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the user, as a trusted proxy gives it.")]
+Known = Annotated[
+    str,
+    typer.Argument(metavar="NAME", help="Name of the user, or its beginning.", autocompletion=completion.users),
+]
 RoleOption = Annotated[
     Role | None,
     typer.Option("--role", help="viewer: reads; designer: submits and changes what is theirs; administrator: all."),
@@ -87,7 +93,10 @@ def list_users(db: Database = None, as_json: JsonFlag = False) -> None:
     waiting, size, checks = _("cases waiting"), _("bytes"), _("checks")
     headings = (_("name"), _("role"), waiting, limit, size, limit, checks, _("removed"))
     rows = [
-        (u.name, u.role, used.cases, u.quota.cases, used.bytes, u.quota.bytes, u.quota.checks, _json(u)["removed_at"])
+        (
+            *(u.name, u.role, used.cases, u.quota.cases, used.bytes, u.quota.bytes, u.quota.checks),
+            time_text(_json(u)["removed_at"]),
+        )
         for u, used in found
     ]
     show_table("", [(head, 2 <= place <= 6, place == 0) for place, head in enumerate(headings)], rows)
@@ -95,7 +104,7 @@ def list_users(db: Database = None, as_json: JsonFlag = False) -> None:
 
 @app.command()
 def change(
-    name: Name,
+    name: Known,
     role: RoleOption = None,
     cases: Cases = None,
     storage: Storage = None,
@@ -107,15 +116,15 @@ def change(
     if role is None and cases is None and storage is None and checks is None:
         raise WrongInputError("invalid-parameter", _("nothing to change; `sprag user change --help` lists the options"))
     with users_of(db) as store:
-        record = store.change_user(name, role, _quota(cases, storage, checks))
+        record = store.change_user(user_of(store, name), role, _quota(cases, storage, checks))
     _show(record, as_json, _("{name} is changed: {role}", name=record.name, role=record.role))
 
 
 @app.command()
-def remove(name: Name, db: Database = None, as_json: JsonFlag = False) -> None:
+def remove(name: Known, db: Database = None, as_json: JsonFlag = False) -> None:
     """Remove a user, whose tokens and sessions end within two seconds; studies and schedules are kept."""
     with users_of(db) as store:
-        record = store.change_user(name, removed=True)
+        record = store.change_user(user_of(store, name), removed=True)
     _show(
         record,
         as_json,
@@ -124,22 +133,31 @@ def remove(name: Name, db: Database = None, as_json: JsonFlag = False) -> None:
 
 
 @app.command()
-def restore(name: Name, db: Database = None, as_json: JsonFlag = False) -> None:
+def restore(name: Known, db: Database = None, as_json: JsonFlag = False) -> None:
     """Let a removed user in again, with the same tokens."""
     with users_of(db) as store:
-        record = store.change_user(name, removed=False)
+        record = store.change_user(user_of(store, name), removed=False)
     _show(record, as_json, _("{name} is a user again: {role}", name=record.name, role=record.role))
 
 
 @app.command("hand-over")
 def hand_over(
-    name: Name,
-    to: Annotated[str, typer.Option("--to", metavar="NAME", help="The user to whom they belong from now on.")],
+    name: Known,
+    to: Annotated[
+        str,
+        typer.Option(
+            "--to",
+            metavar="NAME",
+            help="The user to whom they belong from now on.",
+            autocompletion=completion.users,
+        ),
+    ],
     db: Database = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Give the studies and schedules of one user to another."""
     with users_of(db) as store:
+        name, to = user_of(store, name), user_of(store, to, "--to")
         studies, schedules = store.hand_over(name, to)
     if as_json:
         write_json({"studies": studies, "schedules": schedules})

@@ -33,11 +33,11 @@ _LISTED: Final = 5
 
 
 class AmbiguousError(ServiceError, ValueError):
-    """A text fits several studies; the fault lists them."""
+    """A text fits several studies or others of one ``kind``; the fault lists them."""
 
-    def __init__(self, text: str, fits: Sequence[str]) -> None:
+    def __init__(self, text: str, fits: Sequence[str], kind: str = "studies") -> None:
         more = f" and {len(fits) - _LISTED} more" if len(fits) > _LISTED else ""
-        fault = Fault("ID", "ambiguous", "fits several studies", text, ", ".join(fits[:_LISTED]) + more)
+        fault = Fault("ID", "ambiguous", f"fits several {kind}", text, ", ".join(fits[:_LISTED]) + more)
         super().__init__("invalid-parameter", str(fault), [fault])
 
 

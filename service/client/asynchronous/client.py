@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from sprag.service.client.asynchronous.comparing import compare_studies
 from sprag.service.client.asynchronous.connection import AsyncConnection
-from sprag.service.client.asynchronous.naming import study_of
+from sprag.service.client.asynchronous.naming import schedule_of, study_of
 from sprag.service.client.asynchronous.study import AsyncStudy
 from sprag.service.client.queries import finish_text, given, spec_of
 from sprag.service.client.wire import component_path, model_path, preset_path, schedule_path, study_path, view_path
@@ -187,8 +187,9 @@ class AsyncClient(AsyncConnection):
         return cast("Night", await self.request("GET", "/night", params={"hours": hours}))
 
     async def schedule(self, schedule_id: str) -> ScheduleDetail:
-        """One schedule with its spec and its latest runs."""
-        return cast("ScheduleDetail", await self.request("GET", schedule_path(schedule_id)))
+        """One schedule, named as a study is in `study`, with its spec and its latest runs."""
+        path = schedule_path(await schedule_of(self, schedule_id))
+        return cast("ScheduleDetail", await self.request("GET", path))
 
     async def create_schedule(
         self, spec: Spec | str | PathLike[str], *, key: str | None = None, **fields: Any
@@ -233,11 +234,12 @@ class AsyncClient(AsyncConnection):
 
     async def change_schedule(self, schedule_id: str, **fields: Any) -> ScheduleDetail:
         """Change some fields of a schedule, such as ``enabled=False``; the others are kept."""
-        return cast("ScheduleDetail", await self.request("PATCH", schedule_path(schedule_id), json=fields))
+        path = schedule_path(await schedule_of(self, schedule_id))
+        return cast("ScheduleDetail", await self.request("PATCH", path, json=fields))
 
     async def delete_schedule(self, schedule_id: str) -> None:
         """Delete a schedule; its studies are kept."""
-        await self.delete(schedule_path(schedule_id))
+        await self.delete(schedule_path(await schedule_of(self, schedule_id)))
 
     async def me(self) -> Me:
         """Who asks: user, token, role and quotas."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 from sprag.service.client.queries import finish_text, given, spec_of
 from sprag.service.client.synchronous.comparing import compare_studies
 from sprag.service.client.synchronous.connection import Connection
-from sprag.service.client.synchronous.naming import study_of
+from sprag.service.client.synchronous.naming import schedule_of, study_of
 from sprag.service.client.synchronous.study import Study
 from sprag.service.client.wire import component_path, model_path, preset_path, schedule_path, study_path, view_path
 
@@ -187,8 +187,9 @@ class Client(Connection):
         return cast("Night", self.request("GET", "/night", params={"hours": hours}))
 
     def schedule(self, schedule_id: str) -> ScheduleDetail:
-        """One schedule with its spec and its latest runs."""
-        return cast("ScheduleDetail", self.request("GET", schedule_path(schedule_id)))
+        """One schedule, named as a study is in `study`, with its spec and its latest runs."""
+        path = schedule_path(schedule_of(self, schedule_id))
+        return cast("ScheduleDetail", self.request("GET", path))
 
     def create_schedule(
         self, spec: Spec | str | PathLike[str], *, key: str | None = None, **fields: Any
@@ -233,11 +234,12 @@ class Client(Connection):
 
     def change_schedule(self, schedule_id: str, **fields: Any) -> ScheduleDetail:
         """Change some fields of a schedule, such as ``enabled=False``; the others are kept."""
-        return cast("ScheduleDetail", self.request("PATCH", schedule_path(schedule_id), json=fields))
+        path = schedule_path(schedule_of(self, schedule_id))
+        return cast("ScheduleDetail", self.request("PATCH", path, json=fields))
 
     def delete_schedule(self, schedule_id: str) -> None:
         """Delete a schedule; its studies are kept."""
-        self.delete(schedule_path(schedule_id))
+        self.delete(schedule_path(schedule_of(self, schedule_id)))
 
     def me(self) -> Me:
         """Who asks: user, token, role and quotas."""

@@ -1,18 +1,18 @@
-"""Studies named by people: ``latest``, an id or the beginning of one, a name or the beginning of one."""
+"""What people name: a study as ``latest``, others by an id or the beginning of one, a name or the beginning of one."""
 
 from __future__ import annotations
 
 import re
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.client.errors import AmbiguousError
+from sprag.service.client.matching import Named, meant
 from sprag.worker.limits import MAX_SEARCH_LENGTH
 
 if TYPE_CHECKING:
     from sprag.service.client.synchronous.connection import Connection
 
 LATEST: Final = "latest"
-_WHOLE_ID: Final = re.compile(r"st_[0-9a-f]{16,}")
+_WHOLE_ID: Final = re.compile(r"(st|sc)_[0-9a-f]{16,}")
 _PAGE: Final = "500"
 
 
@@ -22,26 +22,25 @@ def study_of(connection: Connection, text: str) -> str:
     A text that fits no study is returned unchanged, and the service refuses it. Raises AmbiguousError where several
     studies fit; a whole name precedes the beginning of others. ValueError for an empty text.
     """
-    if not text.strip():
-        raise ValueError("the id or name of a study is needed")
     if _WHOLE_ID.fullmatch(text):
         return text
     if text == LATEST:
         newest = (connection.request("GET", "/studies", params=[("page_size", "1")]))["studies"]
         return str(newest[0]["id"]) if newest else text
-    # Every study that fits contains the words of the text; archived ones are found too.
-    asked = [("page_size", _PAGE), ("search", text[:MAX_SEARCH_LENGTH])]
     studies = []
-    for more in ([], [("archived", "true")]):
-        for study in connection.items("/studies", "studies", [*asked, *more]):
-            studies.append(study)
-    wanted = text.casefold()
-    for fits in (
-        [s for s in studies if s["name"] == text],
-        [s for s in studies if s["id"].startswith((text, f"st_{text}")) or s["name"].casefold().startswith(wanted)],
-    ):
-        if len(fits) == 1:
-            return str(fits[0]["id"])
-        if fits:
-            raise AmbiguousError(text, [f"{study['id']} ({study['name'] or study['model']})" for study in fits])
-    return text
+    if text.strip():
+        # Every study that fits contains the words of the text; archived ones are found too.
+        asked = [("page_size", _PAGE), ("search", text[:MAX_SEARCH_LENGTH])]
+        for more in ([], [("archived", "true")]):
+            for s in connection.items("/studies", "studies", [*asked, *more]):
+                studies.append(Named(s["id"], s["name"], f"{s['id']} ({s['name'] or s['model']})"))
+    return meant(text, studies, "studies", "st_")
+
+
+def schedule_of(connection: Connection, text: str) -> str:
+    """The id of the schedule that is meant, otherwise as `study_of`."""
+    if _WHOLE_ID.fullmatch(text):
+        return text
+    found = (connection.request("GET", "/schedules"))["schedules"] if text.strip() else []
+    schedules = [Named(s["id"], s["name"], f"{s['id']} ({s['name']})") for s in found]
+    return meant(text, schedules, "schedules", "sc_")

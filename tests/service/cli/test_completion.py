@@ -13,8 +13,11 @@ from typing import Any
 import pytest
 import typer
 
+from sprag.service.actor import Role
 from sprag.service.cli import completion
 from sprag.service.cli.app import app
+from sprag.service.settings import Settings
+from sprag.service.storage.scopes import TokenScope
 from sprag.worker.models import ENDING_SENTENCES, REGIME_SENTENCES, flags_of, model_names
 from tests.conftest import ROOT
 from tests.service.conftest import Service
@@ -68,6 +71,32 @@ def test_bash_completes_studies_of_the_service(program: dict[str, str], service:
         assert offered(program, "compare", "latest", "fe") == ["feeder"]
         assert offered(program, "watch", "two") == [], "a name that needs quotes"
     assert offered(program, "watch", "") == [], "no service answers"
+
+
+def test_schedules_tokens_and_users_are_completed(
+    service: Service, spec: dict[str, Any], settings: Settings, tmp_path: Path
+) -> None:
+    def given(**params: object) -> typer.Context:
+        context = typer.Context(typer.main.get_command(app))
+        context.params = params
+        return context
+
+    kept = service.http.post("/api/v1/schedules", json={"spec": spec, "cron": "@daily", "name": "nightly"}).json()
+    _, token = service.store.create_token("laptop", TokenScope.READ)
+    service.store.revoke_token(service.store.create_token("old", TokenScope.READ)[1].id)
+    service.store.add_user("dora", Role.VIEWER)
+    own = given(db=settings.database)
+    assert completion.tokens(own, "") == [(token.id, "laptop, read")]
+    assert ("laptop", token.id) in completion.tokens(own, "la")
+    assert completion.users(own) == [("dora", "viewer")]
+    none = tmp_path / "none.sqlite3"
+    assert completion.users(given(db=str(none))) == []
+    assert not none.exists()
+    secret, _ = service.store.create_token("", TokenScope.READ)
+    with served(service.app) as address:
+        context = given(server=address, token=secret)
+        assert completion.schedules(context, "") == [(kept["id"], "nightly, @daily")]
+        assert completion.schedules(context, "ni")[1:] == [("nightly", kept["id"])]
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")

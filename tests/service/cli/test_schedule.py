@@ -123,3 +123,25 @@ def test_recipients_are_options(run: Run, service: Service, spec_file: str) -> N
     assert run("change", name, "--email", "", "--webhook", "", "--report", "always")[0] == 0
     found = service.get(f"/schedules/{name}")
     assert (found["report_email"], found["report_webhook"], found["report_when"]) == ([], None, "always")
+
+
+def test_a_schedule_is_named_as_a_study_is(run: Run, service: Service, spec_file: str) -> None:
+    ids = {}
+    for name in ("nightly", "nightly press", "weekly"):
+        ids[name] = run("add", spec_file, "--cron", "@daily", "--name", name)[1].strip()
+    shown = {text: run("show", text, "--json") for text in ("nightly", "week", ids["weekly"], ids["weekly"][:-1])}
+    names = [json.loads(out)["name"] for _, out, _ in shown.values()]
+    assert names == ["nightly", "weekly", "weekly", "weekly"]
+    code, _, err = run("pause", "night", "--json")
+    (problem,) = json.loads(err)["problems"]
+    assert (code, problem["code"], problem["message"]) == (2, "ambiguous", "fits several schedules")
+    assert ids["nightly"] in problem["allowed"]
+    code, _, err = run("show", " ", "--json")
+    assert (code, json.loads(err)["problems"][0]["code"]) == (2, "required")
+    assert run("pause", "week")[0] == 0
+    assert run("delete", "nightly p")[0] == 0
+    kept = {found["id"]: found["enabled"] for found in service.get("/schedules")["schedules"]}
+    assert kept == {ids["weekly"]: False, ids["nightly"]: True}
+    code, _, err = run("show", "none")
+    assert code == 2
+    assert "none" in err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -54,3 +55,26 @@ def test_alone_it_makes_a_secret_and_keeps_nothing(capsys: pytest.CaptureFixture
     second = json.loads(capsys.readouterr().out)["token"]
     assert len(first) == len(second) == 43
     assert first != second
+
+
+def test_tokens_and_users_are_named_by_their_beginnings(settings: Settings, sprag: Callable[..., Any]) -> None:
+    db = ("--db", settings.database)
+    for name in ("dora", "dorothea"):
+        assert sprag("user", "add", name, *db).code == 0
+    made = [
+        json.loads(sprag("token", "create", "--name", name, "--user", user, "--json", *db).out)
+        for name, user in (("laptop", "dorot"), ("laptop, old", "dora"))
+    ]
+    assert [token["user"] for token in made] == ["dorothea", "dora"]
+    several = sprag("token", "revoke", "lap", "--json", *db)
+    (problem,) = several.failure["problems"]
+    assert (several.code, problem["pointer"], problem["code"]) == (2, "ID", "ambiguous")
+    for text, token in (("laptop", made[0]), ("lap", made[1]), (made[0]["id"], made[0])):
+        assert json.loads(sprag("token", "revoke", text, "--json", *db).out)["id"] == token["id"]
+    several = sprag("user", "hand-over", "dora", "--to", "d", "--json", *db)
+    (problem,) = several.failure["problems"]
+    assert (several.code, problem["pointer"], problem["message"]) == (2, "--to", "fits several users")
+    assert sprag("user", "remove", "doro", *db).code == 0
+    assert sprag("user", "restore", "doro", *db).code == 0
+    assert sprag("user", "change", "", "--role", "viewer", *db).code == 2
+    assert sprag("user", "change", "emil", "--role", "viewer", "--json", *db).failure["code"] == "user-not-found"
