@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Final
 
-from starlette.datastructures import MutableHeaders
-from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddleware
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipResponder
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from werkzeug.datastructures import Accept
+from werkzeug.http import parse_accept_header
 
 from sprag.service import formats
 
@@ -25,7 +27,7 @@ class Compression:
     """ASGI application around another one, whose answers it compresses."""
 
     def __init__(self, app: ASGIApp) -> None:
-        self._app = GZipMiddleware(app, _LEAST_BYTES, _LEVEL, exclude_content_types=_EXCLUDED)
+        self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         async def weakened(message: Message) -> None:
@@ -40,4 +42,13 @@ class Compression:
                     headers["etag"] = f"W/{tag}"
             await send(message)
 
-        await self._app(scope, receive, weakened)
+        app: ASGIApp = self._app
+        if scope["type"] == "http" and _takes_gzip(Headers(scope=scope)):
+            app = GZipResponder(app, _LEAST_BYTES, _LEVEL, exclude_content_types=_EXCLUDED)
+        await app(scope, receive, weakened)
+
+
+def _takes_gzip(headers: Headers) -> bool:
+    """Whether a client takes gzip, and likes plain answers no better (RFC 9110, section 12.5.3)."""
+    accepted = parse_accept_header(", ".join(headers.getlist("accept-encoding")), Accept)
+    return 0.0 < accepted.quality("gzip") >= accepted.quality("identity")

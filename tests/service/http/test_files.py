@@ -158,6 +158,29 @@ def test_answers_are_compressed_and_their_tags_weak(service: Service, ended: str
     assert "content-encoding" not in short.headers
 
 
+@pytest.mark.parametrize(
+    ("accepted", "packed"),
+    [
+        ("gzip, br", True),
+        ("GZIP;q=0.5", True),
+        ("*;q=0.1", True),
+        ("gzip, identity", True),
+        ("br, *;q=0.5, identity;q=0", True),
+        ("gzip;q=0", False),
+        ("gzip;q=0, *", False),
+        ("*;q=0", False),
+        ("br", False),
+        ("gzip;q=0.5, identity;q=0.8", False),
+        ("", False),
+    ],
+)
+def test_gzip_is_sent_to_whoever_takes_it(ended: str, raw: Any, accepted: str, packed: bool) -> None:
+    answer = raw(f"{API}/studies/{ended}", {"Accept-Encoding": accepted})
+    assert answer.headers["content-encoding"] == ("gzip" if packed else "")
+    assert answer.content.startswith(b"\x1f\x8b" if packed else b"{")
+    assert answer.headers["vary"].count("Accept-Encoding") == 1
+
+
 def test_what_is_sent_is_gzip(service: Service, ended: str, raw: Any) -> None:
     answer = raw(f"{API}/studies/{ended}", {"Accept-Encoding": "gzip"})
     assert answer.headers["content-encoding"] == "gzip"
