@@ -71,20 +71,22 @@ class TokenStore(Protocol):
 class Grant:
     """Who asks: the identity of a token (``id``, ``name``) or of a user, and the role.
 
-    ``user`` is the name of the user, None for a token without a user; ``checks`` is the user's own quota of
-    simultaneous checks, None where the settings have it.
+    ``scope`` is that of the token, None without one: whoever has one that only reads has the role of a viewer. ``user``
+    is the name of the user, None for a token without a user; ``checks`` is the user's own quota of simultaneous
+    checks, None where the settings have it.
     """
 
     id: str
     name: str
     role: Role
+    scope: TokenScope | None = None
     user: str | None = None
     checks: int | None = None
 
     @property
     def label(self) -> str:
-        """Who it is, as the subject of a sentence."""
-        return f"Token {self.name or self.id}" if self.user is None else f"User {self.user}"
+        """Who it is, as the subject of a sentence: the user, unless the token allows less than the user may do."""
+        return f"Token {self.name or self.id}" if self.user is None or self._only_reads else f"User {self.user}"
 
     @property
     def token(self) -> str | None:
@@ -94,7 +96,11 @@ class Grant:
     @property
     def reading(self) -> str:
         """The rest of that sentence for a viewer."""
-        return N_("is read-only") if self.user is None else N_("has the role viewer, which cannot change anything")
+        return N_("is read-only") if self._only_reads else N_("has the role viewer, which cannot change anything")
+
+    @property
+    def _only_reads(self) -> bool:
+        return self.scope is TokenScope.READ
 
     @property
     def share(self) -> str:
@@ -160,7 +166,7 @@ class Access:
     def of_token(self, token: bytes) -> Grant | None:
         """The grant of a token; None when it is invalid."""
         if self._setting is not None and hmac.compare_digest(token, self._setting):
-            return Grant(_SETTING, "SPRAG_TOKEN", Role.ADMINISTRATOR)
+            return Grant(_SETTING, "SPRAG_TOKEN", Role.ADMINISTRATOR, TokenScope.WRITE)
         return self._used(self._by_digest.get(digest_of(token)))
 
     def of_header(self, header: str) -> Grant | None:
@@ -178,7 +184,7 @@ class Access:
         if int(end) <= time.time() or seal in self._logged_out:
             return None
         if token_id == _SETTING and self._setting is not None:
-            return Grant(_SETTING, "SPRAG_TOKEN", Role.ADMINISTRATOR)
+            return Grant(_SETTING, "SPRAG_TOKEN", Role.ADMINISTRATOR, TokenScope.WRITE)
         return self._used(self._by_id.get(token_id))
 
     def of_proxy(self, scope: Scope, headers: Headers) -> Grant | None:
@@ -194,7 +200,7 @@ class Access:
         role = self._user_role if record is None else record.role
         if role is None or (record is not None and record.removed_at is not None):
             raise ApiError("not-allowed", f"{shown(name)} is not a user of this service; `sprag user add` adds one.")
-        return Grant(f"user {name}", name, role, name, None if record is None else record.quota.checks)
+        return Grant(f"user {name}", name, role, None, name, None if record is None else record.quota.checks)
 
     def actor(self, grant: Grant, scope: Scope) -> Actor:
         """Who acts in a request, for the log and the ownership of what is new."""
@@ -228,11 +234,12 @@ class Access:
         """The grant of a token: its user's role, or a viewer's for a token that only reads; None for a removed user."""
         reads = record.scope is TokenScope.READ
         if record.owner is None:
-            return Grant(record.id, record.name, Role.VIEWER if reads else Role.DESIGNER)
+            return Grant(record.id, record.name, Role.VIEWER if reads else Role.DESIGNER, record.scope)
         user = self._users.get(record.owner)
         if user is None or user.removed_at is not None:
             return None
-        return Grant(record.id, record.name, Role.VIEWER if reads else user.role, user.name, user.quota.checks)
+        role = Role.VIEWER if reads else user.role
+        return Grant(record.id, record.name, role, record.scope, user.name, user.quota.checks)
 
     async def log_in(self, grant: Grant) -> str:
         """The value of the session cookie for ``grant``; raises StoreError."""

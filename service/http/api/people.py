@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 from fastapi import Query, Request
 from starlette.responses import Response
 
+from sprag.service.answers import filled
 from sprag.service.answers import people as m
 from sprag.service.http.access import OPEN
 from sprag.service.http.api.document import files, format_query, next_page, problems
@@ -27,14 +28,13 @@ router = api_router("administration")
 
 @router.get("/me", response_model=m.Me, responses=problems("invalid-parameter"))
 def get_me(context: Ctx, request: Request) -> Response:
-    """Who asks: user, token, role, and what is used of the quotas."""
+    """Who asks: user, token and its scope, role, and what is used of the quotas."""
     grant = cast("Grant | None", request.scope.get("sprag.grant")) or OPEN
     store, quota = context.store, None
     if grant.user is not None:
         own = next((user.quota for user in store.users() if user.name == grant.user), Quota())
         quota = quota_json(store, grant.user, own)
-    data: m.Me = {"user": grant.user, "token": grant.token, "role": grant.role.value, "quota": quota}
-    return json_response(data)
+    return json_response(filled(m.Me, grant, quota=quota))
 
 
 @router.get("/users", response_model=m.UserList, responses=problems("invalid-parameter", "not-allowed"))

@@ -149,6 +149,7 @@ def test_role_removal_and_expiry_take_effect_at_once(office: Office, monkeypatch
     assert dora.get("/api/v1/me").json() == {
         "user": "dora",
         "token": "of dora",
+        "scope": "write",
         "role": "designer",
         "quota": {"cases": 0, "most_cases": None, "bytes": 0, "most_bytes": None, "most_checks": None},
     }
@@ -175,6 +176,8 @@ def test_role_removal_and_expiry_take_effect_at_once(office: Office, monkeypatch
 def test_a_reading_token_of_an_administrator_only_reads(office: Office) -> None:
     office.tokens["screen"], _ = office.store.create_token("screen", TokenScope.READ, owner="ada")
     screen = office.program("screen")
-    assert screen.get("/api/v1/me").json()["role"] == "viewer"
+    me = screen.get("/api/v1/me").json()
+    assert (me["user"], me["scope"], me["role"]) == ("ada", "read", "viewer")
     assert screen.get("/api/v1/audit").status_code == 403
-    assert screen.post(STUDIES, json=SPEC).status_code == 403
+    refused = screen.post(STUDIES, json=SPEC)
+    assert (refused.status_code, refused.json()["detail"]) == (403, "Token screen is read-only.")
