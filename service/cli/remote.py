@@ -69,7 +69,14 @@ PriorityOption = Annotated[
 @contextmanager
 def connection(server: str, token: str | None) -> Iterator[ServiceClient]:
     """A client of the service; its errors become failures of the command."""
-    from sprag.service.client import RefusedError, ServiceClient, StudyTimeoutError, UnreachableError, UntrustedError
+    from sprag.service.client import (
+        ArgumentError,
+        RefusedError,
+        ServiceClient,
+        StudyTimeoutError,
+        UnreachableError,
+        UntrustedError,
+    )
 
     try:
         client = ServiceClient(server, token)
@@ -95,6 +102,8 @@ def connection(server: str, token: str | None) -> Iterator[ServiceClient]:
             ) from error
         except RefusedError as error:
             raise refusal(error) from error
+        except ArgumentError as error:
+            raise WrongInputError("invalid-parameter", _("invalid argument"), error.faults) from error
         except StudyTimeoutError as error:
             raise TroubleError("not-done", _("{what}; it continues.", what=error)) from error
 

@@ -16,6 +16,7 @@ from sprag.service.client.asynchronous.study import AsyncStudy
 from sprag.service.client.comparison import Comparison
 from sprag.service.client.errors import (
     AmbiguousError,
+    ArgumentError,
     RefusedError,
     ServiceError,
     SpecFileError,
@@ -34,6 +35,7 @@ from sprag.service.client.wire import Query
 
 __all__ = [
     "AmbiguousError",
+    "ArgumentError",
     "AsyncClient",
     "AsyncStudy",
     "Client",

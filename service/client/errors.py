@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, cast, get_args
 
-from sprag.service.faults import Code, Fault, FaultError, Kind, ParameterFault
+from sprag.service.faults import Code, Fault, FaultError, Kind, ParameterFault, shown
 
 
 class ServiceError(FaultError):
@@ -17,6 +17,15 @@ class SpecFileError(ServiceError, ValueError):
 
     def __init__(self, message: str) -> None:
         super().__init__("invalid-file", message)
+
+
+class ArgumentError(ServiceError, ValueError):
+    """An argument of a method cannot be what it must be; the fault names it. Nothing was requested."""
+
+    def __init__(self, argument: str, value: object, allowed: str) -> None:
+        told = shown(value if isinstance(value, str | int | float) else repr(value))
+        fault = ParameterFault(argument, "wrong-type", "is not possible", told, allowed)
+        super().__init__("invalid-parameter", str(fault), [fault])
 
 
 class UnreachableError(ServiceError):

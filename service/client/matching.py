@@ -20,10 +20,8 @@ def meant(text: str, things: Iterable[Named], kind: str, prefix: str = "") -> st
     """The id of what ``text`` means: an id or the beginning of one, also without its ``prefix``, or the same of a name.
 
     A text that fits nothing is returned unchanged. Raises AmbiguousError, with ``kind``, such as "studies", where
-    several fit; a whole id or name precedes the beginning of others. ValueError for an empty text.
+    several fit; a whole id or name precedes the beginning of others.
     """
-    if not text.strip():
-        raise ValueError(f"the id or name of one of the {kind} is needed")
     things, wanted = tuple(things), text.casefold()
     for fits in (
         [thing for thing in things if text in (thing.id, thing.name)],

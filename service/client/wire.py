@@ -7,12 +7,13 @@ import math
 import re
 import ssl
 from collections.abc import Mapping, Sequence
+from operator import index
 from typing import Any, Final, Literal
 from urllib.parse import quote
 
 import httpx
 
-from sprag.service.client.errors import RefusedError, ServiceError, UnreachableError, UntrustedError
+from sprag.service.client.errors import ArgumentError, RefusedError, ServiceError, UnreachableError, UntrustedError
 from sprag.service.languages import N_
 
 #: Seconds without a byte after which an event stream is abandoned; the service sends one every 15 s.
@@ -111,9 +112,20 @@ def require_finite(data: object, pointer: str = "") -> None:
         raise RefusedError(422, problem)
 
 
+def named(argument: str, value: object) -> str:
+    """The id or name in an argument of a method; ArgumentError where it is none."""
+    if not isinstance(value, str) or not value.strip():
+        raise ArgumentError(argument, value, "an id or name")
+    return value
+
+
+def _quoted(argument: str, value: object) -> str:
+    return quote(named(argument, value), safe="")
+
+
 def study_path(study_id: str) -> str:
     """Address of a study under the API."""
-    return f"/studies/{quote(study_id, safe='')}"
+    return f"/studies/{_quoted('study_id', study_id)}"
 
 
 def address(path: str) -> str:
@@ -123,34 +135,38 @@ def address(path: str) -> str:
 
 def model_path(name: str) -> str:
     """Address of a model under the API."""
-    return f"/models/{quote(name, safe='')}"
+    return f"/models/{_quoted('name', name)}"
 
 
 def preset_path(name: str) -> str:
     """Address of a study that comes with the service."""
-    return f"/presets/{quote(name, safe='')}"
+    return f"/presets/{_quoted('name', name)}"
 
 
 def case_path(study_id: str, case: int, part: str) -> str:
-    """Address of a case under the API, or of a part of it, such as "/branch"; ValueError for a negative number."""
-    if case < 0:
-        raise ValueError(f"there is no case {case:d}: cases are numbered from 0")
-    return f"{study_path(study_id)}/cases/{case:d}{part}"
+    """Address of a case under the API, or of a part of it, such as "/branch"; ArgumentError for no whole number."""
+    try:
+        number = -1 if isinstance(case, bool) else index(case)  # numbers of numpy are numbers too
+    except TypeError:
+        number = -1
+    if number < 0:
+        raise ArgumentError("case", case, "whole numbers from 0")
+    return f"{study_path(study_id)}/cases/{number}{part}"
 
 
 def component_path(component_id: str) -> str:
     """Address of a component."""
-    return f"/components/{quote(component_id, safe='')}"
+    return f"/components/{_quoted('component_id', component_id)}"
 
 
 def view_path(view_id: str) -> str:
     """Address of a saved view under the API."""
-    return f"/views/{quote(view_id, safe='')}"
+    return f"/views/{_quoted('view_id', view_id)}"
 
 
 def schedule_path(schedule_id: str) -> str:
     """Address of a schedule under the API."""
-    return f"/schedules/{quote(schedule_id, safe='')}"
+    return f"/schedules/{_quoted('schedule_id', schedule_id)}"
 
 
 def refusal(response: httpx.Response) -> ServiceError:

@@ -6,6 +6,7 @@ import re
 from typing import TYPE_CHECKING, Final
 
 from sprag.service.client.matching import Named, meant
+from sprag.service.client.wire import named
 from sprag.worker.limits import MAX_SEARCH_LENGTH
 
 if TYPE_CHECKING:
@@ -20,27 +21,26 @@ async def study_of(connection: AsyncConnection, text: str) -> str:
     """The id of the study that is meant: ``latest``, an id or the beginning of one, a name or the beginning of one.
 
     A text that fits no study is returned unchanged, and the service refuses it. Raises AmbiguousError where several
-    studies fit; a whole name precedes the beginning of others. ValueError for an empty text.
+    studies fit; a whole name precedes the beginning of others. ArgumentError for an empty text.
     """
-    if _WHOLE_ID.fullmatch(text):
+    if _WHOLE_ID.fullmatch(named("study_id", text)):
         return text
     if text == LATEST:
         newest = (await connection.request("GET", "/studies", params=[("page_size", "1")]))["studies"]
         return str(newest[0]["id"]) if newest else text
+    # Every study that fits contains the words of the text; archived ones are found too.
+    asked = [("page_size", _PAGE), ("search", text[:MAX_SEARCH_LENGTH])]
     studies = []
-    if text.strip():
-        # Every study that fits contains the words of the text; archived ones are found too.
-        asked = [("page_size", _PAGE), ("search", text[:MAX_SEARCH_LENGTH])]
-        for more in ([], [("archived", "true")]):
-            async for s in connection.items("/studies", "studies", [*asked, *more]):
-                studies.append(Named(s["id"], s["name"], f"{s['id']} ({s['name'] or s['model']})"))
+    for more in ([], [("archived", "true")]):
+        async for s in connection.items("/studies", "studies", [*asked, *more]):
+            studies.append(Named(s["id"], s["name"], f"{s['id']} ({s['name'] or s['model']})"))
     return meant(text, studies, "studies", "st_")
 
 
 async def schedule_of(connection: AsyncConnection, text: str) -> str:
     """The id of the schedule that is meant, otherwise as `study_of`."""
-    if _WHOLE_ID.fullmatch(text):
+    if _WHOLE_ID.fullmatch(named("schedule_id", text)):
         return text
-    found = (await connection.request("GET", "/schedules"))["schedules"] if text.strip() else []
+    found = (await connection.request("GET", "/schedules"))["schedules"]
     schedules = [Named(s["id"], s["name"], f"{s['id']} ({s['name']})") for s in found]
     return meant(text, schedules, "schedules", "sc_")

@@ -61,8 +61,8 @@ class Client(Connection):
     def study(self, study_id: str) -> Study:
         """A study by its id, its name, or the beginning of one; "latest": the newest.
 
-        RefusedError when there is none, AmbiguousError when several fit and none has that name, ValueError for an
-        empty text.
+        RefusedError when there is none, AmbiguousError when several fit and none has that name, ArgumentError for
+        an empty text, or no text.
         """
         found = study_of(self, study_id)
         return Study(self, (self.request("GET", study_path(found)))["id"])

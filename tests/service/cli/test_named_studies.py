@@ -60,7 +60,7 @@ def test_what_names_a_study(service: Service, portal: BlockingPortal, spec: dict
             with pytest.raises(WrongInputError) as empty:
                 study_of(client, nothing)
             assert [(fault.where, fault.code) for fault in empty.value.faults] == [("ID", "required")]
-            with pytest.raises(ValueError, match="id or name"):
+            with pytest.raises(ValueError, match="an id or name"):
                 naming.study_of(client, nothing)
         third = submit(service, spec, "Feeder")
         assert study_of(client, "Feeder") == third, "a whole name precedes the beginning of others"

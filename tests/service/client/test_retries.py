@@ -80,7 +80,7 @@ def test_a_restart_is_waited_over(
 
 def test_what_may_have_happened_is_not_sent_twice(client: Client, scripted: Scripted) -> None:
     study = Study(client, "st_1")
-    for ask in (study.pause, study.delete, lambda: client.change_schedule("sc_1", enabled=True)):
+    for ask in (study.pause, study.delete, lambda: client.change_schedule("sc_0123456789abcdef", enabled=True)):
         scripted.answers = [BROKEN, {}]
         with pytest.raises(UnreachableError):
             ask()

@@ -18,6 +18,7 @@ from anyio.from_thread import BlockingPortal
 from sprag.service.answers.studies import StudyDetail
 from sprag.service.client import (
     AmbiguousError,
+    ArgumentError,
     AsyncClient,
     AsyncStudy,
     Client,
@@ -277,6 +278,15 @@ def test_studies_are_named_as_on_the_command_line(client: Client, service: Servi
     assert (caught.value.code, caught.value.faults[0].code) == ("invalid-parameter", "ambiguous")
     with refused(RefusedError, "study-not-found"):
         client.study("nothing")
+    for ask, argument in (
+        (client.study, "study_id"),
+        (client.schedule, "schedule_id"),
+        (client.model, "name"),
+        (client.delete_component, "component_id"),
+    ):
+        for wrong in (None, 7, "", " "):
+            with pytest.raises(ArgumentError, match=f"^{argument}: is not possible .*allowed: an id or name"):
+                ask(wrong)  # type: ignore[operator]
     for study in (first, second):
         service.fill(study)
     at = {"excitation.frequency": "16 Hz"}
@@ -288,7 +298,10 @@ def test_studies_are_named_as_on_the_command_line(client: Client, service: Servi
 
 def test_cases_are_numbered_from_0(client: Client, service: Service) -> None:
     study = client.study(service.submit())
-    with pytest.raises(ValueError, match="no case -1: cases are numbered from 0"):
-        study.case(-1)
-    with pytest.raises(ValueError, match="no case -3"):
+    for wrong in (-1, "abc", 1.5, True, None):
+        with pytest.raises(ArgumentError, match=r"^case: is not possible .*allowed: whole numbers from 0") as caught:
+            study.case(wrong)  # type: ignore[arg-type]
+        assert (caught.value.code, caught.value.faults[0].where) == ("invalid-parameter", "case")
+    assert study.case(np.int64(0)) == study.case(0)  # type: ignore[arg-type]
+    with pytest.raises(ArgumentError, match="got -3"):
         study.trajectory(-3)
