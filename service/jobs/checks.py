@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from sprag.service.faults import FaultError, parameter_error
 from sprag.service.jobs.calibrations import Calibrations
@@ -42,6 +42,10 @@ if TYPE_CHECKING:
     from sprag.service.results.explore import ExploreQuery
     from sprag.service.spec.text import Format
     from sprag.worker.chunking import Chunking
+
+#: Fields of a schedule by which it is paused and resumed, and the most bytes of a body with them.
+_PAUSING: Final = frozenset({"enabled", "paused_until"})
+_SHORT: Final = 200
 
 
 def prepare() -> None:
@@ -194,6 +198,17 @@ def schedule_body(
 ) -> ScheduleFields:
     """`schedule_fields` of the body of a request."""
     return schedule_fields(library, load_spec(content, form), now, old)
+
+
+def only_pauses(content: bytes, form: Format) -> bool:
+    """Whether the body of a change of a schedule does no more than pause or resume it; such a body is short."""
+    if len(content) > _SHORT:
+        return False
+    try:
+        data = load_spec(content, form)
+    except SpecError:
+        return False
+    return isinstance(data, Mapping) and set(data) <= _PAUSING
 
 
 def study_change(content: bytes, form: Format) -> StudyChange:

@@ -161,7 +161,10 @@ def _made(context: Context, record: ScheduleRecord) -> Response:
 async def _fields(context: Context, work: Work, received: Body, old: ScheduleFields | None) -> ScheduleFields:
     with as_body_problems():
         now = context.store.clock.now()
-        fields = await work.check(checks.schedule_body, context.library, received.content, received.format, now, old)
+        # Whoever pauses a schedule does not wait for a process, of which a service that has just started has none yet.
+        quick = old is not None and checks.only_pauses(received.content, received.format)
+        asked = (context.library, received.content, received.format, now, old)
+        fields = await (run_in_threadpool if quick else work.check)(checks.schedule_body, *asked)
         if old is None or fields.report_to != old.report_to:
             require_deliverable(fields.report_to, context.settings.reports)
         return fields

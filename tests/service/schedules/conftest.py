@@ -37,7 +37,7 @@ def clock() -> Clock:
 @pytest.fixture
 def service(settings: Settings, clock: Clock, connect: Callable[..., httpx.Client]) -> Iterator[Service]:
     """A service by the clock of the test."""
-    computer = InThread()
+    computer, checker = InThread(), InThread()
     with Store.open(settings.database_url, chunking=chunking(settings), clock=clock) as store:
-        app = create_app(settings, store=store, computer=computer, checker=InThread())
-        yield Service(app, connect(app), store, computer)
+        app = create_app(settings, store=store, computer=computer, checker=checker)
+        yield Service(app, connect(app), store, computer, checker)

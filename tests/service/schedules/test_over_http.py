@@ -40,6 +40,24 @@ def test_the_interface_keeps_changes_disables_and_deletes(service: Service, cloc
     assert service.get("/schedules") == {"schedules": []}
 
 
+def test_pausing_and_resuming_wait_for_no_process(service: Service, clock: Clock) -> None:
+    address = service.http.post(API, json=EXAMPLE).headers["location"]
+    checked = len(service.checker.calls)
+    for change, paused in (
+        ({"enabled": False}, True),
+        ({"enabled": True, "paused_until": None}, False),
+        ({"paused_until": "2026-01-07T00:00"}, False),
+    ):
+        answer = service.http.patch(address, json=change)
+        assert (answer.status_code, answer.json()["next_due"] is None) == (200, paused)
+    for wrong in ({"enabled": 3}, {"paused_until": "soon"}):
+        assert service.http.patch(address, json=wrong).status_code == 422
+    assert len(service.checker.calls) == checked
+    assert service.http.patch(address, json={"enabled": True, "name": "changed"}).status_code == 200
+    assert service.http.patch(address, content="{", headers={"content-type": "application/json"}).status_code == 422
+    assert len(service.checker.calls) == checked + 2
+
+
 def test_studies_of_a_schedule_start_from_the_end_of_a_case(
     service: Service, clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
