@@ -301,6 +301,7 @@ def test_the_page_of_the_log(office: Office) -> None:
     assert f'href="/studies/{made}"' in shown.text
     assert "user.add" not in shown.text
     assert "user.add" in ada.get("/audit").text
+    assert "<td>API<br>" in shown.text, "the way is called as in the answers of the API"
     wrong = ada.get("/audit", params={"since": "yesterday"})
     assert wrong.status_code == 422
     assert 'id="wrong-since"' in wrong.text
