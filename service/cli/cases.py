@@ -38,7 +38,7 @@ def cases(
         typer.Option(
             "--sort",
             metavar="NAME",
-            help="Parameter, result, case or ending; -NAME: largest first.",
+            help="Parameter, result, case, ending, regime or flags; -NAME: largest first.",
             autocompletion=completion.sortings,
         ),
     ] = None,

@@ -114,7 +114,8 @@ def quantities(context: typer.Context) -> list[tuple[str, str]]:
 
 def sortings(context: typer.Context) -> list[tuple[str, str]]:
     """What the cases of the study of the command are sorted by."""
-    return [("case", _("number of the case")), ("ending", _("how it ended")), *quantities(context)]
+    kinds = [("ending", _("how it ended")), ("flags", _("those without first"))]
+    return [("case", _("number of the case")), *kinds, *quantities(context)]
 
 
 def _of_study(context: typer.Context, parts: Sequence[str]) -> list[tuple[str, str]]:

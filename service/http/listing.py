@@ -38,16 +38,20 @@ def wanted_studies(
         ),
     ] = "",
     state: Annotated[StudyState | None, Query(description="only studies in this state", examples=["finished"])] = None,
-    tag: Annotated[str, Query(max_length=MAX_TAG_LENGTH, description="only studies with this tag")] = "",
-    owner: Annotated[str, Query(max_length=MAX_USER_NAME, description="only studies of this user")] = "",
-    model: Annotated[str, Query(max_length=40, description="only studies of this model")] = "",
+    tag: Annotated[
+        str | None, Query(min_length=1, max_length=MAX_TAG_LENGTH, description="only studies with this tag")
+    ] = None,
+    owner: Annotated[
+        str | None, Query(min_length=1, max_length=MAX_USER_NAME, description="only studies of this user")
+    ] = None,
+    model: Annotated[str | None, Query(min_length=1, max_length=40, description="only studies of this model")] = None,
     archived: Annotated[bool, Query(description="only archived studies; otherwise they are left out")] = False,
     deleted: Annotated[bool, Query(description="only deleted studies that can be restored")] = False,
 ) -> StudyFilter:
     """The filter that a request asks for; FaultError about a model that there is not."""
     if model and model not in models.model_names():
         raise parameter_error("model", "invalid-choice", "is not a model", model, ", ".join(models.model_names()))
-    return StudyFilter(search, state, tag, owner, model, archived, deleted)
+    return StudyFilter(search, state, tag or "", owner or "", model or "", archived, deleted)
 
 
 WantedStudies = Annotated[StudyFilter, Depends(wanted_studies)]

@@ -35,7 +35,7 @@ class CasePage:
 
 def by_number(query: ExploreQuery) -> bool:
     """Whether a page is read straight from the database: cases in the order of their numbers, of any values."""
-    return query.sort in ("", "case") and not (query.where or query.at)
+    return query.sort == "case" and not (query.where or query.at)
 
 
 def case_page(library: Library, study_id: str, query: ExploreQuery, page_token: str | None) -> CasePage:

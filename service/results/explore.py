@@ -17,6 +17,7 @@ from sprag.service.spec.catalogue import result_of, unit_of
 from sprag.service.spec.report import did_you_mean
 from sprag.service.spec.units import plain_signs
 from sprag.worker import models
+from sprag.worker.codes import FLAG_MASKS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,7 +37,7 @@ ROWS: Final = 50
 BINS: Final = 24
 
 #: What every case can be sorted by.
-_ALWAYS: Final = ("case", "ending")
+_ALWAYS: Final = ("case", "ending", "flags")
 _FORM: Final = re.compile(r"\s*([A-Za-z][\w.]*)\s*(>=|<=|≥|≤)\s*(.+?)\s*")
 
 
@@ -45,9 +46,10 @@ class ExploreQuery:
     """Which cases: ``where`` are texts such as ``shaft.load <= 2 N*m``, all of which must hold.
 
     ``at`` holds axes at a value: pairs of path and text. ``ending``, ``regime`` and ``flag`` keep one kind, "" any.
-    Rows are ordered by ``sort``, a parameter, a result, "case" or "ending", with "-" before it from the largest down;
-    cases without the number come last, and equal ones in the order of their numbers. Only those ``after`` a case are
-    ordered. ``show`` are the quantities of histograms and rows, by default the axes and the model's own columns.
+    Rows are ordered by ``sort``, a parameter, a result, "case", "ending", "flags" (none first) or the regime, with "-"
+    before it from the largest down; cases without it come last, and equal ones in the order of their numbers. Only
+    those ``after`` a case are ordered. ``show`` are the quantities of histograms and rows, by default the axes and the
+    model's own columns.
     """
 
     where: tuple[str, ...] = ()
@@ -145,9 +147,10 @@ def plan_of(study: Study, query: ExploreQuery) -> Plan:
     _kind("ending", query.ending, models.endings_of(study.model))
     _kind("flag", query.flag, models.flags_of(study.model))
     fixed = {axis: index for axis, (_, index) in locate_axes(study, query.at).items()}
-    descending, sort = query.sort.startswith("-"), query.sort.removeprefix("-") or "case"
-    if sort not in _ALWAYS:
-        _require(study, infos, "sort", sort)
+    descending, sort = query.sort.startswith("-"), query.sort.removeprefix("-")
+    kinds = _ALWAYS if regime is None else (*_ALWAYS, regime.name)
+    if sort not in kinds:
+        _require(study, infos, "sort", sort, kinds)
     shown = tuple(dict.fromkeys(query.show)) or usual_quantities(study, infos)
     for name in shown:
         _require(study, infos, "show", name)
@@ -194,17 +197,22 @@ def explore(study: Study, plan: Plan, rows: RowColumns) -> Explored:
     if query.regime and plan.regime is not None:
         selected &= rows.values[plan.regime.name] == plan.regime.categories.index(query.regime)
     places = np.flatnonzero(selected).astype(np.int64)
-    if plan.sort == "ending":
-        # By all endings there are: those of the finished cases become more while a reader turns pages.
-        ranks = {ending: float(rank) for rank, ending in enumerate(sorted(models.ENDING_SENTENCES))}
-        keys = np.array([ranks[ending] for ending, _ in rows.kinds])[rows.kind] if known else empty
-    else:
-        keys = rows.cases.astype(np.float64) if plan.sort == "case" else every.get(plan.sort, empty)
+    keys = rows.cases.astype(np.float64) if plan.sort == "case" else every.get(plan.sort, empty)
+    if plan.sort in ("ending", "flags") and known:
+        keys = np.array(_kind_keys(plan.sort, rows.kinds))[rows.kind]
     if query.after is not None:
         places = _beyond(places, keys, rows.cases, query.after, descending=plan.descending)
     order = _first(places, keys, query.limit, descending=plan.descending)
     shown = {name: every.get(name, empty) for name in plan.shown}
     return Explored(study, plan, rows, known, selected, order, keys, shown)
+
+
+def _kind_keys(sort: str, kinds: Sequence[tuple[str, str]]) -> list[float]:
+    """The keys of pairs of ending and flags, by all that there are: more occur while a reader turns pages."""
+    if sort == "flags":
+        return [float(sum(FLAG_MASKS[name] for name in flags.split(",") if name)) for _, flags in kinds]
+    ranks = {ending: float(rank) for rank, ending in enumerate(sorted(models.ENDING_SENTENCES))}
+    return [ranks[ending] for ending, _ in kinds]
 
 
 def _upwards(keys: NDArray[np.float64], *, descending: bool) -> NDArray[np.float64]:
@@ -245,9 +253,9 @@ def _numeric(infos: Sequence[ResultInfo], name: str) -> bool:
     return info is not None and info.kind != "category"
 
 
-def _require(study: Study, infos: Sequence[ResultInfo], parameter: str, name: str) -> None:
+def _require(study: Study, infos: Sequence[ResultInfo], parameter: str, name: str, others: Sequence[str] = ()) -> None:
     if name not in study.column_paths and not _numeric(infos, name):
-        names = [*study.column_paths, *(info.name for info in infos if info.kind != "category")]
+        names = [*others, *study.column_paths, *(info.name for info in infos if info.kind != "category")]
         message = "is neither a parameter that varies nor a numeric result" + did_you_mean(name, names)
         raise refused(parameter, "unknown-name", message, name, allowed=listed(names))
 

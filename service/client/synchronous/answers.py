@@ -86,7 +86,7 @@ class StudyAnswers(StudyPart):
         ----------
         where : str or sequence of str
         sort : str, optional
-            A parameter or a result, with "-" before it from the largest down.
+            A parameter, a result, "case", "ending", "flags" or "regime"; "-" before it: from the largest down.
         limit : int, optional
             Most cases, by default 50.
         show : str or sequence of str

@@ -47,7 +47,7 @@ class StudyTables(StudyPart):
         at : mapping, optional
             Paths of axes and their only values.
         sort : str, optional
-            Parameter, result, "case" or "ending"; "-" before it: from the largest down.
+            A parameter, a result, "case", "ending", "flags" or "regime"; "-" before it: from the largest down.
         """
         query = cases_query(ending, regime, flag, where, at, sort)
         for case in self._client.items(f"{self._path}/cases", "cases", query):

@@ -85,8 +85,8 @@ async def list_cases(
         str,
         Query(
             max_length=100,
-            description='parameter, result, "case" or "ending" to sort all rows by; "-" before it: from the largest '
-            "down; cases without the number come last",
+            description='parameter, result, "case", "ending", "flags" or "regime" to sort all rows by; "-" before it: '
+            "from the largest down; cases without it come last",
             examples=["-efficiency"],
         ),
     ] = "case",

@@ -31,13 +31,13 @@ if TYPE_CHECKING:
 router = api_router(path="/studies/{study_id:study}")
 
 _WRITERS: Final[dict[str, Callable[..., bytes]]] = {"json": explore.explored_as_json, "csv": explore.explored_as_csv}
-_OfKind = Annotated[str, Query(max_length=40, description="only cases of this kind")]
+_OfKind = Annotated[str | None, Query(min_length=1, max_length=40, description="only cases of this kind")]
 _Sort = Annotated[
     str,
     Query(
         max_length=100,
-        description='parameter, result or "case" to sort all rows by; "-" before it: from the largest down; cases '
-        "without the number come last",
+        description='parameter, result, "case", "ending", "flags" or "regime" to sort all rows by; "-" before it: from '
+        "the largest down; cases without it come last",
         examples=["-efficiency"],
     ),
 ]
@@ -58,9 +58,9 @@ async def get_exploration(
     study_id: StudyId,
     choice: FileChoice,
     where: Ranges = None,
-    ending: _OfKind = "",
-    regime: _OfKind = "",
-    flag: _OfKind = "",
+    ending: _OfKind = None,
+    regime: _OfKind = None,
+    flag: _OfKind = None,
     sort: _Sort = "case",
     limit: Annotated[int, Query(ge=1, le=MAX_SELECTED, description="most rows", examples=[10])] = ROWS,
     show: Annotated[
@@ -76,7 +76,7 @@ async def get_exploration(
 ) -> Response:
     """Cases within ranges of parameters and results, sorted over all rows, with a histogram of each quantity."""
     chosen = choose_format(work.request, form, DRAWN_FORMATS)
-    query = ExploreQuery(tuple(where or ()), ending, regime, flag, sort, limit, tuple(show or ()))
+    query = ExploreQuery(tuple(where or ()), ending or "", regime or "", flag or "", sort, limit, tuple(show or ()))
 
     def make(record: StudyRecord) -> Response | Drawing:
         study = work.context.store.study(study_id)
@@ -113,9 +113,9 @@ async def select_cases(
     work: Attended,
     study_id: StudyId,
     where: Ranges = None,
-    ending: _OfKind = "",
-    regime: _OfKind = "",
-    flag: _OfKind = "",
+    ending: _OfKind = None,
+    regime: _OfKind = None,
+    flag: _OfKind = None,
     sort: _Sort = "case",
     limit: Annotated[int, Query(ge=1, le=MAX_POINTS_SELECTED, description="most cases", examples=[10])] = ROWS,
     idempotency_key: SelectKey = None,
@@ -124,7 +124,7 @@ async def select_cases(
 
     Derived parameters follow from the others; a case of a drive with tolerances keeps the values of its drive.
     """
-    query = ExploreQuery(tuple(where or ()), ending, regime, flag, sort, limit)
+    query = ExploreQuery(tuple(where or ()), ending or "", regime or "", flag or "", sort, limit)
     given = given_options(where=where, ending=ending, regime=regime, flag=flag, sort=sort, limit=limit)
     made = await work.check(checks.selected_study, context.library, study_id, query, context.store.clock.now(), given)
     return await run_in_threadpool(taken_in, context, made, idempotency_key, 0)

@@ -106,12 +106,12 @@ def test_bash_completes_what_options_take(program: dict[str, str], service: Serv
     with served(service.app) as address:
         program["SPRAG_SERVER"] = address
         quantities = [*case["parameters"], *case["results"]]
-        assert offered(program, "cases", study, "--sort", "") == ["case", "ending", *quantities]
+        assert offered(program, "cases", study, "--sort", "") == ["case", "ending", "flags", *quantities]
         assert offered(program, "cases", "fee", "--sort", "shaft.l") == ["shaft.load"]
         assert offered(program, "explore", "latest", "--limit", "3", "--show", "") == quantities
         assert offered(program, "curve", study, "--x", "") == [*case["parameters"]]
         assert offered(program, "compare", study, "latest", "--y", "eff") == ["efficiency"]
-        assert offered(program, "cases", "--sort", "") == ["case", "ending"], "no study is named yet"
+        assert offered(program, "cases", "--sort", "") == ["case", "ending", "flags"], "no study is named yet"
         assert offered(program, "models", "") == [m["name"] for m in service.get("/models")["models"]]
         assert offered(program, "list", "--model", "m") == ["machine-shaft"]
     assert offered(program, "cases", study, "--sort", "shaft") == [], "no service answers"

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 import pytest
 
 from sprag.service.client import Client
+from sprag.worker.models import REGIME_SENTENCES
 from tests.service.conftest import API, PortalTransport, Service
+from tests.service.spec_sample import changed
 
 Rows = list[dict[str, Any]]
 SPEED, COUNT = "shaft.speed.mean", "overtakings"
@@ -53,6 +56,26 @@ def test_cases_are_sorted_by_any_quantity_through_all_pages(service: Service, st
         assert every(service, study_id, sort=f"-{path}") == expected
     assert every(service, study_id, sort="-case") == rows[::-1]
     assert every(service, study_id, sort="ending") == sorted(rows, key=lambda row: row["ending"])
+    flagged = every(service, study_id, sort="flags")
+    assert flagged[0]["flags"] == []
+    assert {tuple(row["flags"]) for row in flagged} == {tuple(row["flags"]) for row in rows}
+    groups = [flags for flags, _ in groupby(row["flags"] for row in flagged)]
+    assert len(groups) == len({*map(tuple, groups)}) > 1, "cases of the same flags are together"
+    assert [flags for flags, _ in groupby(row["flags"] for row in every(service, study_id, sort="-flags"))] == (
+        groups[::-1]
+    )
+
+
+def test_cases_are_sorted_by_their_regimes(service: Service) -> None:
+    loads = [0.1 * place for place in range(1, 9)]
+    study_id = service.submit(
+        changed({"/run": {"until": "settled"}, "/axes": [{"path": "shaft.load", "values": loads}]})
+    )
+    service.fill(study_id)
+    rows = every(service, study_id)
+    assert len({row["results"]["regime"] for row in rows} - {None}) > 1
+    order = {name: place for place, name in enumerate(REGIME_SENTENCES)} | {None: len(REGIME_SENTENCES)}
+    assert every(service, study_id, sort="regime") == sorted(rows, key=lambda row: order[row["results"]["regime"]])
 
 
 def test_ranges_kinds_and_values_choose_them(service: Service, study_id: str) -> None:
@@ -81,6 +104,8 @@ def test_ranges_kinds_and_values_choose_them(service: Service, study_id: str) ->
     ("query", "parameter"),
     [
         ({"sort": "beauty"}, "sort"),
+        ({"sort": "-"}, "sort"),
+        ({"sort": "regime"}, "sort"),
         ({"where": "beauty > 3"}, "where"),
         ({"where": "efficiency"}, "where"),
         ({"at": "shaft.load=17"}, "at"),
@@ -100,6 +125,17 @@ def test_what_cannot_be_chosen_names_the_parameter(
     assert answer.json()["errors"][0]["parameter"] == parameter
     page = service.http.get(f"/studies/{study_id}/cases", params={**query, "after": query.get("page_token", "")})
     assert page.status_code == (200 if query == {"at": "shaft.load"} else 422)
+
+
+@pytest.mark.parametrize("address", ["/cases?sort=", "/explore?sort=", "/explore?sort=-", "/explore?flag=", "?tag="])
+def test_what_is_empty_is_not_ignored(service: Service, study_id: str, address: str) -> None:
+    place = f"{API}/studies" if address == "?tag=" else f"{API}/studies/{study_id}"
+    answer = service.http.get(place + address)
+    assert answer.status_code == 422
+    (error,) = answer.json()["errors"]
+    assert error["parameter"] == address.partition("?")[2].partition("=")[0]
+    if error["parameter"] == "sort":
+        assert error["allowed"].startswith("case, ending, flags, ")
 
 
 def test_a_token_belongs_to_its_order(service: Service, study_id: str) -> None:
