@@ -11,6 +11,11 @@
 
   const withKey = (prefix, key) => [...document.querySelectorAll(prefix)].find((link) => link.dataset.key === key);
   const PAGES = "header.site [data-key]", PARTS = ".tabs [data-key]";
+  // The shortcuts that a key may mean: its own, and under a layout that has no Latin letter on it, that at its place on a US keyboard.
+  const meant = ({ key, code, shiftKey }) => {
+    const place = code === "Slash" ? (shiftKey ? "?" : "/") : !shiftKey && /^(?:Key|Digit)(.)$/.exec(code)?.[1].toLowerCase();
+    return /^[a-z]$/i.test(key) || !place ? [key] : [key, place];
+  };
   const field = () => [...document.querySelectorAll("main [type=search], main form.choices :is(input, select), main form :is(input, select, textarea)")]
     .find((one) => one.type !== "hidden" && one.checkVisibility());
 
@@ -35,13 +40,16 @@
     if (!on.checked) return;
     const after = waiting > event.timeStamp;
     waiting = 0;
-    const link = after ? withKey(PAGES, event.key) : withKey(PARTS, event.key);
-    if (link) link.click();
-    else if (event.key === "g") waiting = event.timeStamp + WAIT;
-    else if (event.key === "?") help();
-    else if (event.key === "/" && field()) field().focus();
-    else return;
-    event.preventDefault();
+    const taken = meant(event).some((key) => {
+      const link = withKey(after ? PAGES : PARTS, key);
+      if (link) link.click();
+      else if (key === "g") waiting = event.timeStamp + WAIT;
+      else if (key === "?") help();
+      else if (key === "/" && field()) field().focus();
+      else return false;
+      return true;
+    });
+    if (taken) event.preventDefault();
   });
 
   // F1 opens the explanation of the current field; its link is no stop of the Tab key then, which would have twice as many.

@@ -38,6 +38,30 @@ def test_pages_and_parts_of_a_study_by_keys(visitor: Visitor, example: str) -> N
     page.wait_for_url(re.compile("/compare$"))
 
 
+def test_under_a_layout_without_latin_letters_keys_mean_their_places(visitor: Visitor, example: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{example}")
+
+    def press(key: str, code: str, *, shift: bool = False) -> None:
+        page.dispatch_event("body", "keydown", {"key": key, "code": code, "shiftKey": shift})
+
+    press(",", "Slash", shift=True)
+    expect(page.get_by_role("dialog", name="Keyboard shortcuts")).to_be_visible()
+    page.keyboard.press("Escape")
+    # A Latin letter is itself, wherever it is: here the i of a Dvorak keyboard.
+    press("i", "KeyG")
+    press("т", "KeyN")
+    press("!", "Digit2", shift=True)
+    press("é", "Digit2")
+    page.wait_for_url("**/curves*")
+    press(".", "Slash")
+    expect(page.locator("main form :focus")).to_have_count(1)
+    page.locator(".tabs a").first.focus()
+    press("п", "KeyG")
+    press("т", "KeyN")
+    page.wait_for_url("**/new*")
+
+
 def test_shortcuts_are_switched_off_and_on(visitor: Visitor) -> None:
     page = visitor.page
     page.goto("/compare")
