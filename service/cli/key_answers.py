@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from sprag.service.cli import completion
-from sprag.service.cli.console import Column, say, show_table, write_json
+from sprag.service.cli.console import Column, cell_text, say, show_table, write_json
 from sprag.service.cli.file_formats import file_format
 from sprag.service.cli.files import write_pieces
 from sprag.service.cli.names import study_of
@@ -92,4 +92,7 @@ def _show(found: dict[str, Any]) -> None:
 def _row(item: dict[str, Any]) -> tuple[object, ...]:
     unit = "" if item["unit"] == "1" else item["unit"]
     cases = ", ".join(map(str, item["cases"]))
-    return _(item["title"]), item["value"], unit, item["x"], cases, _(item["note"]) if item["note"] else item["note"]
+    value = item["value"]
+    if item["above"] and value is not None:
+        value = f"> {cell_text(value)}"
+    return _(item["title"]), value, unit, item["x"], cases, _(item["note"]) if item["note"] else item["note"]

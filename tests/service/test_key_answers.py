@@ -18,6 +18,7 @@ import pytest
 from anyio.from_thread import BlockingPortal
 
 from sprag.service.cli import key_answers
+from sprag.service.cli.console import cell_text
 from sprag.service.client import AsyncClient, Client
 from tests.conftest import Finished
 from tests.service.conftest import API, PortalTransport, Service
@@ -106,6 +107,11 @@ def test_the_command_shows_them_and_writes_them(
     assert (tmp_path / "answers.svg").read_text().startswith("<?xml")
     told = json.loads(sprag("answers", study_id, "--point", "0.2 N*m", "--json").out)
     assert told == service.get(f"/studies/{study_id}/answers", point="0.2 N*m")
+    # What is beyond the cases that were run is no number.
+    beyond = [item["value"] for curve in told["curves"] for item in curve["answers"] if item["above"]]
+    assert beyond
+    assert shown.out.count("> ") == len(beyond)
+    assert all(f"> {cell_text(value)} " in shown.out for value in beyond)
 
 
 def test_the_page_says_the_answers_first(filled: tuple[Service, str]) -> None:
