@@ -177,14 +177,37 @@ def test_the_page_has_its_choice_in_the_address(filled: tuple[Service, str]) -> 
 
 
 @pytest.mark.parametrize(
-    ("query", "parameter"), [("limit=-1", "limit"), ("limit=1e999", "limit"), ("min:efficiency=3 mm", "where")]
+    ("query", "field", "name"),
+    [
+        ("limit=-1", "limit", "Rows"),
+        ("limit=1e999", "limit", "Rows"),
+        ("min:efficiency=3 mm", "min:efficiency", "Efficiency, from"),
+        ("max:shaft.load=abc", "max:shaft.load", "Load torque, to"),
+    ],
 )
-def test_the_page_says_what_is_wrong_and_keeps_it(filled: tuple[Service, str], query: str, parameter: str) -> None:
+def test_the_page_says_at_its_field_what_is_wrong_and_asks_the_rest(
+    filled: tuple[Service, str], query: str, field: str, name: str
+) -> None:
     service, study_id = filled
-    page = service.http.get(f"/studies/{study_id}/explore?{query}")
+    page = service.http.get(f"/studies/{study_id}/explore?{query}&max:excitation.frequency=24&sort=-efficiency")
+    assert page.status_code == 422
+    assert f"<p>{name}: " in page.text
+    (wrong,) = re.findall(r'<span class="wrong" id="wrong:([^"]+)">[^<]', page.text)
+    assert wrong == field
+    (entry,) = re.findall(r'<input name="([^"]+)" value="([^"]+)"[^>]*aria-invalid="true"', page.text)
+    assert entry == (field, query.partition("=")[2])
+    assert "<strong>15</strong> of 30 finished cases" in page.text
+    assert "by efficiency" in page.text
+    assert service.http.get(f"/studies/{study_id}/explore/new?{query}").status_code == 422
+
+
+@pytest.mark.parametrize(("query", "parameter"), [("flag=x", "flag"), ("x=y", "x"), ("min:x=1", "min:x")])
+def test_what_has_no_field_is_named_as_in_the_address(filled: tuple[Service, str], query: str, parameter: str) -> None:
+    service, study_id = filled
+    page = service.http.get(f"/studies/{study_id}/explore?{query}&max:excitation.frequency=24")
     assert page.status_code == 422
     assert f"<code>{parameter}</code>" in page.text
-    assert "of 30 finished cases" in page.text
+    assert "<strong>15</strong> of 30 finished cases" in page.text
 
 
 def selection_spec_of(service: Service, study_id: str, query: str) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import QueryParams
 from starlette.responses import Response
 
+from sprag.service.faults import ParameterFault, shown
 from sprag.service.http import views
 from sprag.service.http.context import Context, StudyId
 from sprag.service.http.drawing import Drawing, conditional
@@ -18,6 +19,7 @@ from sprag.service.http.respond import JSON
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.figures import answers as figures
 from sprag.service.http.web.figures.linked import BELOW, GRID, HEIGHT, TOP, Linked, linked
+from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.page import spec_in_form
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
@@ -25,11 +27,12 @@ from sprag.service.http.work import Attended
 from sprag.service.jobs.answers import FEW
 from sprag.service.jobs.explore import explored, selection_spec
 from sprag.service.jobs.reading import reading_of
-from sprag.service.results.explore import ROWS, ExploreQuery, explored_json, quantities
+from sprag.service.languages import _
+from sprag.service.results.explore import ROWS, ExploreQuery, explored_json, plan_of, quantities
 from sprag.service.results.figures.explore import chosen_pair
 from sprag.service.results.phrases import meanings
 from sprag.service.results.reading import Choice, Reading
-from sprag.service.results.selection import SelectionError, own_paths, refused
+from sprag.service.results.selection import SelectionError, own_paths
 from sprag.service.spec.numbers import parse_number
 from sprag.worker import models
 from sprag.worker.limits import MAX_SELECTED
@@ -54,7 +57,10 @@ MOST_POINTS: Final = 1_000
 
 @dataclass(frozen=True, slots=True)
 class ExploreView:
-    """What the page shows: the answer of the API for the choices of the address, and these."""
+    """What the page shows: the answer of the API for the choices of the address, and these.
+
+    ``typed`` has what stands in the fields of text, by parameter of the address.
+    """
 
     query: ExploreQuery
     found: Exploration
@@ -64,24 +70,49 @@ class ExploreView:
     typed: dict[str, str] = field(default_factory=dict)
 
 
-def read_choice(given: QueryParams, study: Study, reading: Reading) -> ExploreQuery:
+def read_choice(given: QueryParams, study: Study, reading: Reading) -> tuple[ExploreQuery, tuple[Fault, ...]]:
     """The question in the address of the page, whose bare ends of ranges are in the units that it shows.
 
-    Raises SelectionError about ``limit``.
+    What cannot be asked is left out of it; the faults say why, each about its parameter of the address.
     """
-    units = quantities(study)
-    where = [text for text in given.getlist("where") if text.strip()]
-    where += [
-        f"{key[4:]} {_SIGNS[key[:4]]} {reading.typed(value.strip(), units.get(key[4:], '1'))}"
-        for key, value in _ranges(given)
-    ]
+    units, query = quantities(study), ExploreQuery()
+    faults: list[Fault] = []
+
+    def ask(parameter: str, **changes: object) -> None:
+        nonlocal query
+        wanted = replace(query, **changes)  # type: ignore[arg-type]
+        try:
+            plan_of(study, wanted)
+        except SelectionError as error:
+            faults.extend(replace(fault, where=parameter) for fault in error.faults)
+        else:
+            query = wanted
+
+    for text in filter(str.strip, given.getlist("where")):
+        ask("where", where=(*query.where, text))
+    for key, value in _ranges(given):
+        end = reading.typed(value.strip(), units.get(key[4:], "1"))
+        ask(key, where=(*query.where, f"{key[4:]} {_SIGNS[key[:4]]} {end}"))
+    for name in ("ending", "regime", "flag", "sort"):
+        if value := given.get(name, ""):
+            ask(name, **{name: value})
+    for name in filter(None, given.getlist("show")):
+        ask("show", show=(*query.show, name))
     text = given.get("limit", "").strip() or str(ROWS)
     limit = parse_number(text)
     if limit is None or not 1 <= limit <= _MOST_ON_PAGE or limit != int(limit):
-        raise refused("limit", "out-of-range", "is not a number of rows", text, allowed=f"1 to {_MOST_ON_PAGE}")
-    ending, regime, flag = (given.get(name, "") for name in ("ending", "regime", "flag"))
-    show = tuple(name for name in given.getlist("show") if name)
-    return ExploreQuery(tuple(where), ending, regime, flag, given.get("sort") or "case", int(limit), show)
+        allowed = f"1 to {_MOST_ON_PAGE}"
+        faults.append(ParameterFault("limit", "out-of-range", "is not a number of rows", shown(text), allowed))
+        limit = ROWS
+    return replace(query, limit=int(limit)), tuple(faults)
+
+
+def _whole(choice: tuple[ExploreQuery, tuple[Fault, ...]]) -> ExploreQuery:
+    """The question of an address, all of it; raises SelectionError where some of it cannot be asked."""
+    query, faults = choice
+    if faults:
+        raise SelectionError(faults)
+    return query
 
 
 def _ranges(given: QueryParams) -> list[tuple[str, str]]:
@@ -89,19 +120,27 @@ def _ranges(given: QueryParams) -> list[tuple[str, str]]:
 
 
 def explore_view(library: Library, study_id: str, given: Sequence[tuple[str, str]], choice: Choice) -> ExploreView:
-    """The page of a study; where its address asks for what there is not, all cases, with what is wrong."""
+    """The page of a study; where its address asks for what there is not, the rest of it, with what is wrong."""
     params = QueryParams(list(given))
-    faults: tuple[Fault, ...] = ()
+    query, faults = read_choice(params, library.store.study(study_id), reading_of(library.store, study_id, choice))
+    found = explored(library, study_id, query)
     try:
-        query = read_choice(params, library.store.study(study_id), reading_of(library.store, study_id, choice))
-        found = explored(library, study_id, query)
         axes = chosen_pair(found, params.get("x", ""), params.get("y", ""))
     except SelectionError as error:
-        faults, query = error.faults, ExploreQuery()
-        found = explored(library, study_id, query)
-        axes = chosen_pair(found, "", "")
+        faults, axes = (*faults, *error.faults), chosen_pair(found, "", "")
     answer = explored_json(study_id, found)
-    return ExploreView(query, answer, axes, linked(found, answer["quantities"], axes), faults, dict(_ranges(params)))
+    typed = {"limit": params.get("limit") or str(query.limit), **dict(_ranges(params))}
+    return ExploreView(query, answer, axes, linked(found, answer["quantities"], axes), faults, typed)
+
+
+def _field_names(view: ExploreView, reading: Reading) -> dict[str, str]:
+    """What the fields are called in which something is wrong, by parameter of the address."""
+    named = {"limit": _("Rows")}
+    for item in view.found["quantities"]:
+        caption = reading.caption(item["name"])
+        named[f"min:{item['name']}"] = _("{caption}, from", caption=caption)
+        named[f"max:{item['name']}"] = _("{caption}, to", caption=caption)
+    return named
 
 
 @router.get("/studies/{study_id:study}/explore")
@@ -131,14 +170,17 @@ def _page(context: Context, study_id: str, view: ExploreView, given: Sequence[tu
     asked.append(("sort", query.sort))
     chosen = address_pairs(CHOICE.get())
     drawn = urlencode([*asked, *chosen, ("limit", str(query.limit)), ("x", view.axes[0]), ("y", view.axes[1])])
+    frame = study_frame(context, study_id)
     return page(
         "explore.html",
         status=422 if view.faults else 200,
-        **study_frame(context, study_id),
+        **frame,
         tab="/explore",
         view=view,
         query=query,
         faults=view.faults,
+        wrong={fault.where: message(fault) for fault in view.faults},
+        field_names=_field_names(view, frame["reading"]),
         found=view.found,
         plot={"top": TOP, "height": HEIGHT, "bottom": TOP + HEIGHT + BELOW, "grid": GRID},
         halves=halves,
@@ -173,7 +215,7 @@ async def new_study_of_selection(work: Attended, study_id: StudyId) -> Response:
 
     def asked() -> ExploreQuery:
         study = context.store.study(study_id)
-        query = read_choice(given, study, reading_of(context.store, study_id, choice))
+        query = _whole(read_choice(given, study, reading_of(context.store, study_id, choice)))
         return replace(query, limit=MOST_POINTS)
 
     query = await run_in_threadpool(asked)
@@ -188,7 +230,7 @@ async def explore_figure(work: Attended, study_id: StudyId, choice: FileChoice) 
 
     def make(_record: StudyRecord) -> Response | Drawing:
         study = work.context.store.study(study_id)
-        query, pair = read_choice(given, study, Reading(study.model)), (given.get("x", ""), given.get("y", ""))
+        query, pair = _whole(read_choice(given, study, Reading(study.model))), (given.get("x", ""), given.get("y", ""))
         drawing = Drawing(figures.explore_json, (work.context.library, study_id, query, *pair, choice), JSON)
         return drawing if _many(work.context, study_id) else drawing.here()
 

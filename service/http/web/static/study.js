@@ -25,6 +25,15 @@ for (const form of document.querySelectorAll("form[data-swap]")) {
   };
   // Saved views and the report use the choices too; what is typed in their forms stays.
   const FOLLOW = ["#view-query", "#report-curves"];
+  // What is wrong with a field stands beside it; the field stays, because somebody may be typing in it.
+  const mark = (page) => {
+    for (const note of form.querySelectorAll(".wrong")) {
+      note.textContent = page.getElementById(note.id)?.textContent ?? "";
+      const field = form.elements.namedItem(note.id.slice("wrong:".length));
+      if (note.textContent) field?.setAttribute("aria-invalid", "true");
+      else field?.removeAttribute("aria-invalid");
+    }
+  };
   const show = async (page) => {
     const part = sprag.take(page, form.dataset.swap);
     part.classList.remove("stale");
@@ -42,6 +51,7 @@ for (const form of document.querySelectorAll("form[data-swap]")) {
     if (!(focused && focused.closest && focused.closest("#held"))) sprag.take(page, "#held");
     const summary = form.querySelector("details.results summary"), fresh = page.querySelector("details.results summary");
     if (summary && fresh) summary.textContent = fresh.textContent;
+    mark(page);
     history[push && address !== location.pathname + location.search ? "pushState" : "replaceState"](null, "", address);
     const drawn = show(page);
     if (place && document.activeElement === document.body) {
@@ -58,6 +68,8 @@ for (const form of document.querySelectorAll("form[data-swap]")) {
     await show(page);
   };
   form.addEventListener("change", (event) => swap(event.target.matches(CHOSEN)));
+  // Enter after a change shows its page too, in one entry of the history and without the fields that are empty.
+  form.addEventListener("submit", (event) => { event.preventDefault(); swap(true); });
   window.addEventListener("popstate", () => { if (location.search !== shown) go(); });
   document.addEventListener("sprag:found", () => asked?.());
 }

@@ -137,3 +137,34 @@ def test_ranges_by_the_keyboard_alone(visitor: Visitor, example: str) -> None:
     page.keyboard.press("Enter")
     expect(page.locator('.pairs a[aria-current] svg[data-y="shaft.load"]')).to_have_count(1)
     expect(page.get_by_label("upwards")).to_have_value("shaft.load")
+
+
+def test_enter_in_a_field_is_one_step_of_the_history(visitor: Visitor, example: str) -> None:
+    page = visitor.page
+    page.goto("/compare")
+    page.goto(f"/studies/{example}/explore")
+    drawn(page)
+    before = page.evaluate("history.length")
+    load = page.get_by_role("group", name=re.compile("Load torque"))
+    load.get_by_label("to").fill("0.15")
+    load.get_by_label("to").press("Enter")
+    page.wait_for_url("**max%3Ashaft.load=0.15*")
+    drawn(page)
+    assert page.evaluate("history.length") == before + 1
+    assert not re.findall(r"=(?:&|$)", page.url)
+    # What is wrong is said at its field, and the rest is asked.
+    load.get_by_label("from").fill("abc")
+    load.get_by_label("from").press("Enter")
+    expect(load.locator(".wrong").first).to_contain_text("abc")
+    expect(load.get_by_label("from")).to_have_attribute("aria-invalid", "true")
+    expect(page.locator("#explored .fault")).to_contain_text("Load torque, from: ")
+    load.get_by_label("from").fill("")
+    load.get_by_label("from").press("Enter")
+    expect(load.locator(".wrong").first).to_be_empty()
+    expect(load.get_by_label("from")).not_to_have_attribute("aria-invalid", "true")
+    drawn(page)
+    for _step in range(3):
+        page.go_back()
+    expect(load.get_by_label("to")).to_have_value("")
+    page.go_back()
+    page.wait_for_url("**/compare")
