@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 from urllib.parse import urlencode
 
 from fastapi import Query
@@ -44,6 +44,9 @@ if TYPE_CHECKING:
     from sprag.worker.study import Study
 
 router = page_router()
+
+#: The ending of a machine that has no motion of the required mean speed, for which no spec of it alone is valid.
+_NO_MOTION: Final = "inertia_insufficient"
 
 #: Periods of the motion that are shown first, at the end of the evaluated window.
 _FIRST_PERIODS = 4
@@ -161,6 +164,7 @@ def case_page(
         has_strobes=models.has_strobes(study),
         has_transients=has_transients(study),
         has_laboratory=has_laboratory(study.model),
+        has_motion=row is None or row.ending != _NO_MOTION,
         settled=models.is_settled(study.run),
         last=study.cases - 1,
     )

@@ -1,0 +1,24 @@
+"""The way from the page of a case to the laboratory."""
+
+from __future__ import annotations
+
+from sprag.service.presets import preset_text
+from sprag.service.spec.text import load_spec
+from sprag.worker import models
+from tests.service.conftest import Service
+
+
+def test_a_machine_without_a_motion_has_no_link_but_a_sentence(service: Service) -> None:
+    study_id = service.submit(load_spec(preset_text("press")[1], "toml"))
+    study, record = service.store.study(study_id), service.store.get_study(study_id)
+    epoch = service.store.take_over("test")
+    for chunk in service.store.claim(epoch, service.store.open_chunks(record.number)):
+        assert service.store.commit(epoch, chunk, models.run_chunk(study, chunk.first, chunk.count))
+    found = service.get(f"/studies/{study_id}/cases", page_size=100)["cases"]
+    endings = {row["ending"]: row["case"] for row in found}
+    assert set(endings) == {"ok", "inertia_insufficient"}
+    for ending, case in endings.items():
+        page = service.http.get(f"/studies/{study_id}/cases/{case}").text
+        linked = f'href="/studies/{study_id}/cases/{case}/laboratory"' in page
+        assert linked == (ending == "ok")
+        assert ("this machine has none at its mean speed" in page) == (ending != "ok")
