@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import hashlib
 import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from fastapi import Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
-from sprag.service.faults import parameter_error
+from sprag.service.faults import FaultError, parameter_error
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.routers import page_router
-from sprag.service.http.web.form.entries import Values, list_of
+from sprag.service.http.web.form.check import message
+from sprag.service.http.web.form.entries import Faults, Values, list_of
 from sprag.service.http.web.form.values import Form
+from sprag.service.http.web.study import shown_study
 from sprag.service.http.work import Attended
 from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.spec.numbers import parse_number
 from sprag.worker.limits import MAX_PRIORITY
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sprag.service.faults import Fault
 
 router = page_router()
 
@@ -37,26 +45,60 @@ def change_priority(context: Ctx, study_id: StudyId, values: Form) -> Response:
 
 @router.post("/studies/{study_id:study}/extend")
 async def extend(context: Ctx, work: Attended, study_id: StudyId, values: Form) -> Response:
-    """The form for further values of the axes, or further cases: submit the extended study."""
-    content = json.dumps(_addition(values), sort_keys=True).encode()
+    """The form for further values of the axes, or further cases: submit the extended study.
+
+    Where it is not valid, the page of the study again, with what is wrong beside the fields.
+    """
     now = context.store.clock.now()
-    made = await work.check(checks.extended_study, context.library, study_id, content, "json", None, now, {})
+    try:
+        content = json.dumps(_addition(values), sort_keys=True).encode()
+        made = await work.check(checks.extended_study, context.library, study_id, content, "json", None, now, {})
+    except FaultError as error:
+        if not error.faults:
+            raise
+        return await shown_study(context, work, study_id, values, _wrong(values, error.faults))
     # Pressed twice, it submits one study.
     key = f"extend-{study_id}-{hashlib.sha256(content).hexdigest()[:32]}"
     record = await run_in_threadpool(take_in, context.store, made, key)
     return RedirectResponse(f"/studies/{record.id}", status_code=303)
 
 
-def _addition(values: Values) -> dict[str, Any]:
-    """The extension that the form describes; FaultError unless it is either of values or of cases."""
-    axes = [
+@router.get("/studies/{study_id:study}/extend")
+def extension_form(request: Request, study_id: StudyId) -> Response:
+    """The page of the study, from the address that a refused extension has."""
+    query = request.url.query
+    return RedirectResponse(f"/studies/{study_id}{f'?{query}' if query else ''}", status_code=303)
+
+
+def _wrong(values: Values, faults: Sequence[Fault]) -> Faults:
+    """What is wrong with an extension, by field of its form; under "" what is about none of them."""
+    axes, found = _axes(values), Faults()
+    for fault in faults:
+        part, _slash, index = (fault.where or "").strip("/").partition("/")
+        place = index.partition("/")[0]
+        if part == "axes" and place.isdigit() and int(place) < len(axes):
+            field = f"axis:{axes[int(place)]['path']}"
+        else:
+            field = {"cases": "points", "points": "points", "name": "name"}.get(part, "")
+        found.setdefault(field, []).append(message(fault))
+    return found
+
+
+def _axes(values: Values) -> list[dict[str, Any]]:
+    """The further values of axes in a form."""
+    return [
         {"path": name.removeprefix("axis:"), "values": entries}
         for name, text in values.items()
         if name.startswith("axis:") and (entries := list_of(text))
     ]
+
+
+def _addition(values: Values) -> dict[str, Any]:
+    """The extension that the form describes; FaultError unless it is either of values or of cases."""
+    axes = _axes(values)
     points = values.get("points", "").strip()
     if bool(axes) == bool(points):
-        message = "give further values of axes, or further cases, and not both"
-        raise parameter_error("points", "exactly-one", message, allowed="values, or a table of cases")
+        wanted = "give further values of axes, or further cases, and not both"
+        raise parameter_error("", "exactly-one", wanted, allowed="values, or a table of cases")
     named = {"name": name} if (name := values.get("name", "").strip()) else {}
     return {**({"axes": axes} if axes else {"cases": [{"points": points}]}), **named}

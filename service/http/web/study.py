@@ -23,7 +23,7 @@ from sprag.service.http.web.held import fixed_choices
 from sprag.service.http.web.saved_views import report_figures, saved_here, view_actions
 from sprag.service.http.web.study_answers import AnswersView, answers_view
 from sprag.service.http.web.templates import page
-from sprag.service.http.work import Attended
+from sprag.service.http.work import Attended, Work
 from sprag.service.jobs import answers, checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.json_text import timestamp
@@ -53,6 +53,7 @@ if TYPE_CHECKING:
 
     from sprag.service.answers.studies import ClutchFitReport
     from sprag.service.http.web.figures.fit import FitChart
+    from sprag.service.http.web.form.entries import Faults, Values
     from sprag.service.results.curves import CurveQuery
     from sprag.worker.study import Study
 
@@ -114,12 +115,20 @@ def _verbs(state: StudyState, some_failed: bool) -> list[str]:
 @router.get("/studies/{study_id:study}")
 async def study_page(context: Ctx, work: Attended, study_id: StudyId) -> Response:
     """One study: its progress, answers, mechanical characteristic and inputs."""
+    return await shown_study(context, work, study_id)
+
+
+async def shown_study(
+    context: Context, work: Work, study_id: str, further: Values | None = None, wrong: Faults | None = None
+) -> Response:
+    """The page of a study; ``further`` is what its form for an extension has, with what is ``wrong`` there by field."""
     spec = await run_in_threadpool(context.store.spec, study_id)
     fits = await work.check(fits_of, spec) if has_measured_clutch(spec) else {}
     usual, many = await run_in_threadpool(_usual_curves, context, study_id)
     asked = (context.library, study_id, work.request.query_params.multi_items(), usual, CHOICE.get())
     view = await (work.check(answers_view, *asked) if many else run_in_threadpool(answers_view, *asked))
-    return await run_in_threadpool(_study_page, context, study_id, fits, view, usual)
+    extension = {"further": further or {}, "wrong": wrong or {}}
+    return await run_in_threadpool(_study_page, context, study_id, fits, view, usual, extension)
 
 
 def _usual_curves(context: Context, study_id: str) -> tuple[CurveQuery | None, bool]:
@@ -135,6 +144,7 @@ def _study_page(
     fits: Mapping[str, tuple[ClutchFitReport, FitChart]],
     view: AnswersView,
     usual: CurveQuery | None,
+    extension: Mapping[str, Any],
 ) -> Response:
     study = context.store.study(study_id)
     frame = study_frame(context, study_id)
@@ -143,8 +153,9 @@ def _study_page(
     kinds = context.store.kinds(study_id)
     return page(
         "study.html",
-        status=422 if view.faults else 200,
+        status=422 if view.faults or extension["wrong"] else 200,
         **frame,
+        **extension,
         origins=context.store.origins(study_id),
         tab="",
         shown=models.presentation_of(study),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from tests.service.conftest import Service
@@ -40,14 +42,25 @@ def test_a_study_is_extended_by_values_and_by_cases(service: Service) -> None:
 
 
 @pytest.mark.parametrize(
-    "fields",
+    ("fields", "wrong"),
     [
-        {"points": " "},
-        {"axis:shaft.load": "0.7", "points": "shaft.load\n0.9"},
-        {"axis:shaft.load": "heavy"},
-        {"points": "what\n1"},
+        ({"points": " "}, ""),
+        ({"axis:shaft.load": "0.7", "points": "shaft.load\n0.9"}, ""),
+        ({"axis:shaft.load": "heavy"}, "axis:shaft.load"),
+        ({"points": "what\n1"}, "points"),
     ],
 )
-def test_what_cannot_extend_a_study_is_refused(service: Service, fields: dict[str, str]) -> None:
+def test_what_cannot_extend_a_study_is_refused_on_its_page(
+    service: Service, fields: dict[str, str], wrong: str
+) -> None:
     study_id = service.submit(SPEC)
-    assert service.http.post(f"/studies/{study_id}/extend", data=fields).status_code == 422
+    page = service.http.post(f"/studies/{study_id}/extend", data={**fields, "name": "more of it"})
+    assert page.status_code == 422
+    form = page.text[page.text.index('<details class="screen" id="extend" open>') :].partition("</form>")[0]
+    assert re.findall(r'id="wrong:([^"]*)" role="alert">[^<]', form) == [wrong]
+    assert form.count("autofocus") == 1
+    assert 'value="more of it"' in form
+    assert all(text.strip() in form for text in fields.values())
+    # The address that the page has now leads back to the study.
+    shown = service.http.get(f"/studies/{study_id}/extend?point=0.1")
+    assert (shown.status_code, shown.headers["location"]) == (303, f"/studies/{study_id}?point=0.1")

@@ -73,6 +73,7 @@ PAGES: Final[dict[str, list[str]]] = {
     "/laboratory/drive/study": ["/laboratory/drive/study"],
     "/studies/{study_id}": ["/studies/{STUDY}", "/studies/{SHAFT}", "/studies/{RUNNING}", "/studies/none"],
     "/studies/{study_id}/delete": ["/studies/{STUDY}/delete"],
+    "/studies/{study_id}/extend": ["/studies/{STUDY}/extend"],
     "/studies/{study_id}/front": ["/studies/{GOAL}/front"],
     "/studies/{study_id}/calibration": ["/studies/{CALIBRATION}/calibration"],
     "/studies/{study_id}/drives": ["/studies/{DRIVES}/drives"],
