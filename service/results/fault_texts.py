@@ -10,8 +10,9 @@ import re
 from typing import TYPE_CHECKING, Final
 
 from sprag.service.fault_meanings import MEANINGS, WARNING_MEANINGS
-from sprag.service.languages import ENGLISH, current, decimal, gettext
+from sprag.service.languages import ENGLISH, _, current, decimal, gettext
 from sprag.service.languages.ranges import NUMBER
+from sprag.service.results.phrases import lower_first
 from sprag.service.results.quantities import KINDS
 from sprag.service.results.wording import unit_text
 
@@ -26,11 +27,24 @@ _QUANTITY: Final = re.compile(rf"(?<![\w.])({NUMBER}) ({'|'.join(map(re.escape, 
 _CASES: Final = re.compile(r"\(in ([\d,]+) of ([\d,]+) cases\)")
 #: The place at the beginning of a warning.
 _PLACE: Final = re.compile(r"(/[^:\s]*(?: \([^)]*\))?): ")
+#: The place at the beginning of a fault of a table.
+_CELL: Final = re.compile(r"line (\d+)(?:, column ([^:]+):)? ")
 
 
 def fault_text(fault: Fault) -> str:
-    """What is wrong, without its place and value: the sentence of the fault, in other languages that of its code."""
-    return fault.message if current() == ENGLISH else gettext(MEANINGS[fault.code]).removesuffix(".")
+    """What is wrong, without its place and value: the sentence of the fault, in other languages that of its code.
+
+    The line and the column of a table, which are in the sentence only, stand before the meaning.
+    """
+    if current() == ENGLISH:
+        return fault.message
+    meaning = gettext(MEANINGS[fault.code]).removesuffix(".")
+    cell = _CELL.match(fault.message)
+    if cell is None:
+        return meaning
+    line, column = cell.groups()
+    place = _("line {line}, column {column}", line=line, column=column) if column else _("line {line}", line=line)
+    return f"{place}: {lower_first(meaning)}"
 
 
 def warning_text(text: str) -> str:

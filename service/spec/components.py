@@ -230,7 +230,7 @@ def _read_csv(report: Report, text: object) -> list[tuple[str, Component]]:
         fields = {name: cell for name, cell in cells.items() if name not in COLUMNS}
         one = _checked(line, "", cells, fields, "")
         for fault in line.faults:
-            message = f"line {row.line}, {(fault.where or '').strip('/')}: {fault.message}"
+            message = f"line {row.line}, column {(fault.where or '').strip('/')}: {fault.message}"
             report.fault("/csv", fault.code, message, fault.value, allowed=fault.allowed, unit=fault.unit)
         made += [(f"/csv line {row.line}", one)] if one is not None else []
     return made

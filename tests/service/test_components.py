@@ -151,8 +151,9 @@ def test_the_page_keeps_shows_refuses_and_removes(service: Service) -> None:
     assert 'value="9 mm"' in refused.text
     refused = service.http.post("/components", data={"do": "csv", "csv": "kind;name\nbelt;B\n"})
     assert refused.status_code == 422
-    assert "is not a kind of component" in refused.text
-    service.http.post("/components", data={"do": "csv", "csv": "kind;name;coefficients\nclutch;C;0 200\n"})
+    assert "line 2, column kind: is not a kind of component" in refused.text
+    sent = {"do": "csv", "csv": "kind;name;coefficients\nclutch;C;0 200\n"}
+    assert "1 component is read." in service.http.post("/components", data=sent, follow_redirects=True).text
     assert [one.component.name for one in service.store.components()] == ["C", "F-120"]
     component = service.store.components("spring")[0].id
     assert f'href="/components?edit={component}#spring:name"' in service.http.get("/components").text

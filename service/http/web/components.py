@@ -33,6 +33,7 @@ from sprag.service.spec.components import (
 )
 from sprag.service.spec.units import example
 from sprag.service.storage.errors import ComponentNotFoundError
+from sprag.worker.limits import MAX_COMPONENTS
 
 router = page_router()
 
@@ -66,9 +67,16 @@ def _columns(kind: str) -> list[_Column]:
 
 
 @router.get("/components")
-def components_page(context: Ctx, edit: Annotated[str, Query(max_length=40)] = "") -> Response:
-    """Every component by kind, and a form for each kind; that of ``edit`` has the values of this component."""
-    return _page(context, _values(context, edit) if edit else {}, {}, 200)
+def components_page(
+    context: Ctx,
+    edit: Annotated[str, Query(max_length=40)] = "",
+    read: Annotated[int, Query(ge=0, le=MAX_COMPONENTS)] = 0,
+) -> Response:
+    """Every component by kind, and a form for each kind; that of ``edit`` has the values of this component.
+
+    ``read`` is the number of those that a CSV text has just given.
+    """
+    return _page(context, _values(context, edit) if edit else {}, {}, 200, read)
 
 
 def _values(context: Context, component_id: str) -> Values:
@@ -93,7 +101,7 @@ async def put_component(context: Ctx, work: Attended, values: Form) -> Response:
     except FaultError as error:
         faults, status = _faults(error, csv=csv), api_error(error).type.status
         return await run_in_threadpool(_page, context, values, faults, status)
-    return RedirectResponse("/components", status_code=303)
+    return RedirectResponse(f"/components?read={len(given)}" if csv else "/components", status_code=303)
 
 
 def _component(values: Values) -> Component:
@@ -119,7 +127,7 @@ def delete_component(context: Ctx, component_id: str) -> Response:
     return RedirectResponse("/components", status_code=303)
 
 
-def _page(context: Context, values: Values, faults: Faults, status: int) -> Response:
+def _page(context: Context, values: Values, faults: Faults, status: int, read: int = 0) -> Response:
     records = context.store.components()
     return page(
         "components.html",
@@ -130,4 +138,5 @@ def _page(context: Context, values: Values, faults: Faults, status: int) -> Resp
         ],
         values=values,
         faults=faults,
+        read=read,
     )

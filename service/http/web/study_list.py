@@ -146,9 +146,8 @@ def change_many(context: Ctx, request: Request, pairs: RepeatedForm) -> Response
     if refused:
         # The rest is done, and the list shows it.
         return _list(context, QueryParams(back), refused, 409)
-    said = [("done", done), *(("changed", study_id) for study_id in chosen[:_LISTED])] if chosen else []
-    query = urlencode([*back, *said])
-    return RedirectResponse(f"/?{query}" if query else "/", status_code=303)
+    said = [("done", done), *(("changed", study_id) for study_id in chosen[:_LISTED])]
+    return RedirectResponse(f"/?{urlencode([*back, *said])}", status_code=303)
 
 
 def _action(context: Context, done: str, tags: str) -> Callable[[str], Any]:

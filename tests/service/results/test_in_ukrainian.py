@@ -110,6 +110,15 @@ def test_a_fault_is_the_meaning_of_its_code_with_value_and_range() -> None:
         assert allowed_text("grid, zip") == "grid, zip"
         assert allowed_text(None) == ""
     assert fault_text(fault) == "is too small"
+
+
+def test_a_fault_of_a_table_has_its_line_and_column() -> None:
+    cell = Fault("/csv", "wrong-unit", "line 3, column spring_rate: is no stiffness", "9 N")
+    short = Fault("/csv", "unequal-lengths", "line 4 has 2 cells", allowed="3 cells")
+    with languages.language("uk"):
+        assert fault_text(cell).startswith("рядок 3, стовпець spring_rate: ")
+        assert fault_text(short).startswith("рядок 4: ")
+    assert fault_text(cell) == cell.message
     assert allowed_text("0.05 to 1.5 m") == "0.05 to 1.5 m"
 
 
