@@ -41,6 +41,7 @@ MEANINGS: Final[dict[Code, str]] = {
     "not-fixed": "An axis needs one value and has none.",
     "not-numeric": "The result is a category, and a number is required.",
     "not-used": "The field has no effect here and is therefore refused.",
+    "nothing-in-common": "The compared studies have no varying parameter, or no result, in common.",
     "nothing-varies": "The study has one case only, or no axis.",
     "out-of-range": "The value is outside the allowed range.",
     "quadrature-not-reached": "Torque or inertia is too rough to be integrated to the required accuracy.",

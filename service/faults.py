@@ -46,6 +46,7 @@ Code = Literal[
     "not-fixed",
     "not-numeric",
     "not-used",
+    "nothing-in-common",
     "nothing-varies",
     "out-of-range",
     "quadrature-not-reached",

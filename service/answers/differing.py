@@ -1,4 +1,4 @@
-"""The inputs in which studies differ, for pages and for the client."""
+"""What studies have in common and the inputs in which they differ, for pages and for the client."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from typing import Any, Final
 
 #: More studies are not compared at once.
 MOST_COMPARED: Final = 10
+#: Axes without a parameter: the drives of a batch, and the directions of a sweep.
+NO_PARAMETERS: Final = frozenset({"drive", "sweep"})
 
 
 def differing(specs: Sequence[Mapping[str, Any]]) -> dict[str, tuple[Any, ...]]:
@@ -15,6 +17,16 @@ def differing(specs: Sequence[Mapping[str, Any]]) -> dict[str, tuple[Any, ...]]:
     pointers = dict.fromkeys(pointer for leaves in flat for pointer in leaves)
     found = {pointer: tuple(leaves.get(pointer) for leaves in flat) for pointer in pointers}
     return {pointer: values for pointer, values in found.items() if any(value != values[0] for value in values)}
+
+
+def common_axes(studies: Sequence[Sequence[tuple[Sequence[str], int]]]) -> list[str]:
+    """The parameters that vary in all studies, each once, as the first study names them.
+
+    An axis is its paths and its number of values.
+    """
+    varying = [{path for paths, count in axes if count > 1 for path in paths} for axes in studies]
+    shared = set[str].intersection(*varying).difference(NO_PARAMETERS)
+    return [paths[0] for paths, _count in studies[0] if paths[0] in shared]
 
 
 def unique_names(names: Sequence[str], ids: Sequence[str]) -> list[str]:

@@ -9,7 +9,7 @@ import typer
 
 from sprag.service.answers.differing import MOST_COMPARED
 from sprag.service.cli import completion
-from sprag.service.cli.console import Column, show_table, write_json, wrong_option
+from sprag.service.cli.console import Column, say, show_table, write_json, wrong_option
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, CurveBy, JsonFlag, Server, Token
 from sprag.service.cli.pictures import show_curves
@@ -62,13 +62,15 @@ def compare(
         ids = [study_of(client, text) for text in studies]
         found = compare_studies(client, ids, x, y or (), by=by or (), at=held)
     if as_json:
-        curves = {name: curves.data for name, curves in zip(found.names, found.curves, strict=True)}
+        curves = {name: curves.data for name, curves in zip(found.names, found.curves, strict=False)}
         write_json({"studies": list(found.names), "inputs": found.inputs, "curves": curves})
         return
     columns: list[Column] = [(_("input"), False, True), *((name, False) for name in found.names)]
     rows = [(pointer, *map(_text, values)) for pointer, values in found.inputs.items()]
     show_table(_("inputs that differ"), columns, rows)
-    for name, drawn in zip(found.names, found.curves, strict=True):
+    if not found.curves:
+        say(_("These studies have no varying parameter in common, so there are no curves to compare."))
+    for name, drawn in zip(found.names, found.curves, strict=False):
         show_curves(drawn.data, name)
 
 

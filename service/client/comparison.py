@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,12 +15,16 @@ if TYPE_CHECKING:
 
     from sprag.service.answers.studies import StudyDetail
     from sprag.service.client.frames import Curves
+    from sprag.service.client.queries import Value
     from sprag.service.client.sketch import Line
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison(Tabular):
-    """Studies side by side. ``names`` are unique; ``inputs`` has, by JSON Pointer into the spec, what differs."""
+    """Studies side by side. ``names`` are unique; ``inputs`` has, by JSON Pointer into the spec, what differs.
+
+    ``curves`` has those of each study, or nothing where no parameter varies in all of them.
+    """
 
     names: tuple[str, ...]
     inputs: dict[str, tuple[Any, ...]]
@@ -32,7 +36,12 @@ class Comparison(Tabular):
         return {name: unit for curves in self.curves for name, unit in curves.units.items()}
 
     def to_pandas(self) -> pd.DataFrame:
-        """A row for each point of each study, whose name is in the column ``study``; ``attrs["units"]``."""
+        """A row for each point of each study, whose name is in the column ``study``; ``attrs["units"]``.
+
+        Raises ValueError where there are no curves.
+        """
+        if not self.curves:
+            raise ValueError("these studies have no varying parameter in common, so they have no curves to compare")
         with naming_extra("Comparison.to_pandas", "tables"):
             import pandas as pd
 
@@ -52,8 +61,14 @@ class Comparison(Tabular):
         return table.rename_axis(index="input")
 
     def _lines(self) -> tuple[str, str, list[Line]]:
-        drawn = [curves._lines() for curves in self.curves]
+        drawn = [curves._lines() for curves in self.curves] or [("", "", [])]
         return drawn[0][0], drawn[0][1], [lines[0] for _, _, lines in drawn if lines]
+
+
+def held_in(detail: StudyDetail, details: Sequence[StudyDetail], at: Mapping[str, Value] | None) -> dict[str, Value]:
+    """The values ``at`` which a study is held: those of its axes, and of what no study has, for it to be refused."""
+    own, *_ = paths = [{path for axis in each["axes"] for path in axis["paths"]} for each in (detail, *details)]
+    return {path: value for path, value in (at or {}).items() if path in own or not any(path in each for each in paths)}
 
 
 def compared(details: Sequence[StudyDetail], curves: Sequence[Curves]) -> Comparison:

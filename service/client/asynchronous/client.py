@@ -108,7 +108,9 @@ class AsyncClient(AsyncConnection):
     ) -> Comparison:
         """Two to ten studies, named as for `study`: inputs in which they differ, and the same curves of each.
 
-        Curves are chosen as in `AsyncStudy.curves`; without ``x`` and ``y``, those that the first study shows first.
+        Curves are chosen as in `AsyncStudy.curves`; without ``x`` and ``y``, those that the first study shows first,
+        over a parameter that varies in all of them. Axes that are not drawn and not in ``at`` are held at the usual
+        value of each study, and a value of an axis that only some of them have applies to these.
         """
         ids = [await study_of(self, text) for text in studies]
         return await compare_studies(self, ids, x, y, by=by, at=at)

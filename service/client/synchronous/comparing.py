@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
-from sprag.service.answers.differing import MOST_COMPARED
-from sprag.service.client.comparison import Comparison, compared
+from sprag.service.answers.differing import MOST_COMPARED, common_axes
+from sprag.service.client.comparison import Comparison, compared, held_in
 from sprag.service.client.frames import Curves
+from sprag.service.client.queries import curve_query
 from sprag.service.client.synchronous.study import Study
 
 if TYPE_CHECKING:
@@ -24,17 +25,36 @@ def compare_studies(
     by: str | Sequence[str],
     at: Mapping[str, Value] | None,
 ) -> Comparison:
-    """Studies, by their ids, and the same curves of each; ValueError for less than two, or too many."""
+    """Studies, by their ids, and the same curves of each, as the page that compares them draws them.
+
+    Axes that only some of them have are held at their usual value. There are no curves where no parameter varies in
+    all of them. ValueError for less than two, or too many.
+    """
     if not 2 <= len(studies) <= MOST_COMPARED:
         raise ValueError(f"2 to {MOST_COMPARED} studies can be compared, not {len(studies)}")
-    details, curves = [], list[Curves]()
-    for study_id in studies:
-        study = Study(connection, study_id)
-        details.append(study.detail())
-        found = study.curves(x, y, by=by, at=at)
-        if not curves and found.data["curves"]:
-            # The others have the curves of the first, however it has chosen them.
-            first = found.data["curves"][0]
-            x, y, by, at = found.data["x"]["path"], list(found.data["results"]), list(first["by"]), first["at"]
-        curves.append(found)
-    return compared(details, curves)
+    details = [Study(connection, study_id).detail() for study_id in studies]
+    axes = common_axes([[(axis["paths"], axis["values"]) for axis in detail["axes"]] for detail in details])
+    if not axes and x is None:
+        return compared(details, [])
+    held = [held_in(detail, details, at) for detail in details]
+    if x is None or not y:
+        usual = (_curves(connection, studies[0], x, y, by, held[0])).data
+        x = x or (path if (path := usual["x"]["path"]) in axes else axes[0])
+        y = y or list(usual["results"])
+        by = by or [path for curve in usual["curves"][:1] for path in curve["by"] if path in axes and path != x]
+    return compared(
+        details,
+        [_curves(connection, study_id, x, y, by, own) for study_id, own in zip(studies, held, strict=True)],
+    )
+
+
+def _curves(
+    connection: Connection,
+    study_id: str,
+    x: str | None,
+    y: str | Sequence[str],
+    by: str | Sequence[str],
+    at: Mapping[str, Value],
+) -> Curves:
+    query = [*curve_query(x, y, by, at), ("rest", "usual")]
+    return Curves(cast("Any", connection.request("GET", f"/studies/{study_id}/curves", params=query)))

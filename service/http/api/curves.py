@@ -25,6 +25,7 @@ from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
 from sprag.service.jobs import answers
 from sprag.service.results import exports, report
+from sprag.service.results.choice import held
 from sprag.service.results.chosen_figures import CONTOUR
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import completed
@@ -135,10 +136,18 @@ async def get_curves(
     ] = None,
     at: Fixed = None,
     of: Chosen = None,
+    rest: Annotated[
+        Literal["given", "usual"],
+        Query(
+            description="axes that are neither drawn nor in `at`: `given` refuses them, `usual` holds them at their "
+            "usual value, as pages do"
+        ),
+    ] = "given",
     number: Number = 0,
     form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
-    """Results against one axis. An axis of several values that is neither x nor in `by` needs its value in `at`.
+    """Results against one axis. An axis of several values that is neither x nor in `by` needs its value in `at`, or
+    `rest`.
 
     Without `x` or `y` they are the curves that the page of the study shows first. Refined curves tell their error and
     their jumps.
@@ -147,6 +156,9 @@ async def get_curves(
     def chosen(study: Study) -> CurveQuery:
         infos = models.study_results(study)
         query = completed(study, infos, x, tuple(y or ()), tuple(by or ()), pairs(at), pairs(of, "of"))
+        if rest == "usual":
+            given = [f"{path}={value}" for path, value in query.at]
+            query = replace(query, at=held(study, given, (query.x, *query.by)))
         return _numbered(study, query, number)
 
     return await _drawn(work, study_id, choice, form, "curves", chosen)

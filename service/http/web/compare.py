@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 from fastapi import Request
 from starlette.responses import Response
 
-from sprag.service.answers.differing import MOST_COMPARED, unique_names
+from sprag.service.answers.differing import MOST_COMPARED, common_axes, unique_names
 from sprag.service.formats import MEDIA_TYPES
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx
@@ -27,7 +27,7 @@ from sprag.service.jobs.reading import reading_of
 from sprag.service.results.choice import held
 from sprag.service.results.curve_cases import draw, select
 from sprag.service.results.curves import CurveQuery, Curves
-from sprag.service.results.defaults import main_query, varying_axes
+from sprag.service.results.defaults import main_query
 from sprag.service.results.differences import compared_csv, differences
 from sprag.service.results.differing_inputs import DifferingInput, differing_inputs
 from sprag.service.results.figures.curves import curves_figure
@@ -112,17 +112,13 @@ def chosen_studies(context: Context, given: QueryParams) -> list[StudyRecord]:
 def comparison(context: Context, given: QueryParams, records: list[StudyRecord]) -> Comparison:
     """The comparison of a URL, whose studies are ``records``; SelectionError where they have nothing in common."""
     studies = [context.store.study(record.id) for record in records]
-    axes = [axis.paths[0] for axis in varying_axes(studies[0])]
-    axes = [
-        path
-        for path in axes
-        if all((i := study.axis_of(path)) is not None and len(study.axes[i]) > 1 for study in studies)
-    ]
-    if not axes:
-        message = "these studies have no varying parameter in common against which to draw results"
-        raise refused("study", "nothing-varies", message)
+    axes = common_axes([[(axis.paths, len(axis)) for axis in study.axes] for study in studies])
     known = [{info.name for info in models.study_results(study)} for study in studies]
     results = [info for info in models.study_results(studies[0]) if all(info.name in names for names in known)]
+    if not axes or not results:
+        what = "result" if axes else "varying parameter"
+        message = f"these studies have no {what} in common against which to draw results"
+        raise refused("study", "nothing-in-common", message)
     main = main_query(studies[0], models.study_results(studies[0]))
     x = given.get("x") or (main.x if main and main.x in axes else axes[0])
     names = {info.name for info in results}
@@ -185,7 +181,7 @@ def compare_page(context: Ctx, request: Request) -> Response:
     return page(
         "compare.html",
         # Inputs are compared of any studies.
-        status=422 if any(fault.code != "nothing-varies" for fault in faults) else 200,
+        status=422 if any(fault.code != "nothing-in-common" for fault in faults) else 200,
         chosen=chosen,
         reading=reading,
         choice=choice,

@@ -166,6 +166,24 @@ def test_studies_side_by_side(service: Service, sprag: Sprag, here: None, spec: 
     assert found["studies"] == ["light", "heavy"]
     assert found["inputs"]["/base/shaft/inertia"] == ["2e-3 kg*m^2", "4e-3 kg*m^2"]
     assert len(found["curves"]["heavy"]["curves"][0]["x"]) == 3
+    # An axis that only one study has is held at its usual value; without a common one the inputs are all there is.
+    axes = [{"path": "shaft.load", "values": [0.1, 0.3]}, {"path": "pendulums.0.mass", "values": [0.4, 0.5]}]
+    other = {**heavy, "axes": axes}
+    service.fill(submit(service, other, "other"))
+    for pair in (("light", "other"), ("other", "light")):
+        both = json.loads(sprag("compare", *pair, "--json").out)["curves"]
+        assert [curves["x"]["path"] for curves in both.values()] == ["shaft.load"] * 2
+        assert [len(curves["curves"]) for curves in both.values()] == [1, 1]
+        assert list(both["other"]["curves"][0]["at"]) == ["pendulums.0.mass"]
+    held = json.loads(sprag("compare", "light", "other", "--at", "pendulums.0.mass=0.4", "--json").out)["curves"]
+    assert held["other"]["curves"][0]["at"] == {"pendulums.0.mass": 0.4}
+    assert sprag("compare", "light", "other", "--at", "shaft.mass=0.4").code == 2
+    submit(service, {**heavy, "axes": []}, "single")
+    apart = sprag("compare", "light", "single")
+    assert apart.code == 0
+    assert "/base/shaft/inertia" in apart.out
+    assert "no varying parameter in common" in apart.err
+    assert json.loads(sprag("compare", "light", "single", "--json").out)["curves"] == {}
     assert sprag("compare", "light").code == 2
     assert sprag("compare", "light", "heavy", "--at", "16 Hz").code == 2
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.service.answers.differing import MOST_COMPARED, unique_names
+from sprag.service.answers.differing import MOST_COMPARED, NO_PARAMETERS, common_axes, unique_names
+from sprag.worker import models
 from tests.service.conftest import Service
 from tests.service.timed_spec import SPEC
 
@@ -97,6 +98,12 @@ def test_studies_without_a_common_axis_are_compared_by_their_inputs(service: Ser
     page = service.http.get("/compare", params={"study": [three[0], other]})
     assert page.status_code == 200
     assert "no varying parameter in common" in page.text
+    page = service.http.get("/compare", params={"study": [three[0], other], "language": "uk"})
+    assert "не мають спільного змінного параметра" in page.text
+    for part in ("figure", "curves.csv"):
+        (fault,) = service.http.get(f"/compare/{part}", params={"study": [three[0], other]}).json()["errors"]
+        assert fault["code"] == "nothing-in-common"
+    page = service.http.get("/compare", params={"study": [three[0], other]})
     assert (
         '<th scope="row" title="shaft.load">Load torque, varied</th><td>0.1; 0.2; 0.4 N·m</td><td>–</td>' in page.text
     )
@@ -170,6 +177,13 @@ def test_what_cannot_be_compared_is_refused(service: Service, three: list[str]) 
         (fault,) = service.http.get(f"/compare/{part}").json()["errors"]
         assert (fault["parameter"], fault["code"], fault["allowed"]) == ("study", "required", "1 to 10 ids of studies")
     assert service.http.get("/compare/curves.csv", params={"study": [*three, "st_nothing"]}).status_code == 404
+
+
+def test_what_varies_in_all_studies() -> None:
+    drives, load = (("drive",), 9), (("shaft.load", "a"), 3)
+    assert common_axes([[load, drives, (("b",), 2)], [(("c", "shaft.load"), 2), drives, (("b",), 1)]]) == [X]
+    assert common_axes([[drives], [drives]]) == []
+    assert NO_PARAMETERS == models.NO_PARAMETERS
 
 
 def test_names_of_studies_tell_them_apart() -> None:
