@@ -7,16 +7,18 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.answers.differing import differing
+from sprag.service.languages import N_
 from sprag.service.languages import gettext as _
-from sprag.service.results.phrases import plural
+from sprag.service.results.exports.inputs import inputs as every_input
+from sprag.service.results.phrases import model_title, plural
+from sprag.service.results.shown_inputs import choice_name, in_words, run_settings
 from sprag.service.results.wording import number, unit_text
 from sprag.service.spec.catalogue import shown_values, unit_of
-from sprag.service.spec.units import QuantityError, parse_quantity
-from sprag.worker.models.parameters import parameter_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
+    from sprag.service.results.exports.inputs import Input
     from sprag.service.results.reading import Reading
     from sprag.worker.study import Axis, Study
 
@@ -25,6 +27,10 @@ _LONGEST: Final = 120
 #: Of an axis with more values, the first ones and the last are listed.
 _MOST_VALUES: Final = 12
 _DIGITS: Final = 8
+#: Parts of a spec that are shown as what the study has of them, defaults included.
+_READ: Final = frozenset({"axes", "base", "combine", "derive", "model", "run"})
+_COMBINED: Final = {"grid": N_("every combination (grid)"), "zip": N_("value by value (zip)")}
+_NONE: Final = "–"
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,31 +42,50 @@ class DifferingInput:
     values: list[str]
 
 
-def differing_inputs(
-    specs: Sequence[Mapping[str, Any]], studies: Sequence[Study], reading: Reading
-) -> list[DifferingInput]:
-    """Parameters of the machine and values of axes as they are read, other inputs as they were written."""
-    rows = _axes(studies, reading)
-    for pointer, values in differing(specs).items():
-        if pointer.split("/")[1] == "axes":
-            continue
+@dataclass(frozen=True, slots=True)
+class ReadStudy:
+    """A study with its spec, and how its numbers and names are read: in its own units, by the names of its model."""
+
+    study: Study
+    spec: Mapping[str, Any]
+    reading: Reading
+
+
+@dataclass(frozen=True, slots=True)
+class _Cell:
+    """An input of one study: what it is called there, what it is compared by (None where it varies), and its text."""
+
+    caption: str
+    value: object
+    text: str
+
+
+def differing_inputs(compared: Sequence[ReadStudy]) -> list[DifferingInput]:
+    """Axes, model, machine and run of the studies as their pages show them, other inputs as they were written."""
+    rows = [row for part in (_axes, _general, _machine, _run) for row in _rows([dict(part(one)) for one in compared])]
+    for pointer, values in differing([one.spec for one in compared]).items():
         path = pointer[1:].replace("/", ".").replace("~1", "/").replace("~0", "~")
-        row = _parameter(path, values, studies, reading)
-        rows += [] if row is None else [row]
+        if pointer.split("/")[1] not in _READ:
+            rows.append(DifferingInput(path, path, [_written(value) for value in values]))
     return rows
 
 
-def _axes(studies: Sequence[Study], reading: Reading) -> list[DifferingInput]:
-    """What varies, where it does not have the same values in all studies."""
-    rows = []
-    for paths in dict.fromkeys(axis.paths for study in studies for axis in study.axes):
-        found = [next((axis for axis in study.axes if axis.paths == paths), None) for study in studies]
-        if len({None if axis is None else axis.array.tobytes() for axis in found}) > 1:
-            pairs = zip(studies, found, strict=True)
-            shown = ["–" if axis is None else _values(study, axis, reading) for study, axis in pairs]
-            name = " = ".join(paths)
-            rows.append(DifferingInput(name, _("{name}, varied", name=reading.caption(name)), shown))
-    return rows
+def _rows(cells: Sequence[Mapping[str, _Cell]]) -> Iterator[DifferingInput]:
+    """The inputs, by path of each study, that are not the same in all of them; the axes say what only varies."""
+    for path in dict.fromkeys(path for own in cells for path in own):
+        found = [own.get(path) for own in cells]
+        values = [None if cell is None else cell.value for cell in found]
+        if any(value != values[0] for value in values):
+            captions = dict.fromkeys(cell.caption for cell in found if cell is not None)
+            yield DifferingInput(path, " / ".join(captions), [_NONE if cell is None else cell.text for cell in found])
+
+
+def _axes(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
+    """What varies."""
+    for axis in one.study.axes:
+        name = " = ".join(axis.paths)
+        caption = _("{name}, varied", name=one.reading.caption(name))
+        yield name, _Cell(caption, axis.array.tobytes(), _values(one.study, axis, one.reading))
 
 
 def _values(study: Study, axis: Axis, reading: Reading) -> str:
@@ -74,35 +99,38 @@ def _values(study: Study, axis: Axis, reading: Reading) -> str:
     return f"{text} ({reading.say(plural('{count} value', '{count} values', values.size))})"
 
 
-def _parameter(path: str, values: Sequence[Any], studies: Sequence[Study], reading: Reading) -> DifferingInput | None:
-    """None where the values differ only in how they were written."""
-    first, _dot, name = path.partition(".")
-    entry = (
-        next((found for study in studies if (found := parameter_of(study, name))), None) if first == "base" else None
-    )
-    numbers = [None if value is None or entry is None else _in_si(value, entry.unit) for value in values]
-    if entry is None or all(number is None for number in numbers):
-        return DifferingInput(path, path, [_written(value) for value in values])
-    if None not in numbers and len(set(numbers)) == 1:
-        return None
-    shown = [
-        _written(value) if number is None else reading.quantity(number, entry.unit, _DIGITS)
-        for value, number in zip(values, numbers, strict=True)
-    ]
-    return DifferingInput(path, reading.caption(name), shown)
+def _general(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
+    """The model, and how several axes go together."""
+    yield "model", _Cell(_("Model"), one.study.model, model_title(one.study.model))
+    if len(one.study.axes) > 1:
+        how = one.study.combine
+        yield "combine", _Cell(_("Combine"), how, _(_COMBINED[how]))
 
 
-def _in_si(value: object, unit: str) -> float | None:
-    """A quantity of a spec; None for anything else."""
-    try:
-        return parse_quantity(value, unit)
-    except QuantityError:
-        return None
+def _machine(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
+    """Numbers and choices of the machine."""
+    for item in every_input(one.study, one.spec):
+        caption = one.reading.caption(item.path) if item.unit else choice_name(item)
+        yield f"base.{item.path}", _Cell(caption, item.value, _text(item, one.reading))
+
+
+def _text(item: Input, reading: Reading) -> str:
+    if item.varies:
+        return _("varies")
+    if isinstance(item.value, str):
+        return item.value if item.origin == "derived" else str(in_words(item))
+    return reading.quantity(item.value, item.unit, _DIGITS)
+
+
+def _run(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
+    """The settings of the run."""
+    for label, text, item in run_settings(one.study, one.spec, one.reading):
+        yield f"run.{item.path}", _Cell(label, str(item.value), text)
 
 
 def _written(value: object) -> str:
     """A value of a spec as text, long lists shortened."""
     if value is None:
-        return "–"
+        return _NONE
     text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} …"

@@ -29,11 +29,12 @@ from sprag.service.results.curve_cases import draw, select
 from sprag.service.results.curves import CurveQuery, Curves
 from sprag.service.results.defaults import main_query
 from sprag.service.results.differences import compared_csv, differences
-from sprag.service.results.differing_inputs import DifferingInput, differing_inputs
+from sprag.service.results.differing_inputs import DifferingInput, ReadStudy, differing_inputs
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.read import read_figure
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.pictures.curves import draw_compare
+from sprag.service.results.reading import reading_for
 from sprag.service.results.selection import SelectionError, refused
 from sprag.service.spec.catalogue import unit_of
 from sprag.service.storage.errors import StudyNotFoundError
@@ -152,9 +153,11 @@ def drawn(context: Context, chosen: Comparison) -> list[tuple[str, Curves]]:
     return found
 
 
-def _differing_inputs(context: Context, records: list[StudyRecord], reading: Reading) -> list[DifferingInput]:
-    specs = [context.store.spec(record.id) for record in records]
-    return differing_inputs(specs, [context.store.study(record.id) for record in records], reading)
+def _differing_inputs(context: Context, records: list[StudyRecord], choice: Choice) -> list[DifferingInput]:
+    if len(records) < 2:
+        return []
+    pairs = [(context.store.study(record.id), context.store.spec(record.id)) for record in records]
+    return differing_inputs([ReadStudy(study, spec, reading_for(study, spec, choice)) for study, spec in pairs])
 
 
 @router.get("/compare")
@@ -176,7 +179,6 @@ def compare_page(context: Ctx, request: Request) -> Response:
             faults = error.faults
     choice = CHOICE.get()
     reading = None if chosen is None else reading_of(context.store, chosen.records[0].id, choice)
-    differ = len(records) > 1
     query = "" if chosen is None else urlencode([*chosen.pairs(), *address_pairs(choice)])
     return page(
         "compare.html",
@@ -190,7 +192,7 @@ def compare_page(context: Ctx, request: Request) -> Response:
         **_offered(context, given, choosing=choosing or not records),
         most=MOST_COMPARED,
         labels=labels(records),
-        inputs=_differing_inputs(context, records, reading_of(context.store, records[0].id, choice)) if differ else [],
+        inputs=_differing_inputs(context, records, choice),
         faults=faults,
         units={} if chosen is None else {path: unit_of(chosen.studies[0], path) for path in chosen.axes},
         held=[[reading.say(text) for text in texts] for texts in held_at] if reading else [],

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import copy
 import csv
+import html
 import io
+import re
 from typing import Any
 
 import numpy as np
 import pytest
 
 from sprag.service.answers.differing import MOST_COMPARED, NO_PARAMETERS, common_axes, unique_names
+from sprag.service.presets import preset_text
+from sprag.service.spec.text import load_spec
 from sprag.worker import models
 from tests.service.conftest import Service
 from tests.service.timed_spec import SPEC
@@ -55,7 +59,7 @@ def test_the_page_lists_the_inputs_that_differ(service: Service, three: list[str
     assert page.status_code == 200
     table = page.text[page.text.index('id="inputs"') :]
     mass = '<th scope="row" title="base.pendulums.0.mass">Mass, pendulum 0</th>'
-    assert f"{mass}<td>0.5 kg</td><td>0.6 kg</td><td>0.7 kg</td>" in table
+    assert f"{mass}<td>0.5 kg</td><td>0.6 kg</td><td>700 g</td>" in table
     loads = '<th scope="row" title="shaft.load">Load torque, varied</th>'
     assert f"{loads}<td>0.1; 0.2; 0.4 N·m</td><td>0.1; 0.3; 0.4; 0.9 N·m</td><td>0.1; 0.2; 0.4 N·m</td>" in table
     assert "axes." not in table
@@ -77,9 +81,36 @@ def test_inputs_are_compared_in_the_units_of_the_reader(service: Service) -> Non
 
     soft, other, same = stiff("9 N/mm"), stiff(9500), stiff(9000)
     caption = '<th scope="row" title="base.pendulums.0.spring_rate">Spring rate, pendulum 0</th>'
-    assert f"{caption}<td>9 N/mm</td><td>9.5 N/mm</td>" in table(soft, other, units="typed")
+    assert f"{caption}<td>9 N/mm</td><td>9500 N/m</td>" in table(soft, other, units="typed")
     assert f"{caption}<td>9000 N/m</td><td>9500 N/m</td>" in table(soft, other, units="si")
     assert "spring_rate" not in table(soft, same, units="si")
+
+
+def test_inputs_are_named_by_the_model_that_has_them_and_read_as_its_study_typed_them(service: Service) -> None:
+    def made(name: str) -> str:
+        file, text = preset_text(name)
+        return service.submit(load_spec(text, file.rpartition(".")[2]))
+
+    def rows(*studies: str, language: str = "en") -> dict[str, list[str]]:
+        text = service.http.get("/compare", params={"study": studies, "units": "typed", "language": language}).text
+        found = re.findall(r'<tr><th scope="row"[^>]*>(.*?)</th>(.*?)</tr>', text[text.index('id="inputs"') :])
+        return {html.unescape(caption): re.findall("<td>(.*?)</td>", cells) for caption, cells in found}
+
+    drive, press, compressor = made("one_pendulum"), made("press"), made("compressor")
+    found = rows(drive, press)
+    assert found["Model"] == ["Vibration drive", "Machine shaft"]
+    assert found["Inertia of the drive, varied"][0] == "–"
+    assert found["Length of the crank"] == ["–", "100 mm"]
+    assert found["Beginning of step 0"] == ["–", "120 deg"]
+    assert found["Mass, pendulum 0"] == ["0.5 kg", "–"]
+    assert found["Each case runs"] == ["until its motion is settled", "–"]
+    assert "Excitation frequency" not in found
+    assert not [caption for caption in found if "." in caption or caption.islower()]
+    ukrainian = rows(drive, press, language="uk")
+    assert ukrainian["Як задано опір"] == ["–", "сходинки"]
+    other = rows(press, compressor)
+    assert other["Absolute pressure of suction"] == ["–", "1 bar"]
+    assert other["Mean speed"] == ["varies", "750 rpm"]
 
 
 def test_long_axes_are_shortened_and_written_differently_are_the_same(service: Service) -> None:
