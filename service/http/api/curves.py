@@ -147,7 +147,7 @@ async def get_curves(
     form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """Results against one axis. An axis of several values that is neither x nor in `by` needs its value in `at`, or
-    `rest`.
+    `rest=usual`.
 
     Without `x` or `y` they are the curves that the page of the study shows first. Refined curves tell their error and
     their jumps.
