@@ -192,6 +192,7 @@ def test_the_page_says_at_its_field_what_is_wrong_and_asks_the_rest(
     page = service.http.get(f"/studies/{study_id}/explore?{query}&max:excitation.frequency=24&sort=-efficiency")
     assert page.status_code == 422
     assert f"<p>{name}: " in page.text
+    assert f"got <code>{query.partition('=')[2]}</code>" in page.text
     (wrong,) = re.findall(r'<span class="wrong" id="wrong:([^"]+)">[^<]', page.text)
     assert wrong == field
     (entry,) = re.findall(r'<input name="([^"]+)" value="([^"]+)"[^>]*aria-invalid="true"', page.text)

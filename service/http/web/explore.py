@@ -78,26 +78,26 @@ def read_choice(given: QueryParams, study: Study, reading: Reading) -> tuple[Exp
     units, query = quantities(study), ExploreQuery()
     faults: list[Fault] = []
 
-    def ask(parameter: str, **changes: object) -> None:
+    def ask(parameter: str, given: str, **changes: object) -> None:
         nonlocal query
         wanted = replace(query, **changes)  # type: ignore[arg-type]
         try:
             plan_of(study, wanted)
         except SelectionError as error:
-            faults.extend(replace(fault, where=parameter) for fault in error.faults)
+            faults.extend(replace(fault, where=parameter, value=shown(given)) for fault in error.faults)
         else:
             query = wanted
 
     for text in filter(str.strip, given.getlist("where")):
-        ask("where", where=(*query.where, text))
+        ask("where", text, where=(*query.where, text))
     for key, value in _ranges(given):
         end = reading.typed(value.strip(), units.get(key[4:], "1"))
-        ask(key, where=(*query.where, f"{key[4:]} {_SIGNS[key[:4]]} {end}"))
+        ask(key, value.strip(), where=(*query.where, f"{key[4:]} {_SIGNS[key[:4]]} {end}"))
     for name in ("ending", "regime", "flag", "sort"):
         if value := given.get(name, ""):
-            ask(name, **{name: value})
+            ask(name, value, **{name: value})
     for name in filter(None, given.getlist("show")):
-        ask("show", show=(*query.show, name))
+        ask("show", name, show=(*query.show, name))
     text = given.get("limit", "").strip() or str(ROWS)
     limit = parse_number(text)
     if limit is None or not 1 <= limit <= _MOST_ON_PAGE or limit != int(limit):
