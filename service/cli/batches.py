@@ -9,7 +9,7 @@ import typer
 from sprag.service.cli import completion
 from sprag.service.cli.console import cell_text, say, show_table
 from sprag.service.cli.names import study_of
-from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
+from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, PictureLanguage, Server, StudyId, Token, in_language
 from sprag.service.cli.pictures import HeldAt, answer, heading, held_text
 from sprag.service.cli.remote import connection
 from sprag.service.languages import _
@@ -46,6 +46,7 @@ def ribbon(
     ] = None,
     file: Annotated[str | None, _FILE] = None,
     mapped: Annotated[bool, _MAP] = False,
+    language: PictureLanguage = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -53,7 +54,7 @@ def ribbon(
     """Show quantiles of results over the drives of a study with tolerances, with their intervals and causes."""
     query = [*_places(x, by, at), *(("y", name) for name in y or ())]
     query += [("quantile", _probability(text)) for text in quantile or ()]
-    drawing = [("map", "true")] if mapped else []
+    drawing = [*([("map", "true")] if mapped else []), *in_language(language)]
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
         answer(client, study_id, "ribbon", query, file, show_ribbon, as_json, _FORMATS, drawing)
@@ -71,13 +72,14 @@ def yields(
     worst: Annotated[int, typer.Option("--worst", min=0, metavar="N", help="Number of the worst drives to list.")] = 5,
     file: Annotated[str | None, _FILE] = None,
     mapped: Annotated[bool, _MAP] = False,
+    language: PictureLanguage = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Show the share of drives that reach conditions, the tolerances that it is owed to, and the worst drives."""
     query = [*_places(x, by, at), *(("condition", text) for text in condition), ("worst", str(worst))]
-    drawing = [("map", "true")] if mapped else []
+    drawing = [*([("map", "true")] if mapped else []), *in_language(language)]
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
         answer(client, study_id, "yield", query, file, show_yield, as_json, _FORMATS, drawing)

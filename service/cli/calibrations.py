@@ -12,7 +12,17 @@ from sprag.service.cli.console import WrongInputError, say, show_table, warning_
 from sprag.service.cli.file_formats import file_format
 from sprag.service.cli.files import MAX_DATA_BYTES, decode, read_bytes, read_spec, spec_failure, write_pieces
 from sprag.service.cli.names import study_of
-from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Processes, Server, SpecFile, StudyId, Token
+from sprag.service.cli.options import (
+    DEFAULT_SERVER,
+    JsonFlag,
+    PictureLanguage,
+    Processes,
+    Server,
+    SpecFile,
+    StudyId,
+    Token,
+    in_language,
+)
 from sprag.service.cli.pictures import heading
 from sprag.service.cli.remote import connection
 from sprag.service.cli.running import run_parsed
@@ -118,6 +128,7 @@ def _report(study_id: str, found: Calibration) -> dict[str, Any]:
 def calibration(
     study_id: StudyId,
     file: _File = None,
+    language: PictureLanguage = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -128,7 +139,7 @@ def calibration(
         study_id = study_of(client, study_id)
         found = client.calibration(study_id)
         if file is not None and form is not None:
-            write_pieces(file, client.calibration_file(study_id, form))
+            write_pieces(file, client.calibration_file(study_id, form, in_language(language)))
     _tell(found, as_json)
     if file is not None:
         say(_("file: {file}", file=file))

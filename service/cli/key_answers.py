@@ -11,7 +11,18 @@ from sprag.service.cli.console import Column, cell_text, say, show_table, write_
 from sprag.service.cli.file_formats import file_format
 from sprag.service.cli.files import write_pieces
 from sprag.service.cli.names import study_of
-from sprag.service.cli.options import DEFAULT_SERVER, CurveBy, FileUnits, JsonFlag, Server, StudyId, Token, in_units
+from sprag.service.cli.options import (
+    DEFAULT_SERVER,
+    CurveBy,
+    FileUnits,
+    JsonFlag,
+    PictureLanguage,
+    Server,
+    StudyId,
+    Token,
+    in_language,
+    in_units,
+)
 from sprag.service.cli.pictures import ChosenOf, HeldAt, heading, held_text
 from sprag.service.cli.remote import connection
 from sprag.service.languages import _
@@ -42,6 +53,7 @@ def answers(
         typer.Option("-o", "--output", metavar="FILE", help="Table or picture to write: .csv, .svg, .png or .pdf."),
     ] = None,
     units: FileUnits = None,
+    language: PictureLanguage = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -56,7 +68,8 @@ def answers(
         study_id = study_of(client, study_id)
         found = client.answers(study_id, query)
         if file is not None and form is not None:
-            write_pieces(file, client.answers_file(study_id, [*query, *in_units(units), ("format", form)]))
+            drawing = [*in_units(units), *in_language(language), ("format", form)]
+            write_pieces(file, client.answers_file(study_id, [*query, *drawing]))
     if as_json:
         write_json(found)
     else:

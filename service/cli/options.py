@@ -77,6 +77,9 @@ FileUnits = Annotated[
         help='Units of FILE: si, typed (those of the spec), or a list such as "rpm, mm, torque=N*mm"; default: SI.',
     ),
 ]
+PictureLanguage = Annotated[
+    str | None, typer.Option("--language", metavar="CODE", help="Language of a picture, such as uk; default: English.")
+]
 StudyId = Annotated[
     str,
     typer.Argument(
@@ -168,3 +171,8 @@ WaitTimeout = Annotated[
 def in_units(units: str | None) -> list[tuple[str, str]]:
     """The units of a file as a query."""
     return [] if units is None else [("units", units)]
+
+
+def in_language(language: str | None) -> list[tuple[str, str]]:
+    """The language of a picture as a query."""
+    return [] if language is None else [("language", language)]

@@ -12,7 +12,18 @@ from sprag.service.cli.console import OK, cell_text, say, show_table, warning_li
 from sprag.service.cli.file_formats import file_format
 from sprag.service.cli.files import write_pieces
 from sprag.service.cli.names import study_of
-from sprag.service.cli.options import DEFAULT_SERVER, CurveBy, FileUnits, JsonFlag, Server, StudyId, Token, in_units
+from sprag.service.cli.options import (
+    DEFAULT_SERVER,
+    CurveBy,
+    FileUnits,
+    JsonFlag,
+    PictureLanguage,
+    Server,
+    StudyId,
+    Token,
+    in_language,
+    in_units,
+)
 from sprag.service.cli.remote import connection
 from sprag.service.languages import N_, _, decimal
 
@@ -88,6 +99,7 @@ def curve(
     of: ChosenOf = None,
     file: PictureFile = None,
     units: FileUnits = None,
+    language: PictureLanguage = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -96,9 +108,10 @@ def curve(
     query = [*([] if x is None else [("x", x)]), *(("y", name) for name in y or ())]
     query += [("by", path) for path in by or ()]
     query += [*(("at", item) for item in at or ()), *(("of", item) for item in of or ())]
+    drawing = [*in_units(units), *in_language(language)]
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
-        answer(client, study_id, "curves", query, file, show_curves, as_json, drawing=in_units(units))
+        answer(client, study_id, "curves", query, file, show_curves, as_json, drawing=drawing)
 
 
 def draw_map(
@@ -122,15 +135,17 @@ def draw_map(
     at: HeldAt = None,
     file: PictureFile = None,
     units: FileUnits = None,
+    language: PictureLanguage = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Show one result over two axes as a table, and write it as a picture."""
     query = [("x", x), ("y", y), ("z", z), *(("at", item) for item in at or ())]
+    drawing = [*in_units(units), *in_language(language)]
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
-        answer(client, study_id, "map", query, file, show_map, as_json, drawing=in_units(units))
+        answer(client, study_id, "map", query, file, show_map, as_json, drawing=drawing)
 
 
 def show_map(found: dict[str, Any]) -> None:
@@ -178,6 +193,7 @@ def sensitivity(
         typer.Option("--y", metavar="RESULT", help="Result; may be repeated.", autocompletion=completion.results),
     ],
     file: PictureFile = None,
+    language: PictureLanguage = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -185,7 +201,9 @@ def sensitivity(
     """Show what results depend on: the share of their variance for every axis, and the range of its main effect."""
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
-        answer(client, study_id, "sensitivity", [("y", name) for name in y], file, _show_sensitivity, as_json)
+        query = [("y", name) for name in y]
+        drawing = in_language(language)
+        answer(client, study_id, "sensitivity", query, file, _show_sensitivity, as_json, drawing=drawing)
 
 
 def _show_sensitivity(found: dict[str, Any]) -> None:

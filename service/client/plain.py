@@ -96,9 +96,9 @@ class ServiceClient(Connection):
         """What a calibration has found."""
         return self.request("GET", f"{study_path(study_id)}/calibration")
 
-    def calibration_file(self, study_id: str, form: str) -> Iterator[bytes]:
+    def calibration_file(self, study_id: str, form: str, query: Query = ()) -> Iterator[bytes]:
         """The same as "csv", a row for each measured value, or as a picture: "svg", "png" or "pdf"."""
-        return self.download(f"{study_path(study_id)}/calibration", [("format", form)])
+        return self.download(f"{study_path(study_id)}/calibration", [*query, ("format", form)])
 
     def answers(self, study_id: str, query: Query = ()) -> dict[str, Any]:
         """What people ask of a study first."""

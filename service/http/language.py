@@ -65,6 +65,11 @@ def _accepted(header: str) -> str:
     return accepted.best_match(languages.available()) or languages.ENGLISH
 
 
+def language_pairs() -> list[tuple[str, str]]:
+    """The language of the page that is made as a parameter of the addresses of its files; nothing for English."""
+    return [] if languages.current() == languages.ENGLISH else [(PARAMETER, languages.current())]
+
+
 def keep_language(response: Response, code: str) -> None:
     """Keep the language in the browser."""
     response.set_cookie(COOKIE, code, max_age=_YEAR, httponly=True, samesite="lax")

@@ -9,6 +9,7 @@ from urllib.parse import quote, unquote, urlencode, urlsplit
 
 from fastapi import Depends, Query, Request
 
+from sprag.service.http.language import language_pairs
 from sprag.service.results.quantities import SI, TYPED, UNITS_PATTERN, read_units
 from sprag.service.results.reading import CAPTIONS, CODES, Choice
 from sprag.service.results.selection import SelectionError
@@ -95,9 +96,19 @@ def address_pairs(choice: Choice) -> list[tuple[str, str]]:
     return [("units", choice.units), *([("names", choice.names)] if choice.names != CAPTIONS else [])]
 
 
+def file_pairs() -> list[tuple[str, str]]:
+    """The choice of the page that is made, and its language, as parameters of the addresses of its files."""
+    return [*address_pairs(CHOICE.get()), *language_pairs()]
+
+
 def read_as() -> str:
     """The choice of the page that is made, as the rest of an address of a figure that has a query already."""
     return f"&{urlencode(address_pairs(CHOICE.get()))}"
+
+
+def file_read_as() -> str:
+    """`file_pairs` as the rest of an address of a file that has a query already."""
+    return f"&{urlencode(file_pairs())}"
 
 
 def page_query() -> str:

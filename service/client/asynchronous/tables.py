@@ -130,10 +130,11 @@ class AsyncStudyTables(AsyncStudyPart):
         by: str | Sequence[str] = (),
         at: Mapping[str, Value] | None = None,
         units: str | None = None,
+        language: str | None = None,
     ) -> Path:
-        """Write curves as a picture: .svg, .png or .pdf."""
+        """Write curves as a picture: .svg, .png or .pdf; ``language`` a code such as "uk", English without it."""
         path = Path(file)
-        query = [*curve_query(x, y, by, at), ("format", path.suffix[1:].lower())]
-        query += [] if units is None else [("units", units)]
+        drawing = {"format": path.suffix[1:].lower(), "units": units, "language": language}
+        query = [*curve_query(x, y, by, at), *given(drawing)]
         path.write_bytes(await self._client.read(f"{self._path}/curves", query))
         return path

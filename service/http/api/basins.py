@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 from starlette.responses import Response
 
 from sprag.service.answers.results import BasinData
-from sprag.service.http.api.document import CASE_PROBLEMS, files, format_query, problems
+from sprag.service.http.api.document import CASE_PROBLEMS, files, problems
+from sprag.service.http.api.drawn_format import DrawnFormat
 from sprag.service.http.basin_query import AskedBasin
 from sprag.service.http.context import CaseNumber, StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, picture
 from sprag.service.http.drawing import table as written
-from sprag.service.http.respond import choose_format
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import Attended
 from sprag.service.results import basins
@@ -35,10 +33,9 @@ async def get_basin(
     study_id: StudyId,
     case: CaseNumber,
     asked: AskedBasin,
-    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
+    chosen: DrawnFormat,
 ) -> Response:
     """To which regime a settled case comes from each start of a grid. The case is run from all of them for this."""
-    chosen = choose_format(work.request, form, DRAWN_FORMATS)
     study, query = await work.case_of(study_id, case, lambda study: asked.of(study, case))
     if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - narrows the type
         content = await work.run_case(basins.basin_file, study, case, query, chosen)

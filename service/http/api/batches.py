@@ -11,12 +11,12 @@ from starlette.responses import Response
 from sprag.service.answers import tolerances as m
 from sprag.service.faults import parameter_error
 from sprag.service.http.api.curves import Fixed, pairs
-from sprag.service.http.api.document import files, format_query, problems
+from sprag.service.http.api.document import files, problems
 from sprag.service.http.api.document import not_modified as documented_304
+from sprag.service.http.api.drawn_format import DrawnFormat
 from sprag.service.http.context import StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture
 from sprag.service.http.reading import FileChoice
-from sprag.service.http.respond import choose_format
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
 from sprag.service.jobs import answers, batch_answers
@@ -63,6 +63,7 @@ async def get_ribbon(
     work: Attended,
     study_id: StudyId,
     choice: FileChoice,
+    chosen: DrawnFormat,
     x: Along = None,
     y: Annotated[
         list[str] | None,
@@ -81,7 +82,6 @@ async def get_ribbon(
     mapped: Annotated[
         bool, Query(alias="map", description="of a picture: a map of the quantile over `x` and `by`")
     ] = False,
-    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """Quantiles of results over the drives along an axis, with 95 % intervals, the nominal drive, and the causes."""
     if mapped and quantile is not None and len(quantile) > 1:
@@ -91,7 +91,9 @@ async def get_ribbon(
         Asked(x, tuple(dict.fromkeys(by or ())), pairs(at)),
         tuple(quantile) if quantile else (0.5,) if mapped else QUANTILES,
     )
-    return await _answered(work, study_id, choice, form, "ribbon", _RIBBON, batch_answers.ribbon_picture, query, mapped)
+    return await _answered(
+        work, study_id, choice, chosen, "ribbon", _RIBBON, batch_answers.ribbon_picture, query, mapped
+    )
 
 
 @router.get(
@@ -107,6 +109,7 @@ async def get_yield(
     work: Attended,
     study_id: StudyId,
     choice: FileChoice,
+    chosen: DrawnFormat,
     condition: Annotated[
         list[str],
         Query(
@@ -123,25 +126,23 @@ async def get_yield(
     mapped: Annotated[
         bool, Query(alias="map", description="of a picture: a map of the yield over `x` and `by`")
     ] = False,
-    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """The share of drives that reach conditions, at each place and at all places, its causes, and the worst drives."""
     query = YieldQuery(tuple(condition), Asked(x, tuple(dict.fromkeys(by or ())), pairs(at)), worst)
-    return await _answered(work, study_id, choice, form, "yield", _YIELD, batch_answers.yield_picture, query, mapped)
+    return await _answered(work, study_id, choice, chosen, "yield", _YIELD, batch_answers.yield_picture, query, mapped)
 
 
 async def _answered(
     work: Work,
     study_id: str,
     choice: Choice,
-    form: str | None,
+    chosen: DrawnFormat,
     part: str,
     writers: Mapping[str, Callable[..., bytes]],
     draw: Callable[..., bytes],
     query: RibbonQuery | YieldQuery,
     mapped: bool,
 ) -> Response:
-    chosen = choose_format(work.request, form, DRAWN_FORMATS)
 
     def make(record: StudyRecord) -> Response | Drawing:
         if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - narrows the type

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Final
 
 from starlette.responses import Response
 
 from sprag.service.answers import calibration as m
-from sprag.service.http.api.document import files, format_query, problems
+from sprag.service.http.api.document import files, problems
 from sprag.service.http.api.document import not_modified as documented_304
+from sprag.service.http.api.drawn_format import DrawnFormat
 from sprag.service.http.context import StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture
 from sprag.service.http.reading import FileChoice
-from sprag.service.http.respond import choose_format
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import answers
@@ -39,10 +39,9 @@ async def get_calibration(
     work: Attended,
     study_id: StudyId,
     choice: FileChoice,
-    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
+    chosen: DrawnFormat,
 ) -> Response:
     """What a calibration has found: values with intervals, correlations, residuals, the next point to measure."""
-    chosen = choose_format(work.request, form, DRAWN_FORMATS)
 
     def make(record: StudyRecord) -> Response | Drawing:
         plan_of(work.context.store.study(study_id))

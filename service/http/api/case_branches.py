@@ -9,11 +9,11 @@ from starlette.responses import Response
 
 from sprag.service.answers.results import Branch
 from sprag.service.answers.sections import Sections
-from sprag.service.http.api.document import CASE_PROBLEMS, files, format_query, problems
+from sprag.service.http.api.document import CASE_PROBLEMS, files, problems
+from sprag.service.http.api.drawn_format import DrawnFormat
 from sprag.service.http.context import CaseNumber, StartNumber, StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, picture
 from sprag.service.http.drawing import table as written
-from sprag.service.http.respond import choose_format
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import Attended, Work
 from sprag.service.results import branches, sections
@@ -68,15 +68,14 @@ async def get_branch(
     work: Attended,
     study_id: StudyId,
     case: CaseNumber,
+    chosen: DrawnFormat,
     along: Paths,
     low: Low = None,
     high: High = None,
     y: Annotated[str | None, Query(description="the result that a picture shows")] = None,
     which: StartNumber = None,
-    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """The periodic motions that the motion of one case becomes along a parameter, stable and unstable ones."""
-    chosen = choose_format(work.request, form, DRAWN_FORMATS)
 
     def look(study: Study) -> tuple[Along, str]:
         return branches.along_of(study, case, along, low, high), branches.result_of(study, y)
@@ -101,6 +100,7 @@ async def get_diagram(
     work: Attended,
     study_id: StudyId,
     case: CaseNumber,
+    chosen: DrawnFormat,
     along: Paths,
     low: Low = None,
     high: High = None,
@@ -113,10 +113,8 @@ async def get_diagram(
     ] = 64,
     y: Annotated[str | None, Query(description="the variable that a picture shows")] = None,
     which: StartNumber = None,
-    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """Strobes of the settled motions of one case along a parameter, each from its own start: a bifurcation diagram."""
-    chosen = choose_format(work.request, form, DRAWN_FORMATS)
 
     def look(study: Study) -> tuple[Sampling, str]:
         asked = sections.diagram_of(study, case, along, (low, high), phase, (points, strobes))
@@ -142,13 +140,12 @@ async def get_section(
     work: Attended,
     study_id: StudyId,
     case: CaseNumber,
+    chosen: DrawnFormat,
     phase: Phase = None,
     strobes: Annotated[int, Query(ge=1, le=sections.MAX_SECTION, description="most strobes", examples=[50])] = 1000,
     which: StartNumber = None,
-    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """Strobes of the settled motion of one case at a phase of the excitation: its Poincare section."""
-    chosen = choose_format(work.request, form, DRAWN_FORMATS)
 
     def look(study: Study) -> Sampling:
         return sections.section_of(study, case, phase, strobes)

@@ -10,6 +10,7 @@ from starlette.responses import Response
 from sprag.service.answers.results import EngagementTables, Portrait
 from sprag.service.faults import choice_of
 from sprag.service.http.api.document import CASE_PROBLEMS, files, format_query, one_of, problems
+from sprag.service.http.api.drawn_format import DrawnFormat
 from sprag.service.http.context import CaseNumber, StartNumber, StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, TABLE_FORMATS, picture
 from sprag.service.http.drawing import table as written
@@ -63,6 +64,7 @@ async def get_strobes(
     work: Attended,
     study_id: StudyId,
     case: CaseNumber,
+    chosen: DrawnFormat,
     table: Annotated[
         str,
         Query(
@@ -71,10 +73,8 @@ async def get_strobes(
         ),
     ] = "strobes",
     which: StartNumber = None,
-    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """The state of one case once per excitation period, and its orbit. The case is run again for this."""
-    chosen = choose_format(work.request, form, DRAWN_FORMATS)
     asked = choice_of("table", table, portraits.TABLES)
     study, _ = await work.case_of(study_id, case, portraits.require_strobes, which)
     if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - narrows the type

@@ -8,10 +8,10 @@ from fastapi import Query
 from starlette.responses import Response
 
 from sprag.service.answers.transients import Transient
-from sprag.service.http.api.document import CASE_PROBLEMS, files, format_query, one_of, problems
+from sprag.service.http.api.document import CASE_PROBLEMS, files, one_of, problems
+from sprag.service.http.api.drawn_format import DrawnFormat
 from sprag.service.http.context import CaseNumber, StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, picture, table
-from sprag.service.http.respond import choose_format
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import Attended
 from sprag.service.results import transients
@@ -64,6 +64,7 @@ async def get_transient(
     work: Attended,
     study_id: StudyId,
     case: CaseNumber,
+    chosen: DrawnFormat,
     kind: Kind,
     load: Load = None,
     angle: Angle = None,
@@ -74,10 +75,8 @@ async def get_transient(
         int,
         Query(ge=MIN_TRAJECTORY_POINTS, le=MAX_TRAJECTORY_POINTS, description="equally spaced times", examples=[50]),
     ] = 1000,
-    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """The run-up from rest of one machine shaft, a step of its load, or its coasting, over time."""
-    chosen = choose_format(work.request, form, DRAWN_FORMATS)
     given = {"load": load, "angle": angle, "torque": torque, "within": within, "revolutions": revolutions}
 
     def look(study: Study) -> Course:

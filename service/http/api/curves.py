@@ -16,6 +16,7 @@ from sprag.service.answers import results as m
 from sprag.service.faults import choice_of, parameter_error
 from sprag.service.http.api.document import CONTENT_RANGE, files, format_query, one_of, problems
 from sprag.service.http.api.document import not_modified as documented_304
+from sprag.service.http.api.drawn_format import DrawnFormat, language_query
 from sprag.service.http.context import StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture, placed, tag_of
 from sprag.service.http.kept_files import asks_for_part, file_response
@@ -55,15 +56,6 @@ _ROW_FORMATS: Final[dict[formats.Format, str]] = {"json": JSON, **formats.MEDIA_
 _IN_UNITS: Final = ("csv", "parquet", "arrow", "xlsx")
 _PROBLEMS = ("invalid-parameter", "invalid-selection", "study-not-found", "not-acceptable", *CHECK_PROBLEMS)
 
-_Language = Annotated[
-    str,
-    Query(
-        max_length=20,
-        description="language of the document",
-        examples=["uk"],
-        json_schema_extra=one_of(languages.available()),
-    ),
-]
 _REPORT_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; sandbox allow-modals"
 
 #: Cases of an ended study whose file is written before its first byte is sent, so that its length is known; of a larger
@@ -117,6 +109,7 @@ async def get_curves(
     work: Attended,
     study_id: StudyId,
     choice: FileChoice,
+    chosen: DrawnFormat,
     x: Annotated[
         str | None,
         Query(description="path of the axis along the curve; default: that of the page", examples=["shaft.load"]),
@@ -144,7 +137,6 @@ async def get_curves(
         ),
     ] = "given",
     number: Number = 0,
-    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """Results against one axis. An axis of several values that is neither x nor in `by` needs its value in `at`, or
     `rest=usual`.
@@ -153,7 +145,7 @@ async def get_curves(
     their jumps.
     """
 
-    def chosen(study: Study) -> CurveQuery:
+    def asked(study: Study) -> CurveQuery:
         infos = models.study_results(study)
         query = completed(study, infos, x, tuple(y or ()), tuple(by or ()), pairs(at), pairs(of, "of"))
         if rest == "usual":
@@ -161,7 +153,7 @@ async def get_curves(
             query = replace(query, at=held(study, given, (query.x, *query.by)))
         return _numbered(study, query, number)
 
-    return await _drawn(work, study_id, choice, form, "curves", chosen)
+    return await _drawn(work, study_id, choice, chosen, "curves", asked)
 
 
 @router.get(
@@ -177,6 +169,7 @@ async def get_map(
     work: Attended,
     study_id: StudyId,
     choice: FileChoice,
+    chosen: DrawnFormat,
     x: XPath,
     y: Annotated[str, Query(description="path of the other axis", examples=["excitation.frequency"])],
     z: Annotated[str, Query(description="the result", examples=["shaft.speed.mean"])],
@@ -185,12 +178,11 @@ async def get_map(
     kind: Annotated[
         Literal["heatmap", "contour"], Query(description="of a picture: colours, or lines of equal value")
     ] = "heatmap",
-    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """One result over two axes."""
     query = CurveQuery(x, (z,), (y,), pairs(at))
     part: Literal["map", "contours"] = "contours" if kind == CONTOUR else "map"
-    return await _drawn(work, study_id, choice, form, part, lambda study: _numbered(study, query, number))
+    return await _drawn(work, study_id, choice, chosen, part, lambda study: _numbered(study, query, number))
 
 
 def _numbered(study: Study, query: CurveQuery, number: int) -> CurveQuery:
@@ -205,11 +197,10 @@ async def _drawn(
     work: Work,
     study_id: str,
     choice: Choice,
-    form: str | None,
+    chosen: DrawnFormat,
     part: Literal["curves", "map", "contours"],
     query: Callable[[Study], CurveQuery],
 ) -> Response:
-    chosen = choose_format(work.request, form, DRAWN_FORMATS)
     as_json, as_table, as_picture = _WRITERS[part]
 
     def make(record: StudyRecord) -> Response | Drawing:
@@ -304,7 +295,7 @@ async def get_report(
     of: Chosen = None,
     y: Annotated[list[str] | None, Query(description="result of a chosen curve; may be repeated")] = None,
     point: Point = None,
-    language: _Language = languages.ENGLISH,
+    language: Annotated[str, language_query("the document")] = languages.ENGLISH,
     form: Annotated[str | None, format_query(report.REPORT_FORMATS, "pdf")] = None,
 ) -> Response:
     """A study as a printable page or a PDF: machine, answers, chosen curves, endings, ranges of results, inputs.

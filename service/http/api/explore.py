@@ -11,13 +11,13 @@ from starlette.responses import Response
 
 from sprag.service.answers import explore as m
 from sprag.service.answers.studies import StudySummary
-from sprag.service.http.api.document import Ranges, files, format_query, located, problems
+from sprag.service.http.api.document import Ranges, files, located, problems
 from sprag.service.http.api.document import not_modified as documented_304
+from sprag.service.http.api.drawn_format import DrawnFormat
 from sprag.service.http.api.studies import SelectKey, given_options, taken_in
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture
 from sprag.service.http.reading import FileChoice
-from sprag.service.http.respond import choose_format
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import checks, explore
@@ -57,6 +57,7 @@ async def get_exploration(
     work: Attended,
     study_id: StudyId,
     choice: FileChoice,
+    chosen: DrawnFormat,
     where: Ranges = None,
     ending: _OfKind = None,
     regime: _OfKind = None,
@@ -72,10 +73,8 @@ async def get_exploration(
     ] = None,
     x: Annotated[str, Query(max_length=100, description="of a picture: shown quantity to the right")] = "",
     y: Annotated[str, Query(max_length=100, description="of a picture: the same upwards")] = "",
-    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """Cases within ranges of parameters and results, sorted over all rows, with a histogram of each quantity."""
-    chosen = choose_format(work.request, form, DRAWN_FORMATS)
     query = ExploreQuery(tuple(where or ()), ending or "", regime or "", flag or "", sort, limit, tuple(show or ()))
 
     def make(record: StudyRecord) -> Response | Drawing:

@@ -8,12 +8,12 @@ from fastapi import Query
 from starlette.responses import Response
 
 from sprag.service.answers import goals as m
-from sprag.service.http.api.document import files, format_query, problems
+from sprag.service.http.api.document import files, problems
 from sprag.service.http.api.document import not_modified as documented_304
+from sprag.service.http.api.drawn_format import DrawnFormat
 from sprag.service.http.context import StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture
 from sprag.service.http.reading import FileChoice
-from sprag.service.http.respond import choose_format
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import answers
@@ -40,16 +40,15 @@ async def get_front(
     work: Attended,
     study_id: StudyId,
     choice: FileChoice,
+    chosen: DrawnFormat,
     exact: Annotated[
         bool, Query(description="designs must meet equalities of real numbers to 1e-6 to be feasible")
     ] = False,
     limit: Annotated[int, Query(ge=1, le=MOST_DESIGNS, description="most designs", examples=[100])] = DESIGNS,
     x: Annotated[str | None, Query(description="of a picture: goal, variable or limited result to the right")] = None,
     y: Annotated[str | None, Query(description="of a picture: the same upwards; by default two goals")] = None,
-    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """The designs of a study with a goal, the best first: variables, goals, limits, ranks, and the search's history."""
-    chosen = choose_format(work.request, form, DRAWN_FORMATS)
 
     def make(record: StudyRecord) -> Response | Drawing:
         study = work.context.store.study(study_id)

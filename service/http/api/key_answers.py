@@ -10,12 +10,12 @@ from starlette.responses import Response
 
 from sprag.service.answers import key as m
 from sprag.service.http.api.curves import Chosen, Fixed, Point, pairs
-from sprag.service.http.api.document import files, format_query, problems
+from sprag.service.http.api.document import files, problems
 from sprag.service.http.api.document import not_modified as documented_304
+from sprag.service.http.api.drawn_format import DrawnFormat
 from sprag.service.http.context import StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture
 from sprag.service.http.reading import FileChoice
-from sprag.service.http.respond import choose_format
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import key_answers
@@ -49,6 +49,7 @@ async def get_answers(
     work: Attended,
     study_id: StudyId,
     choice: FileChoice,
+    chosen: DrawnFormat,
     x: Annotated[
         str | None,
         Query(description="path of the axis along the curves; default: that of the page", examples=["shaft.load"]),
@@ -60,10 +61,8 @@ async def get_answers(
     at: Fixed = None,
     of: Chosen = None,
     point: Point = None,
-    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """What one asks of a study first: no-load speed, largest power, best efficiency, stall torque, a working point."""
-    chosen = choose_format(work.request, form, DRAWN_FORMATS)
 
     def query(study: Study) -> CurveQuery | None:
         """The chosen curves; None for those of the page."""

@@ -9,12 +9,12 @@ from starlette.responses import Response
 
 from sprag.service.answers import results as m
 from sprag.service.faults import warned
-from sprag.service.http.api.document import files, format_query, problems
+from sprag.service.http.api.document import files, problems
 from sprag.service.http.api.document import not_modified as documented_304
+from sprag.service.http.api.drawn_format import DrawnFormat
 from sprag.service.http.context import StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture
 from sprag.service.http.reading import FileChoice
-from sprag.service.http.respond import choose_format
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import sensitivities
@@ -38,14 +38,12 @@ async def get_sensitivity(
     work: Attended,
     study_id: StudyId,
     choice: FileChoice,
+    chosen: DrawnFormat,
     y: Annotated[
         list[str], Query(description="result; may be repeated", examples=[["shaft.speed.mean"]], min_length=1)
     ],
-    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """Main effects of every axis on results, and shares of their variance (Sobol indices) or elementary effects."""
-    chosen = choose_format(work.request, form, DRAWN_FORMATS)
-
     names = tuple(dict.fromkeys(y))
 
     def make(record: StudyRecord) -> Response | Drawing:

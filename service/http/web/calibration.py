@@ -11,7 +11,7 @@ from starlette.responses import Response
 from sprag.service.http import views
 from sprag.service.http.context import Context, StudyId
 from sprag.service.http.drawing import Columns, Drawing, conditional
-from sprag.service.http.reading import CHOICE, FileChoice, address_pairs, read_as
+from sprag.service.http.reading import FileChoice, file_pairs, read_as
 from sprag.service.http.respond import JSON
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.figures import answers as figures
@@ -49,7 +49,7 @@ def _page(context: Context, study_id: str, found: CalibrationReport) -> Response
         units=units,
         result_units={info.name: info.unit for info in models.study_results(study)},
         figure=f"/studies/{study_id}/figures/calibration?columns=2{read_as()}",
-        files=f"{views.study_address(study_id)}/calibration?{urlencode(address_pairs(CHOICE.get()))}",
+        files=f"{views.study_address(study_id)}/calibration?{urlencode(file_pairs())}",
     )
 
 

@@ -13,7 +13,7 @@ from starlette.responses import RedirectResponse, Response
 from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.drawing import Drawing, conditional
-from sprag.service.http.reading import CHOICE, FileChoice, read_as
+from sprag.service.http.reading import CHOICE, FileChoice, file_read_as, read_as
 from sprag.service.http.respond import JSON
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.figures import answers as figures
@@ -109,8 +109,8 @@ def _page(
         reached=found and found[1],
         ribbon_figure=f"{own}/figures/ribbon?{drawn}{read_as()}",
         yield_figure=f"{own}/figures/yield?{reached}{read_as()}",
-        ribbon_files=f"{views.study_address(study_id)}/ribbon?{drawn}{read_as()}",
-        yield_files=f"{views.study_address(study_id)}/yield?{reached}{read_as()}",
+        ribbon_files=f"{views.study_address(study_id)}/ribbon?{drawn}{file_read_as()}",
+        yield_files=f"{views.study_address(study_id)}/yield?{reached}{file_read_as()}",
     )
 
 

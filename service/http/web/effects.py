@@ -12,7 +12,7 @@ from starlette.responses import RedirectResponse, Response
 from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.drawing import Drawing, conditional, picture
-from sprag.service.http.reading import FileChoice, read_as
+from sprag.service.http.reading import FileChoice, file_read_as, read_as
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
@@ -75,7 +75,7 @@ def _page(
         found=found,
         methods=METHODS,
         picture=f"/studies/{study_id}/figures/sensitivity?{chosen}{read_as()}",
-        files=f"{views.study_address(study_id)}/sensitivity?{chosen}{read_as()}",
+        files=f"{views.study_address(study_id)}/sensitivity?{chosen}{file_read_as()}",
     )
 
 

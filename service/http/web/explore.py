@@ -14,7 +14,7 @@ from sprag.service.faults import ParameterFault, shown
 from sprag.service.http import views
 from sprag.service.http.context import Context, StudyId
 from sprag.service.http.drawing import Drawing, conditional
-from sprag.service.http.reading import CHOICE, FileChoice, address_pairs
+from sprag.service.http.reading import CHOICE, FileChoice, address_pairs, file_pairs
 from sprag.service.http.respond import JSON
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.figures import answers as figures
@@ -168,8 +168,8 @@ def _page(context: Context, study_id: str, view: ExploreView, given: Sequence[tu
     kinds = {"ending": query.ending, "regime": query.regime, "flag": query.flag}
     asked += [(key, value) for key, value in kinds.items() if value]
     asked.append(("sort", query.sort))
-    chosen = address_pairs(CHOICE.get())
-    drawn = urlencode([*asked, *chosen, ("limit", str(query.limit)), ("x", view.axes[0]), ("y", view.axes[1])])
+    chosen, in_file = address_pairs(CHOICE.get()), file_pairs()
+    drawn = [*asked, ("limit", str(query.limit)), ("x", view.axes[0]), ("y", view.axes[1])]
     frame = study_frame(context, study_id)
     return page(
         "explore.html",
@@ -194,9 +194,9 @@ def _page(context: Context, study_id: str, view: ExploreView, given: Sequence[tu
         own_numbers=bool(own_paths(study)),
         points=f"/studies/{study_id}/explore/new?{urlencode([*asked, *chosen])}",
         comparison=f"/studies/{study_id}/explore/compare",
-        figure=f"/studies/{study_id}/figures/explore?{drawn}",
-        picture=f"{views.study_address(study_id)}/explore?{drawn}&format=svg",
-        files=f"{views.study_address(study_id)}/explore?{urlencode([*asked, *chosen, ('limit', str(MAX_SELECTED))])}",
+        figure=f"/studies/{study_id}/figures/explore?{urlencode([*drawn, *chosen])}",
+        picture=f"{views.study_address(study_id)}/explore?{urlencode([*drawn, *in_file])}&format=svg",
+        files=f"{views.study_address(study_id)}/explore?{urlencode([*asked, *in_file, ('limit', str(MAX_SELECTED))])}",
         address=lambda sort: f"/studies/{study_id}/explore?{urlencode([*kept, ('sort', sort)])}",
     )
 

@@ -12,7 +12,7 @@ from starlette.responses import Response
 from sprag.service.http import views
 from sprag.service.http.context import Context, StudyId
 from sprag.service.http.drawing import Columns, Drawing, conditional, picture
-from sprag.service.http.reading import CHOICE, FileChoice, address_pairs, read_as
+from sprag.service.http.reading import FileChoice, file_pairs, file_read_as, read_as
 from sprag.service.http.respond import JSON
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.figures import answers as figures
@@ -66,8 +66,8 @@ def _front_page(context: Context, study_id: str, view: FrontView, *, exact: bool
         figure=f"/studies/{study_id}/figures/front?{urlencode(drawn | only)}{read_as()}",
         history=f"/studies/{study_id}/figures/search?columns=2{read_as()}",
         data=f"{address}?{urlencode({'limit': _LINKED} | only)}",
-        files=f"{address}?{urlencode(drawn | only)}{read_as()}",
-        search=f"/studies/{study_id}/front/search.svg?{urlencode(address_pairs(CHOICE.get()))}",
+        files=f"{address}?{urlencode(drawn | only)}{file_read_as()}",
+        search=f"/studies/{study_id}/front/search.svg?{urlencode(file_pairs())}",
         pictured=view.report["counts"]["known"] <= pictures.MAX_PICTURE_POINTS,
     )
 

@@ -11,7 +11,7 @@ from starlette.responses import RedirectResponse, Response
 from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.drawing import Columns, Drawing, conditional, placed
-from sprag.service.http.reading import CHOICE, FileChoice, address_pairs
+from sprag.service.http.reading import CHOICE, FileChoice, address_pairs, file_pairs
 from sprag.service.http.respond import JSON, json_response
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.figures import answers
@@ -79,7 +79,8 @@ def curves_page(context: Ctx, request: Request, study_id: StudyId) -> Response:
         faults = error.faults
     shown = query or curve_query(study, infos, Address())
     assert shown is not None
-    files = urlencode([*pairs_of(shown), *address_pairs(CHOICE.get())])
+    figure = urlencode([*pairs_of(shown), *address_pairs(CHOICE.get())])
+    files = urlencode([*pairs_of(shown), *file_pairs()])
     alt = _("{y} against {x}", y=", ".join(map(reading.caption, shown.y)), x=reading.within(shown.x))
     return page(
         "curves.html",
@@ -92,7 +93,7 @@ def curves_page(context: Ctx, request: Request, study_id: StudyId) -> Response:
         results=[info for info in infos if info.kind != "category"],
         fixed=fixed_choices(study, (shown.x, *shown.by), shown.at, reading),
         choices=[] if faults else value_choices(study, shown),
-        figure=f"/studies/{study_id}/figures/curves?{files}",
+        figure=f"/studies/{study_id}/figures/curves?{figure}",
         files=f"{views.study_address(study_id)}/curves?{files}",
         report=files,
         alt=alt,
@@ -102,7 +103,7 @@ def curves_page(context: Ctx, request: Request, study_id: StudyId) -> Response:
         regime_maps=regime_maps(study, study_id),
         many_starts=has_starts(study.run),
         held=list(map(reading.say, held)),
-        here_saved=saved_here(frame["saved"], "curves", study_id, files, alt),
+        here_saved=saved_here(frame["saved"], "curves", study_id, figure, alt),
     )
 
 
@@ -130,6 +131,7 @@ def map_page(
     pairs = [*pairs_of(shown), *address_pairs(CHOICE.get())]
     kind = kind if kind in KINDS else "heatmap"
     query_text = urlencode([*pairs, ("kind", kind)])
+    files = urlencode([*pairs_of(shown), *file_pairs(), ("kind", kind)])
     alt = _(
         "{z} over {x} and {y}",
         z=reading.caption(shown.z), x=reading.within(shown.x), y=reading.within(shown.y),
@@ -147,7 +149,7 @@ def map_page(
         results=_mapped_results(study, infos),
         fixed=fixed_choices(study, (shown.x, shown.y), shown.at, reading),
         figure=f"/studies/{study_id}/figures/map?{query_text}",
-        files=f"{views.study_address(study_id)}/map?{query_text}",
+        files=f"{views.study_address(study_id)}/map?{files}",
         alt=alt,
         held=list(map(reading.say, held)),
         here_saved=saved_here(frame["saved"], "map", study_id, query_text, alt),

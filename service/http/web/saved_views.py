@@ -12,6 +12,7 @@ from starlette.responses import RedirectResponse, Response
 from sprag.service.faults import choice_of
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx
+from sprag.service.http.language import language_pairs
 from sprag.service.http.reading import CHOICE, address_pairs, page_query
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.form.values import Form
@@ -96,12 +97,13 @@ def _figure(study: Study, study_id: str, saved: SavedView) -> ReportFigure:
     own = [(name, value) for name in _READING if (value := given.get(name))]
     own += [pair for pair in address_pairs(CHOICE.get()) if pair[0] not in dict(own)]
     kind = [("kind", given.get("kind") or "heatmap")] if isinstance(query, MapQuery) else []
-    text, columns = urlencode([*pairs_of(query), *kind, *own]), "" if kind else "&columns=2"
+    shown, columns = [*pairs_of(query), *kind, *own], "" if kind else "&columns=2"
+    picture = urlencode([*shown, *language_pairs(), ("format", "svg")])
     page = saved.view.page
     return ReportFigure(
         saved,
-        f"/studies/{study_id}/figures/{page}?{text}{columns}",
-        f"{views.study_address(study_id)}/{page}?{text}&format=svg",
+        f"/studies/{study_id}/figures/{page}?{urlencode(shown)}{columns}",
+        f"{views.study_address(study_id)}/{page}?{picture}",
     )
 
 

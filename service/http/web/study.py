@@ -16,7 +16,7 @@ from sprag.service import formats
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx, StudyId
 from sprag.service.http.problems import ApiError
-from sprag.service.http.reading import CHOICE, address_pairs
+from sprag.service.http.reading import CHOICE, address_pairs, file_pairs
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.form.check import fits_of, has_measured_clutch
 from sprag.service.http.web.held import fixed_choices
@@ -211,13 +211,14 @@ def _main_figure(
     study: Study, study_id: str, query: CurveQuery | None, view: AnswersView, reading: Reading
 ) -> dict[str, Any]:
     """The addresses of the figure on the page, of its picture and of the page where others are chosen; its caption."""
-    chosen = address_pairs(CHOICE.get())
+    chosen, in_file = address_pairs(CHOICE.get()), file_pairs()
     own = urlencode(chosen)
+    picture = f"format=svg&{urlencode(in_file)}"
     if _has_goal(study):
         return {
             "heading": _("Designs"),
             "figure": f"/studies/{study_id}/figures/front?{own}",
-            "picture": f"{views.study_address(study_id)}/front?format=svg&{own}" if _drawable(study.cases) else None,
+            "picture": f"{views.study_address(study_id)}/front?{picture}" if _drawable(study.cases) else None,
             "others": f"/studies/{study_id}/front",
             "kind": _("Designs"),
             "invitation": _("More on the page"),
@@ -227,7 +228,7 @@ def _main_figure(
         return {
             "heading": _("Calibration"),
             "figure": f"/studies/{study_id}/figures/calibration?columns=2&{own}",
-            "picture": f"{views.study_address(study_id)}/calibration?format=svg&{own}",
+            "picture": f"{views.study_address(study_id)}/calibration?{picture}",
             "others": f"/studies/{study_id}/calibration",
             "kind": _("Calibration"),
             "invitation": _("More on the page"),
@@ -255,7 +256,7 @@ def _main_figure(
         kind, pairs, more = "curves", pairs_of(query), ("columns", "2")
         text = caption(study, query).said(reading)
         drawable = _drawable(drawn_numbers(study, query))
-    picture = f"{views.study_address(study_id)}/{kind}?{urlencode([*pairs, ('format', 'svg'), *chosen])}"
+    picture = f"{views.study_address(study_id)}/{kind}?{urlencode([*pairs, ('format', 'svg'), *in_file])}"
     figure = f"/studies/{study_id}/figures/{kind}?{urlencode([*pairs, more, *chosen])}"
     if view.figure is not None:  # with the answers on the curves
         figure, picture = view.figure, view.picture or picture

@@ -9,6 +9,7 @@ from urllib.parse import urlencode
 from starlette.datastructures import QueryParams
 
 from sprag.service.http import views
+from sprag.service.http.language import language_pairs
 from sprag.service.http.reading import address_pairs
 from sprag.service.http.web.held import with_held
 from sprag.service.jobs.key_answers import answers_of
@@ -166,7 +167,8 @@ def _view(
     drawn = sum(line.cases.size for line in (part.line for part in found.curves)) * len(found.query.y)
     address = views.study_address(study_id)
     named = [("curve", names[chosen]), ("columns", "2")]
-    picture = f"{address}/answers?{urlencode([*asked, *shown, ('format', 'svg'), *address_pairs(choice)])}"
+    in_file = [*address_pairs(choice), *language_pairs()]
+    picture = f"{address}/answers?{urlencode([*asked, *shown, ('format', 'svg'), *in_file])}"
     return AnswersView(
         faults,
         found.query,

@@ -18,6 +18,7 @@ from starlette.responses import Response
 from sprag.service import languages
 from sprag.service.actor import Role
 from sprag.service.http.access import ASKING
+from sprag.service.http.language import language_pairs
 from sprag.service.http.prefix import PREFIX, here
 from sprag.service.http.reading import PAGE
 from sprag.service.http.web.explained import explained
@@ -128,6 +129,7 @@ def _templates() -> Environment:
     environment.globals["prefix_of_urls"] = PREFIX.get
     environment.globals["language"] = languages.current
     environment.globals["languages"] = languages.titles
+    environment.globals["in_language"] = _in_language
     environment.globals["script_texts"] = translated_texts
     environment.globals["page_address"] = PAGE.get
     environment.globals["read_only"] = _read_only
@@ -135,6 +137,11 @@ def _templates() -> Environment:
     environment.globals["explained"] = explained
     environment.globals["administers"] = _administers
     return environment
+
+
+def _in_language() -> str:
+    """The language of the page as the rest of the address of a file that has a query already."""
+    return "".join(f"&{urlencode([pair])}" for pair in language_pairs())
 
 
 def cell(value: float | str | None, digits: int = 5) -> str:

@@ -100,6 +100,13 @@ def test_a_study_from_submission_to_table_grid_and_curves(
     assert study.export(tmp_path / "report.pdf").read_bytes().startswith(b"%PDF")
     assert len(pd.read_csv(io.BytesIO(study.download("csv")))) == 9
     assert study.picture(tmp_path / "curve.svg", "shaft.load", SPEED, by="excitation.frequency").stat().st_size > 1000
+    english, ukrainian = (
+        study.picture(
+            tmp_path / f"{code}.svg", "shaft.load", SPEED, by="excitation.frequency", language=code
+        ).read_text("utf-8")
+        for code in ("en", "uk")
+    )
+    assert ("Load torque" in english, "Момент навантаження" in ukrainian) == (True, True)
     with pytest.raises(ValueError, match="cannot tell the format"):
         study.export(tmp_path / "rows.doc")
     with refused(RefusedError, "invalid-parameter", "invalid-choice"):

@@ -137,6 +137,9 @@ def test_no_text_of_any_page_is_left_out(service: Service) -> None:
         assert "⟦" in answer.text, address
         if texts_left := left(answer.text, names):
             found[address] = texts_left
+        # What is drawn of the API is in the language of the page, too.
+        drawn = re.findall(r'"(/api/v1/[^"]*format=(?:svg|png|pdf)[^"]*)"', answer.text)
+        assert all(f"language={MADE_UP}" in picture for picture in drawn), (address, drawn)
     for name in ("STUDY", "SHAFT", "GOAL", "CALIBRATION", "DRIVES"):
         address = f"/api/v1/studies/{ids[name]}/report"
         answer = service.http.get(address, params={"format": "html", "language": MADE_UP})

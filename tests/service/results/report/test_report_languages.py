@@ -60,6 +60,25 @@ def test_each_language_is_a_document_of_its_own(service: Service, spec: dict[str
     assert plain == accepting
 
 
+def test_a_picture_is_in_the_language_of_its_address_and_data_are_not(service: Service) -> None:
+    study_id = service.submit()
+    service.fill(study_id)
+    address = f"{API}/studies/{study_id}/curves"
+    english, ukrainian = (
+        service.http.get(address, params={"format": "svg", **asked}).text for asked in ({}, {"language": "uk"})
+    )
+    for text, other in (("Load torque", "Момент навантаження"), ("N·m", "Н·м"), ("<!-- 0.1", "<!-- 0,1")):
+        assert (text in english, other in english) == (True, False), text
+        assert (text in ukrainian, other in ukrainian) == (False, True), other
+    for form in ("json", "csv"):
+        plain, asked = (
+            service.http.get(address, params={"format": form, **more}).content for more in ({}, {"language": "uk"})
+        )
+        assert plain == asked
+    refused = service.http.get(address, params={"format": "csv", "language": "tlh"})
+    assert (refused.status_code, refused.json()["errors"][0]["allowed"]) == (422, "en, uk")
+
+
 @pytest.mark.parametrize("part", ["", "/results?format=csv", "/results?format=json", "/curves?format=svg", "/curves"])
 def test_programs_read_the_same_bytes_whatever_language_is_accepted(service: Service, part: str) -> None:
     study_id = service.submit()
