@@ -9,8 +9,8 @@ from typing_extensions import TypedDict
 from sprag.service.answers import Doc, Value
 
 
-class AnswerValue(TypedDict):
-    """One answer, such as the largest useful power and the load of it. Numbers are SI."""
+class AnswerFacts(TypedDict):
+    """What is known of one answer. Numbers are SI."""
 
     name: str
     title: str
@@ -22,6 +22,7 @@ class AnswerValue(TypedDict):
         ),
     ]
     result: Annotated[str, Doc("the result that it is read from")]
+    result_unit: Annotated[str, Doc("of this result; `unit` is that of the value, which may be a place on the axis")]
     unit: str
     description: str
     value: Annotated[float | None, Doc("null: there is none, see `why`")]
@@ -32,6 +33,7 @@ class AnswerValue(TypedDict):
     ]
     high: float | None
     above: Annotated[bool, Doc("of until_zero: no case has 0, so the true value is above this one")]
+    there: Annotated[float | None, Doc("of until_zero with `above`: the result at this place")]
     edge: Annotated[bool, Doc("an extreme at the end of the axis, which may go on beyond it")]
     interpolated: Annotated[bool, Doc("on a straight line between two cases")]
     cases: Annotated[list[int], Doc("the case that it was read from, or the two that it is between")]
@@ -41,6 +43,11 @@ class AnswerValue(TypedDict):
     regime: str | None
     flags: list[str]
     why: Annotated[str | None, Doc("why there is no value: no-case, outside, not-joined or no-result")]
+
+
+class AnswerValue(AnswerFacts):
+    """One answer, such as the largest useful power and the load of it."""
+
     note: Annotated[str, Doc("the same in words")]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -26,6 +26,10 @@ from sprag.service.cli.options import (
 from sprag.service.cli.pictures import ChosenOf, HeldAt, heading, held_text
 from sprag.service.cli.remote import connection
 from sprag.service.languages import _
+
+if TYPE_CHECKING:
+    from sprag.service.answers.key import AnswerValue
+    from sprag.service.results.reading import Reading
 
 _FORMATS = ("csv", "svg", "png", "pdf")
 
@@ -66,19 +70,21 @@ def answers(
     query += [*(("at", item) for item in at or ()), *(("of", item) for item in of or ())]
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
-        found = client.answers(study_id, query)
+        found, record = client.answers(study_id, query), client.study(study_id)
         if file is not None and form is not None:
             drawing = [*in_units(units), *in_language(language), ("format", form)]
             write_pieces(file, client.answers_file(study_id, [*query, *drawing]))
     if as_json:
         write_json(found)
     else:
-        _show(found)
+        from sprag.service.results.reading import Reading  # knows the models
+
+        _show(found, Reading(record["model"]))
     if file is not None:
         say(_("table: {file}", file=file) if form == "csv" else _("picture: {file}", file=file))
 
 
-def _show(found: dict[str, Any]) -> None:
+def _show(found: dict[str, Any], reading: Reading) -> None:
     """A table for each curve: its answers and its working point; then the extremes among all cases."""
     x = heading(found["x"] or "", found["unit"] or "1")
     columns: list[Column] = [
@@ -89,23 +95,28 @@ def _show(found: dict[str, Any]) -> None:
         (_("cases"), False),
         (_("note"), False),
     ]
+    unit = found["unit"] or "1"
     for curve in found["curves"]:
         title = held_text({**curve["by"], **curve["at"]}, found["units"])
-        show_table(title, columns, [_row(item) for item in (*curve["answers"], *curve["working_point"])])
+        every = (*curve["answers"], *curve["working_point"])
+        show_table(title, columns, [_row(item, unit, reading) for item in every])
     if found["overall"]:
         columns[3] = (_("case with"), False)
         rows = [
             (*row[:3], held_text(item["parameters"], found["units"]), *row[4:])
             for item in found["overall"]
-            for row in [_row(item)]
+            for row in [_row(item, "1", reading)]
         ]
         show_table(_("among all cases"), columns, rows)
 
 
-def _row(item: dict[str, Any]) -> tuple[object, ...]:
+def _row(item: AnswerValue, x_unit: str, reading: Reading) -> tuple[object, ...]:
+    from sprag.service.results.key_answer_words import note_of
+
     unit = "" if item["unit"] == "1" else item["unit"]
-    cases = ", ".join(map(str, item["cases"]))
-    value = item["value"]
-    if item["above"] and value is not None:
-        value = f"> {cell_text(value)}"
-    return _(item["title"]), value, unit, item["x"], cases, _(item["note"]) if item["note"] else item["note"]
+    title = reading.caption(item["title"]) if item["title"] == item["result"] else _(item["title"])
+    value: object = item["value"]
+    if item["above"] and item["value"] is not None:
+        value = f"> {cell_text(item['value'])}"
+    cases, note = ", ".join(map(str, item["cases"])), note_of(item, x_unit).said(reading)
+    return title, value, unit, item["x"], cases, note

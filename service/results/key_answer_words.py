@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.answers.key import AnswerReport, AnswerValue, CurveAnswer, OverallAnswer
+from sprag.service.answers.key import AnswerFacts, AnswerReport, AnswerValue, CurveAnswer, OverallAnswer
 from sprag.service.results import exports
 from sprag.service.results.directions import case_values, in_words
 from sprag.service.results.phrases import Amount, Name, Phrase, joined, plural, term
@@ -22,62 +22,62 @@ if TYPE_CHECKING:
 _EXTREMES: Final = ("largest", "smallest")
 
 
-def note_of(found: Found, x_unit: str) -> Phrase:
+def note_of(found: AnswerFacts, x_unit: str) -> Phrase:
     """How far an answer can be trusted, or why there is none: a few words."""
-    if found.why is not None:
+    if found["why"] is not None:
         return _missing(found, x_unit)
     parts: list[str] = [part for part in (_how(found, x_unit), _interval(found)) if part]
-    if found.regime is not None and found.regime != "periodic":
-        parts.append(term(found.regime))
-    parts += [term(name) for name in found.flags if name != found.regime]
+    if found["regime"] is not None and found["regime"] != "periodic":
+        parts.append(term(found["regime"]))
+    parts += [term(name) for name in found["flags"] if name != found["regime"]]
     return joined("; ", parts)
 
 
-def _missing(found: Found, x_unit: str) -> Phrase:
-    why = found.why or "no-result"
+def _missing(found: AnswerFacts, x_unit: str) -> Phrase:
+    why = found["why"] or "no-result"
     if why == "not-joined":
         return Phrase("not interpolated: the motion changes between {places}", places=_between(found, x_unit))
     if why == "no-result":
         return Phrase("no case has this result")
-    if found.x is None:
+    if found["x"] is None:
         return Phrase("no case there") if why == "no-case" else Phrase("0 in all cases")
-    x = Amount(found.x, x_unit)
+    x = Amount(found["x"], x_unit)
     return Phrase("no case at {x}", x=x) if why == "no-case" else Phrase("{x} is outside the cases", x=x)
 
 
-def _between(found: Found, x_unit: str) -> Phrase:
+def _between(found: AnswerFacts, x_unit: str) -> Phrase:
     """The neighbours of a place; "" where they are not known."""
-    if found.low is None or found.high is None:
+    if found["low"] is None or found["high"] is None:
         return Phrase("")
-    return Phrase("{low} and {high}", low=Amount(found.low, x_unit, bare=True), high=Amount(found.high, x_unit))
+    return Phrase("{low} and {high}", low=Amount(found["low"], x_unit, bare=True), high=Amount(found["high"], x_unit))
 
 
-def _how(found: Found, x_unit: str) -> Phrase:
-    kind, there = found.answer.kind, found.there or 0.0
+def _how(found: AnswerFacts, x_unit: str) -> Phrase:
+    kind, there = found["kind"], found["there"] or 0.0
     if kind == "until_zero":
-        if found.above:
-            name, value = Name(found.info.name, within=True), Amount(there, found.info.unit)
+        if found["above"]:
+            name, value = Name(found["result"], within=True), Amount(there, found["result_unit"])
             return Phrase("more: there the {name} is still {value}", name=name, value=value)
-        return Phrase("0 in the case at {x}", x=Amount(found.high or 0.0, x_unit))
+        return Phrase("0 in the case at {x}", x=Amount(found["high"] or 0.0, x_unit))
     if kind in _EXTREMES:
         among = (
-            plural("largest of {count} case", "largest of {count} cases", found.cases)
+            plural("largest of {count} case", "largest of {count} cases", found["of_cases"])
             if kind == "largest"
-            else plural("smallest of {count} case", "smallest of {count} cases", found.cases)
+            else plural("smallest of {count} case", "smallest of {count} cases", found["of_cases"])
         )
-        if found.edge:
+        if found["edge"]:
             return Phrase("{among}, at the end of the axis", among=among)
         between = _between(found, x_unit)
         return Phrase("{among}; neighbours at {places}", among=among, places=between) if between else among
-    between = _between(found, x_unit) if found.interpolated else Phrase("")
+    between = _between(found, x_unit) if found["interpolated"] else Phrase("")
     return Phrase("interpolated between the cases at {places}", places=between) if between else Phrase("")
 
 
-def _interval(found: Found) -> Phrase:
-    if found.half_width:
-        return Phrase("± {width} (95 %)", width=Amount(found.half_width, found.info.unit))
-    if found.error is not None:
-        return Phrase("curve within {share} of its range", share=percent(found.error))
+def _interval(found: AnswerFacts) -> Phrase:
+    if found["half_width"]:
+        return Phrase("± {width} (95 %)", width=Amount(found["half_width"], found["result_unit"]))
+    if found["error"] is not None:
+        return Phrase("curve within {share} of its range", share=percent(found["error"]))
     return Phrase("")
 
 
@@ -109,11 +109,18 @@ def _curve(one: CurveAnswers, found: StudyAnswers) -> CurveAnswer:
 
 def answer_json(found: Found, x_unit: str) -> AnswerValue:
     """One answer."""
+    facts = answer_facts(found)
+    return {**facts, "note": note_of(facts, x_unit)}
+
+
+def answer_facts(found: Found) -> AnswerFacts:
+    """What is known of one answer."""
     return {
         "name": found.answer.name,
         "title": found.answer.title,
         "kind": found.answer.kind,
         "result": found.info.name,
+        "result_unit": found.info.unit,
         "unit": found.unit,
         "description": found.info.description,
         "value": found.value,
@@ -121,6 +128,7 @@ def answer_json(found: Found, x_unit: str) -> AnswerValue:
         "low": found.low,
         "high": found.high,
         "above": found.above,
+        "there": found.there,
         "edge": found.edge,
         "interpolated": found.interpolated,
         "cases": [case for case in (found.case, found.other) if case is not None],
@@ -130,7 +138,6 @@ def answer_json(found: Found, x_unit: str) -> AnswerValue:
         "regime": found.regime,
         "flags": list(found.flags),
         "why": found.why,
-        "note": note_of(found, x_unit),
     }
 
 
@@ -174,15 +181,21 @@ def _place(study: Study, values: Mapping[str, Any], reading: Reading) -> dict[st
 
 def _shown(item: Found, x_unit: str, reading: Reading) -> dict[str, Any]:
     """The other columns of a row."""
-    fields: dict[str, Any] = {**answer_json(item, x_unit)}
+    fields = answer_facts(item)
     return {
-        **{name: fields[name] for name in ("name", "result")},
+        "name": fields["name"],
+        "result": fields["result"],
         "unit": reading.unit(item.unit),
         "value": reading.value(item.value, item.unit),
-        **{name: reading.value(fields[name], x_unit) for name in ("x", "low", "high")},
+        "x": reading.value(fields["x"], x_unit),
+        "low": reading.value(fields["low"], x_unit),
+        "high": reading.value(fields["high"], x_unit),
         **({} if reading.unit(x_unit) == x_unit else {"unit of x": reading.unit(x_unit)}),
-        **{name: fields[name] for name in ("above", "edge", "interpolated", "regime")},
-        "note": note_of(item, x_unit).said(reading),
+        "above": fields["above"],
+        "edge": fields["edge"],
+        "interpolated": fields["interpolated"],
+        "regime": fields["regime"],
+        "note": note_of(fields, x_unit).said(reading),
     }
 
 

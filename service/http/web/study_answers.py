@@ -16,7 +16,7 @@ from sprag.service.jobs.key_answers import answers_of
 from sprag.service.jobs.reading import reading_of
 from sprag.service.languages import decimal
 from sprag.service.results.choice import curve_query, pairs_of, value_choices
-from sprag.service.results.key_answer_words import curve_name, note_of, place_text
+from sprag.service.results.key_answer_words import answer_facts, curve_name, note_of, place_text
 from sprag.service.results.key_answers import answers_query
 from sprag.service.results.pictures.curves import MAX_PICTURE_POINTS
 from sprag.service.results.selection import SelectionError
@@ -225,7 +225,7 @@ def _tile(item: Found, x_unit: str, reading: Reading, study: Study | None = None
         reading.unit(item.unit),
         reading.value(where, x_unit),
         item.above,
-        note_of(item, x_unit).said(reading),
+        note_of(answer_facts(item), x_unit).said(reading),
         tuple(case for case in (item.case, item.other) if case is not None),
         place_text(study, item.case).said(reading) if study is not None and item.case is not None else "",
     )

@@ -20,7 +20,7 @@ from sprag.service.results.exports.inputs import Input, inputs
 from sprag.service.results.exports.source import given_texts
 from sprag.service.results.figures.answers import answers_figure
 from sprag.service.results.figures.clutch import clutch_figure
-from sprag.service.results.key_answer_words import curve_name, note_of, said_title
+from sprag.service.results.key_answer_words import answer_facts, curve_name, note_of, said_title
 from sprag.service.results.key_answers import answers_query, find_answers
 from sprag.service.results.phrases import model_title, shown
 from sprag.service.results.pictures.curves import require_drawable
@@ -252,7 +252,7 @@ def _answer_rows(found: StudyAnswers, study: Study, reading: Reading) -> Iterato
             sign = "> " if item.above and item.value is not None else ""
             value = "–" if item.value is None else sign + reading.quantity(item.value, item.unit)
             place = "" if item.x is None else reading.quantity(item.x, found.unit)
-            yield (title, value, place, note_of(item, found.unit).said(reading))
+            yield (title, value, place, note_of(answer_facts(item), found.unit).said(reading))
 
 
 def _largest_windup(every: Sequence[Range]) -> float:

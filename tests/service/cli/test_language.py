@@ -245,6 +245,7 @@ REMOTE: dict[str, tuple[str, ...]] = {
     "list": ("finished", "queued", "running"),
     "pause latest": (),
     "curve latest": ("ok", "Hz", "chatter"),
+    "answers latest --at excitation.frequency=16": ("efficiency", "shaft.load", "rad", "Hz", "excitation.frequency"),
     "cases latest --result efficiency": ("efficiency", "ok", "Hz", "chatter"),
     "explore latest": ("ok", "Hz", "chatter"),
     "models": ("vibration-drive", "machine-shaft"),

@@ -13,7 +13,7 @@ from scipy.interpolate import interp1d
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.figures.answers import answers_figure
-from sprag.service.results.key_answer_words import note_of, report
+from sprag.service.results.key_answer_words import answer_facts, note_of, report
 from sprag.service.results.key_answers import answers_query, find_answers
 from sprag.service.results.selection import SelectionError
 from sprag.service.spec.document import parse_spec
@@ -104,7 +104,7 @@ def test_answers_of_a_linear_characteristic(spec: dict[str, Any]) -> None:
     here = found["shaft.speed.mean"]
     assert (here.value, here.interpolated, here.case, here.other) == (pytest.approx(SPEED * 0.5), True, 2, 3)
     assert found["power.useful.mean"].value == pytest.approx(by_scipy)
-    assert "interpolated between the cases at 0.4 and 0.55 N·m" in note_of(here, "N*m")
+    assert "interpolated between the cases at 0.4 and 0.55 N·m" in note_of(answer_facts(here), "N*m")
 
 
 def test_a_working_point_on_a_case_is_that_case(spec: dict[str, Any]) -> None:
@@ -120,7 +120,7 @@ def test_there_is_no_value_beyond_the_cases_and_where_the_motion_changes(
     study = study_of(spec, run={"until": "settled"})
     here = only(found_in(study, Rows(study), point))["shaft.speed.mean"]
     assert (here.value, here.why) == (None, why)
-    assert note_of(here, "N*m")
+    assert note_of(answer_facts(here), "N*m")
 
 
 def test_other_cases_are_preferred_to_doubtful_ones(spec: dict[str, Any]) -> None:
@@ -130,7 +130,7 @@ def test_other_cases_are_preferred_to_doubtful_ones(spec: dict[str, Any]) -> Non
     every = dict.fromkeys(range(len(LOADS)), "not_settled,windup_out_of_data")
     power = only(found_in(study, Rows(study, flags=every)))["largest_power"]
     assert (power.x, power.flags) == (0.55, ("not_settled", "windup_out_of_data"))
-    assert note_of(power, "N*m").endswith("not settled; windup out of data")
+    assert note_of(answer_facts(power), "N*m").endswith("not settled; windup out of data")
 
 
 def test_an_axis_that_ends_before_stall_gives_a_bound(spec: dict[str, Any]) -> None:
@@ -140,7 +140,7 @@ def test_an_axis_that_ends_before_stall_gives_a_bound(spec: dict[str, Any]) -> N
     assert (stall.value, stall.above, stall.there) == (0.3, True, pytest.approx(0.7 * SPEED))
     assert (power.x, power.edge, power.high) == (0.3, True, None)
     assert (found["no_load_speed"].value, found["no_load_speed"].why) == (None, "no-case")
-    assert "at the end of the axis" in note_of(power, "N*m")
+    assert "at the end of the axis" in note_of(answer_facts(power), "N*m")
 
 
 def test_each_curve_has_answers_and_the_study_its_own(spec: dict[str, Any]) -> None:
