@@ -6,6 +6,9 @@ import re
 from collections.abc import Iterator
 from typing import Final
 
+from sprag.engine.continuation.problem import End
+from sprag.engine.continuation.problem import Kind as Special
+from sprag.engine.vibration_drive.branches import NO_ORBIT
 from sprag.service.actor import Role
 from sprag.service.fault_meanings import KIND_MEANINGS, MEANINGS, WARNING_MEANINGS
 from sprag.service.http.problems import PROBLEM_TYPES
@@ -53,6 +56,8 @@ def vocabulary() -> Iterator[str]:
         yield from filter(None, _of_model(model))
     for codes in (models.ENDING_SENTENCES, models.REGIME_SENTENCES, StudyState, DIRECTIONS):
         yield from map(_term, codes)
+    yield from map(_term, Special)
+    yield from (NO_ORBIT, *(end.sentence for end in End))
     yield from (*models.ENDING_SENTENCES.values(), *models.REGIME_SENTENCES.values())
     yield from (state.sentence for state in StudyState)
     yield from (kind.title for kind in KINDS)

@@ -47,15 +47,14 @@ _SENTENCES = {
     ),
     Ending.INERTIA_INSUFFICIENT: (
         "The inertia is insufficient for the required mean speed: the shaft would stop, or nearly stop, within the "
-        "cycle. The result least_mean_speed is the speed that must be exceeded; a mean over time may have to by "
-        "far."
+        "cycle. The least feasible mean speed, a result, must be exceeded; by a mean over time possibly by far."
     ),
     Ending.UNBALANCED_WORK: (
         "Drive and resistance do not do opposite work over the cycle, so there is no steady motion: scale the drive, "
         "let it be constant, or correct the torques."
     ),
     Ending.CANNOT_ASSEMBLE: (
-        "The mechanism cannot be assembled at every angle of the shaft: the result assembly.angle is the first "
+        "The mechanism cannot be assembled at every angle of the shaft: its result has the first "
         "angle at which its links do not reach each other, or its motions take more than a revolution."
     ),
     Ending.NEGATIVE_INERTIA: "The reduced inertia is not positive at every angle of the shaft.",

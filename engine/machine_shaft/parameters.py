@@ -287,7 +287,7 @@ def parameters(spec: MachineSpec) -> tuple[Parameter, ...]:
             2.0,
             True,
             _INF,
-            "irregularity that determines required_inertia",
+            "irregularity that determines the required inertia",
         ),
         *_drive(spec),
         *(_FLYWHEEL if spec.drive.flywheel else ()),

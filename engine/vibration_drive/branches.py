@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,10 @@ from sprag.engine.vibration_drive.settle import settle
 from sprag.engine.vibration_drive.strobes import BEGIN
 
 Floats = NDArray[np.float64]
+
+
+#: The beginning of what `NoOrbitError` says.
+NO_ORBIT: Final = "the case has no periodic motion of a turning shaft to be followed"
 
 
 class NoOrbitError(ValueError):
@@ -93,7 +98,7 @@ def branch(
     regime, ending = Regime(int(found.regimes[0])), ENDINGS[int(found.endings[0])]
     if regime != Regime.PERIODIC:
         what = ending.sentence if ending != Ending.OK else regime.sentence
-        raise NoOrbitError(f"the case has no periodic motion of a turning shaft to be followed: {what}")
+        raise NoOrbitError(f"{NO_ORBIT}: {what}")
     order = int(found.orders[0])
     kernel = kernel_of(columns, settings.tolerance)
     units = _units(kernel, case_matrix(columns, settings.fine, 1), settings, found.points, order)

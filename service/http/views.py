@@ -12,6 +12,7 @@ from sprag.service.answers.studies import FullProgress, Origin, StudyDetail, Stu
 from sprag.service.faults import warned
 from sprag.service.http.prefix import here
 from sprag.service.presets import ABOUT, preset_text
+from sprag.service.results.fronts import goal_units
 from sprag.service.results.rounds import rounds_json
 from sprag.service.spec.catalogue import axes_json
 from sprag.service.spec.document import format_of, load_spec
@@ -53,15 +54,15 @@ def summary(record: StudyRecord) -> StudySummary:
     )
 
 
-def progress_json(progress: Progress) -> FullProgress:
-    """Progress of a study, its rate and its time left."""
+def progress_json(progress: Progress, units: Sequence[str] = ()) -> FullProgress:
+    """Progress of a study, its rate and its time left; ``units`` are those of the goals of a search."""
     left, covered = progress.seconds_left, progress.covered
     return filled(
         FullProgress,
         progress,
         seconds_left=None if left is None else {"low": left[0], "high": left[1]},
         passes=None if covered is None else asdict(covered),
-        rounds=None if progress.rounds is None else rounds_json(progress.rounds, progress.state),
+        rounds=None if progress.rounds is None else rounds_json(progress.rounds, progress.state, units),
     )
 
 
@@ -76,7 +77,7 @@ def detail(
     """A study with everything; ``record`` and ``progress`` come from one transaction (`Store.look`)."""
     return {
         **summary(record),
-        "progress": progress_json(progress),
+        "progress": progress_json(progress, goal_units(study)),
         "combine": study.combine,
         "axes": axes_json(study),
         "derive": dict(study.derive),

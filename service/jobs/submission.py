@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from sprag.service.faults import FaultError
 from sprag.service.jobs.preview import estimated_bytes, estimated_seconds
-from sprag.service.languages import recorded
+from sprag.service.languages import grouped, recorded
 from sprag.service.schedules.deadline import finish_warnings
 from sprag.service.storage.room import RESERVE_BYTES
 from sprag.service.storage.study_row import study_row
@@ -111,7 +111,7 @@ def take_in(
     if known is not None:
         return known
     if store.waiting_studies() >= MAX_WAITING_STUDIES:
-        raise FaultError("queue-full", recorded.MANY_STUDIES.format(count=f"{MAX_WAITING_STUDIES:,}"))
+        raise FaultError("queue-full", recorded.MANY_STUDIES.format(count=grouped(MAX_WAITING_STUDIES)))
     _require_room(store, made.bytes)
     return store.insert_study(
         made.row,

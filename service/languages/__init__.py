@@ -112,9 +112,8 @@ def decimal(text: str) -> str:
 
 
 def grouped(count: int) -> str:
-    """A whole number with separated thousands: by commas in English, elsewhere by narrow spaces as in ISO 80000."""
-    text = f"{count:,}"
-    return text if current() == ENGLISH else text.replace(",", "\N{NARROW NO-BREAK SPACE}")
+    """A whole number with thousands separated by narrow spaces, as in ISO 80000: a comma would be a decimal mark."""
+    return f"{count:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
 
 
 def date_format() -> str:

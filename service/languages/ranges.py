@@ -34,6 +34,7 @@ def allowed_text(allowed: str | None) -> str:
         text = text[: found.start()] + said + text[found.end() :]
         break
     text = re.sub(r"\band\b", gettext("and"), text)
+    text = re.sub(r"… (\d+) more", lambda found: gettext("… {count} more", count=found[1]), text)
     return re.sub(r"([\d,\N{NARROW NO-BREAK SPACE}]+) characters", lambda found: _characters(found[1]), text)
 
 

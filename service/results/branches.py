@@ -39,6 +39,12 @@ def ranged_axes(study: Study, *, initial: bool = False) -> list[str]:
     return [axis.paths[0] for axis in axes if initial or not any(map(is_initial, axis.paths))]
 
 
+def free_parameters(study: Study, case: int, *, initial: bool = False) -> list[str]:
+    """Paths of the parameters of a case that can be changed alone, with the initial values if ``initial``."""
+    own = case_machine(study, case)
+    return [path for path in own if path not in study.derive and (initial or not is_initial(path))]
+
+
 def usual_along(study: Study) -> str:
     """The parameter along which a branch is usually followed: the first axis with a range; "" where there is none."""
     wanted = ranged_axes(study)
@@ -51,9 +57,7 @@ def along_of(study: Study, case: int, along: str, low: str | None = None, high: 
         axis = study.axis_of(path)
         if any(map(is_initial, (path,) if axis is None else study.axes[axis].paths)):
             message = "is an initial value: a periodic motion does not depend on how it began"
-            own = case_machine(study, case)
-            free = ", ".join(name for name in own if name not in study.derive and not is_initial(name))
-            raise parameter_error("along", "conflict", message, path, free)
+            raise parameter_error("along", "conflict", message, path, ", ".join(free_parameters(study, case)))
     return range_of(study, case, along, low, high, initial=False)
 
 
@@ -84,8 +88,8 @@ def range_of(
     for path in filter(None, (part.strip() for part in along.split(","))):
         if path not in own or path in study.derive:
             message = "is derived from others" if path in study.derive else "is not a numeric parameter of the study"
-            free = [name for name in own if name not in study.derive and (initial or not is_initial(name))]
-            raise parameter_error("along", "unknown-name", message, path, ", ".join(free))
+            free = ", ".join(free_parameters(study, case, initial=initial))
+            raise parameter_error("along", "unknown-name", message, path, free)
         axis = study.axis_of(path)
         paths += [path] if axis is None else study.axes[axis].paths
     if not paths:

@@ -84,6 +84,15 @@ class Designs:
         return {"known": len(self.numbers), "pending": self.pending, **counted}
 
 
+def goal_units(study: Study) -> tuple[str, ...]:
+    """The units of the goals of a search, in their order; none of any other study."""
+    if study.plan is None or study.plan["kind"] != GOAL:
+        return ()
+    plan = goal_of(study)
+    infos = _infos(study, plan)
+    return tuple(infos[goal.name].unit for goal in plan.best)
+
+
 def goal_of(study: Study) -> GoalPlan:
     """The search of a study; FaultError for a study without a goal."""
     if study.plan is None or study.plan.get("kind") != GOAL:

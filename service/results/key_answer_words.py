@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.answers.key import AnswerFacts, AnswerReport, AnswerValue, CurveAnswer, OverallAnswer
+from sprag.service.languages import available, language
 from sprag.service.results import exports
 from sprag.service.results.directions import case_values, in_words
-from sprag.service.results.phrases import Amount, Name, Phrase, joined, plural, term
+from sprag.service.results.phrases import Amount, Name, Phrase, joined, plural, shown, term
 from sprag.service.results.selection import axis_name
 from sprag.service.results.wording import percent
 from sprag.service.spec.catalogue import unit_of
@@ -213,6 +214,16 @@ def curve_name(one: CurveAnswers, study: Study) -> Phrase:
             for path, value in one.line.by.items()
         ),
     )
+
+
+def curve_named(names: Sequence[Phrase], text: str) -> int | None:
+    """The place of the curve that a text names, by its name in any language; None where there is none."""
+    for code in available():
+        with language(code):
+            said = list(map(shown, names))
+        if text in said:
+            return said.index(text)
+    return None
 
 
 def place_text(study: Study, case: int) -> Phrase:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from sprag.service.languages import ENGLISH, current, gettext, ngettext
+from sprag.service.languages import ENGLISH, gettext, language, ngettext
 from sprag.service.results.wording import number, unit_text
 from sprag.worker.models.model import model_of
 
@@ -66,7 +66,9 @@ class Phrase(str):
     @classmethod
     def _made(cls, text: str, plural: tuple[str, int] | None, parts: Mapping[str, Part]) -> Phrase:
         english = text if plural is None or plural[1] == 1 else plural[0]
-        made = super().__new__(cls, _filled(english, {name: _plain(part) for name, part in parts.items()}))
+        with language(ENGLISH):  # the same text whoever reads: programs compare it, and addresses have it
+            plain = _filled(english, {name: _plain(part) for name, part in parts.items()})
+        made = super().__new__(cls, plain)
         made.text, made.plural, made.parts = text, plural, parts
         return made
 
@@ -90,8 +92,8 @@ def term(code: str) -> Phrase:
 
 
 def word(code: str) -> str:
-    """A code name for the reader: as it is in English, its words in other languages."""
-    return code if current() == ENGLISH else shown(term(code))
+    """The words of `term` for the reader: ``not settled``."""
+    return shown(term(code))
 
 
 def meanings(sentences: Mapping[str, str]) -> dict[str, str]:

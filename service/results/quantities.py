@@ -64,6 +64,9 @@ KINDS: Final = (
     Kind("spring_rate", "Spring rate", "N/m", ("N/mm", "kN/m")),
     Kind("damping", "Damping", "N*m*s/rad", ("N*mm*s/rad",)),
 )
+_TORQUE: Final = "N*m"
+#: SI units of the coefficients of a torque over an angle: N*m/rad, N*m/rad^2.
+_COEFFICIENT: Final = re.compile(r"N\*m(/rad(?:\^\d+)?)")
 _BY_NAME: Final = {kind.name: kind for kind in KINDS}
 _BY_UNIT: Final = {kind.unit: kind for kind in KINDS}
 
@@ -92,12 +95,16 @@ class Units:
     chosen: Mapping[str, str] = field(default_factory=dict)
 
     def unit(self, si: str) -> str:
-        """The unit in which quantities of the SI unit are shown."""
+        """The unit in which quantities of the SI unit are shown; of coefficients of a torque that of the torque too."""
+        of_torque = _COEFFICIENT.fullmatch(si)
+        if of_torque is not None:
+            return f"{self.unit(_TORQUE)}{of_torque[1]}"
         return self.chosen.get(si, si)
 
     def value(self, value: float, si: str) -> float:
         """A number in SI in the unit in which it is shown."""
-        return value if si not in self.chosen else value / _size(self.chosen[si], si)
+        unit = self.unit(si)
+        return value if unit == si else value / _size(unit, si)
 
     def cell(self, value: Any, si: str) -> Any:
         """A cell of a table: a number in its unit; texts and missing numbers as they are."""
@@ -105,7 +112,8 @@ class Units:
 
     def values(self, values: NDArray[np.float64], si: str) -> NDArray[np.float64]:
         """The same for an array of any shape."""
-        return values if si not in self.chosen else np.asarray(values / _size(self.chosen[si], si))
+        unit = self.unit(si)
+        return values if unit == si else np.asarray(values / _size(unit, si))
 
     @property
     def text(self) -> str:

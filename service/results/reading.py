@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from markupsafe import Markup
 
 from sprag.service.languages import gettext
-from sprag.service.results.phrases import Name, Phrase
+from sprag.service.results.phrases import Name, Phrase, lower_first
 from sprag.service.results.quantities import SI, Units, units_for
 from sprag.service.results.selection import refused
 from sprag.service.results.wording import number, unit_text
@@ -49,7 +49,8 @@ class Reading:
         """What a path, a result or a variable is called; of tied paths ("a = b") each."""
         if self.names == CODES:
             return name
-        return " = ".join(caption(self.model, part, gettext) for part in name.split(" = "))
+        first, *tied = (caption(self.model, part, gettext) for part in name.split(" = "))
+        return " = ".join([first, *map(lower_first, tied)])
 
     def within(self, name: str) -> str:
         """What it is called within a sentence."""

@@ -5,25 +5,27 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.languages import N_, decimal
-from sprag.service.results.phrases import Phrase, joined, plural
+from sprag.service.results.phrases import Amount, Phrase, joined, plural
 from sprag.service.results.wording import percent
 from sprag.worker.planning.calibrate.plan import CALIBRATE
 from sprag.worker.planning.goals.plan import GOAL
 from sprag.worker.states import StudyState
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from sprag.service.answers.studies import Round, Rounds
     from sprag.service.storage.records import RoundProgress, RoundRecord
 
 
-def rounds_json(rounds: RoundProgress, state: StudyState) -> Rounds:
-    """Where a study stands that is in this state, in short."""
+def rounds_json(rounds: RoundProgress, state: StudyState, units: Sequence[str] = ()) -> Rounds:
+    """Where a study stands that is in this state, in short; ``units`` as for `sentence`."""
     reached = {name: value for name, value in rounds.latest.summary.items() if not isinstance(value, dict | list)}
     return {
         "round": _number(rounds),
         "most": _most(rounds),
         "most_cases": rounds.most_cases,
-        "sentence": sentence(rounds, state),
+        "sentence": sentence(rounds, state, units),
         "state": reached,
     }
 
@@ -39,21 +41,21 @@ def round_json(record: RoundRecord) -> Round:
     }
 
 
-def sentence(rounds: RoundProgress, state: StudyState) -> Phrase:
+def sentence(rounds: RoundProgress, state: StudyState, units: Sequence[str] = ()) -> Phrase:
     """For people: "round 3 of at most 12, error now 2.1 %, asked 1 %", "generation 12 of 60, 240 feasible"; of a queued
-    study "waiting for round 1 of at most 12".
+    study "waiting for round 1 of at most 12". ``units`` are those of the goals of a search, which it has not itself.
     """
-    where, *reached = _parts(rounds)
+    where, *reached = _parts(rounds, units)
     if state is not StudyState.QUEUED:
         return joined(", ", [where, *reached])
     waiting = Phrase("waiting for {where}", where=where)
     return joined(", ", [waiting, *(reached if rounds.latest.round else [])])
 
 
-def _parts(rounds: RoundProgress) -> list[Phrase]:
+def _parts(rounds: RoundProgress, units: Sequence[str]) -> list[Phrase]:
     """Which round it is, then what the rounds have reached."""
     if rounds.latest.summary.get("kind") == GOAL:
-        return _search(rounds.latest.summary)
+        return _search(rounds.latest.summary, units)
     if rounds.latest.summary.get("kind") == CALIBRATE:
         return _calibration(_number(rounds), rounds.latest.summary)
     first = Phrase("round {round} of at most {most}", round=_number(rounds), most=_most(rounds))
@@ -116,14 +118,15 @@ def _calibration(number: int, summary: dict[str, Any]) -> list[Phrase]:
     return parts
 
 
-def _search(summary: dict[str, Any]) -> list[Phrase]:
+def _search(summary: dict[str, Any], units: Sequence[str]) -> list[Phrase]:
     """What a search for designs has reached: "generation 12 of 60", "240 feasible", "best 0.84"."""
     generation, generations, feasible = summary["generation"], summary["generations"], summary["feasible"]
     parts = [Phrase("generation {number} of {most}", number=generation + 1, most=generations)]
     if summary["phase"] != "search":
         parts = [plural("{count} generation", "{count} generations", generation)]
         parts += [] if summary["phase"] == "ended" else [Phrase("polish of equalities")]
-    best = " / ".join(decimal(f"{value:.3g}") for value in summary["best"] if value is not None)
+    reached = zip(summary["best"], units or [""] * len(summary["best"]), strict=True)
+    best = joined(" / ", (Amount(value, unit, 3) for value, unit in reached if value is not None))
     exact = (summary["polish"] or {}).get("met", 0)
     parts.append(Phrase("{count} feasible", count=feasible) if feasible else Phrase("none feasible"))
     if exact:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.languages import ENGLISH, N_, _, current, decimal, gettext, grouped, ngettext
+from sprag.service.languages import N_, _, decimal, gettext, grouped, ngettext
 from sprag.service.results.exports.inputs import inputs as every_input
 from sprag.service.results.exports.inputs import run_inputs
 from sprag.service.results.phrases import lower_first
@@ -30,6 +30,7 @@ _NUMBERED: Final = {
     "steps": N_("Step {number}"),
 }  # fmt: skip
 _NUMBER: Final = re.compile(rf"({'|'.join(_NUMBERED)})\.(\d+)\.")
+_YES_NO: Final = {"true": N_("yes"), "false": N_("no")}
 _COUNT: Final = re.compile(r"(\d+) (period|revolution)s?")
 
 
@@ -41,7 +42,8 @@ def inputs(study: Study, spec: Mapping[str, Any]) -> list[tuple[str, list[dict[s
         section, _dot, name = item.path.rpartition(".")
         symbol = f"c_{int(name) + 1}" if name.isdigit() else "" if entry is None else entry.symbol
         shown = item if item.origin == "derived" else replace(item, value=in_words(item))
-        sections.setdefault(section, []).append({"name": name, "symbol": symbol, "item": shown})
+        code = item.value if _is_code(item.value) and shown is not item else ""
+        sections.setdefault(section, []).append({"name": name, "symbol": symbol, "item": shown, "code": code})
     return [(_section(section), rows) for section, rows in sections.items()]
 
 
@@ -70,7 +72,7 @@ def choice_name(item: Input) -> str:
 
 def in_words(item: Input) -> float | str | None:
     """The value of an input: a choice in words, a count with its unit, a number as it is."""
-    if not isinstance(item.value, str) or current() == ENGLISH:
+    if not isinstance(item.value, str):
         return item.value
     if _COUNT.fullmatch(item.value):
         return _counted(item.value)
@@ -79,7 +81,13 @@ def in_words(item: Input) -> float | str | None:
 
 
 def _in_words(name: str) -> str:
-    return lower_first(gettext(words(name))) if re.fullmatch("[a-z_]+", name) else name
+    if name in _YES_NO:
+        return gettext(_YES_NO[name])
+    return lower_first(gettext(words(name))) if _is_code(name) else name
+
+
+def _is_code(value: float | str | None) -> bool:
+    return isinstance(value, str) and re.fullmatch("[a-z_]+", value) is not None
 
 
 def _counted(text: str) -> str:

@@ -12,13 +12,13 @@ from sprag.service.languages import ENGLISH, N_, current, decimal, gettext, grou
 from sprag.worker import models
 from sprag.worker.models.vocabulary import words
 
-__all__ = ["counted", "duration", "number", "percent", "symbol", "unit_text", "words"]
+__all__ = ["counted", "duration", "number", "percent", "symbol", "typed_text", "unit_text", "words"]
 
-#: Narrow no-break space, the thousands separator of ISO 80000.
-_THIN: Final = "\N{NARROW NO-BREAK SPACE}"
 _RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 #: A name of a unit; words of a sentence around it have none in the catalogues.
 _UNIT: Final = re.compile(r"[A-Za-z]+\d?")
+#: A number of a text, and its unit.
+_QUANTITY: Final = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)(\s?)([A-Za-z][A-Za-z\d*/^-]*)?")
 #: Significant digits of numbers on pages; files and the API have all digits.
 _DIGITS: Final = 5
 _GREEK: Final = {
@@ -41,7 +41,7 @@ def number(value: float | str | None, digits: int = _DIGITS) -> str:
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "–"
     if isinstance(value, int):
-        return f"{value:,}".replace(",", _THIN)
+        return grouped(value)
     text = f"{value:.{digits}g}".replace("-", "−", 1 if value < 0 else 0)
     mantissa, _, exponent = text.partition("e")
     rounded = float(f"{value:.{digits}g}")
@@ -53,7 +53,7 @@ def number(value: float | str | None, digits: int = _DIGITS) -> str:
 
 
 def _grouped(value: float) -> str:
-    return f"{value:,.0f}".replace(",", _THIN).replace("-", "−")
+    return grouped(round(value)).replace("-", "−")
 
 
 def unit_text(unit: str | None) -> str:
@@ -67,6 +67,13 @@ def unit_text(unit: str | None) -> str:
     return raised.replace("*", "·")
 
 
+def typed_text(text: str) -> str:
+    """A quantity, or several, as somebody types them: ``0.3 deg`` as ``0,3 град``; words around them stay."""
+    if current() == ENGLISH:
+        return text
+    return _QUANTITY.sub(lambda found: f"{decimal(found[1])}{found[2]}{unit_text(found[3] or '')}", text)
+
+
 def symbol(text: str) -> Markup:
     """A symbol of the model with its index, as in print."""
     base, _, index = text.partition("_")
@@ -77,7 +84,7 @@ def symbol(text: str) -> Markup:
 
 
 def counted(value: int, noun: str) -> str:
-    """How many there are: "1 drive", "1,000 drives"; ``noun`` is one of `NOUNS`, whose plural has an s."""
+    """How many there are: "1 drive", "1 000 drives"; ``noun`` is one of `NOUNS`, whose plural has an s."""
     one, many = f"{{n}} {noun}", f"{{n}} {noun}s"
     return ngettext(one, many, value, n=grouped(value))
 

@@ -7,7 +7,7 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Any, Final
 
-from sprag.service.languages import N_, gettext, ngettext
+from sprag.service.languages import N_, gettext, grouped, ngettext
 from sprag.service.languages.recorded import said
 
 
@@ -89,7 +89,7 @@ class Outcome:
     def sentence(self) -> str:
         """The outcome in one or two sentences."""
         numbers = {"cases": self.cases, "done": self.done, "ok": self.ok}
-        shown = {name: f"{number:,}" for name, number in numbers.items()}
+        shown = {name: grouped(number) for name, number in numbers.items()}
         first = gettext(_SENTENCES[self.result])
         if self.study is None or self.result is Result.FAILED:
             first += f": {said(self.reason)}" if self.reason else ""
@@ -108,7 +108,7 @@ class Outcome:
                     "{count} due time before it was not run",
                     "{count} due times before it were not run",
                     self.missed,
-                    count=f"{self.missed:,}",
+                    count=grouped(self.missed),
                 )
             )
         return " ".join(part if part.endswith(".") else f"{part}." for part in parts)

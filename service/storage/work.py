@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import sqlalchemy as sa
 
-from sprag.service.languages import recorded
+from sprag.service.languages import grouped, recorded
 from sprag.service.storage.dispatchers import WAITING, return_claims
 from sprag.service.storage.part import add_chunks, moment, optional_moment
 from sprag.service.storage.round_table import add_round, latest_round
@@ -162,8 +162,8 @@ class Work(Storing):
                     part = done_rounds if rounds else recorded.NO_ROUND
                 reason = (recorded.LATE_PART if part else recorded.LATE).format(
                     time=moment(finish_by).isoformat(timespec="seconds"),
-                    done=f"{done:,}",
-                    cases=f"{cases:,}",
+                    done=grouped(done),
+                    cases=grouped(cases),
                     part=part,
                 )
                 if not paused:

@@ -9,6 +9,8 @@ from typing import Final
 
 from sprag.worker.models.model import model_of
 from sprag.worker.models.parameters import general_path, model_parameter
+from sprag.worker.spread import DRIVE
+from sprag.worker.sweeps import SWEEP
 
 _HALF_WIDTH: Final = ".half_width"
 #: Caption of the half width of a mean.
@@ -65,7 +67,8 @@ def caption_texts(model: str) -> list[str]:
     names = [entry.path for entry in known.parameters()] + [info.name for info in known.result_catalogue()]
     own = (name for name in names if not name.endswith(_HALF_WIDTH))
     found = [*known.presentation.captions.values(), *(_caption(model, name)[0] for name in own)]
-    return list(dict.fromkeys([HALF_WIDTH, *(word for _, word in _PARTS), *found]))
+    axes = map(words, (DRIVE, SWEEP))  # of no machine
+    return list(dict.fromkeys([HALF_WIDTH, *(word for _, word in _PARTS), *axes, *found]))
 
 
 def _own(name: str) -> tuple[str, tuple[str, str] | None]:

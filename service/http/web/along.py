@@ -9,7 +9,8 @@ from fastapi import Query
 
 from sprag.service.http.reading import read_as
 from sprag.service.http.web.study import study_frame
-from sprag.service.results.branches import ranged_axes
+from sprag.service.languages import _
+from sprag.service.results.branches import free_parameters, ranged_axes
 from sprag.service.results.selection import axis_name
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def along_frame(
 ) -> dict[str, Any]:
     """What the template of these pages shows around their figures.
 
-    ``entered`` are the fields of their form, which offers the axes, those of initial values only if ``initial``.
+    ``entered`` are the fields of their form, which offers initial values only if ``initial``.
     """
     return {
         **study_frame(context, study_id),
@@ -43,8 +44,16 @@ def along_frame(
         "start": "" if start is None else str(start),
         "read_as": read_as(),
         "own": f"/studies/{study_id}/cases/{case}",
-        "choices": [(path, axis_name(study, path)) for path in ranged_axes(study, initial=initial)],
+        "choices": _choices(study, case, initial=initial),
     }
+
+
+def _choices(study: Study, case: int, *, initial: bool) -> list[tuple[str, list[tuple[str, str]]]]:
+    """The parameters to choose from, axes of the study first: for each group a path and a name of each."""
+    axes = {path: axis_name(study, path) for path in ranged_axes(study, initial=initial)}
+    on_axes = {path for name in axes.values() for path in name.split(" = ")}
+    others = [(path, path) for path in free_parameters(study, case, initial=initial) if path not in on_axes]
+    return [(_("Axes of the study"), list(axes.items())), (_("Other parameters"), others)]
 
 
 def query_of(asked: dict[str, str], start: int | None) -> str:

@@ -31,7 +31,6 @@ from sprag.service.results.selection import SelectionError, refused
 from sprag.service.results.tolerances.batch import Asked
 from sprag.service.results.tolerances.conditions import first_condition
 from sprag.service.results.tolerances.ribbons import MOST_QUANTILES, QUANTILES
-from sprag.service.results.tolerances.written import percent
 from sprag.worker import models
 from sprag.worker.spread import DRIVE
 
@@ -99,7 +98,7 @@ def _page(
         asked=asked,
         y=ribbon.y,
         # What was refused stays in its field.
-        quantiles=(faults and given.get("quantile")) or ", ".join(map(percent, ribbon.quantiles)),
+        quantiles=(faults and given.get("quantile")) or ", ".join(f"{100.0 * p:g} %" for p in ribbon.quantiles),
         conditions=(faults and given.get("condition")) or "\n".join(wanted.conditions),
         axes=axis_choices(study),
         results=[info for info in models.study_results(study) if info.kind != "category"],
@@ -107,6 +106,7 @@ def _page(
         result_units={info.name: info.unit for info in models.study_results(study)},
         ribbon=found and found[0],
         reached=found and found[1],
+        wanted=[frame["reading"].say(one["text"]) for one in found[1]["conditions"]] if found else [],
         ribbon_figure=f"{own}/figures/ribbon?{drawn}{read_as()}",
         yield_figure=f"{own}/figures/yield?{reached}{read_as()}",
         ribbon_files=f"{views.study_address(study_id)}/ribbon?{drawn}{file_read_as()}",

@@ -16,13 +16,13 @@ from sprag.service.jobs.key_answers import answers_of
 from sprag.service.jobs.reading import reading_of
 from sprag.service.languages import decimal
 from sprag.service.results.choice import curve_query, pairs_of, value_choices
-from sprag.service.results.key_answer_words import answer_facts, curve_name, note_of, place_text
+from sprag.service.results.key_answer_words import answer_facts, curve_name, curve_named, note_of, place_text
 from sprag.service.results.key_answers import answers_query
 from sprag.service.results.pictures.curves import MAX_PICTURE_POINTS
 from sprag.service.results.selection import SelectionError
 from sprag.service.results.wording import unit_text
 from sprag.service.spec.catalogue import unit_of
-from sprag.service.spec.units import has_unit, split_quantity
+from sprag.service.spec.units import split_quantity, to_float
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from sprag.service.jobs.checks import Library
     from sprag.service.results.curves import CurveQuery
     from sprag.service.results.key_answers import CurveAnswers, Found, StudyAnswers
+    from sprag.service.results.phrases import Phrase
     from sprag.service.results.reading import Choice, Reading
     from sprag.worker.study import Study
 
@@ -71,7 +72,7 @@ class AnswersView:
     query : the curves; None where the cases lie on none
     point : the working point as typed, otherwise its SI number; ``unit`` is its unit
     place : the working point that is shown, with a unit
-    chosen : place of the curve whose answers are shown, of the ``names`` of all curves
+    chosen : place of the curve whose answers are shown, of the ``names`` of all curves; ``codes`` in addresses
     tiles, here : its answers, and its main results at the working point
     family : the answers of all curves, where there are several
     overall : extremes among all cases
@@ -86,7 +87,8 @@ class AnswersView:
     place: str = ""
     unit: str = "1"
     chosen: int = 0
-    names: list[str] = field(default_factory=list)
+    names: list[Phrase] = field(default_factory=list)
+    codes: list[str] = field(default_factory=list)
     tiles: list[Tile] = field(default_factory=list)
     here: list[Tile] = field(default_factory=list)
     family: list[FamilyRow] = field(default_factory=list)
@@ -149,8 +151,9 @@ def _view(
     reading: Reading,
     choice: Choice,
 ) -> AnswersView:
-    names: list[str] = [*(curve_name(one, study) for one in found.curves)]
-    chosen = names.index(curve) if curve in names else _usual_curve(study, found)
+    names = [curve_name(one, study) for one in found.curves]
+    asked_for = curve_named(names, curve)
+    chosen = _usual_curve(study, found) if asked_for is None else asked_for
     one = found.curves[chosen] if found.curves else None
     overall = [_tile(item, found.unit, reading, study) for item in found.overall if item.value is not None]
     if one is None:
@@ -173,10 +176,11 @@ def _view(
         faults,
         found.query,
         point or usual,
-        _as_read(used, unit),
+        _as_read(used, unit) if used else "",
         unit,
         chosen,
         names,
+        list(map(str, names)),
         tiles,
         here,
         [
@@ -193,11 +197,9 @@ def _view(
 
 
 def _as_read(text: str, unit: str) -> str:
-    """A working point as people read it; a bare number is in ``unit``."""
-    if not has_unit(text):
-        return f"{decimal(text)} {unit_text(unit)}".strip()
-    own = split_quantity(text)[1]
-    return f"{decimal(text.removesuffix(own).strip())} {unit_text(own)}" if text.endswith(own) else text
+    """A working point, typed in any language, as its reader has it; a bare number is in ``unit``."""
+    value, own = split_quantity(text)
+    return f"{decimal(f'{to_float(value):.10g}')} {unit_text(own or unit)}".strip()
 
 
 def _usual_curve(study: Study, found: StudyAnswers) -> int:

@@ -27,7 +27,7 @@ from sprag.service.languages import N_, recorded
 from sprag.service.languages.ranges import allowed_text
 from sprag.service.results.fault_texts import fault_text, warning_text
 from sprag.service.results.phrases import Phrase, model_title, shown, titled, word
-from sprag.service.results.wording import counted, duration, number, symbol, unit_text
+from sprag.service.results.wording import counted, duration, number, symbol, typed_text, unit_text
 from sprag.service.schedules.times import wall_clock
 from sprag.worker.models import WarningText
 
@@ -104,6 +104,7 @@ def _templates() -> Environment:
         "number": cell,
         "counted": counted,
         "decimal": languages.decimal,
+        "typed": typed_text,
         "unit": unit_text,
         "spec": spec_text,
         "marked": marked,

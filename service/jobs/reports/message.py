@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, Final
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from sprag.service.json_text import timestamp, to_bytes
-from sprag.service.languages import ENGLISH, N_, _, current, language, ngettext
+from sprag.service.languages import ENGLISH, N_, _, current, grouped, language, ngettext
 from sprag.service.languages.recorded import said
-from sprag.service.results.phrases import titled
+from sprag.service.results.phrases import shown, term
 from sprag.service.schedules.outcomes import Outcome
 from sprag.service.schedules.times import wall_clock
 
@@ -43,7 +43,7 @@ def subject(content: dict[str, Any]) -> str:
     outcome = content.get("outcome")
     result = _("did not run") if outcome is None else _(outcome["result"])
     if outcome is not None and outcome["cases"]:
-        cases = {"ok": f"{outcome['ok']:,}", "cases": f"{outcome['cases']:,}"}
+        cases = {"ok": grouped(outcome["ok"]), "cases": grouped(outcome["cases"])}
         result = _("{result}, {ok} of {cases} cases ok", result=result, **cases)
     name = content["name"] or content["schedule"]
     if outcome is None or outcome["trouble"]:
@@ -78,11 +78,11 @@ def facts(content: dict[str, Any]) -> Iterator[Fact]:
 
 
 def _words(code: str) -> str:
-    return code if current() == ENGLISH else titled(code).lower()
+    return shown(term(code))
 
 
 def _cases(count: int) -> str:
-    return ngettext("{count} case", "{count} cases", count, count=f"{count:,}")
+    return ngettext("{count} case", "{count} cases", count, count=grouped(count))
 
 
 def links(content: dict[str, Any], public_url: str) -> dict[str, str]:

@@ -46,9 +46,9 @@ class Input:
 def description_of(study: Study, path: str) -> str:
     """A short description of a flat path of a spec; "" where the catalogue does not contain it."""
     if path == DRIVE:
-        return "number of the drive; 0 is the nominal one"
+        return N_("number of the drive; 0 is the nominal one")
     if path == SWEEP:
-        return "direction of the sweep"
+        return N_("direction of the sweep")
     entry = parameter_of(study, path)
     return "" if entry is None else entry.help
 

@@ -44,7 +44,11 @@ def branch_figure(made: CaseBranch, study: Study, along: Along, result: str, own
     column = made.names.index(result)
     y = Quantity(result, made.units[column])
     if not made.order:
-        return Figure(x, (Panel(y, (), x=x),), note=Phrase("There is no branch: {why}", why=made.note))
+        return Figure(
+            x,
+            (Panel(y, (), x=x),),
+            note=Phrase("There is no branch: {why}", why=joined(": ", map(Phrase, made.note.split(": ", 1)))),
+        )
     values = made.values[:, column]
     full = stable_segments(made)
     lines = [
@@ -112,7 +116,7 @@ def special_text(special: SpecialPoint, unit: str) -> str:
     changes = [
         Phrase(
             "{part} {state} {before} → {after}",
-            part=contact.part,
+            part=_part_text(contact.part),
             state=term(contact.state),
             before=str(contact.before),
             after=str(contact.after),
@@ -120,6 +124,12 @@ def special_text(special: SpecialPoint, unit: str) -> str:
         for contact in special.contacts
     ]
     return joined(": ", (text, joined(", ", changes))) if changes else text
+
+
+def _part_text(part: str) -> Phrase:
+    """What a part of the machine is called: ``pendulum 0`` of ``pendulums.0``."""
+    kind, _, number = part.rpartition("s.")
+    return Phrase("{part} {number}", part=Phrase(kind), number=number) if kind else Phrase(part)
 
 
 def _below(made: CaseBranch) -> str:

@@ -28,7 +28,7 @@ def read_figure(figure: Figure, reading: Reading) -> Figure:
         },
         states=reading.say(figure.states),
         heading=reading.say(figure.heading),
-        scale=figure.scale and reading.caption(figure.scale),
+        scale=figure.scale and reading.say_name(figure.scale),
         note=reading.say(figure.note),
         below=reading.say(figure.below),
         at=None if figure.at is None else reading.value(figure.at, x),

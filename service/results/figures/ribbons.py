@@ -159,7 +159,7 @@ def yield_figure(found: Yield) -> Figure:
         lines.append(Line(text or Phrase("yield"), x, 100.0 * share.value, colour, key=str(at), cases=one.line.cases))
     known = any(np.isfinite(one.each.value).any() for one in found.lines)
     panel = Panel(Quantity(Phrase("yield"), "%"), tuple(lines), fills=tuple(fills))
-    wanted = ", ".join(condition.text for condition in found.conditions)
+    wanted = joined(", ", (condition.text for condition in found.conditions))
     return Figure(
         Quantity(places.names[places.x], places.units[places.x]),
         (panel,),

@@ -20,6 +20,7 @@ from sprag.service.results.exports.inputs import Input, inputs
 from sprag.service.results.exports.source import given_texts
 from sprag.service.results.figures.answers import answers_figure
 from sprag.service.results.figures.clutch import clutch_figure
+from sprag.service.results.fronts import goal_units
 from sprag.service.results.key_answer_words import answer_facts, curve_name, note_of, said_title
 from sprag.service.results.key_answers import answers_query, find_answers
 from sprag.service.results.phrases import model_title, shown
@@ -153,7 +154,10 @@ def report_of(
     rows = partial(store.rows_for_cases, study_id)
     return replace(
         report,
-        facts=(*report.facts, (_("rounds"), report.reading.say(sentence(progress.rounds, record.state)))),
+        facts=(
+            *report.facts,
+            (_("rounds"), report.reading.say(sentence(progress.rounds, record.state, goal_units(study)))),
+        ),
         calibration=calibration_part(study, store.rounds(study_id), rows),
     )
 

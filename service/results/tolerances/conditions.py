@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
+from sprag.service.results.phrases import Amount, Name, Phrase, term
 from sprag.service.results.selection import listed, numeric_results, refused
 from sprag.service.spec.catalogue import result_of
 from sprag.service.spec.units import QuantityError, parse_quantity, plain_signs, split_quantity, to_float
@@ -58,7 +59,7 @@ class Condition:
     kind: Kind
     limit: float
     of_nominal: bool
-    text: str
+    text: Phrase
 
     def margins(self, values: Numbers, nominal: Numbers) -> Numbers:
         """How far results are within the limit, relative to it: negative outside, -inf without a result.
@@ -98,17 +99,19 @@ def _read(infos: Sequence[ResultInfo], text: str) -> Condition:
     if kind == "is" and info.kind != "count":
         message = f"{name} is a real number, which equals no value exactly"
         raise refused("condition", "invalid-choice", message, text, allowed=">= and <=")
-    share = _PART.fullmatch(value)
+    given = _PART.fullmatch(value)
     try:
-        if share is not None:
-            part = to_float(split_quantity(share[1])[0]) / 100.0
-            shown = f"{info.name} {_SHOWN[kind]} {100.0 * part:g} % of nominal"
+        if given is not None:
+            part = to_float(split_quantity(given[1])[0]) / 100.0
+            share = Amount(100.0 * part, "1", bare=True)
+            shown = Phrase("{name} {sign} {share} % of nominal", name=_name(info), sign=_SHOWN[kind], share=share)
             return Condition(info, kind, part, True, shown)
         number, unit = split_quantity(value)
         limit = parse_quantity(value, info.unit) if unit else to_float(number)
     except QuantityError as error:
         raise refused("condition", error.code, f"{name} {error}", text, unit=info.unit) from error
-    shown = f"{info.name} {_SHOWN[kind]} {limit:.6g}" + ("" if info.unit == "1" else f" {info.unit}")
+    amount = Amount(limit, info.unit, 6)
+    shown = Phrase("{name} {sign} {limit}", name=_name(info), sign=_SHOWN[kind], limit=amount)
     return Condition(info, kind, limit, False, shown)
 
 
@@ -116,4 +119,9 @@ def _category(info: ResultInfo, kind: Kind, value: str, text: str) -> Condition:
     if kind != "is" or value not in info.categories:
         allowed = f"{info.name} = one of {listed(info.categories)}"
         raise refused("condition", "invalid-choice", "is not a category of this result", text, allowed=allowed)
-    return Condition(info, kind, float(info.categories.index(value)), False, f"{info.name} = {value}")
+    shown = Phrase("{name} = {value}", name=_name(info), value=term(value))
+    return Condition(info, kind, float(info.categories.index(value)), False, shown)
+
+
+def _name(info: ResultInfo) -> Name:
+    return Name(info.name, within=True)

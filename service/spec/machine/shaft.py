@@ -32,7 +32,7 @@ FIELDS: Final = (
     "cycle", "mean_speed", "mean_speed_is", "drive", "mechanism", "operation", "parts", "balance", "balance_side",
     "phi_c", "constants", "wanted_irregularity", "friction_torque", "gravity",
 )  # fmt: skip
-_MEAN_HELP: Final = "which mean of the speed mean_speed and the irregularity refer to"
+_MEAN_HELP: Final = "which mean of the speed the given mean speed and the irregularity refer to"
 MEAN_SPEED_IS: Final = choice("mean_speed_is", _MEAN_HELP, "midrange", "angle", "time", default="midrange")
 _INDEXED = re.compile(r"(?:parts\.[0-9]{1,9}\.)?(operation\.steps|drive\.stages)\.([0-9]{1,9})\.")
 _PART: Final = re.compile(r"parts\.([0-9]{1,9})\.")

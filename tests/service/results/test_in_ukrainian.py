@@ -15,14 +15,18 @@ from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.languages.elsewhere import speak
 from sprag.service.languages.ranges import allowed_text
 from sprag.service.results.fault_texts import fault_text, warning_text
+from sprag.service.results.figures.branch import special_text
 from sprag.service.results.figures.figure import Figure, Line, Note, Panel, Quantity
 from sprag.service.results.figures.orders import motion_text
 from sprag.service.results.figures.read import read_figure
+from sprag.service.results.key_answer_words import curve_named
 from sprag.service.results.phrases import Amount, Phrase, joined, part_label, plural, shown, term, titled
 from sprag.service.results.pictures.curves import draw_figure
 from sprag.service.results.reading import CODES, Reading
+from sprag.service.results.tolerances.conditions import read_conditions
 from sprag.service.results.wording import unit_text
-from sprag.worker.models import WarningText
+from sprag.worker.models import ResultInfo, WarningText
+from sprag.worker.models.branches import BranchContact, SpecialPoint
 
 DRIVE, SHAFT = Reading("vibration-drive"), Reading("machine-shaft")
 
@@ -33,10 +37,11 @@ def test_a_phrase_is_english_until_it_is_said_in_another_language() -> None:
         assert phrase == "3 jumps, each within 0.25 N·m"
         assert phrase.said(DRIVE) == "3 стрибки, кожен у межах 0,25 Н·м"
         assert pickle.loads(pickle.dumps(phrase)).said(DRIVE) == phrase.said(DRIVE)
-        assert Phrase("no case at {x}", x=Amount(1.5, "rad/s")).said(DRIVE) == "немає випадку при 1,5 рад/с"
+        assert Phrase("no case at {x}", x=Amount(1.5, "rad/s")).said(DRIVE) == "немає випадку за 1,5 рад/с"
         assert joined("; ", (term("not_settled"), Phrase("± {width} (95 %)", width=Amount(0.5, "W")))).said(DRIVE) == (
             "не усталено; ± 0,5 Вт (95 %)"
         )
+        assert Phrase("{low} m", low=Amount(0.25, "N*m")) == "0.25 N·m m", "the same for programs in every language"
     assert phrase.said(DRIVE) == phrase
 
 
@@ -59,6 +64,10 @@ def test_captions_are_made_of_translated_parts() -> None:
         assert DRIVE.within("shaft.load") == "момент навантаження"
         assert DRIVE.title("shaft.load", "N*m") == "Момент навантаження (Н·м)"
         assert replace(DRIVE, names=CODES).caption("shaft.load") == "shaft.load"
+        assert DRIVE.caption("sweep") == "Прохід"
+        tied = "excitation.amplitude_x = excitation.amplitude_y"
+        assert DRIVE.caption(tied) == "Горизонтальна амплітуда = вертикальна амплітуда"
+    assert DRIVE.caption(tied) == "Horizontal amplitude = vertical amplitude"
     assert DRIVE.caption("pendulums.1.spring_rate") == "Spring rate, pendulum 1"
 
 
@@ -87,7 +96,27 @@ def test_figures_are_read_in_the_language_for_both_painters() -> None:
         assert {trace["name"] for trace in drawn["data"]} >= {"найбільше на своїй кривій"}
         assert "випадок %{customdata}" in drawn["data"][0]["hovertemplate"]
         assert draw_figure(read_figure(figure, DRIVE), "", "svg") != english
-    assert "separators" not in plotly_figure(read_figure(figure, DRIVE))["layout"]
+    assert plotly_figure(read_figure(figure, DRIVE))["layout"]["separators"] == ".\N{NARROW NO-BREAK SPACE}"
+
+
+def test_special_points_conditions_and_scales_are_in_words() -> None:
+    grazing = SpecialPoint("grazing", "", 0.25, 0, (), (BranchContact("pendulums.0", "engaged", 0, 1),))
+    (condition,) = read_conditions([ResultInfo("efficiency", "1", "")], ["efficiency >= 90 % of nominal"])
+    strobes = Figure(Quantity("", "1"), (), scale=Phrase("excitation period"))
+    assert condition.text == "efficiency ≥ 90 % of nominal"
+    assert special_text(grazing, "N*m") == "grazing at 0.25 N·m: pendulum 0 engaged 0 → 1"
+    with languages.language("uk"):
+        assert DRIVE.say(special_text(grazing, "N*m")) == "дотик за 0,25 Н·м: маятник 0 зчеплена 0 → 1"
+        assert DRIVE.say(condition.text) == "ККД ≥ 90 % від номінального"
+        assert read_figure(strobes, DRIVE).scale == "Період збудження"
+
+
+def test_a_curve_is_named_in_addresses_the_same_by_all_readers() -> None:
+    names = [Phrase("{value}", value=Amount(value, "m")) for value in (0.001, 0.002)]
+    for code, text in (("en", "0.002 m"), ("uk", "0.002 m"), ("en", "0,002 м"), ("uk", "0,002 м")):
+        with languages.language(code):
+            assert curve_named(names, text) == 1
+    assert curve_named(names, "0.003 m") is None
 
 
 def test_every_ending_has_a_sentence_of_its_own() -> None:

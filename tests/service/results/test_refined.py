@@ -18,6 +18,8 @@ from sprag.service.results.defaults import completed, main_query
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.figure import BANDS, Figure, Line
 from sprag.service.results.pictures.curves import paint_figure, painting
+from sprag.service.results.quantities import Units
+from sprag.service.results.reading import Reading
 from sprag.service.results.report.content import report_of
 from sprag.service.results.rounds import sentence
 from sprag.service.results.wording import percent
@@ -226,6 +228,14 @@ def test_a_sentence_says_when_the_bound_of_cases_ended_the_rounds() -> None:
     assert (
         sentence(RoundProgress(going, 5, 9), StudyState.RUNNING) == "round 2 of at most 5, error now 2.1 %, asked 1 %"
     )
+
+
+def test_the_best_values_of_a_search_have_their_units() -> None:
+    summary = {"kind": "goal", "phase": "search", "generation": 1, "generations": 9, "feasible": 4, "polish": None}
+    record = RoundRecord(1, range(3, 5), {**summary, "best": [51.28, 0.25]}, datetime(2026, 1, 1, tzinfo=UTC))
+    told = sentence(RoundProgress(record, 9, 36), StudyState.RUNNING, ("rad/s", "1"))
+    assert told == "generation 2 of 9, 4 feasible, best 51.3 rad/s / 0.25"
+    assert told.said(Reading("vibration-drive", Units({"rad/s": "rpm"}))).endswith("best 490 rpm / 0.25")
 
 
 def test_a_queued_study_waits_for_its_round() -> None:

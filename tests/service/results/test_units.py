@@ -161,6 +161,15 @@ def test_units_are_as_typed_unless_others_are_chosen() -> None:
     assert (mixed.unit("Hz"), mixed.unit("rad/s"), mixed.unit("m")) == ("Hz", "rpm", "mm")
 
 
+def test_coefficients_of_a_torque_have_its_unit() -> None:
+    units = Units({"N*m": "N*mm"})
+    assert [units.unit(si) for si in ("N*m", "N*m/rad", "N*m/rad^3", "N*m*s/rad")] == [
+        "N*mm", "N*mm/rad", "N*mm/rad^3", "N*m*s/rad"
+    ]  # fmt: skip
+    assert units.value(2.5, "N*m/rad^3") == pytest.approx(2500.0)
+    assert Units().unit("N*m/rad") == "N*m/rad"
+
+
 def test_a_bare_unit_is_of_the_first_kind_that_has_it() -> None:
     assert read_units("rpm, mm, N·mm") == (False, {"rad/s": "rpm", "m": "mm", "N*m": "N*mm"})
     assert read_units("typed") == (True, {})

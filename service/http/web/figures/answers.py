@@ -25,7 +25,7 @@ from sprag.service.results.figures.orders import motion_text
 from sprag.service.results.figures.portrait import portrait_figure
 from sprag.service.results.figures.read import read_figure, read_map
 from sprag.service.results.figures.ribbons import ribbon_figure, yield_figure
-from sprag.service.results.key_answer_words import curve_name
+from sprag.service.results.key_answer_words import curve_name, curve_named
 from sprag.service.results.wording import number
 from sprag.worker import models
 
@@ -67,8 +67,8 @@ def answers_json(
     found = answers_of(library, study_id, query, point)
     if found.drawn is None:
         return to_bytes({"data": [], "layout": {}})
-    names: list[str] = [*(curve_name(one, library.store.study(study_id)) for one in found.curves)]
-    chosen = names.index(curve) if curve in names else None
+    study = library.store.study(study_id)
+    chosen = curve_named([curve_name(one, study) for one in found.curves], curve)
     return to_bytes(_drawn(library, study_id, answers_figure(found, columns, chosen=chosen), choice))
 
 

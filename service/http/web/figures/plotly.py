@@ -139,9 +139,8 @@ def plotly_figure(figure: Figure) -> Data:
 
 
 def separators() -> Data:
-    """The decimal mark of the language and the sign between thousands, where they are not those of plotly."""
-    mark = decimal(".")
-    return {} if mark == "." else {"separators": f"{mark}\N{NARROW NO-BREAK SPACE}"}
+    """The decimal mark of the language and the sign between thousands."""
+    return {"separators": f"{decimal('.')}\N{NARROW NO-BREAK SPACE}"}
 
 
 def _motion_title(figure: Figure) -> str:

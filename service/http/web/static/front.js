@@ -116,7 +116,7 @@
       const label = document.createElement("label"), input = document.createElement("input");
       input.type = "number";
       input.step = "any";
-      input.placeholder = short(limit);
+      input.placeholder = sprag.decimal(short(limit));
       input.addEventListener("input", update);
       axis.inputs.push(input);
       label.append(`${word} `, input);

@@ -10,6 +10,7 @@ sprag.prefix = document.documentElement.dataset.prefix;
 // with the decimal mark of the language.
 (() => {
   const data = document.getElementById("texts"), texts = data ? JSON.parse(data.textContent) : {};
+  sprag.texts = texts;
   sprag.say = (text, values = {}) => (texts[text] ?? text).replace(/\{(\w+)\}/g, (place, name) => values[name] ?? place);
   sprag.decimal = (text) => text.replace(".", texts["."] ?? ".");
 })();

@@ -76,6 +76,7 @@ sprag.themed = (figure, width) => {
 };
 
 sprag.config = {
+  locale: "page", locales: { page: { dictionary: sprag.texts } }, // what its buttons say
   responsive: true, displaylogo: false, showLink: false, showSendToCloud: false, plotlyServerURL: "",
   modeBarButtonsToRemove: ["toImage", "select2d", "lasso2d", "sendChartToCloud"],
 };

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 from html.parser import HTMLParser
@@ -15,6 +16,7 @@ from sprag.service.http.web import manual
 from sprag.service.languages.catalogue import Catalogue, Entry, Key
 from sprag.service.spec.described import ANY_RUN, SETTLED_RUN
 from sprag.service.spec.machine.choices import MEANINGS
+from sprag.worker.models import ENDING_SENTENCES, REGIME_SENTENCES
 from sprag.worker.models.model import all_models
 from tests.service.http.web.test_accessibility import LONG, PAGES, studies
 
@@ -30,18 +32,20 @@ _CODE = {"code", "pre", "script", "style", "kbd", "i", "sub", "textarea"}
 _EMPTY = {"meta", "link", "input", "img", "br", "col", "hr", "path", "circle", "line", "rect", "polyline"}
 _ATTRIBUTES = ("title", "aria-label", "placeholder", "alt")
 _WORD = re.compile(r"[A-Za-z]{3,}")
+_PLACE = re.compile(r"%\(\w+\)s|\{\w+[^{}]*\}")
 _BRACKETS = re.compile(r"⟦[^⟦⟧]*⟧")
 #: Names, formats, units and code names, which are the same in all languages.
 _SAME = re.compile(
     r"\b(Sprag|UTC|csv|json|svg|png|pdf|html|xlsx|netcdf|parquet|arrow|jsonl|curl|JSON|TOML|CSV|PDF|HTML|SVG|PNG|"
     r"English|Українська|JavaScript|rpm|deg|min|rad|lbf|bar|kPa|MPa|cos|πft|sin|"
-    r"[a-z_][a-z_0-9]*(\.\w+)+|[sv][ctw]_[0-9a-f]{16}|[0-9a-f]{64}|[A-Z]\w+(/[A-Z]\w+)+)\b|\[[^\[\]]*\]|,sigma$|"
+    r"[a-z_][a-z_0-9]*(\.\w+)+|[sv][ctw]_[0-9a-f]{16}|[0-9a-f]{12}|[0-9a-f]{64}|[A-Z]\w+(/[A-Z]\w+)+)\b|\[[^\[\]]*\]|,sigma$|"
     r"; efficiency$"
 )
 #: Code names in one word, which a title has beside the caption of an element.
-_NAMES = {*MEANINGS, *SETTLED_RUN, *ANY_RUN, "duration"}
+_CHOICES = {"slider_crank", "force", "angle", "steps", "constant", "midrange", "resisting", "none"}
+_NAMES = {*MEANINGS, *SETTLED_RUN, *ANY_RUN, *ENDING_SENTENCES, *_CHOICES, "duration"}
 for _model in all_models():
-    _NAMES.add(_model.name)
+    _NAMES |= {_model.name, *_model.flags}
     _NAMES |= {*(entry.path for entry in _model.parameters()), *(info.name for info in _model.result_catalogue())}
 
 
@@ -81,16 +85,21 @@ def rest_of(part: str) -> bool:
     return bool(_WORD.search(_SAME.sub("", part)))
 
 
+def around(text: str) -> str:
+    """A text in brackets, its places outside them: what is put there has to be in brackets itself."""
+    return f"⟦{_PLACE.sub(lambda place: f'⟧{place[0]}⟦', text)}⟧"
+
+
 @pytest.fixture
 def bracketed(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A language in which each text of the catalogues is in brackets, whose inside may hold bracketed texts, too."""
     keep = {"decimal mark", "date"}
     entries = {
-        key: Entry((key.text if key.context in keep or not _WORD.search(key.text) else f"⟦{key.text}⟧",) * count, many)
+        key: Entry((key.text if key.context in keep or not _WORD.search(key.text) else around(key.text),) * count, many)
         for key, many in texts().items()
         for count in [2 if many else 1]
     }
-    entries |= {key: Entry((f"⟦{key.text}⟧", f"⟦{many}⟧"), many) for key, many in texts().items() if many}
+    entries |= {key: Entry((around(key.text), around(many)), many) for key, many in texts().items() if many}
     entries[Key("English", "name of this language")] = Entry(("Bracketed",))
     made_up = Catalogue("Plural-Forms: nplurals=2; plural=(n != 1);\n", entries)
     real, known = languages.catalogue, languages.available()
@@ -99,6 +108,27 @@ def bracketed(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     languages.titles.cache_clear()
     yield
     languages.titles.cache_clear()
+
+
+def written(figure: object) -> Iterator[str]:
+    """The texts that people read in a figure for plotly."""
+    if isinstance(figure, dict):
+        for key, value in figure.items():
+            if isinstance(value, str) and key in {"text", "name", "below", "note"}:
+                yield value
+            yield from written(value)
+    elif isinstance(figure, list):
+        for value in figure:
+            yield from written(value)
+
+
+def bare(text: str, names: Iterable[str]) -> str:
+    """A text without what is in brackets and without ``names``."""
+    while text != (text := _BRACKETS.sub("", text)):
+        pass
+    for name in names:
+        text = text.replace(name, "")
+    return text
 
 
 def left(page: str, names: Iterable[str] = ()) -> list[str]:
@@ -110,10 +140,10 @@ def left(page: str, names: Iterable[str] = ()) -> list[str]:
     pieces = [*texts_of.attributes, "\x01".join(texts_of.body)]
     found = []
     for text in pieces:
-        while text != (text := _BRACKETS.sub("", text)):
+        while text != (text := _BRACKETS.sub("\x02", text)):
             pass
         parts = (given.sub("", part) for part in text.split("\x01"))
-        found += [" ".join(part.split()) for part in parts if rest_of(part)]
+        found += [" ".join(part.replace("\x02", " ").split()) for part in parts if rest_of(part)]
     return found
 
 
@@ -129,7 +159,18 @@ def without_spec(report: str) -> str:
 def test_no_text_of_any_page_is_left_out(service: Service) -> None:
     ids = studies(service)
     own = {study["name"] for study in service.get("/studies")["studies"]}
-    names = {LONG, "Nothing", *own, *(f"{name}, design of case 0" for name in own), *manual.titles().values()}
+    categories = ", ".join(REGIME_SENTENCES)
+    names = {
+        LONG,
+        "Nothing",
+        "'none'",
+        "test",
+        "efficiency",
+        categories,
+        *own,
+        *(f"{name}, design of case 0" for name in own),
+        *manual.titles().values(),
+    }
     found: dict[str, list[str]] = {}
     for address in (address.format(**ids) for addresses in PAGES.values() for address in addresses):
         headers = {"Accept": "text/html", "Accept-Language": MADE_UP}
@@ -137,6 +178,11 @@ def test_no_text_of_any_page_is_left_out(service: Service) -> None:
         assert "⟦" in answer.text, address
         if texts_left := left(answer.text, names):
             found[address] = texts_left
+        # Figures are drawn of texts that no page has.
+        for figure in re.findall(r'data-figure="([^"]+)"', answer.text):
+            made = service.http.get(html.unescape(figure), headers=headers)
+            if texts_left := [text for text in written(made.json()) if rest_of(bare(text, names))]:
+                found[figure] = texts_left
         # What is drawn of the API is in the language of the page, too.
         drawn = re.findall(r'"(/api/v1/[^"]*format=(?:svg|png|pdf)[^"]*)"', answer.text)
         assert all(f"language={MADE_UP}" in picture for picture in drawn), (address, drawn)

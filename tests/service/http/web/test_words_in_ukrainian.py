@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import TYPE_CHECKING
+
+from sprag.service.spec.text import load_spec
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
@@ -38,6 +41,40 @@ def test_figures_have_the_language_of_their_page(service: Service) -> None:
     assert english.json()["layout"]["xaxis"]["title"]["text"].startswith("Load torque")
 
 
+def test_fields_examples_and_choices_are_as_they_are_typed(service: Service) -> None:
+    study_id = service.submit()
+    case = f"/studies/{study_id}/cases/0"
+    motion, branch, components = (
+        service.http.get(address, headers=UKRAINIAN).text for address in (case, f"{case}/branch", "/components")
+    )
+    assert re.search(r'name="to" value="" placeholder="[\d,]+ с"', motion)
+    assert re.search(r'placeholder="[^"]* Н/мм?"', components)
+    assert '<option value="shaft.load" title="shaft.load" selected>Момент навантаження</option>' in branch
+    assert 'title="pendulums.0.mass">' in branch
+    assert (
+        "<option selected>shaft.load,gravity</option>"
+        in service.http.get(f"{case}/branch?along=shaft.load,gravity").text
+    )
+
+
+def test_choices_of_a_machine_are_in_words_with_their_code_names_in_titles(service: Service) -> None:
+    study_id = service.submit(load_spec(Path("examples/press.toml").read_text("utf-8"), "toml"))
+    english = service.http.get(f"/studies/{study_id}", headers={"Accept": "text/html"}).text
+    assert '<td class="num" title="slider_crank">slider crank</td>' in english
+    assert (
+        'title="slider_crank">кривошипно-повзунний' in service.http.get(f"/studies/{study_id}", headers=UKRAINIAN).text
+    )
+
+
+def test_what_only_scripts_can_do_is_told_where_scripts_run(service: Service) -> None:
+    study_id = service.submit()
+    service.fill(study_id)
+    page = service.http.get(f"/studies/{study_id}/explore", headers={"Accept": "text/html"}).text
+    told = re.findall(r'<span class="([^"]*)">[^<]*(?:click|drag)[^<]*</span>', page)
+    assert told
+    assert all("script" in classes.split() for classes in told)
+
+
 def test_a_fault_of_a_page_is_the_meaning_of_its_code(service: Service) -> None:
     study_id = service.submit()
     answer = service.http.get(f"/studies/{study_id}/curves?x=nope", headers=UKRAINIAN)
@@ -56,5 +93,8 @@ def test_the_working_point_and_the_date_of_the_report_are_as_written(service: Se
     page = service.http.get(f"{address}&point=150.5+N*mm", headers=UKRAINIAN).text
     heading = page.partition('<h2 class="minor">')[2].partition("</h2>")[0]
     assert "150,5 Н·мм" in heading
+    assert heading.startswith("Робоча точка: момент навантаження 150,5")
     assert 'name="point" value="150.5 N*mm"' in page
+    typed = service.http.get(f"{address}&point=0,15+Н·м", headers={"Accept-Language": "en"}).text
+    assert "At load torque 0.15 N·m" in typed
     assert re.search(r'name="date" size="10" maxlength="200" value="\d\d\.\d\d\.\d{4}"', page)

@@ -70,7 +70,7 @@ def test_values_that_are_held_stand_above_the_picture(spec: dict[str, Any], figu
     curves(grid(spec, 16), at=(("excitation.amplitude_y", "2 mm"), ("excitation.frequency", "1500 rpm")))
     assert figures[0].get_suptitle().splitlines() == [
         "A study",
-        "Vertical amplitude = Horizontal amplitude = 0.002 m; Excitation frequency = 25 Hz",
+        "Vertical amplitude = horizontal amplitude = 0.002 m; Excitation frequency = 25 Hz",
     ]
 
 
@@ -90,7 +90,7 @@ def test_long_titles_are_broken_between_values(spec: dict[str, Any], figures: li
 def test_few_curves_have_a_legend_with_units(spec: dict[str, Any], figures: list[Figure]) -> None:
     curves(grid(spec, 2), by=("excitation.amplitude_x",), at=(("excitation.frequency", "20 Hz"),))
     (legend,) = figures[0].legends
-    assert legend.get_title().get_text().replace("\n", " ") == "Horizontal amplitude = Vertical amplitude (m)"
+    assert legend.get_title().get_text().replace("\n", " ") == "Horizontal amplitude = vertical amplitude (m)"
     assert [text.get_text() for text in legend.get_texts()] == ["0.001", "0.002"]
 
 
@@ -100,7 +100,7 @@ def test_each_of_many_curves_is_named(spec: dict[str, Any], figures: list[Figure
     one, two = (figure.axes[-1] for figure in figures)
     assert one.get_ylabel() == "Excitation frequency (Hz)"
     assert [text.get_text() for text in one.get_yticklabels()] == [str(frequency) for frequency in range(20, 36)]
-    assert "Horizontal amplitude = Vertical amplitude (m)" in two.get_ylabel()
+    assert "Horizontal amplitude = vertical amplitude (m)" in two.get_ylabel()
     assert [text.get_text() for text in two.get_yticklabels()][:2] == ["20, 0.001", "21, 0.001"]
 
 
@@ -124,9 +124,9 @@ def test_a_map_ends_where_its_values_end(spec: dict[str, Any], figures: list[Fig
         maps.draw_map(read_map(made, Reading(study.model)), "A study", "png")
     axes, bar = figures[0].axes
     assert axes.collections[0].get_datalim(axes.transData).extents.tolist() == [0.0, 20.0, 1.6, 35.0]
-    assert figures[0].get_suptitle() == "A study\nHorizontal amplitude = Vertical amplitude = 0.002 m"
+    assert figures[0].get_suptitle() == "A study\nHorizontal amplitude = vertical amplitude = 0.002 m"
     assert bar.get_ylabel() == "Mean shaft speed (rad/s)"
-    assert figures[1].axes[0].get_ylabel() == "Horizontal amplitude = Vertical amplitude (m)"
+    assert figures[1].axes[0].get_ylabel() == "Horizontal amplitude = vertical amplitude (m)"
 
 
 def test_cases_without_a_result_are_grey(spec: dict[str, Any], figures: list[Figure]) -> None:
