@@ -36,7 +36,7 @@ _PLACE = re.compile(r"%\(\w+\)s|\{\w+[^{}]*\}")
 _BRACKETS = re.compile(r"⟦[^⟦⟧]*⟧")
 #: Names, formats, units and code names, which are the same in all languages.
 _SAME = re.compile(
-    r"\b(Sprag|UTC|csv|json|svg|png|pdf|html|xlsx|netcdf|parquet|arrow|jsonl|curl|JSON|TOML|CSV|PDF|HTML|SVG|PNG|"
+    r"\b(Sprag|API|UTC|csv|json|svg|png|pdf|html|xlsx|netcdf|parquet|arrow|jsonl|curl|JSON|TOML|CSV|PDF|HTML|SVG|PNG|"
     r"English|Українська|JavaScript|rpm|deg|min|rad|lbf|bar|kPa|MPa|cos|πft|sin|"
     r"[a-z_][a-z_0-9]*(\.\w+)+|[sv][ctw]_[0-9a-f]{16}|[0-9a-f]{12}|[0-9a-f]{64}|[A-Z]\w+(/[A-Z]\w+)+)\b|\[[^\[\]]*\]|,sigma$|"
     r"; efficiency$"
