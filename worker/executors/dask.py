@@ -25,7 +25,7 @@ from distributed.scheduler import KilledWorker
 from sprag.worker import fingerprint, models
 from sprag.worker.executors import dask_tasks as tasks
 from sprag.worker.executors.dask_jobs import Job, Waiting, Worker, outcome_of, refusals, report_of
-from sprag.worker.executors.dask_link import Link, own_cluster, value_of
+from sprag.worker.executors.dask_link import CONFIG, Link, own_cluster, value_of
 from sprag.worker.executors.process_pool import MAX_LOADS, useful_chunks
 from sprag.worker.limits import WALL_TIMES
 from sprag.worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
@@ -48,17 +48,6 @@ SCHEDULER_SECONDS: Final = 60.0
 FROZEN_SECONDS: Final = 15.0
 #: Seconds that a stopped chunk gets to finish before its worker is ended; most finish sooner.
 STOP_SECONDS: Final = 5.0
-#: Configuration of every Dask process that is started here.
-_CONFIG: Final = {
-    "distributed.scheduler.allowed-failures": 0,
-    # No dashboard or other pages.
-    "distributed.scheduler.http.routes": [],
-    "distributed.worker.http.routes": [],
-    "distributed.worker.memory.target": False,
-    "distributed.worker.memory.spill": False,
-    "distributed.worker.memory.pause": False,
-    "distributed.worker.memory.terminate": False,
-}
 
 
 class DaskExecutor:
@@ -116,7 +105,7 @@ class DaskExecutor:
         self._outcomes: SimpleQueue[Outcome | None] = SimpleQueue()
         self._next_look = 0.0
         self._gone_since: float | None = None
-        with dask.config.set(_CONFIG):
+        with dask.config.set(CONFIG):
             self._cluster = None if url else own_cluster(processes)
         place = tasks.scheduler_address(url) if self._cluster is None else (self._cluster.scheduler_address, None)
         self._link = Link(*place, f"sprag-{self._name}", self._lock)

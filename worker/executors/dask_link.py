@@ -31,6 +31,17 @@ DASHBOARD_SECONDS: Final = 1.0
 VALUE_SECONDS: Final = 15.0
 #: Seconds for which the connection is kept open for values being fetched.
 FETCH_SECONDS: Final = 5.0
+#: Configuration of every Dask process that is started here.
+CONFIG: Final = {
+    "distributed.scheduler.allowed-failures": 0,
+    # No dashboard or other pages.
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
+    "distributed.worker.memory.terminate": False,
+}
 
 
 def _is_news(record: logging.LogRecord) -> bool:
