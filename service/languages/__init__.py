@@ -19,6 +19,7 @@ from sprag.service.languages.catalogue import Catalogue, read
 
 ENGLISH: Final = "en"
 FOLDER: Final = Path(__file__).parent
+_SEPARATED: Final = 10_000
 _LANGUAGE: ContextVar[str] = ContextVar("language", default=ENGLISH)
 
 __all__ = [
@@ -112,8 +113,11 @@ def decimal(text: str) -> str:
 
 
 def grouped(count: int) -> str:
-    """A whole number with thousands separated by narrow spaces, as in ISO 80000: a comma would be a decimal mark."""
-    return f"{count:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+    """A whole number with thousands separated by narrow spaces, as in ISO 80000: a comma would be a decimal mark.
+
+    Numbers of four digits are not separated: 9000, but 10 000.
+    """
+    return f"{count:,}".replace(",", "\N{NARROW NO-BREAK SPACE}") if abs(count) >= _SEPARATED else str(count)
 
 
 def date_format() -> str:

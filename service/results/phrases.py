@@ -104,7 +104,7 @@ def meanings(sentences: Mapping[str, str]) -> dict[str, str]:
 def titled(code: str) -> str:
     """The words of `term` for the reader, as a title: ``Not settled``."""
     text = shown(term(code))
-    return text[:1].upper() + text[1:]
+    return upper_first(text)
 
 
 def model_title(model: str) -> str:
@@ -152,6 +152,11 @@ def _said(part: Part, reading: Reading | None) -> str:
 def lower_first(text: str) -> str:
     """A caption within a sentence; one that begins with an abbreviation stays as it is."""
     return text if text[1:2].isupper() else f"{text[:1].lower()}{text[1:]}"
+
+
+def upper_first(text: str) -> str:
+    """A text as the beginning of a sentence."""
+    return f"{text[:1].upper()}{text[1:]}"
 
 
 def joined(separator: str, parts: Iterable[Part]) -> Phrase:

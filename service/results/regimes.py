@@ -36,6 +36,15 @@ class Mark:
     marker: str
 
 
+def left_out(count: int) -> Phrase:
+    """That so many unsettled cases do not count."""
+    return plural(
+        "{count} unsettled case is left out: its results do not show settled motion",
+        "{count} unsettled cases are left out: their results do not show settled motion",
+        count,
+    )
+
+
 def motion_sentence(regime: str, order: int | None) -> Phrase:
     """Description of a motion by its regime and the order of its orbit (None: it has none)."""
     if regime != "periodic" or order is None:

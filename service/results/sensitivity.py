@@ -22,7 +22,7 @@ from sprag.service.faults import Fault
 from sprag.service.json_text import numbers
 from sprag.service.results.curves import Fetch
 from sprag.service.results.phrases import Phrase, plural
-from sprag.service.results.regimes import UNSETTLED, counted, kind_columns, kinds_of
+from sprag.service.results.regimes import UNSETTLED, counted, kind_columns, kinds_of, left_out
 from sprag.service.results.selection import SelectionError, axis_name, numeric_results, refused
 from sprag.service.results.sensitivity_design import (
     factorial_table,
@@ -156,13 +156,7 @@ def _settled_only(y: Numbers, regimes: list[str | None] | None, notes: list[str]
     names = np.array([name or "" for name in regimes])
     unsettled = (names == UNSETTLED) & np.isfinite(y)
     if unsettled.any():
-        notes.append(
-            plural(
-                "{count} unsettled case is left out: its results do not show settled motion",
-                "{count} unsettled cases are left out: their results do not show settled motion",
-                int(unsettled.sum()),
-            )
-        )
+        notes.append(left_out(int(unsettled.sum())))
     y = np.where(unsettled, np.nan, y)
     counts = Counter(names[np.isfinite(y)].tolist())
     if len(counts) > 1:

@@ -127,7 +127,7 @@ def _run_value(study: Study, item: Input, reading: Reading) -> str:
                  ranges="; ".join(ranges))  # fmt: skip
     if isinstance(value, list | tuple):
         return _time(*value) if isinstance(value[-1], str) else _window(*value)
-    return _counted(decimal(str(item.value)))
+    return number(value, 8) if isinstance(value, float) else _counted(str(item.value))
 
 
 def _range(study: Study, path: str, ends: Sequence[float], reading: Reading) -> str:

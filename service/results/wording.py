@@ -32,7 +32,7 @@ NOUNS: Final = ("case", "drive", "generation", "result", "round", "run", "strobe
 
 
 def number(value: float | str | None, digits: int = _DIGITS) -> str:
-    """A number for display: few digits, separated thousands, superscript powers of ten; a dash for none.
+    """A number for display: few digits, thousands separated from 10 000 on, superscript powers of ten; a dash for none.
 
     The name of a category is unchanged.
     """
@@ -41,19 +41,20 @@ def number(value: float | str | None, digits: int = _DIGITS) -> str:
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "–"
     if isinstance(value, int):
-        return grouped(value)
-    text = f"{value:.{digits}g}".replace("-", "−", 1 if value < 0 else 0)
+        return grouped(value).replace("-", "−")
+    text = f"{value:.{digits}g}"
     mantissa, _, exponent = text.partition("e")
-    rounded = float(f"{value:.{digits}g}")
-    if 1e3 <= abs(rounded) < 1e7 and (exponent or ("." not in text and abs(value) >= 1e4)):
-        return _grouped(rounded)
     if not exponent:
-        return decimal(text)
-    return f"{decimal(mantissa)}·10{str(int(exponent)).translate(_RAISED)}"
+        return _separated(text)
+    if 1e3 <= abs(float(text)) < 1e7:
+        return _separated(f"{float(text):.0f}")
+    return f"{_separated(mantissa)}·10{str(int(exponent)).translate(_RAISED)}"
 
 
-def _grouped(value: float) -> str:
-    return grouped(round(value)).replace("-", "−")
+def _separated(text: str) -> str:
+    """A number written by Python with the signs of print."""
+    whole, mark, rest = text.lstrip("-").partition(".")
+    return ("−" if text.startswith("-") else "") + decimal(grouped(int(whole)) + mark + rest)
 
 
 def unit_text(unit: str | None) -> str:

@@ -32,7 +32,7 @@ from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import completed
 from sprag.service.results.quantities import SI
 from sprag.service.results.report.content import report_of
-from sprag.service.results.report.document import TitleBlock
+from sprag.service.results.report.document import TitleBlock, today
 from sprag.worker import models
 from sprag.worker.limits import MAX_STARTS
 
@@ -288,7 +288,7 @@ async def get_report(
     project: Annotated[str, _particular("project")] = "",
     author: Annotated[str, _particular("author")] = "",
     number: Annotated[str, _particular("number of the document")] = "",
-    date: Annotated[str, _particular("date")] = "",
+    date: Annotated[str | None, _particular("date, today if there is none")] = None,
     x: Annotated[str | None, Query(description="path of the axis along the chosen curves")] = None,
     by: Annotated[list[str] | None, Query(description="axis with one curve for each of its values")] = None,
     at: Fixed = None,
@@ -305,7 +305,6 @@ async def get_report(
     """
     chosen = choose_format(work.request, form, report.MEDIA_TYPES)
     settings = work.context.settings
-    block = TitleBlock(settings.report_office, project, author, number, date)
 
     def make(_record: StudyRecord) -> Drawing:
         policy = {"Content-Security-Policy": _REPORT_POLICY} if chosen == "html" else {}
@@ -320,7 +319,8 @@ async def get_report(
 
     choice_of("language", language, languages.available())
     with languages.language(language):
-        return await conditional(work, study_id, chosen, make)
+        block = TitleBlock(settings.report_office, project, author, number, today() if date is None else date)
+        return await conditional(work, study_id, f"{chosen} {block.date}", make)
 
 
 def pairs(at: list[str] | None, parameter: str = "at") -> tuple[tuple[str, str], ...]:

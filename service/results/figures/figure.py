@@ -9,6 +9,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.service.languages import gettext
 from sprag.service.results.phrases import Phrase
 
 #: Colours that are distinguishable with any kind of colour vision (after Okabe and Ito), on light and dark backgrounds.
@@ -17,6 +18,10 @@ PALETTE: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e
 NEUTRAL: Final = "#7a7f87"
 #: What bands are, for the legend.
 BANDS: Final = Phrase("jump, not interpolated")
+#: Shapes of markers, in the order of lines: they repeat the distinction by colour, for prints in grey.
+MARKERS: Final = ("circle", "square", "diamond", "triangle-up", "x", "triangle-down", "star", "cross")
+#: Lines with more points are drawn without markers.
+_MARKED: Final = 60
 #: Look of a state for which its model defines none.
 OTHER_LOOK: Final = ("#999999", "+", "+++")
 
@@ -64,6 +69,15 @@ class Line:
     shades: NDArray[np.float64] | None = None
     ring: bool = False
     wide: bool = False
+
+    @property
+    def marker(self) -> str:
+        """The shape of its markers: that of its curve, or that of its style where its points are no cases."""
+        return MARKERS[(self.style if self.cases is None else int(self.key)) % len(MARKERS)]
+
+    def marked(self, points: int) -> bool:
+        """Whether it is drawn with markers where it has so many points."""
+        return not self.joined or (self.cases is not None and points <= _MARKED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,6 +201,11 @@ class Figure:
         return any(panel.x for panel in self.panels)
 
     @property
+    def from_zero(self) -> bool:
+        """Whether the y axes contain zero, so that heights of curves can be compared."""
+        return not (self.motion or self.apart)
+
+    @property
     def rows(self) -> int:
         """Rows of panels."""
         return -(-len(self.panels) // self.columns)
@@ -197,6 +216,14 @@ class Figure:
         occurring = {state: None for spans in self.spans.values() for state, _, _ in spans}
         known = [state for state in self.looks if state in occurring]
         return {state: self.looks.get(state, OTHER_LOOK) for state in dict.fromkeys([*known, *occurring])}
+
+    @property
+    def title_of_marks(self) -> str:
+        """What the legend of marks and strips is about."""
+        if not self.regimes:
+            return self.states if self.spans or not (self.banded or self.noted) else ""
+        regime = gettext("Regime")
+        return f"{regime}; {self.states.lower()}" if self.spans else regime
 
     @property
     def banded(self) -> bool:

@@ -17,14 +17,23 @@ from sprag.service.results.figures.portrait import portrait_figure
 from sprag.service.results.figures.read import read_figure
 from sprag.service.results.pictures.legends import (
     COLUMNS,
+    MARKERS,
     NOTE_MARKERS,
     STYLES,
     explain,
-    explain_regimes,
+    explain_marks,
     explain_studies,
     handle,
+    state_style,
 )
-from sprag.service.results.pictures.text import load_matplotlib, quantity_label, use_decimal_mark, writable
+from sprag.service.results.pictures.text import (
+    load_matplotlib,
+    quantity_label,
+    use_decimal_mark,
+    wrapped,
+    writable,
+    writer_of,
+)
 from sprag.service.results.regimes import MARKS
 from sprag.service.results.selection import refused
 
@@ -45,8 +54,17 @@ MEDIA_TYPES: Final[dict[Picture, str]] = {"svg": "image/svg+xml", "png": "image/
 #: Limits of one picture; more would take minutes to draw and be unreadable.
 MAX_PICTURE_CURVES: Final = 200
 MAX_PICTURE_POINTS: Final = 100_000
-#: Columns of the legend of a strip of states.
+#: Columns of the legend of the states of a motion.
 _MOST_STATES: Final = 8
+#: Inches of a row of panels of a picture, and on paper, where a page has the width of a picture of two columns.
+_ROW: Final = 3.6
+_PAPER_ROW: Final = 2.4
+_PAPER: Final = (8.5, 11.0)
+#: Points of the letters of the names of axes, and the share of it that is the mean width of a letter.
+_LABEL_SIZE: Final = 9.0
+_LETTER: Final = 0.58
+#: Inches around the panels of a picture, for names and legends.
+_AROUND: Final = 1.6
 #: Characters on a line of a title.
 _TITLE_WIDTH: Final = 100
 _STYLE: Final[dict[Any, Any]] = {
@@ -57,6 +75,7 @@ _STYLE: Final[dict[Any, Any]] = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "font.size": 10.0,
+    "axes.labelsize": _LABEL_SIZE,
     # Names of results and studies are text, never formulas.
     "text.parse_math": False,
 }
@@ -120,34 +139,39 @@ def require_drawable(drawn: Sequence[Curves]) -> None:
     check_size("points", points, MAX_PICTURE_POINTS)
 
 
-def draw_figure(figure: Described, title: str, picture: Picture) -> bytes:
-    """Any described figure as a picture."""
+def draw_figure(figure: Described, title: str, picture: Picture, *, paper: bool = False) -> bytes:
+    """Any described figure as a picture; on ``paper`` its panels are lower, and all of it fits on a page."""
     legend = 0.24 * len(figure.listed) / COLUMNS if figure.studies > 1 else 0.5 * len(figure.spans)
-    size = (8.0 if figure.columns == 1 else 11.0, 1.2 + (2.1 if figure.motion else 3.6) * figure.rows + legend)
+    row = 2.1 if figure.motion else _ROW
+    if paper:
+        size = (_PAPER[0], min(1.2 + min(row, _PAPER_ROW) * figure.rows + legend, _PAPER[1]))
+    else:
+        size = (8.0 if figure.columns == 1 else 11.0, 1.2 + row * figure.rows + legend)
     return render(partial(paint_figure, drawn=figure, title=title), picture, size)
 
 
 def paint_figure(figure: Figure, drawn: Described, title: str) -> None:
     """Draw a described figure into an empty one; for use inside `painting`."""
-    strip = (0.45 if drawn.motion else 0.2) * len(drawn.spans)
-    heights = [3.0] * drawn.rows + ([strip + 0.3] if drawn.motion else [strip + 0.15]) * bool(drawn.spans)
+    strip = 0.2 + (0.3 if drawn.motion else 0.2) * len(drawn.spans) if drawn.spans else 0.0
+    row = (figure.get_figheight() - _AROUND - strip) / drawn.rows
+    heights = [row] * drawn.rows + [strip] * bool(drawn.spans)
     together = not drawn.apart
     grid = figure.subplots(len(heights), drawn.columns, sharex=together, height_ratios=heights, squeeze=False)
     plots: list[Axes] = list(grid.reshape(-1))
     for axes, panel in zip(plots, drawn.panels, strict=False):
         _paint_panel(figure, axes, panel, drawn)
+        axes.set_ylabel(wrapped(quantity_label(panel.y), int(72.0 * row / (_LETTER * _LABEL_SIZE))))
     for axes in plots[len(drawn.panels) : drawn.rows * drawn.columns]:
         axes.set_visible(False)
     for axes in plots[drawn.rows * drawn.columns :]:
         _paint_states(axes, drawn)
     for axes in plots[-drawn.columns :] if together else ():
         axes.set_xlabel(quantity_label(drawn.x))
-    if not drawn.motion:
-        (explain if drawn.studies == 1 else explain_studies)(figure, plots, drawn)
-        edge: Literal["upper", "lower"] = "lower" if drawn.studies == 1 else "upper"
-        explain_regimes(figure, drawn.regimes, edge, jumps=drawn.banded, below=drawn.below, notes=drawn.noted)
     held = drawn.held if drawn.studies == 1 else ()
     head(figure, title, (drawn.heading, *held) if drawn.heading else held)
+    if not drawn.motion:
+        (explain if drawn.studies == 1 else explain_studies)(figure, plots, drawn)
+        explain_marks(figure, drawn)
 
 
 def check_size(what: str, count: int, most: int, parameter: str = "format") -> None:
@@ -172,17 +196,21 @@ def render(paint: Callable[[Figure], None], picture: Picture, size: tuple[float,
     load_matplotlib()
     from matplotlib.figure import Figure
 
-    buffer = io.BytesIO()
+    buffer, write = io.BytesIO(), writer_of(picture)
     with painting():
-        figure = Figure(figsize=size, layout="constrained")
+        figure = Figure(figsize=size, layout="constrained", dpi=120.0 if picture == "png" else 72.0)
         paint(figure)
         use_decimal_mark(figure)
-        figure.savefig(buffer, format=picture, dpi=120, metadata=_METADATA[picture])
+        # `savefig` would draw the figure twice: once for its layout alone, which does not need the drawing.
+        engine = figure.get_layout_engine()
+        assert engine is not None
+        engine.execute(figure)
+        figure.set_layout_engine("none")
+        write(figure, buffer, _METADATA[picture])
     return buffer.getvalue()
 
 
 def _paint_panel(figure: Figure, axes: Axes, panel: Panel, drawn: Described) -> None:
-
     shaded = None
     for band in panel.bands:
         # The edges show a jump that is narrower than a pixel.
@@ -191,15 +219,17 @@ def _paint_panel(figure: Figure, axes: Axes, panel: Panel, drawn: Described) -> 
         axes.fill_between(fill.x, fill.low, fill.high, color=fill.colour, alpha=0.2, linewidth=0.0)
     for line in panel.lines:
         if line.shades is not None and line.x.size:
-            marker = STYLES[line.style % len(STYLES)][1]
-            shaded = axes.scatter(line.x, line.y, c=line.shades, cmap="viridis", s=12.0, marker=marker, zorder=2.1)
+            shaded = axes.scatter(
+                line.x, line.y, c=line.shades, cmap="viridis", s=12.0, marker=MARKERS[line.marker], zorder=2.1
+            )
         elif line.shades is None:
             _paint_line(axes, line, thin=drawn.motion or drawn.apart)
     if shaded is not None:
         figure.colorbar(shaded, ax=axes, label=drawn.scale)
     paint_marks(axes, panel.marks)
     paint_notes(axes, panel)
-    axes.set_ylabel(quantity_label(panel.y))
+    if drawn.from_zero:
+        _with_zero(axes)
     if panel.x is not None:
         axes.set_xlabel(quantity_label(panel.x))
         named = [line for line in panel.lines if line.listed]
@@ -208,10 +238,10 @@ def _paint_panel(figure: Figure, axes: Axes, panel: Panel, drawn: Described) -> 
     if drawn.at is not None:
         axes.axvline(drawn.at, color="0.35", linewidth=0.9)
     if drawn.motion and len(panel.lines) > 1:
-        _legend_above(axes, columns=5)
+        legend_above(axes, columns=5)
 
 
-def _legend_above(axes: Axes, columns: int, **entries: Any) -> None:
+def legend_above(axes: Axes, columns: int, **entries: Any) -> None:
     """A legend above a plot, where it hides no point; by default of all its lines."""
     handles = entries.get("handles") or axes.get_legend_handles_labels()[0]
     axes.legend(
@@ -227,19 +257,31 @@ def _legend_above(axes: Axes, columns: int, **entries: Any) -> None:
 
 
 def _paint_line(axes: Axes, line: Line, *, thin: bool) -> None:
-    style, marker = STYLES[line.style % len(STYLES)]
+    marked = line.marked(line.x.size)
     for stretch in line.stretches or (slice(None),):
+        x = line.x[stretch]
+        # Of a point between two gaps no line is seen.
+        shown = marked or (line.cases is not None and x.size == 1)
         axes.plot(
-            line.x[stretch],
+            x,
             line.y[stretch],
             color=line.colour,
-            linestyle=style if line.joined else "none",
-            marker="" if line.joined and line.cases is None else marker,
-            markersize=9.0 if line.ring else 3.0 if line.joined or thin else 4.5,
+            linestyle=STYLES[line.style % len(STYLES)] if line.joined else "none",
+            marker=MARKERS[line.marker] if shown else "",
+            markersize=9.0 if line.ring else 3.5 if line.joined or thin else 4.5,
             markerfacecolor="none" if line.ring else None,
             linewidth=2.2 if line.wide else 1.1 if thin else 1.4,
             label=line.name,
         )
+
+
+def _with_zero(axes: Axes) -> None:
+    """Let the y axis contain zero, as on pages."""
+    low, high = axes.dataLim.intervaly
+    if low >= 0.0 < high:
+        axes.set_ylim(0.0, 1.05 * high)
+    elif low < 0.0 >= high:
+        axes.set_ylim(1.05 * low, 0.0)
 
 
 def paint_marks(axes: Axes, every: Sequence[Marks], *, clipped: bool = True) -> None:
@@ -272,24 +314,19 @@ def _paint_states(axes: Axes, drawn: Described) -> None:
     """A strip of states over time: a row for each part of the machine."""
     from matplotlib.patches import Patch
 
-    styles: dict[str, dict[str, Any]] = {
-        state: {"facecolor": colour, "hatch": hatch, "edgecolor": "#333333", "linewidth": 0.0}
-        for state, (colour, _, hatch) in drawn.shown_looks.items()
-    }
+    styles = {state: state_style(look) for state, look in drawn.shown_looks.items()}
     for row, spans in enumerate(drawn.spans.values()):
-        for state, begin, end in spans:
-            axes.broken_barh([(begin, end - begin)], (row - 0.4, 0.8), **styles[state])
+        for state in dict.fromkeys(state for state, _, _ in spans):
+            bars = [(begin, end - begin) for own, begin, end in spans if own == state]
+            axes.broken_barh(bars, (row - 0.4, 0.8), **styles[state])
     axes.set_yticks(range(len(drawn.spans)), list(drawn.spans))
     axes.grid(visible=False)
-    # What regimes look like is explained with their marks.
-    listed = [Patch(label=motion_text(state), **style) for state, style in styles.items() if state not in drawn.regimes]
-    if not listed:
+    if not drawn.motion:
         return
+    listed = [Patch(label=motion_text(state), **style) for state, style in styles.items()]
     axes.legend(
         handles=listed,
-        title="" if drawn.motion else drawn.states,
         fontsize=7,
-        title_fontsize=7,
         ncols=min(len(listed), _MOST_STATES),
         loc="upper center",
         bbox_to_anchor=(0.5, 0.0),

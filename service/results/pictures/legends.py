@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, Literal
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from sprag.service.results.figures.figure import BANDS, NOTES, PALETTE, shortened
 from sprag.service.results.figures.orders import motion_text
@@ -21,13 +22,12 @@ if TYPE_CHECKING:
     from sprag.service.results.figures.figure import Figure as Described
     from sprag.service.results.figures.figure import Line, NoteKind
 
-#: Style of the line, and marker where there is none.
-STYLES: Final[tuple[tuple[Literal["-", "--", ":", "-."], str], ...]] = (
-    ("-", "o"),
-    ("--", "s"),
-    (":", "^"),
-    ("-.", "D"),
-)
+STYLES: Final[tuple[Literal["-", "--", ":", "-."], ...]] = ("-", "--", ":", "-.")
+#: What matplotlib calls the shapes of markers.
+MARKERS: Final = {
+    "circle": "o", "square": "s", "diamond": "D", "triangle-up": "^", "x": "X", "triangle-down": "v", "star": "*",
+    "cross": "P",
+}  # fmt: skip
 #: Markers of the points that are read off lines.
 NOTE_MARKERS: Final[dict[NoteKind, str]] = {"largest": "v", "smallest": "^", "point": "o"}
 #: Labels of a colour bar, which distinguishes more curves than a legend.
@@ -35,6 +35,9 @@ _BAR_LABELS: Final = 24
 #: Columns of the legend of several studies, and the characters that fit in each.
 COLUMNS: Final = 2
 _MOST_LABEL: Final = 52
+#: Points of a letter of a legend, and of a symbol with the space around an entry.
+_LETTER: Final = 4.6
+_SYMBOL: Final = 36.0
 #: Characters on a line of a sentence below the plots.
 _SENTENCE_WIDTH: Final = 110
 
@@ -43,37 +46,40 @@ def handle(line: Line) -> Artist:
     """The legend handle of a line."""
     from matplotlib.lines import Line2D
 
-    style, marker = STYLES[line.style % len(STYLES)]
-    marker = "" if line.joined and line.cases is None else marker
     return Line2D(
         [],
         [],
         color=line.colour,
-        linestyle=style if line.joined else "none",
-        marker=marker,
-        markersize=6.0 if line.ring else 3.0,
+        linestyle=STYLES[line.style % len(STYLES)] if line.joined else "none",
+        marker=MARKERS[line.marker] if line.marked(line.x.size) else "",
+        markersize=6.0 if line.ring else 4.0,
         markerfacecolor="none" if line.ring else line.colour,
     )
 
 
 def explain(figure: Figure, plots: list[Axes], drawn: Described) -> None:
-    """Explain the colours beside the plots: in a legend, or in a colour bar where there are many curves.
+    """Explain the colours: in a legend above the plots, or in a colour bar beside them where there are many curves.
 
-    As on pages, one line alone needs none, and panels with axes of their own have their own.
+    As on pages, one line alone needs none, and panels with axes of their own have their own. The legend has the title
+    of the picture, which would be written over it otherwise.
     """
     if not drawn.family and (len(drawn.listed) < 2 or drawn.apart):
         return
     from matplotlib.patches import Patch
 
-    meaning = ",\n".join(quantity_label(quantity).replace(" = ", " =\n") for quantity in drawn.family)
+    meaning = ", ".join(quantity_label(quantity) for quantity in drawn.family)
     lines = drawn.listed
     texts = [line.name for line in lines]
     if len(texts) <= len(PALETTE):
         fills = [fill for panel in drawn.panels for fill in panel.fills if fill.listed]
+        labels = [*(fill.name for fill in fills), *texts]
+        heading = figure.get_suptitle()
+        figure.suptitle("")
         figure.legend(
             [*(Patch(color=fill.colour, alpha=0.2, linewidth=0.0) for fill in fills), *map(handle, lines)],
-            [*(fill.name for fill in fills), *texts],
-            title=meaning or None, loc="outside right upper", fontsize=8, title_fontsize=8,
+            labels,
+            title="\n".join(filter(None, (heading, meaning))) or None, loc="outside upper center", fontsize=8,
+            title_fontsize=9, ncols=columns_of(figure, labels), frameon=False,
         )  # fmt: skip
         return
     from matplotlib.cm import ScalarMappable
@@ -85,7 +91,7 @@ def explain(figure: Figure, plots: list[Axes], drawn: Described) -> None:
     labelled = range(0, len(texts), math.ceil(len(texts) / _BAR_LABELS))
     bar.set_ticks(list(labelled), labels=[texts[number] for number in labelled])
     bar.ax.tick_params(labelsize=8, length=0)
-    bar.set_label(meaning.replace(" =\n", " = "), fontsize=8)
+    bar.set_label(meaning, fontsize=8)
 
 
 def explain_studies(figure: Figure, _plots: list[Axes], drawn: Described) -> None:
@@ -111,16 +117,32 @@ def explain_studies(figure: Figure, _plots: list[Axes], drawn: Described) -> Non
     )  # fmt: skip
 
 
+def explain_marks(figure: Figure, drawn: Described) -> None:
+    """Explain the marks, jumps, notes and states of a figure other than a motion: below the plots, or above them where
+    the legend of several studies is below. The states of a motion are explained by their strip.
+    """
+    edge: Literal["upper", "lower"] = "lower" if drawn.studies == 1 else "upper"
+    states = {name: look for name, look in drawn.shown_looks.items() if name not in drawn.regimes}
+    lines = [drawn.below, drawn.title_of_marks if states else ""]
+    explain_regimes(figure, drawn.regimes, edge, jumps=drawn.banded, below=lines, notes=drawn.noted, states=states)
+
+
+def state_style(look: tuple[str, str, str]) -> dict[str, Any]:
+    """The colour and the pattern of a state."""
+    return {"facecolor": look[0], "hatch": look[2], "edgecolor": "#333333", "linewidth": 0.0}
+
+
 def explain_regimes(
     figure: Figure,
     regimes: Sequence[str],
     edge: Literal["upper", "lower"] = "lower",
     *,
     jumps: bool = False,
-    below: str = "",
+    below: Sequence[str] = (),
     notes: Sequence[NoteKind] = (),
+    states: Mapping[str, tuple[str, str, str]] = MappingProxyType({}),
 ) -> None:
-    """Explain the marks of points, jumps and notes, at an edge of the picture, after the sentence ``below``.
+    """Explain the marks of points, jumps, notes and states, at an edge of the picture, after the sentences ``below``.
 
     Nothing where all motions are periodic and there is none of these.
     """
@@ -141,16 +163,24 @@ def explain_regimes(
         )
         for kind in notes
     ]  # fmt: skip
-    if handles or below:
+    handles += [Patch(label=motion_text(name), **state_style(look)) for name, look in states.items()]
+    sentences = "\n".join(line for sentence in below for line in textwrap.wrap(sentence, _SENTENCE_WIDTH))
+    if handles or sentences:
         figure.legend(
             handles=handles,
-            title="\n".join(textwrap.wrap(below, _SENTENCE_WIDTH)) or None,
+            title=sentences or None,
             title_fontsize=9,
             loc="outside upper center" if edge == "upper" else "outside lower center",
-            ncols=max(len(handles), 1),
+            ncols=columns_of(figure, [str(own.get_label()) for own in handles]),
             fontsize=8,
             frameon=False,
         )
+
+
+def columns_of(figure: Figure, labels: Sequence[str]) -> int:
+    """Columns of a legend across a picture: as many as its width has room for, at least one."""
+    widest = _SYMBOL + _LETTER * max(map(len, labels), default=0)
+    return max(min(len(labels), int(figure.get_figwidth() * 72.0 / widest)), 1)
 
 
 def _fitting(label: str) -> str:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.languages import _
-from sprag.service.results.pictures.curves import Picture, check_size, head, render
-from sprag.service.results.pictures.text import axis_label
+from sprag.service.results.pictures.curves import Picture, check_size, head, legend_above, render
+from sprag.service.results.pictures.text import axis_label, wrapped
 from sprag.service.results.wording import number
 
 if TYPE_CHECKING:
@@ -26,30 +26,46 @@ MOST_RESULTS: Final = 8
 #: Interactions that are drawn, and the least share of one.
 MOST_PAIRS: Final = 6
 _LEAST_SHARE: Final = 0.005
-#: Characters of a line of notes that fit into the width of a picture.
+#: Inches of the width of a picture, and of the height of a panel, of an axis among the bars and of a line of a legend.
+_WIDTH: Final = 9.0
+_PANEL: Final = 2.6
+_BAR: Final = 0.45
+_ENTRY: Final = 0.19
+#: Characters of a line of notes that fit into the width of a picture, and inches of such a line.
 _NOTE_WIDTH: Final = 110
-#: Characters of a label that stands along the height of a panel.
-_LABEL_HEIGHT: Final = 28
+_NOTE: Final = 0.18
+#: Characters of labels that stand along the height of a panel, and below the bars.
+_LABEL_HEIGHT: Final = 34
+_LABEL_WIDTH: Final = 44
 
 
-def draw_sensitivity(found: Sequence[Sensitivity], title: str, reading: Reading, picture: Picture) -> bytes:
-    """A row of two plots for each result, as somebody reads it.
+def draw_sensitivity(
+    found: Sequence[Sensitivity], title: str, reading: Reading, picture: Picture, *, noted: bool = True
+) -> bytes:
+    """A row of plots for each result, as somebody reads it: its bars, where any result has some, and its lines.
+
+    ``noted`` writes the notes of the results above them.
 
     Raises SelectionError when there are more than one picture can show.
     """
     check_size("results", len(found), MOST_RESULTS, "y")
-    axes = max(len(item.effects) + len(_largest(item)) for item in found)
-    height = 0.8 + len(found) * max(2.6, 1.0 + 0.45 * axes)
-    return render(partial(_paint, found, title, reading), picture, (10.0, height))
+    notes = dict.fromkeys(reading.say(note) for item in found for note in item.notes) if noted else ()
+    lines = [line for note in notes for line in textwrap.wrap(note, _NOTE_WIDTH)]
+    bars = max(len(item.effects) + len(_largest(item)) for item in found)
+    listed = max(len(item.effects) for item in found)
+    panel = max(_PANEL, 0.8 + _BAR * bars) + _ENTRY * listed
+    height = 0.5 + _NOTE * len(lines) + len(found) * panel
+    return render(partial(_paint, found, title, lines, reading), picture, (_WIDTH, height))
 
 
-def _paint(found: Sequence[Sensitivity], title: str, reading: Reading, figure: Figure) -> None:
-    plots = figure.subplots(len(found), 2, squeeze=False, width_ratios=(3, 4))
-    for (bars, lines), item in zip(plots, found, strict=True):
-        _bars(bars, item, reading)
-        _lines(lines, item, reading)
-    notes = dict.fromkeys(reading.say(note) for item in found for note in item.notes)
-    head(figure, title, tuple("\n".join(textwrap.wrap(note, _NOTE_WIDTH)) for note in notes))
+def _paint(found: Sequence[Sensitivity], title: str, notes: Sequence[str], reading: Reading, figure: Figure) -> None:
+    shared = any(item.method != "none" for item in found)
+    plots = figure.subplots(len(found), 1 + shared, squeeze=False, width_ratios=(3, 4) if shared else (1,))
+    for own, item in zip(plots, found, strict=True):
+        if shared:
+            _bars(own[0], item, reading)
+        _lines(own[-1], item, reading)
+    head(figure, title, ("\n".join(notes),) if notes else ())
 
 
 def _bars(axes: Axes, item: Sensitivity, reading: Reading) -> None:
@@ -90,9 +106,9 @@ def _bars(axes: Axes, item: Sensitivity, reading: Reading) -> None:
     axes.invert_yaxis()
     what = _("elementary effects on {result}") if item.method == "morris" else _("share of the variance of {result}")
     unit = reading.unit(item.info.unit) if item.method == "morris" else "1"
-    axes.set_xlabel(what.format(result=axis_label(reading.within(item.info.name), unit)))
+    axes.set_xlabel(wrapped(what.format(result=axis_label(reading.within(item.info.name), unit)), _LABEL_WIDTH))
     if axes.has_data():
-        axes.legend(fontsize=8, loc="best")
+        legend_above(axes, 1)
     else:
         _tell(axes, _("no shares of the variance") if item.cases else _("no case has this result"))
 
@@ -116,9 +132,9 @@ def _lines(axes: Axes, item: Sensitivity, reading: Reading) -> None:
         axes.plot(place, means, marker="o", markersize=3.0, color=f"C{index}", label=text)
     axes.set_xlabel(_("axis, from its least to its largest value"))
     label = axis_label(reading.within(item.info.name), reading.unit(item.info.unit))
-    axes.set_ylabel("\n".join(textwrap.wrap(_("mean of {result}", result=label), _LABEL_HEIGHT)))
+    axes.set_ylabel(wrapped(_("mean of {result}", result=label), _LABEL_HEIGHT))
     if axes.has_data():
-        axes.legend(fontsize=8, loc="best")
+        legend_above(axes, 1)
     else:
         _tell(axes, _("no case has this result"))
 

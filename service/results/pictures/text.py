@@ -2,28 +2,51 @@
 
 from __future__ import annotations
 
+import textwrap
 from functools import cache
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Final, Literal
 
 from sprag.service.languages import decimal, gettext
 from sprag.service.results.wording import unit_text
 from sprag.worker.pool.child_process import uncounted
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from io import BytesIO
+
     from matplotlib.figure import Figure
 
     from sprag.service.results.figures.figure import Quantity
 
 
+#: Characters by which lines of a label may differ.
+_UNEVEN: Final = 3
+
+
 @cache
 def load_matplotlib() -> None:
-    """Load the parts of matplotlib that pictures need, once per process, so that the time counts for no picture."""
+    """Load the parts of matplotlib that all pictures need, once per process, so that the time counts for no picture."""
     with uncounted():
         import matplotlib.backends.backend_agg
-        import matplotlib.backends.backend_pdf
-        import matplotlib.backends.backend_svg
         import matplotlib.figure
         import matplotlib.font_manager  # noqa: F401
+
+
+@cache
+def writer_of(kind: Literal["svg", "png", "pdf"]) -> Callable[..., None]:
+    """What writes a figure as a picture of a kind: a function of the figure, a file and the metadata of the picture.
+
+    Its part of matplotlib is loaded once per process, as above.
+    """
+    with uncounted():
+        module = import_module(f"matplotlib.backends.backend_{'agg' if kind == 'png' else kind}")
+    canvas = module.FigureCanvas
+
+    def write(figure: Figure, file: BytesIO, metadata: dict[str, str | None]) -> None:
+        getattr(canvas(figure), f"print_{kind}")(file, metadata=metadata)
+
+    return write
 
 
 def use_decimal_mark(figure: Figure) -> None:
@@ -55,6 +78,15 @@ def quantity_label(quantity: Quantity) -> str:
     if quantity.name:
         return axis_label(quantity.name, quantity.unit)
     return gettext("dimensionless") if quantity.unit == "1" else unit_text(quantity.unit)
+
+
+def wrapped(label: str, width: int) -> str:
+    """A label in as few lines of at most ``width`` characters as its words allow, of about the same length."""
+    lines = textwrap.wrap(label, width, break_long_words=False)
+    if len(lines) < 2:
+        return label
+    even = textwrap.wrap(label, -(-len(label) // len(lines)) + _UNEVEN, break_long_words=False)
+    return "\n".join(even if len(even) == len(lines) else lines)
 
 
 def writable(text: str, family: str | None = None) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import product
+from itertools import chain, product
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -44,7 +44,7 @@ from sprag.worker import models
 if TYPE_CHECKING:
     from sprag.service.results.curves import CurveQuery
     from sprag.service.results.figures.figure import Figure
-    from sprag.service.results.key_answers import StudyAnswers
+    from sprag.service.results.key_answers import Found, StudyAnswers
     from sprag.service.storage.records import Kinds, RowBlock, StudyRecord
     from sprag.service.storage.store import Store
     from sprag.worker.models import ResultInfo
@@ -52,8 +52,12 @@ if TYPE_CHECKING:
 
 #: Half widths of means appear in the table beside their means.
 _HALF_WIDTH: Final = ".half_width"
-_RESULTS_A_PICTURE: Final = 3
-_MOST_PICTURES: Final = 24
+#: Results in one picture of further results, which fills a page, and the most results that are drawn.
+_RESULTS_A_PICTURE: Final = 12
+_MOST_RESULTS: Final = 48
+#: Difference of values, as a share of them, up to which a result is the same in all points.
+_SAME: Final = 1e-9
+_MOST_MAPS: Final = 24
 _LONGEST_GIVEN: Final = 1000
 #: How a document for people is read unless something else is asked for.
 AS_TYPED: Final = Choice(TYPED)
@@ -87,8 +91,9 @@ class Range:
 class Report:
     """The content of a report, in SI and code names; ``reading`` says how it is read.
 
-    ``main`` are the curves of the answers, with these marked on them; ``answers`` the rows of their table. ``figures``
-    are those that somebody chose for the report, in the place of ``main`` and of the maps.
+    ``main`` are the curves of the answers, with these marked on them; ``answers`` the rows of their table.
+    ``left_out`` are the cases that the ranges leave out because their motion is not settled. ``figures``
+    are those that somebody chose for the report, in the place of ``main``, of ``pictures`` and of the maps.
     """
 
     title: str
@@ -110,6 +115,7 @@ class Report:
     main_caption: str
     answers: tuple[tuple[str, ...], ...]
     clutch: Figure | None
+    left_out: int
     kinds: tuple[tuple[str, int, str], ...]
     calibration: DrivesPart | None = None
     figures: tuple[ChosenFigure, ...] = ()
@@ -177,12 +183,14 @@ def make_report(
 ) -> Report:
     """The report of a study in its current state; reads all its rows once. ``spec`` is the user's own."""
     infos = models.study_results(study)
-    every = ranges(infos, blocks)
+    doubtful = models.presentation_of(study).doubtful
+    left_out = sum(kinds.flags.get(name, 0) for name in doubtful)
+    left_out = left_out if left_out < record.done else 0
+    every = ranges(infos, blocks, doubtful if left_out else ())
     found = _answers_of(study, infos, chosen, point, fetch)
     drawn = None if found is None or figures else found.drawn
-    already = [name for figure in figures for name in figure.results]
-    already += [] if drawn is None else [info.name for info in drawn.selection.results]
-    pictures, note = _pictures(study, infos, frozenset(already), fetch)
+    already = frozenset(() if drawn is None else (info.name for info in drawn.selection.results))
+    pictures, note = ((), "") if figures else _pictures(study, infos, already, fetch)
     main = None if found is None or drawn is None else answers_figure(found, 2)
     return Report(
         record.name or model_title(record.model),
@@ -204,6 +212,7 @@ def make_report(
         "" if found is None or found.query is None else caption(study, found.query).said(reading),
         () if found is None else tuple(_answer_rows(found, study, reading)),
         clutch_figure(study, spec, _largest_windup(every)),
+        left_out,
         (*_kind_rows(kinds.regimes, models.REGIME_SENTENCES), *_flag_rows(study, kinds)),
         figures=figures,
         effects=_effects(study, infos, spec, fetch),
@@ -250,13 +259,17 @@ def _answer_rows(found: StudyAnswers, study: Study, reading: Reading) -> Iterato
         name = curve_name(one, study).said(reading)
         if name and len(found.curves) > 1:
             yield (_("Curve {name}", name=name), "", "", "")
-        for item in (*one.answers, *one.working_point):
-            title = item.answer.title
-            title = reading.say_name(title) if title == item.answer.result else said_title(title, reading)
-            sign = "> " if item.above and item.value is not None else ""
-            value = "–" if item.value is None else sign + reading.quantity(item.value, item.unit)
-            place = "" if item.x is None else reading.quantity(item.x, found.unit)
-            yield (title, value, place, note_of(answer_facts(item), found.unit).said(reading))
+        # Answers of a model may be among the main results at the working point.
+        yield from dict.fromkeys(_answer_row(item, found.unit, reading) for item in (*one.answers, *one.working_point))
+
+
+def _answer_row(item: Found, unit: str, reading: Reading) -> tuple[str, str, str, str]:
+    title = item.answer.title
+    title = reading.say_name(title) if title == item.answer.result else said_title(title, reading)
+    sign = "> " if item.above and item.value is not None else ""
+    value = "–" if item.value is None else sign + reading.quantity(item.value, item.unit)
+    place = "" if item.x is None else reading.quantity(item.x, unit)
+    return (title, value, place, note_of(answer_facts(item), unit).said(reading))
 
 
 def _largest_windup(every: Sequence[Range]) -> float:
@@ -283,8 +296,11 @@ def _shortened(text: str) -> str:
     )
 
 
-def ranges(infos: Sequence[ResultInfo], blocks: Iterable[RowBlock]) -> tuple[Range, ...]:
-    """Least, mean and largest of every result over the rows, with the first case that has the extreme."""
+def ranges(infos: Sequence[ResultInfo], blocks: Iterable[RowBlock], doubtful: Sequence[str] = ()) -> tuple[Range, ...]:
+    """Least, mean and largest of every result over the rows, with the first case that has the extreme.
+
+    Rows with a flag of ``doubtful`` are left out, as answers leave them out.
+    """
     columns = [index for index, info in enumerate(infos) if info.kind != "category"]
     every = np.arange(len(columns))
     known, total = np.zeros(every.size, dtype=np.int64), np.zeros(every.size)
@@ -292,7 +308,8 @@ def ranges(infos: Sequence[ResultInfo], blocks: Iterable[RowBlock]) -> tuple[Ran
     value = {np.less: np.full(every.size, np.inf), np.greater: np.full(every.size, -np.inf)}
     case = {better: np.zeros(every.size, dtype=np.int64) for better in value}
     for block in blocks:
-        values = block.values[:, columns]
+        sound = [not set(doubtful).intersection(flags.split(",")) for flags in block.flags]
+        values = np.where(np.array(sound, dtype=np.bool_)[:, None], block.values[:, columns], np.nan)
         there = ~np.isnan(values)
         known += there.sum(axis=0)
         total += np.where(there, values, 0.0).sum(axis=0)
@@ -317,23 +334,33 @@ def ranges(infos: Sequence[ResultInfo], blocks: Iterable[RowBlock]) -> tuple[Ran
 def _pictures(
     study: Study, infos: tuple[ResultInfo, ...], already: frozenset[str], fetch: Fetch
 ) -> tuple[tuple[Curves, ...], str]:
-    """The study's main curve for each group of related results but those ``already`` drawn; or why there is none."""
+    """The study's main curves of all results but those ``already`` drawn, a page each; or why there are none."""
     query = main_query(study, infos)
     if query is None:
         return (), _("Nothing varies in this study, so there is no curve.")
     if study.plan is not None and curve_plan(study) is None:  # its cases lie on no curves
         return (), ""
-    shown = models.presentation_of(study)
-    groups = list(_groups([info for info in infos if info.name not in already], shown.checks))
-    if not groups:
+    checks = models.presentation_of(study).checks
+    chosen = _in_groups([info for info in infos if info.name not in already], checks)
+    if not chosen:
         return (), ""
-    chosen = [info for group in groups for info in group]
     try:
         whole = draw(select(study, infos, replace(query, y=tuple(info.name for info in chosen))), fetch)
-        require_drawable([_part(whole, groups[0])])
+        shown = [info for info in chosen if _varies(whole, info)][:_MOST_RESULTS]
+        groups = [shown[start : start + _RESULTS_A_PICTURE] for start in range(0, len(shown), _RESULTS_A_PICTURE)]
+        parts = tuple(replace(whole, selection=replace(whole.selection, results=tuple(group))) for group in groups)
+        for part in parts:
+            require_drawable([part])
     except SelectionError as error:
         return (), _("There are no curves here: {why}.", why=error)
-    return tuple(_part(whole, group) for group in groups), ""
+    return parts, ""
+
+
+def _varies(drawn: Curves, info: ResultInfo) -> bool:
+    """Whether curves show more of a result than its value in the table of ranges."""
+    values = np.concatenate([curve.y[info.name] for curve in drawn.curves])
+    known = values[np.isfinite(values)]
+    return bool(known.size and np.ptp(known) > _SAME * np.abs(known).max())
 
 
 def _maps(study: Study, infos: tuple[ResultInfo, ...], fetch: Fetch) -> tuple[Map, ...]:
@@ -343,12 +370,12 @@ def _maps(study: Study, infos: tuple[ResultInfo, ...], fetch: Fetch) -> tuple[Ma
         return ()
     y, x = (axis.paths[0] for axis in plan.adaptive)
     held = product(*([(axis.paths[0], repr(value)) for value in axis.values] for axis in plan.fixed))
-    every = [(name, at) for at in held for name in plan.results][:_MOST_PICTURES]
+    every = [(name, at) for at in held for name in plan.results][:_MOST_MAPS]
     return tuple(draw_map(study, infos, x, y, name, at, fetch) for name, at in every)
 
 
-def _groups(infos: Sequence[ResultInfo], checks: tuple[str, ...]) -> Iterator[tuple[ResultInfo, ...]]:
-    """Results of one unit and one part of the machine, a few at a time."""
+def _in_groups(infos: Sequence[ResultInfo], checks: tuple[str, ...]) -> list[ResultInfo]:
+    """The results that curves are drawn of, those of one part of the machine and of one unit side by side."""
     found: dict[tuple[str, ...], list[ResultInfo]] = {}
     for info in infos:
         first, *rest = info.name.split(".")
@@ -356,13 +383,4 @@ def _groups(infos: Sequence[ResultInfo], checks: tuple[str, ...]) -> Iterator[tu
             continue
         part = f"{first}.{rest[0]}" if rest and rest[0].isdigit() else first
         found.setdefault((part, info.unit), []).append(info)
-    every = (
-        tuple(group[start : start + _RESULTS_A_PICTURE])
-        for group in found.values()
-        for start in range(0, len(group), _RESULTS_A_PICTURE)
-    )
-    yield from list(every)[:_MOST_PICTURES]
-
-
-def _part(whole: Curves, group: tuple[ResultInfo, ...]) -> Curves:
-    return replace(whole, selection=replace(whole.selection, results=group))
+    return list(chain.from_iterable(found.values()))

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.languages import N_, _, pgettext
+from sprag.service.languages import N_, _, date_format, pgettext
 from sprag.service.results.fault_texts import warning_text
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.read import read_figure, read_map
-from sprag.service.results.phrases import lower_first, shown, term, titled
+from sprag.service.results.phrases import lower_first, shown, term, titled, upper_first
 from sprag.service.results.pictures.curves import draw_figure
 from sprag.service.results.pictures.maps import draw_map
 from sprag.service.results.pictures.sensitivity import draw_sensitivity
+from sprag.service.results.regimes import left_out
 from sprag.service.results.report.sketch import sketches
 from sprag.service.results.shown_inputs import choice_name, in_words
 from sprag.service.results.wording import number, unit_text
@@ -74,13 +76,16 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class TitleBlock:
-    """What a customer's document says of itself: who made it, for which project, under which number."""
+    """What a customer's document says of itself: who made it, for which project, under which number.
+
+    Without a ``date`` it is of today, in the language of the task; with an empty one it has none.
+    """
 
     office: str = ""
     project: str = ""
     author: str = ""
     number: str = ""
-    date: str = ""
+    date: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +97,11 @@ class Document:
     sections: tuple[Section, ...] = field(default_factory=tuple)
 
 
+def today() -> str:
+    """The date (UTC), as the language writes it."""
+    return datetime.now(UTC).strftime(date_format())
+
+
 def document_of(report: Report, block: TitleBlock) -> Document:
     """The report with its title block."""
     pairs = (
@@ -99,7 +109,7 @@ def document_of(report: Report, block: TitleBlock) -> Document:
         (_("Project"), block.project),
         (_("Author"), block.author),
         (pgettext("of a document", "Number"), block.number),
-        (_("Date"), block.date),
+        (_("Date"), today() if block.date is None else block.date),
     )
     every: tuple[tuple[str, Callable[[Report], Iterator[Block]]], ...] = (
         ("", _warnings),
@@ -114,8 +124,8 @@ def document_of(report: Report, block: TitleBlock) -> Document:
         (_("Ranges of the results"), _ranges),
         (_("Inputs"), _inputs),
         (_("Machine and run as given"), _given),
-        (_("Curves of further results"), _further),
         (_("Study and versions"), _facts),
+        (_("Curves of further results"), _further),
     )
     sections = (Section(title, tuple(write(report))) for title, write in every)
     return Document(report.title, tuple(pair for pair in pairs if pair[1]), tuple(s for s in sections if s.blocks))
@@ -131,7 +141,7 @@ def _machine(report: Report) -> Iterator[Block]:
         text = _(title)
         yield Image(svg, text, _("Sketch of the machine: {title}", title=text), wide=False)
     if report.clutch is not None:
-        yield _image(report, report.clutch, _("Law of the clutch"))
+        yield replace(_image(report, report.clutch, _("Law of the clutch")), wide=False)
 
 
 def _answers(report: Report) -> Iterator[Block]:
@@ -176,7 +186,8 @@ def _curves(report: Report) -> Iterator[Block]:
 def _sensitivity(report: Report) -> Iterator[Block]:
     for item in report.effects:
         text = _("What {result} depends on", result=report.reading.within(item.info.name))
-        yield Image(draw_sensitivity([item], "", report.reading, "svg"), text, text)
+        svg = draw_sensitivity([item], "", report.reading, "svg", noted=False)
+        yield Image(svg, ". ".join((text, *(upper_first(report.reading.say(note)) for note in item.notes))), text)
 
 
 def _part(report: Report, *, name: str) -> Iterator[Block]:
@@ -186,8 +197,7 @@ def _part(report: Report, *, name: str) -> Iterator[Block]:
             text = _(_MEASURED) if name == "calibration" else _("Quantiles over the drives")
             yield _image(report, part.figure, text)
         for sentence in part.sentences:
-            text = report.reading.say(sentence)
-            yield Text(text[:1].upper() + text[1:])
+            yield Text(upper_first(report.reading.say(sentence)))
 
 
 def _endings(report: Report) -> Iterator[Block]:
@@ -210,6 +220,8 @@ def _ranges(report: Report) -> Iterator[Block]:
                      number(row.known)))  # fmt: skip
     heads = (_("Result"), _("Unit"), _("Least"), _("in case"), _("Mean"), _("Largest"), _("in case"), _("Cases"))
     yield Table(heads, tuple(rows), (2, 3, 4, 5, 6, 7))
+    if report.left_out:
+        yield Text(f"{upper_first(shown(left_out(report.left_out)))}.")
 
 
 def _inputs(report: Report) -> Iterator[Block]:
@@ -241,9 +253,11 @@ def _further(report: Report) -> Iterator[Block]:
     for curves in report.pictures:
         names = ", ".join(report.reading.caption(info.name) for info in curves.selection.results)
         across = report.reading.caption(curves.selection.x)
-        yield _image(
-            report, curves_figure([("", curves)], 2), _("{names} against {x}", names=names, x=lower_first(across))
-        )
+        alt = _("{names} against {x}", names=names, x=lower_first(across))
+        caption = _("Further results against {x}", x=lower_first(across))
+        yield replace(_image(report, curves_figure([("", curves)], 2), caption), alt=alt)
+    if report.pictures:
+        yield Text(_("A result that has the same value everywhere on these curves is in the table of ranges only."))
 
 
 def _facts(report: Report) -> Iterator[Block]:
@@ -251,4 +265,4 @@ def _facts(report: Report) -> Iterator[Block]:
 
 
 def _image(report: Report, figure: Figure, caption: str) -> Image:
-    return Image(draw_figure(read_figure(figure, report.reading), "", "svg"), caption, caption)
+    return Image(draw_figure(read_figure(figure, report.reading), "", "svg", paper=True), caption, caption)

@@ -44,8 +44,8 @@ def test_a_line_joins_neighbours_of_one_regime_and_no_unsettled_point() -> None:
 def test_regimes_are_told_in_one_order_and_counted_in_words() -> None:
     assert regimes_of([REGIMES, None]) == ["periodic", "coasting", "irregular", "unsettled"]
     assert (
-        counted({"periodic": 4860, "irregular": 24, "unsettled": 2})
-        == "4\N{NARROW NO-BREAK SPACE}860 periodic, 24 irregular, 2 unsettled"
+        counted({"periodic": 48600, "irregular": 24, "unsettled": 2})
+        == "48\N{NARROW NO-BREAK SPACE}600 periodic, 24 irregular, 2 unsettled"
     )
     assert set(MARKS) | {"none"} == set(models.REGIME_SENTENCES)
 

@@ -24,16 +24,13 @@ if TYPE_CHECKING:
 
 Data = dict[str, Any]
 
-#: Markers and dashes repeat the distinction by colour, for prints in grey.
-SYMBOLS: Final = ("circle", "square", "diamond", "triangle-up", "x", "triangle-down", "star", "cross")
 _NOTE_SYMBOLS: Final[dict[NoteKind, str]] = {
     "largest": "triangle-down",
     "smallest": "triangle-up",
     "point": "circle-open",
 }
+#: Dashes repeat the distinction by colour, as markers do.
 _DASHES: Final = ("solid", "dash", "dot", "dashdot")
-#: Lines with more points are drawn without markers.
-_MARKED: Final = 60
 #: Characters of the name of a study in a legend.
 _MOST_LABEL: Final = 60
 #: Characters on a line of a heading above one column of panels.
@@ -80,7 +77,7 @@ def plotly_figure(figure: Figure) -> Data:
         "hovermode": "x" if figure.motion else "closest",
         "showlegend": named or bool(figure.regimes or strip or figure.banded or figure.noted),
         "legend": _legend(figure, beside=beside),
-        MOTIONS: {**BELOW, "title": {"text": _motion_title(figure), "side": "top"}},
+        MOTIONS: {**BELOW, "title": {"text": figure.title_of_marks, "side": "top"}},
         "uirevision": "keep",
         **separators(),
     }
@@ -143,14 +140,6 @@ def separators() -> Data:
     return {"separators": f"{decimal('.')}\N{NARROW NO-BREAK SPACE}"}
 
 
-def _motion_title(figure: Figure) -> str:
-    """What the legend of marks and strips is about."""
-    if not figure.regimes:
-        return figure.states if figure.spans or not (figure.banded or figure.noted) else ""
-    regime = gettext("Regime")
-    return f"{regime}; {figure.states.lower()}" if figure.spans else regime
-
-
 def _suffix(number: int) -> str:
     """What the names of the axes of that number end in."""
     return "" if number == 0 else str(number + 1)
@@ -169,7 +158,7 @@ def escaped(text: str) -> str:
 
 def _y_axis(panel: Panel, figure: Figure, domain: tuple[float, float], anchor: str) -> Data:
     axis: Data = {"domain": list(domain), "anchor": anchor, "title": {"text": axis_title(panel.y)}}
-    return axis | ({"zeroline": True} if figure.motion or figure.apart else {"zeroline": False, "rangemode": "tozero"})
+    return axis | ({"zeroline": False, "rangemode": "tozero"} if figure.from_zero else {"zeroline": True})
 
 
 def _x_axis(figure: Figure, index: int, anchor: str) -> Data:
@@ -214,7 +203,7 @@ def _line_trace(line: Line, panel: Panel, figure: Figure, headings: set[str]) ->
     heading, name = (escaped(shortened(text, _MOST_LABEL)) for text in (line.heading, line.name))
     title = "" if heading in headings else heading
     headings.add(heading)
-    marked = not line.joined or (line.cases is not None and kept.size <= _MARKED)
+    marked = line.marked(kept.size)
     trace: Data = {
         "type": "scatter",
         "mode": "+".join(["lines"] * line.joined + ["markers"] * marked),
@@ -235,7 +224,7 @@ def _line_trace(line: Line, panel: Panel, figure: Figure, headings: set[str]) ->
         trace["mode"], size = "lines+markers", _lone(places)
     return trace | {
         "customdata": [None if place is None else int(line.cases[place]) for place in places],
-        "marker": {"color": line.colour, "symbol": SYMBOLS[int(line.key) % len(SYMBOLS)], "size": size},
+        "marker": {"color": line.colour, "symbol": line.marker, "size": size},
         "hovertemplate": _hover(panel.y, label),
     }
 
@@ -244,14 +233,13 @@ def _points(line: Line, kept: NDArray[np.int64], panel: Panel, scale: str) -> Da
     """Points that are no cases: open ones, or in the colours of numbers, with the scale of these."""
     x = unit_text(panel.x.unit if panel.x else "")
     where = f"%{{x:.5g}} {x}, %{{y:.6g}} {unit_text(panel.y.unit)}<extra>{escaped(line.name)}</extra>"
-    symbol = SYMBOLS[line.style % len(SYMBOLS)]
     if line.ring:
-        marker: Data = {"symbol": f"{symbol}-open", "size": 12, "color": line.colour, "line": {"width": 2}}
+        marker: Data = {"symbol": f"{line.marker}-open", "size": 12, "color": line.colour, "line": {"width": 2}}
         return {"marker": marker, "hovertemplate": where}
     if line.shades is None:
-        return {"marker": {"symbol": symbol, "size": 5, "color": line.colour}, "hovertemplate": where}
+        return {"marker": {"symbol": line.marker, "size": 5, "color": line.colour}, "hovertemplate": where}
     numbers = line.shades[kept].tolist()
-    marker = {"symbol": symbol, "size": 6, "color": numbers, "colorscale": "Viridis", "showscale": line.style == 0}
+    marker = {"symbol": line.marker, "size": 6, "color": numbers, "colorscale": "Viridis", "showscale": line.style == 0}
     marker["colorbar"] = {"title": {"text": escaped(scale), "side": "right"}, "thickness": 12}
     return {"customdata": numbers, "marker": marker, "hovertemplate": f"{scale} %{{customdata}}: {where}"}
 

@@ -306,7 +306,11 @@ def test_numbers_are_written_for_people() -> None:
         "–", "0", "1\u202f234\u202f567", "123\u202f460", "−4.5548·10⁻⁶", "0.3",
     ]  # fmt: skip
     assert [unit_text(u) for u in ("1", "kg*m^2", "N*m/rad^10")] == ["", "kg·m²", "N·m/rad¹⁰"]
-    assert [number(v, 3) for v in (1130.4, 999.7, -4321.0)] == ["1\u202f130", "1\u202f000", "−4\u202f320"]
+    assert [number(v, 3) for v in (1130.4, 999.7, -4321.0)] == ["1130", "1000", "−4320"]
+    # In one column: thousands are separated from 10 000 on, with decimals or without.
+    assert [number(v, 6) for v in (10890, 9000, 13778.8, -13778.8, 9000.0, 1e-8, 2e-5)] == [
+        "10\u202f890", "9000", "13\u202f778.8", "−13\u202f778.8", "9000", "1·10⁻⁸", "2·10⁻⁵",
+    ]  # fmt: skip
     assert time_left({"low": 0.2, "high": 0.6}) == "less than 1 s"
     assert time_left({"low": 0.2, "high": 12.0}) == "less than 1 s to 12 s"
     letters = ("m2", "beta", "beta_1", "w_m", "M_c", "lambda", "nu/2pi")

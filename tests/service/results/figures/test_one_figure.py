@@ -17,6 +17,7 @@ from sprag.service.jobs import answers, key_answers
 from sprag.service.jobs.checks import Library
 from sprag.service.presets import preset_text
 from sprag.service.results.curves import CurveQuery
+from sprag.service.results.pictures.legends import MARKERS
 from sprag.service.results.reading import Choice
 from sprag.worker import models
 from tests.service.searching import search
@@ -66,9 +67,18 @@ def test_a_picture_is_the_figure_of_the_page(service: Service, monkeypatch: pyte
         own = [trace for trace in page["data"] if trace["yaxis"] == f"y{place + 1 if place else ''}"]
         assert [to_hex(line.get_color()) for line in axes.lines] == [trace["line"]["color"] for trace in own]
         assert [str(line.get_label()) for line in axes.lines] == [trace["name"] for trace in own]
+        assert [line.get_marker() for line in axes.lines] == [MARKERS[trace["marker"]["symbol"]] for trace in own]
+        assert len({line.get_marker() for line in axes.lines}) == 4
+        assert page["layout"][trace_axis(own[0])]["rangemode"] == "tozero"
+        assert axes.get_ylim()[0] <= 0.0 <= axes.get_ylim()[1]
         for line, trace in zip(axes.lines, own, strict=True):
             known = [float(value) for value in np.asarray(line.get_ydata(), dtype=float) if np.isfinite(value)]
             assert known == [value for value in trace["y"] if value is not None]
+
+
+def trace_axis(trace: dict[str, Any]) -> str:
+    """The key of the y axis of a trace in the layout."""
+    return f"yaxis{trace['yaxis'][1:]}"
 
 
 def test_the_answers_of_a_picture_are_those_of_the_page(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:

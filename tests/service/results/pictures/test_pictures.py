@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import CurveQuery
+from sprag.service.results.figures.curves import curves_figure
+from sprag.service.results.figures.figure import Quantity
 from sprag.service.results.figures.read import read_map
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.pictures import maps
@@ -20,6 +24,7 @@ from sprag.service.storage.records import CaseColumns
 from sprag.worker import models
 
 if TYPE_CHECKING:
+    from matplotlib.backend_bases import RendererBase
     from numpy.typing import NDArray
 
 TIED = ["excitation.amplitude_x", "excitation.amplitude_y"]
@@ -90,8 +95,39 @@ def test_long_titles_are_broken_between_values(spec: dict[str, Any], figures: li
 def test_few_curves_have_a_legend_with_units(spec: dict[str, Any], figures: list[Figure]) -> None:
     curves(grid(spec, 2), by=("excitation.amplitude_x",), at=(("excitation.frequency", "20 Hz"),))
     (legend,) = figures[0].legends
-    assert legend.get_title().get_text().replace("\n", " ") == "Horizontal amplitude = vertical amplitude (m)"
+    # It has the title of the picture, which stands above it.
+    assert legend.get_title().get_text().splitlines() == [
+        "A study", "Excitation frequency = 20 Hz", "Horizontal amplitude = vertical amplitude (m)",
+    ]  # fmt: skip
+    assert figures[0].get_suptitle() == ""
     assert [text.get_text() for text in legend.get_texts()] == ["0.001", "0.002"]
+
+
+def test_a_picture_is_drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[Line2D] = []
+    draw_line = Line2D.draw
+
+    def counted(line: Line2D, renderer: RendererBase) -> None:
+        drawn.append(line)
+        draw_line(line, renderer)
+
+    monkeypatch.setattr(Line2D, "draw", counted)
+    for picture in pictures.PICTURES:
+        assert pictures.render(lambda figure: figure.subplots().plot([1.0, 2.0], [0.0, 1.0]), picture, (3.0, 2.0))
+        assert len(set(drawn)) == len(drawn)
+
+
+def test_long_names_of_axes_have_several_lines(spec: dict[str, Any], figures: list[Figure]) -> None:
+    study = parse_spec({**spec, "axes": [{"path": "shaft.load", "values": [0, 1]}]}).study
+    query = CurveQuery("shaft.load", (SPEED,))
+    figure = curves_figure([("", draw(select(study, models.study_results(study), query), fetch))])
+    long = replace(figure, panels=(replace(figure.panels[0], y=Quantity("word " * 20, "m")),) * 12)
+    pictures.draw_figure(long, "", "svg", paper=True)
+    height = figures[0].get_figheight() * 72.0 / 12
+    for axes in figures[0].axes[:12]:
+        lines = axes.get_ylabel().splitlines()
+        assert len(lines) > 2
+        assert max(map(len, lines)) * 0.5 * axes.yaxis.label.get_fontsize() < height
 
 
 def test_each_of_many_curves_is_named(spec: dict[str, Any], figures: list[Figure]) -> None:
