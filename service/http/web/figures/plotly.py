@@ -50,7 +50,7 @@ BELOW: Final[Data] = {
     "orientation": "h", "x": 0, "xanchor": "left", "y": 0, "yref": "container", "yanchor": "bottom", "tracegroupgap": 0,
 }  # fmt: skip
 #: Share of the width between two panels side by side.
-_GAP: Final = 0.1
+_GAP: Final = 0.12
 #: The same of a motion, whose numbers have more digits and whose legend leaves less room.
 _MOTION_GAP: Final = 0.15
 #: Shares for a scale, and between it and its panel.

@@ -13,12 +13,14 @@ sprag.figures = new Map();
 sprag.colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 // Widths of a picture (px) below which its panels stand one under the other, and its legend under them, as on paper.
-const NARROW = 600, BESIDE = 700, ENTRIES = { legend: 110, legend2: 130 }, LINE = 20, SCALE = 80, LETTER = 7, SYMBOL = 60;
+const NARROW = 600, BESIDE = 700, LINE = 20, SCALE = 80, LETTER = 7, SYMBOL = 60;
+// Size of the titles of axes and the width of their letters (px).
+const TITLE = 14, TITLE_LETTER = 8;
 
 // A text in lines that fit a width (px), as far as its words allow.
-const linesOf = (text, width) => text.split(/ |<br>/).reduce((lines, word) => {
+const linesOf = (text, width, letter = LETTER) => text.split(/ |<br>/).reduce((lines, word) => {
   const longer = [lines.at(-1), word].filter(Boolean).join(" ");
-  return longer.length * LETTER > width ? [...lines, word] : [...lines.slice(0, -1), longer];
+  return longer.length * letter > width ? [...lines, word] : [...lines.slice(0, -1), longer];
 }, [""]).filter(Boolean);
 
 const titleLines = (figure, name, width) => linesOf(figure.layout[name]?.title?.text ?? "", width);
@@ -28,22 +30,27 @@ const hasScale = (figure) => figure.data.some((trace) => trace.colorbar && trace
 // Pixels that a legend takes over the whole width.
 const legendHeight = (figure, name, width) => {
   const shown = figure.data.filter((trace) => trace.showlegend !== false && (trace.legend || "legend") === name);
-  // Those of several lines stand alone.
-  const long = shown.map((trace) => linesOf(trace.name ?? "", width - SYMBOL).length).filter((lines) => lines > 1);
-  const rows = Math.ceil((shown.length - long.length) / Math.max(Math.floor(width / ENTRIES[name]), 1)) + long.reduce((sum, lines) => sum + lines, 0);
+  // As plotly sets them: one after the other, in a new row where there is no more room; those of several lines stand alone.
+  let rows = 0, left = 0;
+  for (const trace of shown) {
+    const lines = linesOf(trace.name ?? "", width - SYMBOL), own = SYMBOL + Math.max(...lines.map((line) => line.length), 0) * LETTER;
+    if (own > left) { rows += lines.length; left = width; }
+    left = lines.length > 1 ? 0 : left - own;
+  }
   return shown.length && (rows + Math.max(titleLines(figure, name, width).length, 1)) * LINE;
 };
 
 // Room for the legends below the panels. In a narrow picture all are there: beside the panels they would leave no room for them.
-sprag.fitted = (figure, width) => {
+// `limited` gives the height that the whole may have.
+sprag.fitted = (figure, width, limited) => {
   const { title: heading } = figure.layout, wrapped = heading && { ...heading, text: linesOf(heading.text, width).join("<br>"), xref: "container" };
   const layout = heading && width < BESIDE ? { ...figure.layout, title: wrapped } : figure.layout;
-  if (!layout.showlegend && !hasScale(figure)) return layout;
+  if (!layout.showlegend && !hasScale(figure)) return { ...layout, height: limited(layout.height) };
   const narrow = width < BESIDE, second = legendHeight(figure, "legend2", width), first = narrow ? legendHeight(figure, "legend", width) : 0;
   const { t, b } = layout.margin, scale = narrow && hasScale(figure) ? SCALE : 0;
   const bottom = b + scale + (first + second ? first + second + 10 : 0);
   const margin = { ...layout.margin, b: bottom, ...(narrow ? { t: layout.title ? 60 : 20, l: 60 } : {}) };
-  const height = layout.height - t - b + margin.t + bottom;
+  const height = limited(layout.height - t - b + margin.t + bottom);
   if (!narrow) return { ...layout, height, margin };
   const below = { orientation: "h", x: 0, xref: "container", xanchor: "left", yref: "container", yanchor: "bottom" };
   const title = { ...layout.legend?.title, text: titleLines(figure, "legend", width).join("<br>"), font: { size: 11 } };
@@ -58,8 +65,14 @@ sprag.traces = (figure, width, layout) => width >= BESIDE ? figure.data : figure
   return { ...trace, colorbar: { ...trace.colorbar, title, orientation: "h", x: 0.5, y, yref: "container", yanchor: "bottom" } };
 });
 
-sprag.themed = (figure, width) => {
-  const layout = sprag.fitted(figure, width);
+// The title of an axis in lines that fit its panel, so that it does not run into those of neighbours.
+const fittedTitle = (key, axis, layout, width) => {
+  const { l, r, t, b } = layout.margin, whole = key[0] === "y" ? layout.height - t - b : width - l - r, [low, high] = axis.domain ?? [0, 1];
+  return { ...axis.title, font: { size: TITLE }, text: linesOf(axis.title.text, (high - low) * whole, TITLE_LETTER).join("<br>") };
+};
+
+sprag.themed = (figure, width, limited = (height) => height) => {
+  const layout = sprag.fitted(figure, width, limited);
   const ink = sprag.colour("--ink"), line = sprag.colour("--line");
   const themed = {
     ...layout, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
@@ -69,7 +82,8 @@ sprag.themed = (figure, width) => {
   };
   for (const [key, axis] of Object.entries(layout)) {
     if (/^[xy]axis\d*$/.test(key)) {
-      themed[key] = { gridcolor: line, linecolor: sprag.colour("--strong"), ticks: "outside", tickcolor: line, automargin: true, ...axis };
+      const title = axis.title?.text ? { title: fittedTitle(key, axis, layout, width) } : {};
+      themed[key] = { gridcolor: line, linecolor: sprag.colour("--strong"), ticks: "outside", tickcolor: line, automargin: true, ...axis, ...title };
     }
   }
   return themed;
@@ -132,11 +146,12 @@ sprag.draw = async (element) => {
 sprag.drawAll = (root) => Promise.all([...root.querySelectorAll("[data-figure]")].map(sprag.draw));
 
 // Paper is narrower than the window, and white; on its first page a picture is at most a quarter lower, to fit.
-const PAPER = 690, LOW = 580, LOWER = 0.75;
+const PAPER = 680, LOW = 580, LOWER = 0.75;
+const onPaper = (height) => Math.max(LOWER * height, Math.min(height, LOW));
 const redraw = (width) => {
   for (const [element, figure] of sprag.figures) {
-    const shown = width || element.clientWidth, layout = sprag.themed(figure, shown);
-    Plotly.react(element, sprag.traces(figure, shown, layout), width ? { ...layout, width, height: Math.max(LOWER * layout.height, Math.min(layout.height, LOW)) } : layout, sprag.config);
+    const shown = width || element.clientWidth, layout = sprag.themed(figure, shown, width ? onPaper : undefined);
+    Plotly.react(element, sprag.traces(figure, shown, layout), width ? { ...layout, width } : layout, sprag.config);
   }
 };
 window.addEventListener("beforeprint", () => redraw(PAPER));

@@ -31,6 +31,14 @@ def family(office: Office) -> str:
     return office.submit(**FAMILY)
 
 
+@pytest.fixture(scope="module")
+def settled(office: Office) -> str:
+    """A study with legends of curves, marks and states."""
+    run = {"until": "settled", "at_most": "100 periods"}
+    loads = {"path": "shaft.load", "values": [0.0, 0.1, 0.2]}
+    return office.submit(run=run, axes=[FAMILY["axes"][0] | {"linspace": ["2 mm", "4 mm", 3]}, loads])
+
+
 def cut_off(page: Page, width: float) -> list[str]:
     """Texts of the legend that are not wholly within the picture and a width."""
     texts: list[str] = page.evaluate(
@@ -76,6 +84,67 @@ def test_a_phone_has_the_whole_legend(visitor: Visitor, family: str) -> None:
         drawn(page)
         assert (entries(page), cut_off(page, 390)) == (8, []), address
         assert page.evaluate("() => document.documentElement.scrollWidth") == 390, address
+
+
+#: Pairs of texts of a picture that lie on each other: titles of axes, and titles and entries of legends.
+OVERLAPS = """() => {
+  const inner = (box, other) => Math.min(box.right, other.right) - Math.max(box.left, other.left) > 1
+    && Math.min(box.bottom, other.bottom) - Math.max(box.top, other.top) > 2;
+  const texts = [...document.querySelectorAll(".plot :is(text[class*=title], .legendtext)")]
+    .map((e) => [e.textContent, e.getBoundingClientRect()]);
+  return texts.flatMap(([text, box], at) => texts.slice(at + 1)
+    .filter(([, other]) => inner(box, other)).map(([other]) => [text, other]));
+}"""
+
+
+@pytest.mark.parametrize("visitor", [{"locale": "uk-UA"}], indirect=True)
+def test_titles_and_legends_lie_nowhere_on_each_other(visitor: Visitor, settled: str) -> None:
+    page = visitor.page
+    for width in (1280, 390):
+        page.set_viewport_size({"width": width, "height": 900})
+        page.goto(f"/studies/{settled}")
+        drawn(page)
+        assert page.locator(".plot text[class^=y][class$=title]").count() == 4
+        assert page.evaluate(OVERLAPS) == []
+    page.set_viewport_size({"width": 1280, "height": 900})
+    page.goto(f"/studies/{settled}")
+    drawn(page)
+    page.emulate_media(media="print")
+    page.evaluate("() => window.dispatchEvent(new Event('beforeprint'))")
+    page.wait_for_function("() => document.querySelector('.plot .main-svg')?.getBoundingClientRect().width <= 690")
+    assert page.evaluate(OVERLAPS) == []
+
+
+#: Words that the tables of inputs break: they are wider than their cells.
+BROKEN = """() => [...document.querySelectorAll(".inputs td")].flatMap((cell) => {
+  const node = cell.firstChild;
+  if (node?.nodeType !== Node.TEXT_NODE) return [];
+  return [...node.data.matchAll(/[\\p{L}]+/gu)].filter(({ index, 0: word }) => {
+    const range = document.createRange();
+    range.setStart(node, index);
+    range.setEnd(node, index + word.length);
+    return new Set([...range.getClientRects()].map((box) => Math.round(box.top))).size > 1;
+  }).map(([word]) => word);
+})"""
+
+
+@pytest.mark.parametrize("visitor", [{"locale": "uk-UA"}], indirect=True)
+def test_inputs_break_no_words_and_tables_tell_that_they_scroll(visitor: Visitor, family: str) -> None:
+    page = visitor.page
+    for width in (1440, 820, 390):
+        page.set_viewport_size({"width": width, "height": 900})
+        page.goto(f"/studies/{family}")
+        drawn(page)
+        assert page.evaluate(BROKEN) == [], width
+        assert page.evaluate("() => document.documentElement.scrollWidth") == width
+    region = "() => getComputedStyle(document.querySelector('.scroll'))"
+    assert page.evaluate(f"{region}.backgroundAttachment") == "local, local, scroll, scroll"
+    page.emulate_media(media="print")
+    page.set_viewport_size({"width": 680, "height": 900})
+    assert page.evaluate(BROKEN) == []
+    assert page.evaluate(f"{region}.overflowX") == "visible"
+    tables = page.locator(".scroll > table")
+    assert all(tables.evaluate_all("(every) => every.map((e) => e.getBoundingClientRect().right <= innerWidth)"))
 
 
 @pytest.mark.parametrize("visitor", [{"viewport": PHONE}], indirect=True)
