@@ -115,8 +115,7 @@ class DaskExecutor:
     def capacity(self) -> int:
         """Useful number of chunks in flight, 0 without usable workers; it changes as workers join and leave."""
         with self._lock:
-            usable = sum(worker.usable for worker in self._workers.values())
-        return useful_chunks(usable) if usable else 0
+            return useful_chunks(usable) if (usable := sum(w.usable for w in self._workers.values())) else 0
 
     @property
     def shortage(self) -> str | None:
