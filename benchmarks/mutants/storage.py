@@ -50,8 +50,8 @@ STORAGE: Final = (
     Mutant(
         "every dispatcher keeps a new study for itself",
         "worker/sharing.py",
-        "return all(peer.studies >= studies for peer in peers)",
-        "return True",
+        "and all(peer.studies >= studies for peer in peers)",
+        "",
         ("tests/worker/test_sharing.py",),
     ),
     Mutant(

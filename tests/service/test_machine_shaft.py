@@ -81,7 +81,7 @@ def test_rows_are_the_engines(filled: tuple[Service, str]) -> None:
     assert page["cases"][0]["ending"] == "inertia_insufficient"
     assert page["cases"][0]["results"]["omega.max"] is None
     case = service.get(f"/studies/{study_id}/cases/0")
-    assert "least_mean_speed" in case["ending_meaning"]
+    assert "least feasible mean speed" in case["ending_meaning"]
     assert case["results"]["least_mean_speed"] > case["parameters"]["mean_speed"]
 
 

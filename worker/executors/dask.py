@@ -44,6 +44,8 @@ _LOG = logging.getLogger(__name__)
 LOOK_SECONDS: Final = 0.5
 #: Seconds without a scheduler after which the executor gives up.
 SCHEDULER_SECONDS: Final = 60.0
+#: Seconds without a usable worker after which waiting chunks are returned; one that was ended is back sooner.
+WAITING_SECONDS: Final = 60.0
 #: Seconds beyond a chunk's time limit after which a worker that should have exited counts as frozen.
 FROZEN_SECONDS: Final = 15.0
 #: Seconds that a stopped chunk gets to finish before its worker is ended; most finish sooner.
@@ -105,6 +107,7 @@ class DaskExecutor:
         self._outcomes: SimpleQueue[Outcome | None] = SimpleQueue()
         self._next_look = 0.0
         self._gone_since: float | None = None
+        self._alone_since: float | None = None
         with dask.config.set(CONFIG):
             self._cluster = None if url else own_cluster(processes)
         place = tasks.scheduler_address(url) if self._cluster is None else (self._cluster.scheduler_address, None)
@@ -227,7 +230,7 @@ class DaskExecutor:
                         job.dropped = inf
                         ended.append(worker.address)
             self._fill()
-            self._return_waiting()
+            self._return_waiting(now)
         for address in ended:
             self._link.end_worker(address)
 
@@ -239,7 +242,7 @@ class DaskExecutor:
                 if (job := worker.job) and job.kind == "chunk" and job.dropped is None:
                     self._outcomes.put(Outcome(job.ticket, Fate.STOPPED, detail="the scheduler was lost"))
         self._disconnect(timeout=1.0)
-        self._return_waiting()
+        self._return_waiting(now)
         if self._gone_since is None:
             self._gone_since = now
             _LOG.error("The scheduler %s cannot be reached; retrying: %s", self._link.address, error)
@@ -248,14 +251,17 @@ class DaskExecutor:
                 f"the scheduler {self._link.address} could not be reached for {self._scheduler_seconds:g} s: {error}"
             )
 
-    def _return_waiting(self) -> None:
-        """Return the waiting chunks while there is no worker for them: another dispatcher may take their study."""
+    def _return_waiting(self, now: float) -> None:
+        """Return the waiting chunks where there is no worker for long: another dispatcher may take their study."""
         with self._lock:
             if any(worker.usable for worker in self._workers.values()):
-                return
-            for item in self._waiting:
-                self._outcomes.put(Outcome(item.ticket, Fate.STOPPED, detail="no worker was left for it"))
-            self._waiting.clear()
+                self._alone_since = None
+            elif self._alone_since is None:
+                self._alone_since = now
+            elif now - self._alone_since >= WAITING_SECONDS:
+                for item in self._waiting:
+                    self._outcomes.put(Outcome(item.ticket, Fate.STOPPED, detail="no worker was left for it"))
+                self._waiting.clear()
 
     def _disconnect(self, timeout: float) -> None:
         with self._lock:
@@ -346,10 +352,9 @@ class DaskExecutor:
                 self._workers.pop(worker.address, None)
             if isinstance(error, KilledWorker):
                 self._died(worker, job)
-            elif job.kind == "chunk":
-                if job.dropped is None:
-                    self._cases[worker.host] += 0 if error is not None else value.count
-                    self._outcomes.put(outcome_of(job.ticket, value, error, worker.host))
+            elif job.kind == "chunk" and job.dropped is None:
+                self._cases[worker.host] += 0 if error is not None else value.count
+                self._outcomes.put(outcome_of(job.ticket, value, error, worker.host))
             elif job.kind == "introduce":
                 self._introduced(worker, value, error)
             elif job.shape is not None:
@@ -357,12 +362,10 @@ class DaskExecutor:
             self._fill()
 
     def _introduced(self, worker: Worker, found: object, error: BaseException | None) -> None:
-        if error is None:
-            worker.refusal = fingerprint.differences(self._expected, found)
-        else:
-            worker.refusal = f"it cannot run Sprag ({type(error).__name__}: {error})"
-        if worker.refusal:
-            _LOG.error("The worker %s is refused: %s.", worker.address, worker.refusal)
+        if error is not None:
+            worker.refuse(f"it cannot run Sprag ({type(error).__name__}: {error})")
+        elif differs := fingerprint.differences(self._expected, found):
+            worker.refuse(differs)
         else:
             worker.usable = True
             self._outcomes.put(None)
@@ -371,10 +374,7 @@ class DaskExecutor:
         if error is None:
             first = next((other for other in self._workers.values() if shape in other.shapes), worker)
             if (expected := first.shapes.setdefault(shape, answers)) != answers:
-                worker.refusal = f"known answers of its kernel: {answers} instead of {expected} of {first.address}"
-                worker.usable = False
-                worker.shapes.clear()
-                _LOG.error("The worker %s is refused: %s.", worker.address, worker.refusal)
+                worker.refuse(f"known answers of its kernel: {answers} instead of {expected} of {first.address}")
             else:
                 worker.shapes[shape] = answers
                 self._failed_loads.pop((worker.host, shape), None)

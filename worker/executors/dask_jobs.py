@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
     from sprag.worker import models
     from sprag.worker.executors.dask_link import Link
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(eq=False, slots=True)
@@ -54,6 +57,12 @@ class Worker:
     def joined(cls, address: str, info: Mapping[str, Any]) -> Worker:
         """A worker as the scheduler describes it."""
         return cls(address, str(info.get("host", address)), int(info.get("nthreads", 1)))
+
+    def refuse(self, reason: str) -> None:
+        """Give it no chunks; ``reason`` is a clause."""
+        self.refusal, self.usable = reason, False
+        self.shapes.clear()
+        _LOG.error("The worker %s is refused: %s.", self.address, reason)
 
     def loads(self, shape: models.KernelShape) -> bool:
         """Whether it loads that kernel at present."""

@@ -110,8 +110,9 @@ class Link:
         page = HTTPConnection(str(urlsplit(self.address).hostname), port, timeout=DASHBOARD_SECONDS)
         with closing(page), suppress(OSError, HTTPException):
             page.request("GET", "/status")
-            if page.getresponse().status == HTTPStatus.OK:
-                self.dashboard = f"http://{page.host}:{port}/status"
+            with page.getresponse() as answer:
+                if answer.status == HTTPStatus.OK:
+                    self.dashboard = f"http://{page.host}:{port}/status"
 
     def submit(
         self, address: str, key: str, done: Callable[[Future[Any]], None], function: Callable[..., Any], *given: Any

@@ -154,7 +154,7 @@ def test_points_of_the_picture_are_the_cases(study: Study, rows: RowColumns) -> 
         (ExploreQuery(ending="fine"), "ending", "invalid-choice"),
         (ExploreQuery(regime="calm"), "regime", "invalid-choice"),
         (ExploreQuery(flag="red"), "flag", "invalid-choice"),
-        (ExploreQuery(sort="-regime"), "sort", "unknown-name"),
+        (ExploreQuery(sort="-regimes"), "sort", "unknown-name"),
         (ExploreQuery(show=("regime",)), "show", "unknown-name"),
     ],
 )

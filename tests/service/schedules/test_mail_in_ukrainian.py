@@ -18,7 +18,7 @@ from sprag.service.storage.reports import Claimed
 from sprag.worker.order import Coverage
 
 NIGHT = datetime(2026, 11, 23, 1, tzinfo=UTC)
-OUTCOME = Outcome(Result.FINISHED, "st_1", "Feeder", 1200, 1200, 1197, {"chatter": 3}, ended_at=NIGHT)
+OUTCOME = Outcome(Result.FINISHED, "st_1", "Feeder", 12_000, 12_000, 11_970, {"chatter": 3}, ended_at=NIGHT)
 
 
 def report(outcome: Outcome) -> Claimed:
@@ -32,12 +32,12 @@ def report(outcome: Outcome) -> Claimed:
 
 def test_a_mail_is_in_the_language_of_the_service() -> None:
     made = mail(report(OUTCOME), Delivery(sender="sprag@example.com", language="uk"), NIGHT, None)
-    assert made["Subject"] == "Sprag: потрібна увага: Живильник: завершене, 1\u202f197 з 1\u202f200 випадків ok"
+    assert made["Subject"] == "Sprag: потрібна увага: Живильник: завершене, 11\u202f970 з 12\u202f000 випадків ok"
     text, page = (made.get_body((kind,)) for kind in ("plain", "html"))
     assert text is not None
     assert page is not None
     lines = text.get_content().splitlines()
-    assert lines[0] == "Закінчено: готово 1\u202f200 з 1\u202f200 випадків, з них 1\u202f197 завершилися ok."
+    assert lines[0] == "Закінчено: готово 12\u202f000 з 12\u202f000 випадків, з них 11\u202f970 завершилися ok."
     assert "Завершення «деренчання»: 3 випадки" in lines
     assert OUTCOME.sentence not in text.get_content()
     assert '<html lang="uk">' in page.get_content()
@@ -58,7 +58,7 @@ def test_a_mail_says_reasons_and_coverage_in_the_language_of_the_service() -> No
 
 def test_mails_are_english_unless_they_are_set_otherwise_and_webhooks_always() -> None:
     english = mail(report(OUTCOME), Delivery(sender="sprag@example.com"), NIGHT, None)
-    assert english["Subject"] == "Sprag: needs attention: Живильник: finished, 1\u202f197 of 1\u202f200 cases ok"
+    assert english["Subject"] == "Sprag: needs attention: Живильник: finished, 11\u202f970 of 12\u202f000 cases ok"
     bodies = [webhook_body(report(OUTCOME), Delivery(language=code)) for code in ("en", "uk")]
     assert bodies[0] == bodies[1]
 

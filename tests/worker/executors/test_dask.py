@@ -147,6 +147,7 @@ def test_chunks_are_stopped_whether_they_run_or_not(
     start: Callable[..., DaskExecutor], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sprag.worker.executors.dask.STOP_SECONDS", 0.2)
+    monkeypatch.setattr("sprag.worker.executors.dask.WAITING_SECONDS", DEADLINE)
     executor = start(run=fakes.faulty(hang=frozenset(range(8))), chunk_timeout=10 * DEADLINE)
     study = fakes.study(12)
     ready(executor, study)
@@ -219,13 +220,17 @@ def test_nothing_is_asked_of_a_connection_that_was_closed(
 
 
 def test_a_worker_with_another_numpy_is_refused(
-    start: Callable[..., DaskExecutor], caplog: pytest.LogCaptureFixture
+    start: Callable[..., DaskExecutor], caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     executor = start(expected={**fingerprint.own(), "numpy": "0.9"})
     eventually(lambda: executor.wait(0.05) or caplog.text.count("is refused") == 2)
     reason = f"is refused: numpy: {np.__version__} instead of 0.9"
     assert reason in caplog.text
     assert executor.capacity == 0
+    # Another dispatcher may have workers for what waits.
+    monkeypatch.setattr("sprag.worker.executors.dask.WAITING_SECONDS", 0.0)
+    executor.submit(7, fakes.study(4), Chunk(1, 0, 4))
+    assert gather(executor, 1)[7].fate is Fate.STOPPED
     assert not executor.ready(fakes.study(1))
     assert (executor.shortage or "").startswith("No usable worker has joined the scheduler tcp://127.0.0.1:")
     assert f"{reason} (and 1 more)." in (executor.shortage or "")
