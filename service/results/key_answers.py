@@ -20,7 +20,7 @@ from sprag.service.results.defaults import drawn_results, main_query, main_resul
 from sprag.service.results.joined import joined_points
 from sprag.service.results.phrases import Name, Phrase
 from sprag.service.results.refined import curve_plan
-from sprag.service.results.selection import refused, value_of
+from sprag.service.results.selection import refused, require_axis, value_of
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 from sprag.worker.codes import PENDING
@@ -153,11 +153,11 @@ def answers_query(study: Study, infos: Sequence[ResultInfo], chosen: CurveQuery 
 def read_point(study: Study, query: CurveQuery, text: str | None) -> float | None:
     """The working point: the text with or without a unit, otherwise the base's value, or the middle one of the axis.
 
-    Raises SelectionError about ``point`` for a text that is no quantity of the axis.
+    Raises SelectionError about ``point`` for a text that is no quantity of the axis, and about ``x`` for no axis.
     """
+    axis = study.axes[require_axis(study, "x", query.x)]
     if text is not None and text.strip():
         return value_of(query.x, text.strip(), unit_of(study, query.x), "point")
-    axis = study.axis_with(query.x)
     base = study.base.get(query.x)
     between = base is not None and axis.array.min() <= base <= axis.array.max()
     return base if between else usual_value(study, axis)

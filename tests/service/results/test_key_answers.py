@@ -183,6 +183,10 @@ def test_chosen_curves_and_wrong_choices(spec: dict[str, Any]) -> None:
     with pytest.raises(SelectionError) as caught:
         find_answers(study, infos, query, "3 mm", Rows(study))
     assert caught.value.faults[0].where == "point"
+    for point in (None, "3 mm"):
+        with pytest.raises(SelectionError) as caught:
+            find_answers(study, infos, replace(query, x="shaft.lod"), point, Rows(study))
+        assert (caught.value.faults[0].where, caught.value.faults[0].code) == ("x", "not-an-axis")
 
 
 def test_one_machine_has_the_results_of_its_case(spec: dict[str, Any]) -> None:
