@@ -23,8 +23,8 @@ class ArgumentError(ServiceError, ValueError):
     """An argument of a method cannot be what it must be; the fault names it. Nothing was requested."""
 
     def __init__(self, argument: str, value: object, allowed: str) -> None:
-        told = shown(value if isinstance(value, str | int | float) else repr(value))
-        fault = ParameterFault(argument, "wrong-type", "is not possible", told, allowed)
+        text = shown(value if isinstance(value, str | int | float) else repr(value))
+        fault = ParameterFault(argument, "wrong-type", "is not possible", text, allowed)
         super().__init__("invalid-parameter", str(fault), [fault])
 
 
