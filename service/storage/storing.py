@@ -78,6 +78,34 @@ def _changing(dialect: str, *columns: str) -> sa.Update:
     return sa.update(CHUNKS).where(_these(dialect)).values({name: sa.bindparam(f"new_{name}") for name in columns})
 
 
+#: The parameters of these are the numbers of studies, ``numbers``.
+_AMONG = STUDIES.c.number.in_(sa.bindparam("numbers", expanding=True))
+_KINDS = sa.select(STUDIES.c.number, STUDIES.c.model, STUDIES.c.variant, STUDIES.c.fingerprint).where(_AMONG)
+_CLAIMABLE = sa.select(STUDIES.c.number, STUDIES.c.state).where(
+    _AMONG,
+    sa.func.coalesce(STUDIES.c.dispatcher, sa.bindparam("epoch")) == sa.bindparam("epoch"),
+    sa.func.coalesce(STUDIES.c.finish_by > sa.bindparam("now", type_=sa.BigInteger), sa.true()),
+)
+_TAKE_FREE = sa.update(STUDIES).where(_AMONG, STUDIES.c.dispatcher.is_(None)).values(dispatcher=sa.bindparam("epoch"))
+_GAINED = (
+    sa.update(STUDIES)
+    .where(STUDIES.c.number == sa.bindparam("of"))
+    .values(
+        {name: STUDIES.c[name] + sa.bindparam(f"more_{name}", type_=sa.Integer) for name in ("done", "ok", "reused")}
+        | {"revision": STUDIES.c.revision + 1}
+    )
+)
+
+
+@cache
+def _counting(dialect: str) -> postgresql.Insert | sqlite.Insert:
+    """Adds to the number of cases of a study with an ending."""
+    more = (postgresql.insert if dialect == "postgresql" else sqlite.insert)(ENDINGS)
+    return more.on_conflict_do_update(
+        index_elements=[ENDINGS.c.study, ENDINGS.c.ending], set_={"cases": ENDINGS.c.cases + more.excluded.cases}
+    )
+
+
 def _by_study(keys: Iterable[Key]) -> Iterator[dict[str, Any]]:
     """The parameters of `_these` for each study."""
     for number, group in groupby(sorted(keys), key=itemgetter(0)):
@@ -152,16 +180,8 @@ class Storing(Reuse, Dispatchers):
     def _claim(self, connection: sa.Connection, epoch: int, wanted: Sequence[Chunk]) -> list[Chunk]:
         if not wanted:
             return []
-        states = {
-            number: StudyState(state)
-            for number, state in connection.execute(
-                sa.select(STUDIES.c.number, STUDIES.c.state).where(
-                    STUDIES.c.number.in_({chunk.study for chunk in wanted}),
-                    sa.func.coalesce(STUDIES.c.dispatcher, epoch) == epoch,
-                    sa.func.coalesce(STUDIES.c.finish_by > self._now(), sa.true()),
-                )
-            ).all()
-        }
+        these = {"numbers": list({chunk.study for chunk in wanted}), "epoch": epoch, "now": self._now()}
+        states = {number: StudyState(state) for number, state in connection.execute(_CLAIMABLE, these).all()}
         waiting = in_state(connection, wanted, ChunkState.WAITING)
         for number in {key[0] for key in waiting}:
             if states.get(number) is StudyState.QUEUED:
@@ -171,8 +191,7 @@ class Storing(Reuse, Dispatchers):
         if got:
             values = {"state": ChunkState.CLAIMED, "epoch": epoch, "claimed_at": self._now()}
             _change_chunks(connection, map(key_of, got), values)
-            free = STUDIES.c.number.in_({chunk.study for chunk in got}) & STUDIES.c.dispatcher.is_(None)
-            connection.execute(sa.update(STUDIES).where(free).values(dispatcher=epoch))
+            connection.execute(_TAKE_FREE, {"numbers": list({chunk.study for chunk in got}), "epoch": epoch})
         return got
 
     def _store(self, connection: sa.Connection, finished: Sequence[Finished]) -> None:
@@ -197,13 +216,8 @@ class Storing(Reuse, Dispatchers):
         self._mark_done(connection, finished, hosts)
         _count(connection, gains)
         for number, gain in gains.items():
-            self._change(
-                connection,
-                number,
-                done=STUDIES.c.done + gain.cases,
-                ok=STUDIES.c.ok + gain.endings[models.OK],
-                reused=STUDIES.c.reused + gain.reused,
-            )
+            more = {"more_done": gain.cases, "more_ok": gain.endings[models.OK], "more_reused": gain.reused}
+            connection.execute(_GAINED, {"of": number, **more})
 
     def _mark_done(
         self, connection: sa.Connection, finished: Sequence[Finished], copied_from: Mapping[Key, set[str]]
@@ -222,10 +236,7 @@ class Storing(Reuse, Dispatchers):
     @staticmethod
     def _kinds(connection: sa.Connection, numbers: Iterable[int]) -> dict[int, tuple[str, str]]:
         """Model and variant of studies, which are marked with the origin of the rows that they get."""
-        c = STUDIES.c
-        rows = connection.execute(
-            sa.select(c.number, c.model, c.variant, c.fingerprint).where(c.number.in_(sorted(numbers)))
-        ).all()
+        rows = connection.execute(_KINDS, {"numbers": sorted(numbers)}).all()
         for row in rows:
             if row.fingerprint != fingerprint.digest():
                 mark_origin(connection, row.number)
@@ -270,9 +281,4 @@ def _count(connection: sa.Connection, gains: Mapping[int, _Gain]) -> None:
         for number, gain in gains.items()
         for ending, cases in gain.endings.items()
     ]
-    insert = postgresql.insert if connection.dialect.name == "postgresql" else sqlite.insert
-    more = insert(ENDINGS)
-    more = more.on_conflict_do_update(
-        index_elements=[ENDINGS.c.study, ENDINGS.c.ending], set_={"cases": ENDINGS.c.cases + more.excluded.cases}
-    )
-    connection.execute(more, rows)
+    connection.execute(_counting(connection.dialect.name), rows)

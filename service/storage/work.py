@@ -33,6 +33,16 @@ if TYPE_CHECKING:
     from sprag.worker.ports import Known
 
 _TERMINAL = [state.value for state in TERMINAL]
+_C = STUDIES.c
+#: Asked at each poll; building the statement anew takes longer than running it.
+_ACTIVE = (
+    sa.select(
+        _C.number, _C.id, _C.state, _C.priority, _C.waits_for, _C.finish_by, _C.most_cases, _C.ok, _C.dispatcher,
+        _C.fingerprint,
+    )
+    .where(_C.state.not_in(_TERMINAL), _C.waits_for.is_distinct_from(HELD_AT_DEADLINE))
+    .order_by(_C.priority.desc(), _C.number)
+)  # fmt: skip
 
 
 class Work(Storing):
@@ -43,14 +53,8 @@ class Work(Storing):
 
         Studies held at their deadline are left out.
         """
-        c = STUDIES.c
-        kept = (c.number, c.id, c.state, c.priority, c.waits_for, c.finish_by, c.most_cases, c.ok)
         with self.session.read() as connection:
-            rows = connection.execute(
-                sa.select(*kept, c.dispatcher, c.fingerprint)
-                .where(c.state.not_in(_TERMINAL), c.waits_for.is_distinct_from(HELD_AT_DEADLINE))
-                .order_by(c.priority.desc(), c.number)
-            ).all()
+            rows = connection.execute(_ACTIVE).all()
         return [
             ActiveStudy(
                 row.number,
