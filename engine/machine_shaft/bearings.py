@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine import elementary
 from sprag.engine.machine_shaft.sliders import Slider
 
 Floats = NDArray[np.float64]
@@ -53,7 +54,7 @@ def joint_forces(
     x1, y1, x2, y2 = slider.along_rod(centre)
     ram1, ram2 = slider.x_slopes()
     # The forward stroke is against x; where it rises, gravity acts along x.
-    along, across = np.sin(values["inclination"]), -np.cos(values["inclination"])
+    along, across = elementary.sin(values["inclination"]), -elementary.cos(values["inclination"])
     rod_x = values["ram_mass"] * (ram2 * squares + ram1 * acceleration - gravity * along) + push
     crank_x = mass * (x2 * squares + x1 * acceleration - rod_gravity * along) + rod_x
     inertial_y = mass * (y2 * squares + y1 * acceleration - rod_gravity * across)

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine import elementary
 from sprag.engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, number_of, reduced
 
 Floats = NDArray[np.float64]
@@ -16,14 +17,14 @@ _Law = Callable[[Floats], tuple[Floats, Floats, Floats]]
 
 def _cycloidal(u: Floats) -> tuple[Floats, Floats, Floats]:
     turn = 2.0 * np.pi * u
-    return u - np.sin(turn) / (2.0 * np.pi), 1.0 - np.cos(turn), 2.0 * np.pi * np.sin(turn)
+    return u - elementary.sin(turn) / (2.0 * np.pi), 1.0 - elementary.cos(turn), 2.0 * np.pi * elementary.sin(turn)
 
 
 def _polynomial_345(u: Floats) -> tuple[Floats, Floats, Floats]:
     rest = 1.0 - u
     return (
-        u**3 * (10.0 - 15.0 * u + 6.0 * u**2),
-        30.0 * (u * rest) ** 2,
+        u * u * u * (10.0 - 15.0 * u + 6.0 * np.square(u)),
+        30.0 * np.square(u * rest),
         60.0 * u * rest * (rest - u),
     )
 
@@ -55,7 +56,7 @@ class Cam(Mechanism):
         lift = values["lift"]
         slope = lift * (up1 / rise - down1 / fall)
         zero = np.zeros((1, 1, 1))
-        curvature = lift * (up2 / rise**2 - down2 / fall**2)
+        curvature = lift * (up2 / np.square(rise) - down2 / np.square(fall))
         inertia, inertia_slope = reduced(
             [Body(values["follower_mass"], zero, slope, zero, zero, curvature, zero, zero)]
         )

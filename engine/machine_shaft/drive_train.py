@@ -52,12 +52,12 @@ class Train:
             kind, prefix = drive.stages[index], f"drive.stages.{index}."
             own = {path.removeprefix(prefix): value for path, value in values.items() if path.startswith(prefix)}
             if kind not in MOVING:
-                inertia = inertia + own["output_inertia"] * ratio**2
+                inertia = inertia + own["output_inertia"] * np.square(ratio)
                 ratio, efficiency = ratio * own["ratio"], efficiency * own["efficiency"]
             way = own["lead"] / (2.0 * math.pi) if kind == "screw_nut" else own.get("radius", 0.0)
-            inertia = inertia + (own["inertia"] + own.get("mass", 0.0) * way**2) * ratio**2
+            inertia = inertia + (own["inertia"] + own.get("mass", 0.0) * np.square(way)) * np.square(ratio)
         if "drive.motor.inertia" in values:
-            inertia = inertia + values["drive.motor.inertia"] * ratio**2
+            inertia = inertia + values["drive.motor.inertia"] * np.square(ratio)
         return cls(inertia, ratio, efficiency, not drive.stages)
 
     def motor(self, values: Mapping[str, Floats]) -> dict[str, Floats]:

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine import elementary
 from sprag.engine.machine_shaft.problems import ExpressionError
 
 Floats = NDArray[np.float64]
@@ -61,9 +62,9 @@ def _chain(outer: Callable[[], Value], inner: Value) -> Value:
 
 def _power(u: Dual, v: Dual) -> Dual:
     base, exponent = np.asarray(u[0], dtype=np.float64), v[0]
-    value = base**exponent
-    slope = _chain(lambda: exponent * base ** (np.asarray(exponent) - 1.0), u[1])
-    return value, slope + _chain(lambda: value * np.log(base), v[1])
+    value = elementary.power(base, exponent)
+    slope = _chain(lambda: exponent * elementary.power(base, np.asarray(exponent) - 1.0), u[1])
+    return value, slope + _chain(lambda: value * elementary.log(base), v[1])
 
 
 def _pick(condition: Value | NDArray[np.bool_], u: Dual, v: Dual) -> Dual:
@@ -73,8 +74,8 @@ def _pick(condition: Value | NDArray[np.bool_], u: Dual, v: Dual) -> Dual:
 
 
 def _atan2(y: Dual, x: Dual) -> Dual:
-    size = np.asarray(x[0]) ** 2 + np.asarray(y[0]) ** 2
-    return np.arctan2(y[0], x[0]), _chain(lambda: x[0] / size, y[1]) + _chain(lambda: -y[0] / size, x[1])
+    size = np.square(np.asarray(x[0])) + np.square(np.asarray(y[0]))
+    return elementary.arctan2(y[0], x[0]), _chain(lambda: x[0] / size, y[1]) + _chain(lambda: -y[0] / size, x[1])
 
 
 def _mod(u: Dual, v: Dual) -> Dual:
@@ -92,17 +93,17 @@ def _extreme(parts: list[Dual], larger: bool) -> Dual:
 
 #: Functions of one variable: value and derivative.
 _SMOOTH: Mapping[str, tuple[Callable[[Value], Value], Callable[[Value], Value]]] = {
-    "sin": (np.sin, np.cos),
-    "cos": (np.cos, lambda u: -np.sin(u)),
-    "tan": (np.tan, lambda u: 1.0 / np.cos(u) ** 2),
-    "asin": (np.arcsin, lambda u: 1.0 / np.sqrt(1.0 - u * u)),
-    "acos": (np.arccos, lambda u: -1.0 / np.sqrt(1.0 - u * u)),
-    "atan": (np.arctan, lambda u: 1.0 / (1.0 + u * u)),
-    "sinh": (np.sinh, np.cosh),
-    "cosh": (np.cosh, np.sinh),
-    "tanh": (np.tanh, lambda u: 1.0 / np.cosh(u) ** 2),
-    "exp": (np.exp, np.exp),
-    "log": (np.log, lambda u: 1.0 / u),
+    "sin": (elementary.sin, elementary.cos),
+    "cos": (elementary.cos, lambda u: -elementary.sin(u)),
+    "tan": (elementary.tan, lambda u: 1.0 / np.square(elementary.cos(u))),
+    "asin": (elementary.arcsin, lambda u: 1.0 / np.sqrt(1.0 - u * u)),
+    "acos": (elementary.arccos, lambda u: -1.0 / np.sqrt(1.0 - u * u)),
+    "atan": (elementary.arctan, lambda u: 1.0 / (1.0 + u * u)),
+    "sinh": (elementary.sinh, elementary.cosh),
+    "cosh": (elementary.cosh, elementary.sinh),
+    "tanh": (elementary.tanh, lambda u: 1.0 / np.square(elementary.cosh(u))),
+    "exp": (elementary.exp, elementary.exp),
+    "log": (elementary.log, lambda u: 1.0 / u),
     "sqrt": (np.sqrt, lambda u: 0.5 / np.sqrt(u)),
     "abs": (np.abs, np.sign),
     "sign": (np.sign, lambda u: 0.0 * u),
@@ -320,7 +321,7 @@ class Expression:
             self._switches.append(lambda v: _evaluate(parts[0], v)[0])
         elif node.kind in {"floor", "mod"}:
             # The sine of the scaled quotient changes sign at each integer.
-            self._switches.append(lambda v: np.sin(np.pi * _evaluate(parts[0], v)[0] / _divisor(parts, v)))
+            self._switches.append(lambda v: elementary.sin(np.pi * _evaluate(parts[0], v)[0] / _divisor(parts, v)))
         elif node.kind in _COMPARE:
             self._switches.append(lambda v: _evaluate(parts[0], v)[0] - _evaluate(parts[1], v)[0])
         elif node.kind in {"min", "max"}:

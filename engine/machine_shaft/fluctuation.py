@@ -7,6 +7,7 @@ of Machines*, chapter 16).
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine import elementary
 from sprag.engine.compile.jit import compiled
 from sprag.engine.machine_shaft.panels import WEIGHTS, Panels
 from sprag.engine.machine_shaft.spec import HARMONICS
@@ -19,7 +20,7 @@ _NO_WORK = 1e-9
 
 def shares(known: dict[str, Floats]) -> dict[str, Floats]:
     """Amplitude of omega^2 and the share of each S in the sum of the four amplitudes."""
-    out = {"omega_squared.amplitude": 0.5 * (known["omega.max"] ** 2 - known["omega.min"] ** 2)}
+    out = {"omega_squared.amplitude": 0.5 * (np.square(known["omega.max"]) - np.square(known["omega.min"]))}
     amplitudes = [known[f"s{k}.amplitude"] for k in range(1, 5)]
     total = sum(amplitudes)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -38,7 +39,7 @@ def harmonics(panels: Panels, cycle: float, values: dict[str, Floats]) -> dict[s
     The K-th amplitude of f is the modulus of (2/cycle) * integral of f exp(-2 pi i K phi/cycle).
     """
     unit = (2.0 * np.pi / cycle) * panels.angles
-    cosine, sine = np.cos(unit), np.sin(unit)
+    cosine, sine = elementary.cos(unit), elementary.sin(unit)
     out: dict[str, Floats] = {}
     for name, given in values.items():
         found = np.empty((len(given), HARMONICS))
@@ -66,4 +67,4 @@ def _harmonics(values: Floats, cosine: Floats, sine: Floats, half: Floats, weigh
                         sums[1, k] += part * im
                         re, im = re * c - im * s, re * s + im * c
         for k in range(count):
-            out[case, k] = np.sqrt(sums[0, k] ** 2 + sums[1, k] ** 2)
+            out[case, k] = np.sqrt(np.square(sums[0, k]) + np.square(sums[1, k]))

@@ -45,7 +45,7 @@ class Flywheel:
     @property
     def inertia(self) -> Floats:
         """In kg*m^2."""
-        return np.asarray(self.form * self.values["mass"] * self.values["diameter"] ** 2)
+        return np.asarray(self.form * self.values["mass"] * np.square(self.values["diameter"]))
 
     def results(self, fastest: Floats, drive: Floats, required: Floats) -> dict[str, Floats]:
         """Results by name, each (cases,).
@@ -62,13 +62,13 @@ class Flywheel:
         inertia = np.broadcast_to(self.inertia[:, 0, 0], (cases,))
         factor = np.broadcast_to(self.factor.ravel(), (cases,))
         speed = 0.5 * own["diameter"] * fastest
-        stress = factor * own["density"] * speed**2
+        stress = factor * own["density"] * np.square(speed)
         needed = np.maximum(required - (drive - inertia), 0.0)
         margin = np.sqrt(own["allowed_stress"] / stress)
         return {
             "flywheel.inertia": inertia, "flywheel.speed": speed, "flywheel.stress": stress,
             "flywheel.margin": np.where(np.isfinite(margin), margin, np.nan),
-            "flywheel.required_mass": needed / (self.form * own["diameter"] ** 2),
+            "flywheel.required_mass": needed / (self.form * np.square(own["diameter"])),
             "flywheel.required_diameter": np.sqrt(needed / (self.form * own["mass"])),
         }  # fmt: skip
 
@@ -99,10 +99,10 @@ def required_inertia(mechanism: Shape, torque: Floats, kind: MeanSpeed, mean: Fl
 
     def solve(slowest: Floats) -> tuple[Floats, Floats]:
         fastest = slowest + wanted * mean
-        above = panels.extremes(2.0 * work - (fastest**2)[:, None, None] * inertia).highest
-        below = panels.extremes(2.0 * work - (slowest**2)[:, None, None] * inertia).lowest
-        drive = (above - below) / (fastest**2 - slowest**2)
-        return drive, 0.5 * (fastest**2 * drive - above)
+        above = panels.extremes(2.0 * work - (np.square(fastest))[:, None, None] * inertia).highest
+        below = panels.extremes(2.0 * work - (np.square(slowest))[:, None, None] * inertia).lowest
+        drive = (above - below) / (np.square(fastest) - np.square(slowest))
+        return drive, 0.5 * (np.square(fastest) * drive - above)
 
     slowest = mean * (1.0 - 0.5 * wanted)
     attained = np.ones(len(mean), dtype=np.bool_)

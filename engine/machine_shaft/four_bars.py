@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine import elementary
 from sprag.engine.machine_shaft.mechanisms import (
     Body,
     HarmonicMechanism,
@@ -29,12 +30,12 @@ class Links:
 
     def __init__(self, a: Floats, b: Floats, c: Floats, d: Floats, phi: Floats) -> None:
         self.a, self.b, self.c, self.phi = a, b, c, phi
-        x, y = a * np.cos(phi) - d, a * np.sin(phi)
-        reach = np.sqrt(x**2 + y**2)
-        self.cos_gamma = (c**2 + reach**2 - b**2) / (2.0 * c * reach)
+        x, y = a * elementary.cos(phi) - d, a * elementary.sin(phi)
+        reach = np.sqrt(np.square(x) + np.square(y))
+        self.cos_gamma = (np.square(c) + np.square(reach) - np.square(b)) / (2.0 * c * reach)
         with np.errstate(invalid="ignore"):
-            self.psi = np.pi + np.arctan2(-y, -x) - np.arccos(self.cos_gamma)
-        self.theta = np.arctan2(c * np.sin(self.psi) - y, c * np.cos(self.psi) - x)
+            self.psi = np.pi + elementary.arctan2(-y, -x) - elementary.arccos(self.cos_gamma)
+        self.theta = elementary.arctan2(c * elementary.sin(self.psi) - y, c * elementary.cos(self.psi) - x)
 
     @classmethod
     def of(cls, values: Values, phi: Floats, third: str = "rocker") -> "Links":
@@ -44,27 +45,27 @@ class Links:
     def turning(self) -> tuple[Floats, Floats, Floats, Floats]:
         """First derivatives of ``psi`` and ``theta`` by the crank's angle, and second ones."""
         a, b, c, phi, psi, theta = self.a, self.b, self.c, self.phi, self.psi, self.theta
-        turn = np.sin(psi - theta)
+        turn = elementary.sin(psi - theta)
         with np.errstate(invalid="ignore", divide="ignore"):
-            psi1 = a * np.sin(phi - theta) / (c * turn)
-            theta1 = a * np.sin(phi - psi) / (b * turn)
-            across = np.cos(psi - theta)
-            psi2 = (a * np.cos(phi - theta) + b * theta1**2 - c * psi1**2 * across) / (c * turn)
-            theta2 = (a * np.cos(phi - psi) + b * theta1**2 * across - c * psi1**2) / (b * turn)
+            psi1 = a * elementary.sin(phi - theta) / (c * turn)
+            theta1 = a * elementary.sin(phi - psi) / (b * turn)
+            across = elementary.cos(psi - theta)
+            psi2 = (a * elementary.cos(phi - theta) + b * np.square(theta1) - c * np.square(psi1) * across) / (c * turn)
+            theta2 = (a * elementary.cos(phi - psi) + b * np.square(theta1) * across - c * np.square(psi1)) / (b * turn)
         return psi1, theta1, psi2, theta2
 
     def coupler(self, values: Values, theta1: Floats, theta2: Floats) -> Body:
         """The coupler, with its centre at ``coupler_centre`` from the crank pin."""
         a, s, phi = self.a, values["coupler_centre"], self.phi
-        sin, cos = np.sin(self.theta), np.cos(self.theta)
+        sin, cos = elementary.sin(self.theta), elementary.cos(self.theta)
         return Body(
             values["coupler_mass"],
             values["coupler_inertia"],
-            -a * np.sin(phi) - s * sin * theta1,
-            a * np.cos(phi) + s * cos * theta1,
+            -a * elementary.sin(phi) - s * sin * theta1,
+            a * elementary.cos(phi) + s * cos * theta1,
             theta1,
-            -a * np.cos(phi) - s * (cos * theta1**2 + sin * theta2),
-            -a * np.sin(phi) - s * (sin * theta1**2 - cos * theta2),
+            -a * elementary.cos(phi) - s * (cos * np.square(theta1) + sin * theta2),
+            -a * elementary.sin(phi) - s * (sin * np.square(theta1) - cos * theta2),
             theta2,
         )
 
@@ -79,7 +80,7 @@ def crank_at(distance: Floats, values: Values) -> Floats:
     """Angle between frame and crank, or its extension, at which the rocker's pin is ``distance`` from the shaft."""
     c, d = values["rocker"], values["frame"]
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(np.arccos((d**2 + distance**2 - c**2) / (2.0 * d * distance)))
+        return np.asarray(elementary.arccos((np.square(d) + np.square(distance) - np.square(c)) / (2.0 * d * distance)))
 
 
 def rocker_dead_centres(values: Values) -> tuple[Floats, Floats]:
@@ -123,7 +124,7 @@ class FourBar(RodMechanism):
         """See Mechanism."""
         links, c = Links.of(values, phi), values["rocker"]
         psi1, theta1, psi2, theta2 = links.turning()
-        carried = values["rocker_inertia"] + values["tray_mass"] * c**2
+        carried = values["rocker_inertia"] + values["tray_mass"] * np.square(c)
         inertia, slope = reduced([links.coupler(values, theta1, theta2), swinging(carried, psi1, psi2)])
         start = Links.of(values, self.dead_centres(values)[0]).psi
         return Motion(inertia, slope, c * (start - links.psi), -c * psi1)
@@ -132,7 +133,7 @@ class FourBar(RodMechanism):
         """See Mechanism; the frame rises from the shaft to the rocker's pivot by the inclination."""
         links, c, zero = Links.of(values, phi), values["rocker"], np.zeros((1, 1, 1))
         psi1, theta1, _, theta2 = links.turning()
-        x1, y1 = -c * np.sin(links.psi) * psi1, c * np.cos(links.psi) * psi1
+        x1, y1 = -c * elementary.sin(links.psi) * psi1, c * elementary.cos(links.psi) * psi1
         tray = Body(values["tray_mass"], zero, x1, y1, zero, zero, zero, zero)
         return lifted([links.coupler(values, theta1, theta2), tray], values["inclination"])
 
@@ -168,4 +169,4 @@ class ParallelCrank(HarmonicMechanism):
     def inertia(self, values: Values, phi: Floats) -> tuple[Floats, Floats]:
         """See HarmonicMechanism; it is constant."""
         del phi
-        return values["coupler_mass"] * values["crank"] ** 2 + values["driven_inertia"], np.zeros((1, 1, 1))
+        return values["coupler_mass"] * np.square(values["crank"]) + values["driven_inertia"], np.zeros((1, 1, 1))

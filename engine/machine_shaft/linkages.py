@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine import elementary
 from sprag.engine.machine_shaft.mechanisms import (
     Body,
     HarmonicMechanism,
@@ -41,7 +42,8 @@ class SliderCrank(RodMechanism):
         return self._from_outside(values, Slider(values["crank"], values["rod"], values["offset"], phi))
 
     def _from_outside(self, values: Values, slider: Slider) -> Floats:
-        return np.sqrt((values["rod"] + values["crank"]) ** 2 - values["offset"] ** 2) - slider.x()
+        outside = np.sqrt(np.square(values["rod"] + values["crank"]) - np.square(values["offset"]))
+        return np.asarray(outside - slider.x())
 
     def lift(self, values: Values, phi: Floats) -> Floats:
         """See Mechanism; the crank's pin is above the level through the shaft first."""
@@ -78,9 +80,11 @@ class ScotchYoke(HarmonicMechanism):
     def inertia(self, values: Values, phi: Floats) -> tuple[Floats, Floats]:
         """See HarmonicMechanism."""
         r, zero = values["crank"], np.zeros((1, 1, 1))
-        yoke = Body(values["yoke_mass"], zero, -r * np.sin(phi), zero, zero, -r * np.cos(phi), zero, zero)
+        yoke = Body(
+            values["yoke_mass"], zero, -r * elementary.sin(phi), zero, zero, -r * elementary.cos(phi), zero, zero
+        )
         inertia, slope = reduced([yoke])
-        return inertia + values["block_mass"] * r**2, slope
+        return inertia + values["block_mass"] * np.square(r), slope
 
 
 class _QuickReturn(RodMechanism):
@@ -97,16 +101,16 @@ class _QuickReturn(RodMechanism):
     def _direction(self, values: Values, phi: Floats) -> Floats:
         """Angle of the link from the direction of the ram's far side."""
         r, d = values["crank"], values["pivot_distance"]
-        return np.asarray(np.arctan2(d + r * np.sin(phi), r * np.cos(phi)))
+        return np.asarray(elementary.arctan2(d + r * elementary.sin(phi), r * elementary.cos(phi)))
 
     def _link(self, values: Values, phi: Floats) -> tuple[Floats, Floats, Floats]:
         """Angle of the link from the direction of the ram's far side, and its two derivatives."""
         r, d = values["crank"], values["pivot_distance"]
-        sin, cos = np.sin(phi), np.cos(phi)
-        size = r**2 + d**2 + 2.0 * d * r * sin
-        turn1 = (r**2 + d * r * sin) / size
-        turn2 = d * r * cos * (d**2 - r**2) / size**2
-        return np.arctan2(d + r * sin, r * cos), turn1, turn2
+        sin, cos = elementary.sin(phi), elementary.cos(phi)
+        size = np.square(r) + np.square(d) + 2.0 * d * r * sin
+        turn1 = (np.square(r) + d * r * sin) / size
+        turn2 = d * r * cos * (np.square(d) - np.square(r)) / np.square(size)
+        return elementary.arctan2(d + r * sin, r * cos), turn1, turn2
 
     def motion(self, values: Values, phi: Floats) -> Motion:
         """See Mechanism."""
@@ -117,7 +121,7 @@ class _QuickReturn(RodMechanism):
         bodies.append(Body(zero, values["link_inertia"], zero, zero, turn1, zero, zero, turn2))
         inertia, slope = reduced(bodies)
         way = self._from_outside(values, slider)
-        return Motion(inertia + values["block_mass"] * values["crank"] ** 2, slope, way, -x1)
+        return Motion(inertia + values["block_mass"] * np.square(values["crank"]), slope, way, -x1)
 
     def way(self, values: Values, phi: Floats) -> Floats:
         """See Mechanism."""
@@ -132,7 +136,9 @@ class _QuickReturn(RodMechanism):
         theta, turn1, turn2 = self._link(values, phi)
         bodies, _ = slider_bodies(self._slider(values, theta), values, turn1, turn2)
         r, zero = values["crank"], np.zeros((1, 1, 1))
-        block = Body(values["block_mass"], zero, -r * np.sin(phi), r * np.cos(phi), zero, zero, zero, zero)
+        block = Body(
+            values["block_mass"], zero, -r * elementary.sin(phi), r * elementary.cos(phi), zero, zero, zero, zero
+        )
         return lifted([*bodies, block], values["inclination"], outward=-1.0)
 
     def _slider(self, values: Values, theta: Floats) -> Slider:
@@ -148,8 +154,8 @@ class Whitworth(_QuickReturn):
 
         def shaft(theta: Floats) -> Floats:
             with np.errstate(invalid="ignore"):
-                reach = d * np.sin(theta) + np.sqrt(r**2 - (d * np.cos(theta)) ** 2)
-            return np.asarray(np.arctan2(reach * np.sin(theta) - d, reach * np.cos(theta)))
+                reach = d * elementary.sin(theta) + np.sqrt(np.square(r) - np.square(d * elementary.cos(theta)))
+            return np.asarray(elementary.arctan2(reach * elementary.sin(theta) - d, reach * elementary.cos(theta)))
 
         outer, inner = slider_dead_centres(values["link_arm"], values)
         return shaft(outer), shaft(inner)
@@ -181,7 +187,7 @@ class CrankShaper(_QuickReturn):
     def dead_centres(self, values: Values) -> tuple[Floats, Floats]:
         """See Mechanism."""
         with np.errstate(invalid="ignore"):
-            swing = np.arcsin(values["crank"] / values["pivot_distance"])
+            swing = elementary.arcsin(values["crank"] / values["pivot_distance"])
         return -swing, np.pi + swing
 
     def margin(self, values: Values, phi: Floats) -> Floats:
@@ -189,7 +195,7 @@ class CrankShaper(_QuickReturn):
         theta = self._link(values, phi)[0]
         rod = slider_margin(values["link_arm"], values, theta)
         # Rod and link in one line are a dead centre of the rod: the ram would reverse within a stroke.
-        straight = np.sin(theta + np.arcsin(self._slider(values, theta).sin_b))
+        straight = elementary.sin(theta + elementary.arcsin(self._slider(values, theta).sin_b))
         swing = (values["pivot_distance"] - values["crank"]) / values["pivot_distance"]
         return np.asarray(np.minimum(np.minimum(rod, swing), straight))
 

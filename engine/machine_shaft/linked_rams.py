@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine import elementary
 from sprag.engine.machine_shaft.four_bars import (
     Links,
     crank_rocker_rule,
@@ -42,11 +43,11 @@ class DragLink(RodMechanism):
         """Angle of the shaft at an angle of the arm."""
         psi = arm - values["frame_angle"] - values["arm_angle"]
         a, b, c, d = (values[name] for name in ("crank", "coupler", "follower", "frame"))
-        x, y = d + c * np.cos(psi), c * np.sin(psi)
-        reach = np.sqrt(x**2 + y**2)
+        x, y = d + c * elementary.cos(psi), c * elementary.sin(psi)
+        reach = np.sqrt(np.square(x) + np.square(y))
         with np.errstate(invalid="ignore"):
-            ahead = np.arccos((a**2 + reach**2 - b**2) / (2.0 * a * reach))
-        return np.asarray(np.arctan2(y, x) + ahead + values["frame_angle"])
+            ahead = elementary.arccos((np.square(a) + np.square(reach) - np.square(b)) / (2.0 * a * reach))
+        return np.asarray(elementary.arctan2(y, x) + ahead + values["frame_angle"])
 
     def motion(self, values: Values, phi: Floats) -> Motion:
         """See Mechanism."""
@@ -168,10 +169,10 @@ class Toggle(RodMechanism):
         start, end = self.dead_centres(values)
         psi = values["line_angle"] + 0.5 * np.pi
         a, b, c = (values[name] for name in ("crank", "coupler", "rocker"))
-        x, y = values["frame"] + c * np.cos(psi), c * np.sin(psi)
-        reach = np.sqrt(x**2 + y**2)
+        x, y = values["frame"] + c * elementary.cos(psi), c * elementary.sin(psi)
+        reach = np.sqrt(np.square(x) + np.square(y))
         with np.errstate(invalid="ignore"):
-            ahead = np.arccos((a**2 + reach**2 - b**2) / (2.0 * a * reach))
-        across = np.arctan2(y, x) + ahead
+            ahead = elementary.arccos((np.square(a) + np.square(reach) - np.square(b)) / (2.0 * a * reach))
+        across = elementary.arctan2(y, x) + ahead
         # A rocker that never stands across the line leaves the ends as the worst.
         return 0.0 * one, np.pi * one, start, end, np.where(np.isnan(across), 0.0, across)

@@ -13,6 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine import elementary
+
 Floats = NDArray[np.float64]
 #: Values of parameters by their name within the mechanism; each of shape (cases or 1, 1, 1).
 Values = Mapping[str, Floats]
@@ -63,7 +65,7 @@ def reduced(bodies: Sequence[Body]) -> tuple[Floats, Floats]:
     inertia: Floats = np.zeros(1)
     slope: Floats = np.zeros(1)
     for b in bodies:
-        inertia = inertia + b.mass * (b.x1**2 + b.y1**2) + b.inertia * b.turn1**2
+        inertia = inertia + b.mass * (np.square(b.x1) + np.square(b.y1)) + b.inertia * np.square(b.turn1)
         slope = slope + 2.0 * (b.mass * (b.x1 * b.x2 + b.y1 * b.y2) + b.inertia * b.turn1 * b.turn2)
     return inertia, slope
 
@@ -82,10 +84,10 @@ def lifted(bodies: Sequence[Body], forward: Floats, turned: Floats | float = 0.0
         1 where the forward stroke is along the ram's x, -1 where it is against it.
     """
     total: Floats = np.zeros(1)
-    cos, sin = np.cos(turned), np.sin(turned)
+    cos, sin = elementary.cos(turned), elementary.sin(turned)
     for b in bodies:
         x1, y1 = b.x1 * cos - b.y1 * sin, b.y1 * cos + b.x1 * sin
-        total = total + b.mass * (outward * np.sin(forward) * x1 + np.cos(forward) * y1)
+        total = total + b.mass * (outward * elementary.sin(forward) * x1 + elementary.cos(forward) * y1)
     return total
 
 
@@ -196,7 +198,7 @@ class HarmonicMechanism(Mechanism):
     def motion(self, values: Values, phi: Floats) -> Motion:
         """See Mechanism."""
         r = values["crank"]
-        return Motion(*self.inertia(values, phi), r * (1.0 - np.cos(phi)), r * np.sin(phi))
+        return Motion(*self.inertia(values, phi), r * (1.0 - elementary.cos(phi)), r * elementary.sin(phi))
 
     def dead_centres(self, values: Values) -> tuple[Floats, Floats]:
         """See Mechanism."""

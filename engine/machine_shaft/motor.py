@@ -62,8 +62,8 @@ def motor_torque(motor: Characteristic, values: Mapping[str, Floats], omega: Flo
         return stall * (1.0 - omega / free), np.broadcast_to(-stall / free, omega.shape)
     most, critical, synchronous = values["breakdown_torque"], values["breakdown_slip"], values["synchronous_speed"]
     slip = 1.0 - omega / synchronous
-    size = slip**2 + critical**2
-    by_slip = 2.0 * most * critical * (critical**2 - slip**2) / size**2
+    size = np.square(slip) + np.square(critical)
+    by_slip = 2.0 * most * critical * (np.square(critical) - np.square(slip)) / np.square(size)
     return 2.0 * most * critical * slip / size, -by_slip / synchronous
 
 
@@ -89,7 +89,7 @@ def steady_speed(motor: Characteristic, values: Mapping[str, Floats], torque: Fl
     most, critical = values["breakdown_torque"], values["breakdown_slip"]
     share = np.clip(torque / most, -1.0, 1.0)
     # The root of s^2 - 2 s s_k/share + s_k^2 closer to zero slip, in a form that is valid for zero torque too.
-    slip = critical * share / (1.0 + np.sqrt(1.0 - share**2))
+    slip = critical * share / (1.0 + np.sqrt(1.0 - np.square(share)))
     return np.asarray(values["synchronous_speed"] * (1.0 - slip))
 
 
@@ -156,7 +156,7 @@ def limit_cycle(
         given = resistance if law is None else resistance + law(np.broadcast_to(speed, inertia.shape))[0]
         needed = -(panels.integral(given) / cycle)[:, None, None]
         speed = np.maximum(steady_speed(motor, values, needed), 0.05 * free)
-    energy = 0.5 * inertia * speed**2
+    energy = 0.5 * inertia * np.square(speed)
     start = energy[:, 0, 0].copy()
     active = np.arange(len(inertia))
     previous = np.full(len(inertia), np.inf)
@@ -236,7 +236,7 @@ def _runs_away(
     """
     fast = values["synchronous_speed"] * (1.0 + values["breakdown_slip"])
     own = {name: np.asarray(value) for name, value in values.items()}
-    energy = 0.5 * float(inertia[0]) * values["synchronous_speed"] ** 2
+    energy = 0.5 * float(inertia[0]) * np.square(values["synchronous_speed"])
     for _ in range(_CYCLES):
         before, slowest = energy, np.inf
         for step, moment, load in zip(steps.tolist(), inertia.tolist(), resistance.tolist(), strict=True):

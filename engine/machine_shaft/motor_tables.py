@@ -54,7 +54,14 @@ class MotorTable:
         rows = [[x[0], x[0], float(self._curve(x[:1])[0]), self._outside[0], 0.0, 0.0]]
         for low, high in pairwise(x.tolist()):
             powers = [math.fsum(row * self._curve(low + (high - low) * u)) for row in _TO_POWERS]
-            rows.append([high, low, *(power / (high - low) ** k for k, power in enumerate(powers))])
+            width = high - low
+            rows.append(
+                [
+                    high,
+                    low,
+                    *(c / w for c, w in zip(powers, (1.0, width, width * width, width * width * width), strict=True)),
+                ]
+            )
         rows.append([np.inf, x[-1], float(self._curve(x[-1:])[0]), self._outside[1], 0.0, 0.0])
         return np.array(rows)
 

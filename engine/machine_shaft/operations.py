@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine import elementary
 from sprag.engine.machine_shaft.expressions import MEAN_SPEED, Expression
 from sprag.engine.machine_shaft.mechanisms import Mechanism, Values
 from sprag.engine.machine_shaft.roots import bracketed_roots, switches
@@ -122,7 +123,7 @@ def formula_breaks(
 def reachable_pressure(suction: Floats, clearance: Floats, exponent: Floats) -> Floats:
     """Pressure (Pa) that a compressor reaches at its head; infinite without clearance."""
     with np.errstate(divide="ignore", over="ignore"):
-        return np.asarray(suction * ((1.0 + clearance) / clearance) ** exponent)
+        return np.asarray(suction * elementary.power((1.0 + clearance) / clearance, exponent))
 
 
 class Operation:
@@ -324,8 +325,8 @@ class Operation:
         x = stroke.fraction(phi)
         # Without clearance the pressure at the head is 0/0; the other bound applies there.
         with np.errstate(divide="ignore", invalid="ignore"):
-            expanding = np.fmax(low, high * (clearance / (clearance + x)) ** n)
-            compressing = np.fmin(high, low * ((1.0 + clearance) / (clearance + x)) ** n)
+            expanding = np.fmax(low, high * elementary.power(clearance / (clearance + x), n))
+            compressing = np.fmin(high, low * elementary.power((1.0 + clearance) / (clearance + x), n))
         pressure = np.where(stroke.forward(phi), expanding, compressing)
         return np.asarray((pressure - v["gas.back_pressure"]) * v["gas.piston_area"])
 
@@ -380,7 +381,7 @@ class Operation:
     def _gas_breaks(self, stroke: Stroke) -> list[Floats]:
         v = self._values
         clearance = v["gas.clearance"]
-        ratio = (self._delivered() / v["gas.suction_pressure"]) ** (1.0 / v["gas.exponent"])
+        ratio = elementary.power(self._delivered() / v["gas.suction_pressure"], 1.0 / v["gas.exponent"])
         opens_suction = stroke.angles(clearance * (ratio - 1.0), forward=True)
         opens_discharge = stroke.angles((1.0 + clearance) / ratio - clearance, forward=False)
         return [every_revolution(angle, self._revolutions) for angle in (opens_suction, opens_discharge)]

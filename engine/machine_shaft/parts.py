@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine import elementary
 from sprag.engine.machine_shaft.bearings import JointForces, joint_forces
 from sprag.engine.machine_shaft.cams import Cam
 from sprag.engine.machine_shaft.columns import Columns
@@ -263,7 +264,7 @@ class ShaftPart:
         if motion is None or self.mechanism is None or self.mechanism.ram_mass is None:
             return np.zeros(1)
         own = self.values
-        force = own[self.mechanism.ram_mass] * self._gravity * np.sin(own["inclination"])
+        force = own[self.mechanism.ram_mass] * self._gravity * elementary.sin(own["inclination"])
         if self.choice.mechanism.kind == "cam":
             force = force + own["spring_preload"] + own["spring_rate"] * motion.way
         return np.asarray(-force * motion.way_slope)

@@ -312,7 +312,7 @@ def _flywheel(spec: MachineSpec, columns: Columns, known: Mapping[str, Floats], 
     none = np.full(columns.cases, np.nan)
     out = {name: none for name in _NAMES if name.startswith("flywheel.")} | {"required_inertia.energy": none}
     if fixed:
-        wanted = columns.row("wanted_irregularity") * columns.row("mean_speed") ** 2
+        wanted = columns.row("wanted_irregularity") * np.square(columns.row("mean_speed"))
         finite = np.isfinite(wanted)
         out["required_inertia.energy"] = np.where(
             finite, known["energy.fluctuation"] / np.where(finite, wanted, 1.0), np.nan

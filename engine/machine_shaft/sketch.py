@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine import elementary
+
 Floats = NDArray[np.float64]
 
 
@@ -63,5 +65,5 @@ class Sketch:
 def _turned(points: Floats, angle: float) -> Floats:
     """Points of shape (k, 2), turned counterclockwise about the origin."""
     x, y = points[:, 0], points[:, 1]
-    cos, sin = np.cos(angle), np.sin(angle)
+    cos, sin = elementary.cos(angle), elementary.sin(angle)
     return np.stack([x * cos - y * sin, x * sin + y * cos], axis=1)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine import elementary
 from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.four_bars import Links
 from sprag.engine.machine_shaft.machine import Machine
@@ -32,7 +33,7 @@ def _point(x: Floats | float, y: Floats | float, like: Floats) -> Floats:
 
 def _circular(radius: float, angle: Floats, x: float = 0.0, y: float = 0.0) -> Floats:
     """Points on a circle about (x, y)."""
-    return np.column_stack([x + radius * np.cos(angle), y + radius * np.sin(angle)])
+    return np.column_stack([x + radius * elementary.cos(angle), y + radius * elementary.sin(angle)])
 
 
 def _rectangle(length: float, height: float, x: float = 0.0) -> Floats:
@@ -48,7 +49,10 @@ def _with_ram(sketch: Sketch, pin: str, ram: Floats, direction: float = 0.0) -> 
     sketch.bars.append(Bar((pin, "ram"), _ROD))
     sketch.turns["ram"] = np.full(len(ram), direction)
     sketch.plates.append(Plate("ram", _rectangle(2.2 * size, 1.4 * size), ("ram_mass", "inclination"), "ram"))
-    along, across = np.array([np.cos(direction), np.sin(direction)]), np.array([-np.sin(direction), np.cos(direction)])
+    along, across = (
+        np.array([elementary.cos(direction), elementary.sin(direction)]),
+        np.array([-elementary.sin(direction), elementary.cos(direction)]),
+    )
     way = ((ram - ram[0]) * along).sum(axis=1)
     for side in (-0.75, 0.75):
         ends = [ram[0] + along * (way.min() - 1.6 * size), ram[0] + along * (way.max() + 1.6 * size)]
@@ -69,7 +73,7 @@ def _slider(radius: float, v: _Numbers, theta: Floats) -> Slider:
 
 def _scotch_yoke(v: _Numbers, phi: Floats, _: Mechanism) -> Sketch:
     r = v["crank"]
-    pin, x = _circular(r, phi), r * np.cos(phi)
+    pin, x = _circular(r, phi), r * elementary.cos(phi)
     sketch = Sketch({"O": _point(0.0, 0.0, phi), "pin": pin, "yoke": _point(x, 0.0, phi)})
     sketch.turns["yoke"] = np.zeros(len(phi))
     slot, arm = _rectangle(0.44 * r, 2.6 * r), _rectangle(1.9 * r, 0.28 * r, 1.17 * r)
@@ -112,7 +116,7 @@ def _parallel_crank(v: _Numbers, phi: Floats, _: Mechanism) -> Sketch:
 def _quick_return(v: _Numbers, phi: Floats, _: Mechanism) -> Sketch:
     r, d, arm = v["crank"], v["pivot_distance"], v["link_arm"]
     pin = _circular(r, phi)
-    theta, away = np.arctan2(d + pin[:, 1], pin[:, 0]), np.hypot(pin[:, 0], d + pin[:, 1])
+    theta, away = elementary.arctan2(d + pin[:, 1], pin[:, 0]), np.sqrt(np.square(pin[:, 0]) + np.square(d + pin[:, 1]))
     sketch = Sketch({"O": _point(0.0, 0.0, phi), "pivot": _point(0.0, -d, phi), "pin": pin})
     sketch.joints["arm"] = _circular(arm, theta, 0.0, -d)
     sketch.joints["end"] = _circular(max(arm, 1.1 * float(away.max())), theta, 0.0, -d)
@@ -127,7 +131,7 @@ def _quick_return(v: _Numbers, phi: Floats, _: Mechanism) -> Sketch:
 def _drag_link(v: _Numbers, phi: Floats, _: Mechanism) -> Sketch:
     turned = v["frame_angle"]
     links = _links(v, phi - turned, "follower")
-    x, y = v["frame"] * np.cos(turned), v["frame"] * np.sin(turned)
+    x, y = (float(v["frame"] * part) for part in (elementary.cos(turned), elementary.sin(turned)))
     arm = links.psi + turned + v["arm_angle"]
     sketch = Sketch({"O": _point(0.0, 0.0, phi), "pivot": _point(x, y, phi), "pin": _circular(v["crank"], phi)})
     sketch.joints["follower"] = _circular(v["follower"], links.psi + turned, x, y)
@@ -148,7 +152,7 @@ def _toggle(v: _Numbers, phi: Floats, _: Mechanism) -> Sketch:
     sketch.bars = [Bar(("O", "pin"), ("crank",)), Bar(("pin", "rocker"), _COUPLER)]
     sketch.bars.append(Bar(("rocker", "pivot"), ("rocker", "rocker_inertia")))
     sketch.pivots.append("pivot")
-    ram = _point(d + x * np.cos(line), x * np.sin(line), phi)
+    ram = _point(d + x * elementary.cos(line), x * elementary.sin(line), phi)
     return _with_ram(sketch, "rocker", ram, line).turned(v["inclination"] - line)
 
 

@@ -5,6 +5,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine import elementary
 from sprag.engine.machine_shaft.mechanisms import Body, Values, number_of
 
 Floats = NDArray[np.float64]
@@ -20,10 +21,10 @@ class Slider:
 
     def __init__(self, radius: Floats, rod: Floats, offset: Floats, theta: Floats) -> None:
         self.radius, self.rod = radius, rod
-        self.sin, self.cos = np.sin(theta), np.cos(theta)
+        self.sin, self.cos = elementary.sin(theta), elementary.cos(theta)
         self.sin_b = (radius * self.sin - offset) / rod
         with np.errstate(invalid="ignore"):
-            self.cos_b = np.sqrt(1.0 - self.sin_b**2)
+            self.cos_b = np.sqrt(1.0 - np.square(self.sin_b))
 
     @cached_property
     def b1(self) -> Floats:
@@ -35,14 +36,14 @@ class Slider:
     def b2(self) -> Floats:
         """Its second derivative."""
         with np.errstate(invalid="ignore", divide="ignore"):
-            return np.asarray((self.sin_b * self.b1**2 - self.radius / self.rod * self.sin) / self.cos_b)
+            return np.asarray((self.sin_b * np.square(self.b1) - self.radius / self.rod * self.sin) / self.cos_b)
 
     def along_rod(self, s: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """First and second derivatives, by theta, of the x and y of the rod's point at ``s`` from the pin."""
         x1 = -self.radius * self.sin - s * self.sin_b * self.b1
         y1 = self.radius * self.cos - s * self.cos_b * self.b1
-        x2 = -self.radius * self.cos - s * (self.cos_b * self.b1**2 + self.sin_b * self.b2)
-        y2 = -self.radius * self.sin - s * (self.cos_b * self.b2 - self.sin_b * self.b1**2)
+        x2 = -self.radius * self.cos - s * (self.cos_b * np.square(self.b1) + self.sin_b * self.b2)
+        y2 = -self.radius * self.sin - s * (self.cos_b * self.b2 - self.sin_b * np.square(self.b1))
         return x1, y1, x2, y2
 
     def x(self) -> Floats:
@@ -52,7 +53,7 @@ class Slider:
     def x_slopes(self) -> tuple[Floats, Floats]:
         """First and second derivative of the ram's place by theta."""
         x1 = -self.radius * self.sin - self.rod * self.sin_b * self.b1
-        x2 = -self.radius * self.cos - self.rod * (self.cos_b * self.b1**2 + self.sin_b * self.b2)
+        x2 = -self.radius * self.cos - self.rod * (self.cos_b * np.square(self.b1) + self.sin_b * self.b2)
         return x1, x2
 
 
@@ -65,7 +66,7 @@ def slider_bodies(
     ram1, ram2 = slider.x_slopes()
 
     def by_shaft(first: Floats, second: Floats) -> tuple[Floats, Floats]:
-        return np.asarray(first * turn1), np.asarray(second * turn1**2 + first * turn2)
+        return np.asarray(first * turn1), np.asarray(second * np.square(turn1) + first * turn2)
 
     (x1, x2), (y1, y2), (b1, b2) = by_shaft(x1, x2), by_shaft(y1, y2), by_shaft(slider.b1, slider.b2)
     ram1, ram2 = by_shaft(ram1, ram2)
@@ -76,14 +77,14 @@ def slider_bodies(
 def slider_dead_centres(radius: Floats, values: Values) -> tuple[Floats, Floats]:
     """Angles of the pin at which the ram is farthest from the pin circle's centre, and nearest to it."""
     with np.errstate(invalid="ignore"):
-        outer = np.arcsin(values["offset"] / (values["rod"] + radius))
-        inner = np.pi + np.arcsin(values["offset"] / (values["rod"] - radius))
+        outer = elementary.arcsin(values["offset"] / (values["rod"] + radius))
+        inner = np.pi + elementary.arcsin(values["offset"] / (values["rod"] - radius))
     return outer, inner
 
 
 def slider_margin(radius: Floats, values: Values, theta: Floats) -> Floats:
     """Positive where the rod reaches the ram's line."""
-    return np.asarray(1.0 - np.abs((radius * np.sin(theta) - values["offset"]) / values["rod"]))
+    return np.asarray(1.0 - np.abs((radius * elementary.sin(theta) - values["offset"]) / values["rod"]))
 
 
 def slider_fold(arm: str, part: str, values: Values) -> str | None:

@@ -10,6 +10,7 @@ from dataclasses import fields as fields_of
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine import elementary
 from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.machine import Fields, Machine
 from sprag.engine.machine_shaft.operations import SpeedLaw
@@ -72,7 +73,7 @@ class _Course:
         """e of e' = slope (e + defect), e(0) = 0, panel after panel with an integrating factor; added to ``defect``."""
         panels = self.panels
         power = panels.within(slope)
-        growth, growths = np.exp(power.nodes), np.exp(power.ends)
+        growth, growths = elementary.exp(power.nodes), elementary.exp(power.ends)
         own = panels.within(slope * defect / growth)
         before: Floats = np.zeros(power.ends.shape)
         for panel in range(before.shape[1] - 1):
@@ -144,7 +145,7 @@ def speed_course(machine: Machine, columns: Columns, panels: Panels, fields: Fie
     """
     whole = _Course(machine.spec, panels, machine.cycle, fields)
     pace = np.broadcast_to(machine.pace, fields.inertia.shape)
-    energy = np.array(0.5 * fields.inertia * pace**2)
+    energy = np.array(0.5 * fields.inertia * np.square(pace))
     wanted = columns.row("mean_speed")
     turning, done = np.zeros(len(wanted), dtype=np.bool_), np.zeros(len(wanted), dtype=np.bool_)
     slopes, previous = np.zeros(energy.shape), np.full(len(wanted), np.inf)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine import elementary
 from sprag.engine.machine_shaft.panels import Extremes, Panels, Points
 from sprag.engine.machine_shaft.quadrature import gauss
 from sprag.engine.machine_shaft.spec import MeanSpeed
@@ -75,7 +76,7 @@ def mean_speed(shape: Shape, kind: MeanSpeed, start: Floats) -> tuple[Floats, Fl
             mean = shape.panels.integral(omega) / shape.cycle
             return mean, shape.panels.integral(1.0 / (shape.inertia * omega)) / shape.cycle
         time = shape.panels.integral(1.0 / omega)
-        return shape.cycle / time, shape.cycle / time**2 * shape.panels.integral(
+        return shape.cycle / time, shape.cycle / np.square(time) * shape.panels.integral(
             1.0 / (shape.inertia * squares * omega)
         )
 
@@ -97,8 +98,8 @@ def start_energy(shape: Shape, stop: Stop, kind: MeanSpeed, wanted: Floats) -> F
     bracket, whose lower end is the energy at which the shaft stops.
     """
     largest = shape.panels.largest(shape.inertia)
-    low, high = -stop.work, 0.5 * largest * wanted**2 * (1.0 + 1e-6) - stop.work
-    start = np.clip(0.5 * largest * wanted**2 - shape.panels.integral(shape.work) / shape.cycle, low, high)
+    low, high = -stop.work, 0.5 * largest * np.square(wanted) * (1.0 + 1e-6) - stop.work
+    start = np.clip(0.5 * largest * np.square(wanted) - shape.panels.integral(shape.work) / shape.cycle, low, high)
     found = start.copy()
     active = np.arange(len(wanted))
     for _ in range(_ITERATIONS):
@@ -106,7 +107,7 @@ def start_energy(shape: Shape, stop: Stop, kind: MeanSpeed, wanted: Floats) -> F
             break
         own = shape if len(active) == len(wanted) else shape.take(active)
         mean, slope = mean_speed(own, kind, start[active])
-        error = mean**2 - wanted[active] ** 2
+        error = np.square(mean) - np.square(wanted[active])
         low[active] = np.where(error <= 0.0, start[active], low[active])
         high[active] = np.where(error >= 0.0, start[active], high[active])
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -119,7 +120,7 @@ def start_energy(shape: Shape, stop: Stop, kind: MeanSpeed, wanted: Floats) -> F
         start[active] = following
         found[active] = following
         # Newton's next step would be the square of this one, unless the slope is nearly infinite.
-        near = (moved <= 1e-9 * scale) & (np.abs(error) <= 1e-6 * wanted[active] ** 2)
+        near = (moved <= 1e-9 * scale) & (np.abs(error) <= 1e-6 * np.square(wanted[active]))
         active = active[~near & (error != 0.0)]
     return found
 
@@ -136,7 +137,9 @@ def least_mean_speed(shape: Shape, stop: Stop, kind: MeanSpeed, torque: Floats) 
     power = 0.5 if kind == "angle" else -0.5
     near, far = _near_stop(shape, stop)
     most = shape.panels.largest(torque)
-    total = shape.panels.integral(np.where(far[..., None], np.where(far[..., None], squares, 1.0) ** power, 0.0))
+    total = shape.panels.integral(
+        np.where(far[..., None], elementary.power(np.where(far[..., None], squares, 1.0), power), 0.0)
+    )
     for case, panel in zip(*np.nonzero(near), strict=True):
         total[case] += _singular(shape, stop, torque, most[case], int(case), int(panel), power)
     return np.asarray(total / shape.cycle if kind == "angle" else shape.cycle / total)
@@ -182,9 +185,9 @@ def _singular(shape: Shape, stop: Stop, torque: Floats, most: float, case: int, 
                 return float("inf")
         low, high = np.sqrt(max(first, 0.0)), np.sqrt(last)
         u = 0.5 * (low + high) + 0.5 * (high - low) * _U
-        where = angle + sign * u**2
+        where = angle + sign * np.square(u)
         squares = 2.0 * (at(shape.work, where) - stop.work[case]) / at(shape.inertia, where)
         squares = np.maximum(squares, 1e-16 * np.abs(squares).max())
         with np.errstate(divide="ignore"):
-            total += float((squares**power * u * (high - low) * _U_WEIGHTS).sum())
+            total += float((elementary.power(squares, power) * u * (high - low) * _U_WEIGHTS).sum())
     return total

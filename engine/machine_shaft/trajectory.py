@@ -170,7 +170,13 @@ def _joint_table(machine: Machine, solved: Solved, angles: Floats) -> dict[str, 
             continue
         forces = part.joint_forces(d.panels.angles, d.squares, acceleration, solved.omega, factor)
         x, y, guide = (d.panels.at_rows(np.ascontiguousarray(force), cases, points) for force in forces)
-        own = {"crank_pin.force": np.hypot(x, y), "crank_pin.x": x, "crank_pin.y": y, "guide.force": guide}
+        pin = np.sqrt(np.square(x) + np.square(y))
+        own = {
+            "crank_pin.force": pin,
+            "crank_pin.x": x,
+            "crank_pin.y": y,
+            "guide.force": guide,
+        }
         table |= {f"{part.prefix}{name}": values for name, values in own.items()}
     return table
 

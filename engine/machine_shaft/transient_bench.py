@@ -1,11 +1,13 @@
 """A machine on panels that resolve it, for transients: inertia, torques and steady cycles at the nodes."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.polynomial import chebyshev, legendre
 from numpy.typing import NDArray
 
+from sprag.engine import elementary
 from sprag.engine.machine_shaft.balance import balanced
 from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.machine import Fields, Machine
@@ -19,15 +21,18 @@ from sprag.engine.machine_shaft.start import Shape, mean_speed
 
 Floats = NDArray[np.float64]
 
-#: Chebyshev series of the polynomial through values at the nodes of a panel.
-_PLACES = np.cos((np.arange(NODES) + 0.5) * np.pi / NODES)
-_TO_CHEBYSHEV = np.ascontiguousarray(
-    product(
-        chebyshev.chebvander(_PLACES, NODES - 1).T * np.where(np.arange(NODES) == 0, 1.0, 2.0)[:, None] / NODES,
-        legendre.legvander(_PLACES, NODES - 1),
-        COEFFICIENTS,
-    )
-)
+
+@cache
+def _to_chebyshev() -> Floats:
+    """Matrix from values at the nodes of a panel to the Chebyshev series of the polynomial through them."""
+    places = _places(NODES)
+    to_values = legendre.legvander(places, NODES - 1)
+    return np.ascontiguousarray(product(_to_series(places), to_values, COEFFICIENTS))
+
+
+def _places(count: int) -> Floats:
+    """Chebyshev's nodes."""
+    return elementary.cos((np.arange(count) + 0.5) * np.pi / count)
 
 
 #: Terms of the load over the speed.
@@ -96,7 +101,7 @@ class Bench:
         if self._law is None:
             return [fixed]
         for terms in _TERMS:
-            z = np.cos((np.arange(terms) + 0.5) * np.pi / terms)
+            z = _places(terms)
             with np.errstate(all="ignore"):
                 values = [load * self._law(np.full(fixed.shape, 0.5 * fastest * (1.0 + own)))[0] for own in z]
             to_series = _to_series(z)
@@ -141,7 +146,7 @@ class Bench:
 
     def table(self, *values: Floats) -> Floats:
         """Chebyshev series over the angle in each panel, shape (panels, len(values), terms)."""
-        return np.ascontiguousarray(np.stack([apply(_TO_CHEBYSHEV, part)[0] for part in values], axis=1))
+        return np.ascontiguousarray(np.stack([apply(_to_chebyshev(), part)[0] for part in values], axis=1))
 
     def at(self, values: Floats, angles: Floats) -> Floats:
         """Values at angles 0 .. cycle, shape (m,)."""

@@ -104,7 +104,7 @@ class Run:
         """Every result by name."""
         course, bench = self.course, self.bench
         done = outcome == ("stopped" if course.kind == "coasting" else "reached")
-        energy, begun = float(totals[kernel.ENERGY]), 0.5 * float(self.state[kernel.ROOT]) ** 2
+        energy, begun = float(totals[kernel.ENERGY]), 0.5 * np.square(float(self.state[kernel.ROOT]))
         drive, resistance = float(totals[kernel.WORK_DRIVE]), float(totals[kernel.WORK_RESISTANCE])
         largest = max(abs(drive), abs(resistance), energy, begun)
         end = np.mod(totals[kernel.ANGLE], bench.cycle)
@@ -182,6 +182,6 @@ class Run:
         inertia, slope = bench.at(bench.fields.inertia, angle), bench.at(bench.fields.slope, angle)
         omega = u / np.sqrt(inertia)
         drive, resistance = bench.at(self.drive, angle) + self._pull(omega), self.load_at(omega, angle)
-        acceleration = (drive + resistance - 0.5 * omega**2 * slope) / inertia
+        acceleration = (drive + resistance - 0.5 * np.square(omega) * slope) / inertia
         energy = 0.5 * u * u
         return np.column_stack([places[:, 0], omega, acceleration, energy, inertia, drive, resistance, drive * omega])

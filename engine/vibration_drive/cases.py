@@ -141,7 +141,7 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     # The fastest rate among the excitation, pendulums on their springs, and pendulums against the shaft through their
     # clutches; it converts accelerations to speeds in the error estimate of a step.
     rate = nu
-    acc_x, acc_y = (parameter(f"excitation.amplitude_{direction}") * nu**2 for direction in "xy")
+    acc_x, acc_y = (parameter(f"excitation.amplitude_{direction}") * np.square(nu) for direction in "xy")
     gravity = parameter("gravity")
     swing = np.zeros(cases)  # the fastest of the pendulums on what accelerates them
     pendulums: list[Floats] = []
@@ -154,7 +154,7 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
             )
         }  # fmt: skip
         inertia = own["inertia"]
-        spring = own["spring_rate"] * own["spring_arm"] ** 2 / inertia
+        spring = own["spring_rate"] * np.square(own["spring_arm"]) / inertia
         rate = np.maximum(rate, np.sqrt(spring))
         moment = own["mass"] * own["arm"] / inertia
         swing = np.maximum(swing, np.sqrt(np.abs(moment) * (gravity + acc_x + acc_y)))

@@ -235,14 +235,14 @@ def _balances(cases: _Cases, out: dict[str, Floats]) -> None:
     stored = out["power.stored.mean"] * length
     lost = out["power.loss.mean"] * length
     useful = cases.load * turn
-    kinetic = 0.5 * cases.inertia * cases.shaft("speed_max") ** 2
+    kinetic = 0.5 * cases.inertia * np.square(cases.shaft("speed_max"))
     for i in range(cases.lay.n):
         fastest = np.maximum(cases.pendulum(i, "speed_max"), -cases.pendulum(i, "speed_min"))
-        kinetic = kinetic + 0.5 * cases.parameter(i, PendulumColumn.INERTIA) * fastest**2
+        kinetic = kinetic + 0.5 * cases.parameter(i, PendulumColumn.INERTIA) * np.square(fastest)
     # A motion that has died away consists of rounding errors only and is judged against a swing of 3e-5 rad.
     least = np.zeros_like(cases.period)
     for i in range(cases.lay.n):
-        least = least + 1e-9 * cases.parameter(i, PendulumColumn.INERTIA) * (2.0 * np.pi / cases.period) ** 2
+        least = least + 1e-9 * cases.parameter(i, PendulumColumn.INERTIA) * np.square(2.0 * np.pi / cases.period)
     size = np.max(np.abs([supplied, stored, lost, useful, kinetic, least]), axis=0)
     residual = supplied - stored - lost - useful - cases.shaft("energy_lost")
     out["balance.energy"] = np.where(size > 0.0, _ratio(np.abs(residual), size), np.where(np.isnan(size), np.nan, 0.0))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.polynomial import polynomial as poly
 from numpy.typing import ArrayLike, NDArray
 
+from sprag.engine import elementary
 from sprag.engine.taylor.straight import horner, integral, slope
 from sprag.engine.vibration_drive.clutch_report import ClutchLaw, ClutchLawError
 from sprag.engine.vibration_drive.formulas import beyond
@@ -174,7 +175,7 @@ def _dip_up_to(law: _Array, end: float, limit: float) -> Dip | None:
     after = np.flatnonzero(~negative[worst:])
     start = float(points[before[-1]]) * end if before.size else 0.0
     stop = float(points[worst + after[0]]) * end if after.size else limit
-    lowest = float(values[worst]) * math.exp(min(log_scale, _MAX_LOG))
+    lowest = float(values[worst] * elementary.exp(min(log_scale, _MAX_LOG)))
     return Dip(start, stop, float(points[worst]) * end, lowest)
 
 
@@ -184,13 +185,13 @@ def _ranges(law: _Array, limit: float) -> list[float]:
     The widest ends at ``limit`` or at a bound of all roots (Fujiwara), beyond which a law with c_p != 0 keeps its sign.
     Where two terms balance, a group of roots of that size may lie: each such size gives a range a few times larger.
     """
-    logs = [(int(k), math.log(abs(law[k]))) for k in np.flatnonzero(law)]
+    logs = [(int(k), float(elementary.log(abs(law[k])))) for k in np.flatnonzero(law)]
     balances = [(log_j - log_k) / (k - j) for j, log_j in logs for k, log_k in logs if j < k]
     top, log_top = logs[-1]
     bound = max(((log_j - log_top) / (top - j) for j, log_j in logs[:-1]), default=0.0)
-    widest = min(limit, 2.0 * math.exp(max(min(bound, _MAX_LOG), -_MAX_LOG)))
+    widest = min(limit, 2.0 * float(elementary.exp(max(min(bound, _MAX_LOG), -_MAX_LOG))))
     sizes = sorted({max(min(math.ceil(balance), _MAX_LOG), -_MAX_LOG) for balance in balances}, reverse=True)
-    return [widest, *(end for end in (4.0 * math.exp(size) for size in sizes) if end < widest)]
+    return [widest, *(end for end in (4.0 * float(elementary.exp(size)) for size in sizes) if end < widest)]
 
 
 def _split(coefficients: ArrayLike, limit: float, u: ArrayLike) -> tuple[_Array, _Array, _Array, NDArray[np.bool_]]:
@@ -269,10 +270,10 @@ def _negative_message(law: Sequence[float], limit: float, dip: Dip) -> str:
 def _on_unit_interval(law: _Array, end: float) -> tuple[_Array, float]:
     """Coefficients in t = u/end, the largest of magnitude 1, and the logarithm of what they were divided by."""
     powers = np.flatnonzero(law)
-    logs = np.log(np.abs(law[powers])) + powers * math.log(end)
+    logs = elementary.log(np.abs(law[powers])) + powers * elementary.log(end)
     scale = float(logs.max())
     scaled = np.zeros(law.size)
-    scaled[powers] = np.sign(law[powers]) * np.exp(logs - scale)
+    scaled[powers] = np.sign(law[powers]) * elementary.exp(logs - scale)
     # In [0, 1] so small a leading term never shows beside the term of magnitude 1 below it; its roots lie far outside.
     kept = int(np.flatnonzero(np.abs(scaled) >= 1e-3 * _ROUNDING)[-1]) + 1
     return scaled[:kept], scale

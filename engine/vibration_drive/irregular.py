@@ -108,7 +108,7 @@ class Batches:
         speed = places.index([info.name for info in result_infos(lay.n)].index("shaft.speed.mean"))
         halves = batches[: self.count // 2, :, speed], batches[self.count // 2 :, :, speed]
         drift = np.abs(_mean(halves[0]) - _mean(halves[1]))
-        spread = np.sqrt(_standard_error(halves[0]) ** 2 + _standard_error(halves[1]) ** 2)
+        spread = np.sqrt(np.square(_standard_error(halves[0])) + np.square(_standard_error(halves[1])))
         changes = (exponents < _SHRINKS) | (drift > _DRIFT * spread)
         regimes = np.where(changes, Regime.UNSETTLED, Regime.IRREGULAR).astype(np.int8)
         return Means(values, half_widths, exponents, regimes)
@@ -128,5 +128,5 @@ def _standard_error(batches: Floats) -> Floats:
     mean = _mean(batches)
     total = np.zeros_like(mean)
     for batch in batches:
-        total += (batch - mean) ** 2
+        total += np.square(batch - mean)
     return np.sqrt(total / (len(batches) * (len(batches) - 1)))

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from sprag.engine.compile.cache import cache_folder
 from sprag.engine.compile.ways import GROUP
 from sprag.engine.taylor.batch import ROWS, SLOTS, peaks_loop, roots_loop
+from sprag.engine.taylor.straight import same_everywhere
 from sprag.engine.vibration_drive.advance import advance_loop
 from sprag.engine.vibration_drive.bounds import bounds_loop
 from sprag.engine.vibration_drive.cases import coefficient_count, pendulum_count
@@ -159,7 +160,7 @@ def order_for(tolerance: float) -> int:
     Next to what Jorba and Zou (2005, eq. 12) find optimal, ``1 - ln(tolerance)/2``. Between 11 and 14 the time is the
     same within a tenth (benchmarks.kernel_shape): higher orders take longer steps, but have more code.
     """
-    return max(6, 1 + math.ceil(-0.52 * math.log(tolerance)))
+    return max(6, 1 + math.ceil(-0.52 * same_everywhere(math.log(tolerance))))
 
 
 @cache

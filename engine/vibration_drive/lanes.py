@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from sprag.engine.compile.jit import part
 from sprag.engine.compile.ways import GROUP
+from sprag.engine.elementary.angles import cosine, sine
 from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.taylor.elementary import cosine, sine
 from sprag.engine.taylor.roots import evaluate
 from sprag.engine.vibration_drive import states as ev
 from sprag.engine.vibration_drive.advance import ANGLE_BOUND, SPEED_BOUND, STEP_FLOOR

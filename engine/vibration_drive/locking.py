@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine.compile.jit import inlined, part
-from sprag.engine.taylor.elementary import cosine, sine
+from sprag.engine.elementary.angles import cosine, sine
 from sprag.engine.vibration_drive.automaton import Band
 from sprag.engine.vibration_drive.formulas import base_series, drive, free_acceleration
 from sprag.engine.vibration_drive.layout import Layout

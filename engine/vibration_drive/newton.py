@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine.compile.jit import compiled, part
-from sprag.engine.taylor.elementary import exponential, logarithm
+from sprag.engine.elementary.powers import exponential, logarithm
 from sprag.engine.vibration_drive.orbits import list_free, same_states, tie
 from sprag.engine.vibration_drive.strobes import ANGLE, PENDULUM_WIDTH, SHAFT_WIDTH, WINDUP
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine.compile.jit import compiled, part
-from sprag.engine.taylor.elementary import exponential, logarithm
+from sprag.engine.elementary.powers import exponential, logarithm
 from sprag.engine.vibration_drive.automaton import Clutch, Shaft
 from sprag.engine.vibration_drive.strobes import (
     ANGLE,

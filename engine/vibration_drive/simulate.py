@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sprag.engine import elementary
 from sprag.engine.endings import ENDINGS
 from sprag.engine.outcome import Batch, Trajectory
 from sprag.engine.run import Run, SettledRun
@@ -138,8 +139,9 @@ def sampled(values: Mapping[str, float], found: Integration, times: Floats) -> T
     value = {**{k: v for k, v in defaults.items() if v is not None}, **values}
     nu = 2.0 * math.pi * frequency
     out = {
-        "base.displacement_x": value["excitation.amplitude_x"] * np.cos(nu * times_done),
-        "base.displacement_y": value["excitation.amplitude_y"] * np.sin(nu * times_done + value["excitation.phase"]),
+        "base.displacement_x": value["excitation.amplitude_x"] * elementary.cos(nu * times_done),
+        "base.displacement_y": value["excitation.amplitude_y"]
+        * elementary.sin(nu * times_done + value["excitation.phase"]),
     }
     for column, name in zip(ShaftSample, ("shaft.angle", "shaft.speed", "shaft.acceleration", "torque"), strict=True):
         out[name] = samples[:, column]
@@ -158,7 +160,7 @@ def sampled(values: Mapping[str, float], found: Integration, times: Floats) -> T
         moment = value[f"pendulums.{i}.mass"] * value[f"pendulums.{i}.arm"]
         damping = values.get(f"pendulums.{i}.damping", 0.0)
         out[f"pendulums.{i}.power.input"] = moment * block[:, PendulumSample.DRIVE] * speed
-        out[f"pendulums.{i}.power.loss"] = damping * speed**2
+        out[f"pendulums.{i}.power.loss"] = damping * np.square(speed)
     out["power.input"] = sum((out[f"pendulums.{i}.power.input"] for i in range(n)), np.zeros(done))
     out["power.loss"] = sum((out[f"pendulums.{i}.power.loss"] for i in range(n)), np.zeros(done))
     named = {"shaft": [SHAFT_NAMES[int(s)] for s in states[:, 0]]}
@@ -191,5 +193,9 @@ def estimate_seconds(pendulums: int, coefficients: int, tolerance: float, period
     much again for slower machines.
     """
     order = order_for(tolerance)
-    step = (2.1e-8 + 9.4e-8 * pendulums) * (0.6 + 0.4 * (order / 12.0) ** 2) * (0.8 + 0.05 * max(4, coefficients))
+    step = (
+        (2.1e-8 + 9.4e-8 * pendulums)
+        * (0.6 + 0.4 * (order / 12.0) * (order / 12.0))
+        * (0.8 + 0.05 * max(4, coefficients))
+    )
     return 1e-5 + periods * (25.0 + 31.0 * period) * step

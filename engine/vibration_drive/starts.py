@@ -59,9 +59,9 @@ class StartedBatch:
 def wilson(reached: ArrayLike, starts: int) -> tuple[Floats, Floats]:
     """95 % interval of the share ``reached / starts`` (Wilson, J. Am. Stat. Assoc. 22 (1927) 209)."""
     share = np.asarray(reached, dtype=np.float64) / starts
-    square = _NORMAL**2
+    square = np.square(_NORMAL)
     middle = (share + square / (2 * starts)) / (1 + square / starts)
-    half = _NORMAL / (1 + square / starts) * np.sqrt(share * (1 - share) / starts + square / (4 * starts**2))
+    half = _NORMAL / (1 + square / starts) * np.sqrt(share * (1 - share) / starts + square / (4 * np.square(starts)))
     # Without rounding errors the ends of a share of 0 or 1 are 0 or 1.
     return np.clip(middle - half, 0.0, share), np.clip(middle + half, share, 1.0)
 

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine.compile.jit import inlined, part
+from sprag.engine.elementary.angles import cosine
 from sprag.engine.taylor.batch import HARD, KNOWN, RESULT, SLOTS, STATUS, slot_start, take
-from sprag.engine.taylor.elementary import cosine
 from sprag.engine.taylor.roots import RECIPROCAL, evaluate, largest
 from sprag.engine.vibration_drive.automaton import Clutch
 from sprag.engine.vibration_drive.layout import Layout, PendulumSample, ShaftSample

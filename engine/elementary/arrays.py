@@ -1,0 +1,167 @@
+"""Elementary functions of arrays, named as numpy's: in place of those, whose last bits depend on the processor.
+
+Each takes anything that broadcasts and returns a float64 array of the broadcast shape, or a number for numbers. They
+never warn: where a function has no value it is NaN.
+"""
+
+import math
+from collections.abc import Callable
+from functools import cache
+from typing import Final, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sprag.engine.compile.jit import compiled
+from sprag.engine.elementary.angles import (
+    LARGEST_ANGLE,
+    arccosine,
+    arcsine,
+    arctangent,
+    arctangent_of,
+    cosine,
+    sine,
+    tangent,
+)
+from sprag.engine.elementary.powers import (
+    exponential,
+    hyperbolic_cosine,
+    hyperbolic_sine,
+    hyperbolic_tangent,
+    logarithm,
+)
+from sprag.engine.elementary.powers import power as power_of
+
+Floats = NDArray[np.float64]
+
+_SIN, _COS, _TAN, _ARCSIN, _ARCCOS, _ARCTAN, _EXP, _LOG, _SINH, _COSH, _TANH = range(11)
+_ARCTAN2, _POWER = range(2)
+#: Binary digits of pi for angles of any size.
+_DIGITS: Final = 1_200
+
+
+@compiled
+def _of_one(function: int, x: Floats) -> int:
+    beyond = 0
+    if function == _SIN:
+        for i in range(len(x)):
+            beyond += abs(x[i]) > LARGEST_ANGLE
+            x[i] = sine(x[i])
+    elif function == _COS:
+        for i in range(len(x)):
+            beyond += abs(x[i]) > LARGEST_ANGLE
+            x[i] = cosine(x[i])
+    elif function == _TAN:
+        for i in range(len(x)):
+            beyond += abs(x[i]) > LARGEST_ANGLE
+            x[i] = tangent(x[i])
+    elif function == _ARCSIN:
+        for i in range(len(x)):
+            x[i] = arcsine(x[i])
+    elif function == _ARCCOS:
+        for i in range(len(x)):
+            x[i] = arccosine(x[i])
+    elif function == _ARCTAN:
+        for i in range(len(x)):
+            x[i] = arctangent(x[i])
+    elif function == _EXP:
+        for i in range(len(x)):
+            x[i] = exponential(x[i])
+    elif function == _LOG:
+        for i in range(len(x)):
+            x[i] = logarithm(x[i])
+    elif function == _SINH:
+        for i in range(len(x)):
+            x[i] = hyperbolic_sine(x[i])
+    elif function == _COSH:
+        for i in range(len(x)):
+            x[i] = hyperbolic_cosine(x[i])
+    else:
+        for i in range(len(x)):
+            x[i] = hyperbolic_tangent(x[i])
+    return beyond
+
+
+@compiled
+def _of_two(function: int, x: Floats, y: Floats) -> None:
+    if function == _ARCTAN2:
+        for i in range(len(x)):
+            x[i] = arctangent_of(x[i], y[i])
+    else:
+        for i in range(len(x)):
+            x[i] = power_of(x[i], y[i])
+
+
+def _one(function: int) -> Callable[[ArrayLike], Floats]:
+    def apply(x: ArrayLike) -> Floats:
+        values = np.array(x, dtype=np.float64, order="C")
+        if _of_one(function, values.reshape(-1)):
+            values = _within_a_turn(x)
+            _of_one(function, values.reshape(-1))
+        return values[()]
+
+    return apply
+
+
+def _two(function: int) -> Callable[[ArrayLike, ArrayLike], Floats]:
+    def apply(x: ArrayLike, y: ArrayLike) -> Floats:
+        shape = np.broadcast_shapes(np.shape(x), np.shape(y))
+        first, second = (np.array(np.broadcast_to(part, shape), dtype=np.float64, order="C") for part in (x, y))
+        _of_two(function, first.reshape(-1), second.reshape(-1))
+        return first[()]
+
+    return apply
+
+
+def _within_a_turn(x: ArrayLike) -> Floats:
+    """The angles ``x``, large ones without their whole turns."""
+    values = np.array(x, dtype=np.float64, order="C")
+    flat, turn = values.reshape(-1), _turn()
+    for i in np.flatnonzero(np.abs(flat) > LARGEST_ANGLE).tolist():
+        if np.isfinite(flat[i]):
+            numerator, denominator = abs(float(flat[i])).as_integer_ratio()
+            left = ((numerator << _DIGITS) // denominator) % turn / (1 << _DIGITS)
+            flat[i] = math.copysign(left, flat[i])
+        else:
+            flat[i] = np.nan
+    return values
+
+
+@cache
+def _turn() -> int:
+    """2 pi, times 2 to the power of `_DIGITS`, by J. Machin's formula."""
+    one = 1 << (_DIGITS + 32)
+
+    def inverse_arctangent(x: int) -> int:
+        term = total = one // x
+        n = 1
+        while term:
+            term //= -x * x
+            n += 2
+            total += term // n
+        return total
+
+    return 8 * (4 * inverse_arctangent(5) - inverse_arctangent(239)) >> 32
+
+
+sin, cos, tan = map(_one, (_SIN, _COS, _TAN))
+arcsin, arccos, arctan, arctan2 = _one(_ARCSIN), _one(_ARCCOS), _one(_ARCTAN), _two(_ARCTAN2)
+exp, log = _one(_EXP), _one(_LOG)
+sinh, cosh, tanh = map(_one, (_SINH, _COSH, _TANH))
+_power = _two(_POWER)
+_SIMPLE: Final[dict[float, Callable[[Floats], Floats]]] = {
+    2.0: np.square,
+    1.0: np.positive,
+    0.5: np.sqrt,
+    -0.5: lambda x: np.asarray(1.0 / np.sqrt(x)),
+    -1.0: lambda x: np.asarray(1.0 / x),
+}
+
+
+def power(x: ArrayLike, y: ArrayLike) -> Floats:
+    """``x`` to the power of ``y``, with the special cases of C's ``pow``; a simple number ``y`` takes less time."""
+    simple = _SIMPLE.get(float(cast("float", y))) if np.ndim(y) == 0 else None
+    if simple is None:
+        return _power(x, y)
+    with np.errstate(all="ignore"):
+        return simple(np.asarray(x, dtype=np.float64))
