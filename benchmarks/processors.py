@@ -1,8 +1,9 @@
 """Code for several instruction sets on this machine: equal bits, and relative speeds.
 
-Each code runs in its own process; they compute in turn, so that slow phases of the machine affect all of them. The
-least processor time of a workload counts. Code without fused multiply-adds calls a function for each of them and is
-very slow, so it computes a few cases only.
+Compiled code is for each instruction set, and numpy and the C library choose theirs as on a processor without vectors
+of 256 bits. Each code runs in its own process; they compute in turn, so that slow phases of the machine affect all of
+them. The least processor time of a workload counts. Code without fused multiply-adds calls a function for each of them
+and is very slow, so it computes a few cases only.
 
     python -m benchmarks.processors [--repeats 5] [--plain] [--cases 512]
 """
@@ -30,6 +31,7 @@ _WORKLOADS = {workload.name: workload for workload in (W1, W2)}
 #: Batch sizes for the compared cases, and the number of these cases.
 _BATCHES = (1, 7, 40)
 _COMPARED = 48
+_PRESET_CASES = 12
 #: Everything beyond SSE 4.2.
 _BEYOND_SSE = ("avx", "amx", "evex", "fma", "f16c", "vaes", "vpclmul", "xop", "gfni", "sha512", "sm3", "sm4")
 _BEYOND_AVX2 = ("avx512", "avx10", "evex512", "amx")
@@ -53,6 +55,10 @@ def codes(plain: bool) -> dict[str, dict[str, str]]:
         found["AVX2"] = {"NUMBA_CPU_NAME": "haswell", "NUMBA_CPU_FEATURES": features(_BEYOND_AVX2)}
     if has.get("sse2"):
         found["SSE"] = {"NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": features(_BEYOND_SSE)}
+    libraries = {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX512F"}
+    if chosen := np.show_config(mode="dicts")["SIMD Extensions"].get("found"):
+        libraries["NPY_DISABLE_CPU_FEATURES"] = " ".join(chosen)
+    found["libraries"] = libraries
     if plain:
         found["plain numba"] = {"SPRAG_COMPILER": "plain"}
     return found
@@ -80,9 +86,27 @@ def _bits(workload: Workload, settled: bool) -> str:
     return found.pop()
 
 
+def _bits_of_presets() -> dict[str, str]:
+    """Hashes of the results of the first cases of every preset, by its name."""
+    from sprag.service.presets import preset_names, preset_text
+    from sprag.service.spec.document import load_spec, parse_spec
+    from sprag.worker import models
+
+    found = {}
+    for name in preset_names():
+        file, text = preset_text(name)
+        study = parse_spec(load_spec(text, file.rpartition(".")[2])).study
+        count = min(study.cases, _PRESET_CASES) if study.sweep is None else study.cases  # lines are run whole
+        values = models.run_chunk(study, 0, count).values
+        found[name] = hashlib.sha256(values.tobytes()).hexdigest()
+    return found
+
+
 def _answer(question: list[Any]) -> Any:
     from sprag.engine.vibration_drive.simulate import simulate
 
+    if question[0] == "presets":
+        return _bits_of_presets()
     workload = _WORKLOADS[question[1]]
     if question[0] == "bits":
         return _bits(workload, question[2])
@@ -144,6 +168,11 @@ def main() -> None:
                     times[name] = min(times.get(name, np.inf), process.ask("time", workload, options.cases))
         for name, seconds in times.items():
             print(f"  {name:<12}{options.cases / seconds:8.0f} cases/s  {times['chosen'] / seconds:6.3f} of chosen")
+    # Without the slowest code: its drives take hours.
+    bits = {name: process.ask("presets") for name, process in processes.items() if name != "SSE"}
+    for preset, digest in bits["chosen"].items():
+        others = [name for name, found in bits.items() if found[preset] != digest]
+        print(f"{preset}: {f'NOT THE SAME with {others}' if others else 'the same bits'}")
     for process in processes.values():
         process.end()
 
