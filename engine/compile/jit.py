@@ -1,5 +1,6 @@
-"""The only access to numba: decorators and lane loops of the way that this process uses (``ways``)."""
+"""The only access to numba: decorators, bits of numbers, and lane loops of the way that is in use (``ways``)."""
 
+from sprag.engine.compile.bits import bits_of, of_bits
 from sprag.engine.compile.places import use_cache
 from sprag.engine.compile.vectors import use_full_vectors
 from sprag.engine.compile.ways import PLAIN, WAY
@@ -24,6 +25,7 @@ use_cache()
 use_full_vectors()
 
 __all__ = [
+    "bits_of",
     "compiled",
     "constant_record",
     "constant_shape",
@@ -31,6 +33,7 @@ __all__ = [
     "lane_loops",
     "lane_mask",
     "lowest",
+    "of_bits",
     "part",
     "unmanaged",
 ]

@@ -8,10 +8,10 @@ import math
 
 import numpy as np
 
-from sprag.engine.compile.jit import inlined, part
+from sprag.engine.compile.jit import bits_of, inlined, of_bits, part
 
 _LN2_HIGH, _LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
-_SQRT_HALF = 0.7071067811865476
+_SQRT_TWO = 1.4142135623730951
 _L1, _L2, _L3, _L4, _L5, _L6, _L7 = (
     6.666666666666735130e-01,
     3.999999999940941908e-01,
@@ -29,31 +29,46 @@ _E1, _E2, _E3, _E4, _E5 = (
     4.13813679705723846039e-08,
 )
 #: Beyond these the exponential is infinite, or 0.
-_HIGHEST, _LOWEST = 709.782712893384, -745.2
+_HIGHEST, _LOWEST, _BEYOND = 709.782712893384, -745.2, 800.0
 #: 2/3 and what its double lacks.
 _TWO_THIRDS, _TWO_THIRDS_LOW = 2.0 / 3.0, 3.7007434154171886e-17
 #: 2/5, 2/7, ..., 2/25.
 _P1, _P2, _P3, _P4, _P5, _P6, _P7, _P8, _P9, _P10, _P11 = (2.0 / n for n in range(5, 26, 2))
+#: Least number with all its digits; 2^54; the bits of a fraction, and those of 1.
+_NORMAL, _TWO_54, _FRACTION, _ONE = 2.0**-1022, 2.0**54, (1 << 52) - 1, 1023 << 52
+#: 1.5 2^52: adding and subtracting it rounds to the nearest integer.
+_ROUND = 6755399441055744.0
 #: Splits a double into two halves of its digits (T. J. Dekker, 1971).
 _SPLIT = 134217729.0
+
+
+@inlined
+def _fraction(x: float) -> float:
+    """The fraction of a positive ``x``, from sqrt(1/2) to sqrt(2)."""
+    bits = bits_of(x if x >= _NORMAL else x * _TWO_54)
+    m = of_bits((bits & _FRACTION) | _ONE)
+    return m if m < _SQRT_TWO else 0.5 * m
+
+
+@inlined
+def _exponent(x: float) -> float:
+    """The power of 2 by which a positive ``x`` is a multiple of its `_fraction`."""
+    bits = bits_of(x if x >= _NORMAL else x * _TWO_54)
+    k = float((bits >> 52) - (1023 if x >= _NORMAL else 1077))
+    return k if of_bits((bits & _FRACTION) | _ONE) < _SQRT_TWO else k + 1.0
 
 
 @part
 def logarithm(x: float) -> float:
     """Natural logarithm."""
-    if not 0.0 < x < math.inf:
-        return x if x > 0.0 else (-math.inf if x == 0.0 else math.nan)
-    m, k = math.frexp(x)
-    if m < _SQRT_HALF:
-        m *= 2.0
-        k -= 1
-    f = m - 1.0
+    k, f = _exponent(x), _fraction(x) - 1.0
     s = f / (2.0 + f)
     z = s * s
     w = z * z
     rest = w * (_L2 + w * (_L4 + w * _L6)) + z * (_L1 + w * (_L3 + w * (_L5 + w * _L7)))
     half = 0.5 * f * f
-    return k * _LN2_HIGH - ((half - (s * (half + rest) + k * _LN2_LOW)) - f)
+    value = k * _LN2_HIGH - ((half - (s * (half + rest) + k * _LN2_LOW)) - f)
+    return value if 0.0 < x < math.inf else (x if x > 0.0 else (-math.inf if x == 0.0 else math.nan))
 
 
 @part
@@ -65,14 +80,17 @@ def exponential(x: float) -> float:
 @inlined
 def _exponential_of_sum(x: float, rest: float) -> float:
     """e to the power of ``x + rest``, where ``rest`` is less than an ulp or so of ``x``."""
-    if not _LOWEST < x < _HIGHEST:
-        return math.inf if x > 0.0 else (0.0 if x < 0.0 else x)
-    k = math.floor(x / _LN2_HIGH + 0.5)
-    high, low = x - k * _LN2_HIGH, k * _LN2_LOW - rest
+    inside = min(max(x, _LOWEST), _HIGHEST)
+    k = (inside / _LN2_HIGH + _ROUND) - _ROUND
+    high, low = inside - k * _LN2_HIGH, k * _LN2_LOW - rest
     r = high - low
     t = r * r
     c = r - t * (_E1 + t * (_E2 + t * (_E3 + t * (_E4 + t * _E5))))
-    return math.ldexp(1.0 - ((low - (r * c) / (2.0 - c)) - high), int(k))
+    value = 1.0 - ((low - (r * c) / (2.0 - c)) - high)
+    # In two factors, because 2^k itself may be too large or too small for a double.
+    first = int(k) >> 1
+    value = value * of_bits((first + 1023) << 52) * of_bits((int(k) - first + 1023) << 52)
+    return value if _LOWEST < x < _HIGHEST else (math.inf if x > 0.0 else (0.0 if x < 0.0 else x))
 
 
 @inlined
@@ -84,17 +102,13 @@ def _rest_of_product(a: float, b: float, product: float) -> float:
     return ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
 
 
-@part
+@inlined
 def _positive_power(x: float, y: float) -> float:
     """``x`` to the power of ``y``, where ``x`` is positive and finite: the logarithm has twice the digits of a double.
 
     log(m) = 2 s + 2/3 s^3 + 2/5 s^5 + ..., s = (m - 1)/(m + 1).
     """
-    m, k = math.frexp(x)
-    if m < _SQRT_HALF:
-        m *= 2.0
-        k -= 1
-    f = m - 1.0
+    k, f = _exponent(x), _fraction(x) - 1.0
     d = 2.0 + f
     s = f / d
     p = s * d
@@ -119,31 +133,27 @@ def _positive_power(x: float, y: float) -> float:
     total = high + low
     low -= total - high
     product = y * total
-    if not abs(product) < 800.0:
-        return _exponential_of_sum(product, 0.0)
-    return _exponential_of_sum(product, _rest_of_product(y, total, product) + y * low)
+    rest = _rest_of_product(y, total, product) + y * low
+    return _exponential_of_sum(product, rest if abs(product) < _BEYOND else 0.0)
 
 
 @part
 def power(x: float, y: float) -> float:
     """``x`` to the power of ``y``, with the special cases of C's ``pow``."""
-    if y == 0.0 or x == 1.0:
-        return 1.0
-    if not abs(y) < math.inf or math.isnan(x):
-        if math.isnan(x) or math.isnan(y):
-            return x + y
-        grows = (abs(x) > 1.0) == (y > 0.0)
-        return 1.0 if x == -1.0 else (math.inf if grows else 0.0)
+    size, half = abs(x), 0.5 * y
     whole = np.floor(y) == y
-    odd = whole and np.floor(0.5 * y) != 0.5 * y
-    size = abs(x)
+    value = _positive_power(size, y)
     if size == 0.0 or size == math.inf:  # noqa: PLR1714
         value = size if y > 0.0 else 1.0 / size
-    elif x < 0.0 and not whole:
-        return math.nan
-    else:
-        value = _positive_power(size, y)
-    return -value if odd and math.copysign(1.0, x) < 0.0 else value
+    if size == 1.0:
+        value = 1.0
+    if whole and np.floor(half) != half:
+        value = math.copysign(value, x)
+    elif -math.inf < x < 0.0 and not whole:
+        value = math.nan
+    if math.isnan(x) or math.isnan(y):
+        value = x + y
+    return 1.0 if y == 0.0 or x == 1.0 else value
 
 
 @part
