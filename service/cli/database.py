@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -42,7 +42,7 @@ def upgrade(db: Database = None, as_json: JsonFlag = False) -> None:
     """Bring the database to the revision of this program, or create it."""
     from sprag.service.storage.maintenance import upgrade as bring_up
 
-    with _opened(db, existing=False) as session:
+    with _opened(db, needs="nothing") as session:
         before, after = bring_up(session)
     if as_json:
         write_json({"database": session.location, "before": before, "after": after})
@@ -140,7 +140,7 @@ def move(
     from sprag.service.jobs.dispatching import owner_name
     from sprag.service.storage.moving import move as move_all
 
-    with _opened(db) as source, _opened(target, existing=False) as other:
+    with _opened(db) as source, _opened(target, needs="folder") as other:
         moved = move_all(source, other, owner_name(), say)
     if as_json:
         write_json({"source": source.location, "target": other.location, **asdict(moved)})
@@ -189,14 +189,16 @@ def audit(
 
 
 @contextmanager
-def _opened(db: str | None, *, existing: bool = True) -> Iterator[Session]:
-    """Connections to the database; with ``existing``, a mistyped name creates no database."""
+def _opened(db: str | None, *, needs: Literal["database", "folder", "nothing"] = "database") -> Iterator[Session]:
+    """Connections to the database; where a file or its folder ``needs`` to be there, a mistyped name creates none."""
     from sprag.service.storage.session import Session, file_of
 
     location = read_settings(database=db).database_url
     file = file_of(location)
-    if existing and file is not None and not file.exists():
+    if file is not None and needs == "database" and not file.exists():
         raise WrongInputError("invalid-file", _("{file}: no such database", file=file))
+    if file is not None and needs == "folder" and not (folder := file.absolute().parent).is_dir():
+        raise WrongInputError("invalid-file", _("{file}: there is no folder {folder}", file=file, folder=folder))
     session = Session(location)
     try:
         yield session

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 import sqlalchemy as sa
 
+from sprag.service.cli.app import execute
 from sprag.service.storage import moved_rows
 from sprag.service.storage.errors import DatabaseError, SchemaError
 from sprag.service.storage.lock import DispatcherLock
@@ -224,3 +225,13 @@ def test_what_cannot_be_moved_is_refused_and_nothing_is_changed(
     lock.release()
     source.close()
     target.close()
+
+
+def test_a_mistyped_folder_of_the_target_is_named_and_not_created(
+    sqlite_url: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Store.open(sqlite_url).close()
+    target = tmp_path / "mistyped" / "a.sqlite3"
+    assert execute(["db", "move", str(target), "--db", sqlite_url]) == 2
+    assert f"{target}: there is no folder {target.parent}" in capsys.readouterr().err
+    assert not target.parent.exists()
