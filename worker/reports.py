@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from dataclasses import asdict, dataclass, field
+from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
@@ -13,6 +14,14 @@ if TYPE_CHECKING:
 RATE_SECONDS: Final = 60.0
 #: Most refused workers that are listed with their reasons.
 MAX_REFUSED: Final = 100
+
+
+@cache
+def processor() -> str:
+    """The processor of this machine as LLVM names it, for example "znver5"."""
+    import llvmlite.binding as llvm
+
+    return str(llvm.get_host_cpu_name())
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +39,8 @@ class WorkerReport:
         Its threads, of which it uses one.
     refusal : str
         Why it is refused, as a clause; "" where it is not.
+    processor : str
+        As its own `processor` names it; "" before it has told.
     """
 
     address: str
@@ -38,6 +49,7 @@ class WorkerReport:
     busy: bool = False
     threads: int = 1
     refusal: str = ""
+    processor: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +82,7 @@ class _Host:
     """The workers of one host in the stored report."""
 
     host: str
+    processor: str = ""
     workers: int = 0
     usable: int = 0
     refused: int = 0
@@ -89,6 +102,7 @@ class Reporter:
         hosts: dict[str, _Host] = {}
         for worker in report.workers:
             host = hosts.setdefault(worker.host, _Host(worker.host))
+            host.processor = host.processor or worker.processor
             host.workers += 1
             host.usable += worker.usable
             host.refused += bool(worker.refusal)

@@ -13,6 +13,7 @@ class HostWorkers(TypedDict):
     """The workers of one host."""
 
     host: str
+    processor: Annotated[str, Doc('its processor as LLVM names it, such as "znver5"; empty where it is not known')]
     workers: int
     usable: Annotated[int, Doc("workers that are given chunks")]
     refused: int
@@ -33,9 +34,9 @@ class Dispatcher(TypedDict):
     """A dispatcher and its workers, as it last reported them."""
 
     owner: Annotated[str, Doc("host and process")]
-    fingerprint: Annotated[str, Doc("SHA-256 of its code, libraries and processor, and of those of all its workers")]
+    fingerprint: Annotated[str, Doc("SHA-256 of its code and libraries, and of those of all its workers")]
     differs: Annotated[
-        str | None, Doc("how its fingerprint differs from that of the first dispatcher; null where it does not")
+        str | None, Doc("how its fingerprint differs from that of the first dispatcher here; null where it does not")
     ]
     studies: Annotated[int, Doc("studies that belong to it")]
     started_at: Moment

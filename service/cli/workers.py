@@ -21,8 +21,9 @@ def workers(server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonF
         write_json(found)
         return
     headings = (_("workers"), _("usable"), _("busy"), _("idle threads"), _("refused"), _("cases/s"))
-    columns: list[Column] = [(_("host"), False, True), *((heading, True) for heading in headings)]
-    fields = ("host", "workers", "usable", "busy", "idle_threads", "refused", "cases_per_second")
+    columns: list[Column] = [(_("host"), False, True), (_("processor"), False, True)]
+    columns += [(heading, True) for heading in headings]
+    fields = ("host", "processor", "workers", "usable", "busy", "idle_threads", "refused", "cases_per_second")
     # A host with two dispatchers has a row for each: the process tells them apart.
     columns.append((_("dispatcher"), False, True))
     # The workers of a dispatcher that does not respond are not known.
@@ -40,15 +41,15 @@ def workers(server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonF
             say(_("The dispatcher {name} has not responded since {time}.", name=item["owner"], time=since))
         else:
             _say_at_work(item)
-            _say_more(item)
+            _say_more(item, first=found["dispatchers"][0]["owner"])
 
 
-def _say_more(item: Dispatcher) -> None:
-    """What is particular about a dispatcher at work, below its own line."""
+def _say_more(item: Dispatcher, first: str) -> None:
+    """What is particular about a dispatcher at work, below its own line; it is compared with the ``first`` one."""
     if item["dashboard"]:
         say(_("Dask's dashboard: {url}", url=item["dashboard"]))
     if item["differs"]:
-        say(_("Its fingerprint differs from that of the first dispatcher: {difference}.", difference=item["differs"]))
+        say(_("Its fingerprint differs from that of {name}: {difference}.", name=first, difference=item["differs"]))
     if item["shortage"]:
         say(_(item["shortage"]))
     for worker in item["refused"]:

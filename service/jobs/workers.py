@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sprag.service.json_text import timestamp
 
@@ -24,6 +24,8 @@ def worker_list(store: Store) -> WorkerList:
 
 def _dispatcher(record: DispatcherRecord) -> Dispatcher:
     report = record.report or {}
+    # Reports of earlier versions say nothing of processors.
+    hosts: list[Any] = [{"processor": "", **host} for host in report.get("hosts", [])]
     return {
         "owner": record.owner,
         "fingerprint": record.fingerprint,
@@ -39,6 +41,6 @@ def _dispatcher(record: DispatcherRecord) -> Dispatcher:
         "shortage": report.get("shortage") or None,
         "chunks_in_flight": report.get("chunks_in_flight", 0),
         "usable": record.usable,
-        "hosts": report.get("hosts", []),
+        "hosts": hosts,
         "refused": report.get("refused", []),
     }

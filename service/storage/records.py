@@ -271,7 +271,7 @@ class DispatcherRecord:
     studies : int
         Studies that belong to it.
     differs : str or None
-        How its fingerprint differs from that of the first dispatcher, as a clause; None where it does not.
+        How its fingerprint differs from that of the first dispatcher at work, as a clause; None where it does not.
     """
 
     epoch: int

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Set as AbstractSet
 from functools import partial
 
 import pytest
@@ -21,26 +20,13 @@ from tests.contract.filling import create
 from tests.worker import fakes
 
 
-class Present:
-    """Dispatchers that are there until they are said to be gone."""
-
-    def __init__(self) -> None:
-        self.epochs: set[int] = set()
-
-    def enter(self, epoch: int) -> None:
-        self.epochs.add(epoch)
-
-    def present(self) -> AbstractSet[int]:
-        return self.epochs
-
-
 @pytest.fixture
-def present(store: Store) -> Present:
-    store.presence = present = Present()
+def present(store: Store) -> fakes.Present:
+    store.presence = present = fakes.Present()
     return present
 
 
-def test_dispatchers_work_beside_each_other_on_studies_of_their_own(store: Store, present: Present) -> None:
+def test_dispatchers_work_beside_each_other_on_studies_of_their_own(store: Store, present: fakes.Present) -> None:
     one, two = create(store), create(store)
     first, second = store.take_over("first"), store.take_over("second")
     assert present.epochs == {first, second}
@@ -67,7 +53,7 @@ def test_dispatchers_work_beside_each_other_on_studies_of_their_own(store: Store
 
 
 def test_the_studies_of_a_dispatcher_that_is_gone_are_free_and_nothing_else_changes(
-    store: Store, present: Present
+    store: Store, present: fakes.Present
 ) -> None:
     one, two, alone = create(store), create(store), create(store)
     first, second = store.take_over("first"), store.take_over("second")
@@ -91,7 +77,7 @@ def test_the_studies_of_a_dispatcher_that_is_gone_are_free_and_nothing_else_chan
     assert active == {one.number: second, two.number: second, alone.number: None}
 
 
-def test_who_leaves_lets_others_take_its_studies(store: Store, present: Present) -> None:
+def test_who_leaves_lets_others_take_its_studies(store: Store, present: fakes.Present) -> None:
     one, two = create(store), create(store)
     first, second = store.take_over("first"), store.take_over("second")
     for record in (one, two):
@@ -111,7 +97,7 @@ def test_who_leaves_lets_others_take_its_studies(store: Store, present: Present)
 
 
 def test_peers_are_those_with_workers_that_take_any_study(
-    store: Store, present: Present, clock: fakes.HandClock
+    store: Store, present: fakes.Present, clock: fakes.HandClock
 ) -> None:
     study = create(store)
     first, second = store.take_over("first"), store.take_over("second")
@@ -138,7 +124,7 @@ def test_peers_are_those_with_workers_that_take_any_study(
 
 
 def test_dispatchers_tell_what_their_fingerprints_differ_in(
-    store: Store, present: Present, monkeypatch: pytest.MonkeyPatch
+    store: Store, present: fakes.Present, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store.take_over("first")
     store.take_over("second")
@@ -150,7 +136,7 @@ def test_dispatchers_tell_what_their_fingerprints_differ_in(
     assert [item["differs"] for item in found] == [None, None, f"Python: 2.7 instead of {platform.python_version()}"]
 
 
-def test_the_last_dispatcher_stays_known_and_so_does_the_clock(store: Store, present: Present) -> None:
+def test_the_last_dispatcher_stays_known_and_so_does_the_clock(store: Store, present: fakes.Present) -> None:
     first = store.take_over("first")
     store.note_clock(store.clock.now())
     second = store.take_over("second")

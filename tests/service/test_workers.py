@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import platform
+from functools import partial
 from typing import TYPE_CHECKING
 
 import pytest
@@ -14,6 +16,7 @@ from sprag.service.cli import workers
 from sprag.service.cli.app import execute
 from sprag.service.cli.doctor import examine
 from sprag.service.storage.tables import DISPATCHERS
+from sprag.worker import fingerprint
 from sprag.worker.reports import WorkerReport
 from tests.service.conftest import SPEC
 from tests.service.shapes import fits
@@ -32,8 +35,8 @@ REFUSED = WorkerReport("tls://b:1", "b", usable=False, refusal="numpy: 1.0 inste
 @pytest.fixture
 def team() -> list[WorkerReport]:
     """Five usable workers on two hosts, and one that is refused."""
-    usable = [WorkerReport(f"tls://a:{port}", "a", usable=True, busy=port < 3) for port in range(1, 5)]
-    return [*usable, WorkerReport("tls://b:2", "b", usable=True, threads=4), REFUSED]
+    usable = [WorkerReport(f"tls://a:{n}", "a", usable=True, busy=n < 3, processor="znver5") for n in range(1, 5)]
+    return [*usable, WorkerReport("tls://b:2", "b", usable=True, threads=4, processor="skylake-avx512"), REFUSED]
 
 
 def report(service: Service, *workers: WorkerReport, shortage: str = "") -> None:
@@ -69,6 +72,7 @@ def test_the_workers_are_shown_by_host_with_refusals(
     ]
     page = service.http.get("/workers").text
     assert "5 workers run chunks" in page
+    assert '<td class="name">a</td><td>znver5</td>' in page
     assert "<code>tls://b:1</code>: numpy: 1.0 instead of 2.0" in page
     assert 'href="http://head:8787/status"' in page
     assert execute(["workers", "--json"]) == 0
@@ -77,7 +81,8 @@ def test_the_workers_are_shown_by_host_with_refusals(
     shown = capsys.readouterr()
     assert "idle threads" in shown.out
     rows = [line for line in shown.out.splitlines() if line.split()[:1] in (["a"], ["b"])]
-    assert [row.split()[-1] for row in rows] == ["head:7", "head:7"]
+    shown_of = [(row.split()[1], row.split()[-1]) for row in rows]
+    assert shown_of == [("znver5", "head:7"), ("skylake-avx512", "head:7")]
     assert "tls://b:1 is refused: numpy: 1.0 instead of 2.0" in shown.err
     assert "head:7 has 0 studies and 0 chunks in flight, fingerprint " in shown.err
     assert "Dask's dashboard: http://head:8787/status" in shown.err
@@ -100,6 +105,37 @@ def test_the_workers_are_shown_by_host_with_refusals(
     assert "has not responded since" in shown.err
     assert "is refused" not in shown.err
     assert "\nsprag_dispatchers 0.0\n" in service.http.get("/metrics").text
+
+
+def test_a_report_of_an_earlier_version_names_no_processor(service: Service, team: list[WorkerReport]) -> None:
+    earlier = fakes.report(*team)
+    for host in earlier["hosts"]:
+        del host["processor"]
+    service.store.heartbeat(service.store.take_over("head:7"), earlier)
+    found = service.get("/workers")
+    fits(WorkerList, found)
+    assert [host["processor"] for host in found["dispatchers"][0]["hosts"]] == ["", ""]
+    assert '<td class="name">a</td><td></td>' in service.http.get("/workers").text
+
+
+def test_a_difference_says_from_which_dispatcher(
+    service: Service,
+    connected: Callable[[ModuleType], None],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    connected(workers)
+    monkeypatch.setattr(service.store, "presence", fakes.Present())
+    service.store.take_over("head:7")
+    monkeypatch.setattr(fingerprint, "digest", lambda: "another")
+    monkeypatch.setattr(fingerprint, "own", partial(dict, fingerprint.own(), Python="2.7"))
+    service.store.take_over("other:8")
+    difference = f"Python: 2.7 instead of {platform.python_version()}"
+    assert f"<code>another</code> (differs from that of head:7: {difference})" in service.http.get("/workers").text
+    assert execute(["workers"]) == 0
+    said = capsys.readouterr().err
+    assert said.count("Its fingerprint differs from that of ") == 1
+    assert f"Its fingerprint differs from that of head:7: {difference}." in said
 
 
 def test_the_service_is_not_ready_while_no_worker_can_work(service: Service) -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from collections.abc import Callable
+from collections.abc import Set as AbstractSet
 from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 from functools import partial
@@ -207,6 +209,19 @@ def pool(
 def faulty(**faults: frozenset[int]) -> partial[ChunkResult]:
     """`run` with faults, to give to an executor."""
     return partial(run, **faults)
+
+
+class Present:
+    """Dispatchers that are there until they are said to be gone."""
+
+    def __init__(self) -> None:
+        self.epochs: set[int] = set()
+
+    def enter(self, epoch: int) -> None:
+        self.epochs.add(epoch)
+
+    def present(self) -> AbstractSet[int]:
+        return self.epochs
 
 
 class HandClock:

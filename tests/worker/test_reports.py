@@ -7,16 +7,22 @@ from sprag.worker.reports import MAX_REFUSED, RATE_SECONDS, ExecutorReport, Repo
 
 def test_workers_are_summed_up_by_host() -> None:
     workers = (
-        WorkerReport("tcp://b:1", "b", usable=True, busy=True, threads=4),
-        WorkerReport("tcp://a:1", "a", usable=True),
+        WorkerReport("tcp://b:1", "b", usable=True, busy=True, threads=4, processor="znver5"),
+        WorkerReport("tcp://a:1", "a", usable=True, processor="skylake-avx512"),
         WorkerReport("tcp://a:2", "a", usable=False, refusal="numpy: 1 instead of 2"),
         WorkerReport("tcp://a:3", "a", usable=False, busy=True),
     )
     found = Reporter().summary(ExecutorReport("dask", workers, {}, scheduler="tls://head:8786"), 3, 0.0)
     assert found["hosts"] == [
-        {"host": "a", "workers": 3, "usable": 1, "refused": 1, "busy": 1, "idle_threads": 1, "cases_per_second": 0.0},
-        {"host": "b", "workers": 1, "usable": 1, "refused": 0, "busy": 1, "idle_threads": 3, "cases_per_second": 0.0},
-    ]
+        {
+            "host": "a", "processor": "skylake-avx512", "workers": 3, "usable": 1, "refused": 1, "busy": 1,
+            "idle_threads": 1, "cases_per_second": 0.0,
+        },
+        {
+            "host": "b", "processor": "znver5", "workers": 1, "usable": 1, "refused": 0, "busy": 1, "idle_threads": 3,
+            "cases_per_second": 0.0,
+        },
+    ]  # fmt: skip
     assert found["refused"] == [{"address": "tcp://a:2", "host": "a", "reason": "numpy: 1 instead of 2"}]
     assert (found["chunks_in_flight"], found["scheduler"]) == (3, "tls://head:8786")
 

@@ -361,13 +361,11 @@ class DaskExecutor:
                 self._loaded(worker, job.shape, value, error)
             self._fill()
 
-    def _introduced(self, worker: Worker, found: object, error: BaseException | None) -> None:
+    def _introduced(self, worker: Worker, told: object, error: BaseException | None) -> None:
         if error is not None:
             worker.refuse(f"it cannot run Sprag ({type(error).__name__}: {error})")
-        elif differs := fingerprint.differences(self._expected, found):
-            worker.refuse(differs)
         else:
-            worker.usable = True
+            worker.introduced(told, self._expected)
             self._outcomes.put(None)
 
     def _loaded(self, worker: Worker, shape: models.KernelShape, answers: Any, error: BaseException | None) -> None:

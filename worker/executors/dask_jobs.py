@@ -7,6 +7,7 @@ from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
+from sprag.worker import fingerprint
 from sprag.worker.executors.dask_tasks import OtherFingerprintError
 from sprag.worker.ports import Fate, Outcome
 from sprag.worker.reports import ExecutorReport, WorkerReport
@@ -42,6 +43,7 @@ class Worker:
     """A worker of the cluster.
 
     ``usable`` is False until its introduction is accepted; for a refused worker ``refusal`` states why.
+    ``processor`` is "" until the worker has told it.
     ``shapes`` has the known answers of the kernels that it has loaded.
     """
 
@@ -50,6 +52,7 @@ class Worker:
     threads: int = 1
     usable: bool = False
     refusal: str = ""
+    processor: str = ""
     shapes: dict[models.KernelShape, str | None] = field(default_factory=dict)
     job: Job | None = None
 
@@ -57,6 +60,21 @@ class Worker:
     def joined(cls, address: str, info: Mapping[str, Any]) -> Worker:
         """A worker as the scheduler describes it."""
         return cls(address, str(info.get("host", address)), int(info.get("nthreads", 1)))
+
+    def introduced(self, told: object, expected: Mapping[str, str]) -> None:
+        """Take what `introduce` returned: the worker is usable where its fingerprint is the one expected.
+
+        Other versions of Sprag may have returned anything; earlier ones return the fingerprint only.
+        """
+        match told:
+            case (found, str(name)):
+                self.processor = name
+            case _:
+                found = told
+        if differs := fingerprint.differences(expected, found):
+            self.refuse(differs)
+        else:
+            self.usable = True
 
     def refuse(self, reason: str) -> None:
         """Give it no chunks; ``reason`` is a clause."""
@@ -90,9 +108,12 @@ def refusals(workers: Iterable[Worker]) -> str:
 def report_of(link: Link, workers: Iterable[Worker], cases: Mapping[str, int], shortage: str | None) -> ExecutorReport:
     """The report of workers that have run ``cases`` on their hosts."""
     found = (
-        WorkerReport(worker.address, worker.host, worker.usable, worker.job is not None, worker.threads, worker.refusal)
+        WorkerReport(
+            worker.address, worker.host, worker.usable, worker.job is not None, worker.threads, worker.refusal,
+            worker.processor,
+        )
         for worker in workers
-    )
+    )  # fmt: skip
     return ExecutorReport("dask", tuple(found), dict(cases), shortage or "", link.address, link.dashboard)
 
 

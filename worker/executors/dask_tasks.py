@@ -18,6 +18,7 @@ from sprag.worker import fingerprint, models
 from sprag.worker.limits import LOAD_SECONDS
 from sprag.worker.pool.processes import within_processor_time
 from sprag.worker.ports import ExecutorError
+from sprag.worker.reports import processor
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,8 +39,8 @@ class OtherFingerprintError(Exception):
     """The process is not the one that was introduced at its address: it has another fingerprint."""
 
 
-def introduce(discard: str) -> dict[str, str]:
-    """Runs in each worker that joins: loads the engine and returns its fingerprint.
+def introduce(discard: str) -> tuple[dict[str, str], str]:
+    """Runs in each worker that joins: loads the engine and returns its fingerprint and the name of its processor.
 
     With ``discard`` the compiled kernels of its host are deleted first, once for each such text. A process that had
     loaded any of them exits, and its nanny starts another.
@@ -48,7 +49,7 @@ def introduce(discard: str) -> dict[str, str]:
     if discard and _loaded:
         os._exit(0)
     models.prepare()
-    return fingerprint.collect()
+    return fingerprint.collect(), processor()
 
 
 def load_kernel(
@@ -65,7 +66,10 @@ def load_kernel(
 
 
 def load_and_answer(shape: models.KernelShape) -> str:
-    """Load a kernel; returns a hash of its known answers."""
+    """Load a kernel; returns a hash of its known answers.
+
+    They are the same on every processor: other ones are those of a faulty processor or of a damaged cache.
+    """
     models.load(shape)
     return hashlib.sha256(models.model_of(shape.model).known_answers(shape)).hexdigest()[:16]
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from sprag.worker import models
 from sprag.worker.ports import Chunk, Fate, Outcome
-from sprag.worker.reports import ExecutorReport, WorkerReport
+from sprag.worker.reports import ExecutorReport, WorkerReport, processor
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -70,7 +70,8 @@ class InlineExecutor:
     def report(self) -> ExecutorReport:
         """This process, between two chunks."""
         host = socket.gethostname()
-        return ExecutorReport("inline", (WorkerReport("this process", host, True),), {host: self._cases})
+        worker = WorkerReport("this process", host, True, processor=processor())
+        return ExecutorReport("inline", (worker,), {host: self._cases})
 
     def close(self) -> None:
         """Drop what has not run."""

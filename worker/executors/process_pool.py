@@ -16,7 +16,7 @@ from sprag.worker.pool.child_pool import ChildPool, JobStoppedError
 from sprag.worker.pool.child_process import ProcessDiedError, ProcessStartError
 from sprag.worker.pool.processes import single_threaded_children, within_processor_time
 from sprag.worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
-from sprag.worker.reports import ExecutorReport, WorkerReport
+from sprag.worker.reports import ExecutorReport, WorkerReport, processor
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -189,7 +189,7 @@ class ProcessPoolExecutor:
         """The processes of the pool; they start with the first chunk."""
         host, busy, shortage = socket.gethostname(), len(self._jobs) + len(self._loading), self.shortage
         workers = tuple(
-            WorkerReport(f"process {number + 1}", host, shortage is None, number < busy)
+            WorkerReport(f"process {number + 1}", host, shortage is None, number < busy, processor=processor())
             for number in range(self._processes)
         )
         return ExecutorReport("pool", workers, {host: self._cases}, shortage or "")
