@@ -105,7 +105,7 @@ WARNING_MEANINGS: Final[dict[WarningCode, str]] = {
     "law-falls": "The torque of the clutch law falls with growing windup somewhere.",
     "law-jumps": "c_1 > 0: the torque jumps as soon as contact begins.",
     "many-runs": "Cases times starts of each are more than a million runs.",
-    "mixed-origins": "The cases of the study were not all computed by one version on one kind of processor.",
+    "mixed-origins": "The cases of the study were not all computed by one version of Sprag and its libraries.",
     "never-acts": "A step over the stroke begins after its end and never acts.",
     "no-compression": "The discharge pressure is below the suction pressure.",
     "no-discharge": "The compressor does not reach the discharge pressure.",

@@ -1,7 +1,7 @@
-"""What determines the bits of a result besides its parameters: code, libraries and processor of the process.
+"""What determines the bits of a result besides its parameters: code and libraries of the process.
 
-numpy and the C library choose their code by the processor itself: what they chose is told by their answers
-(`sprag.worker.known_answers`).
+The kind of processor does not: a case is computed by operations that every processor of an architecture rounds alike
+(docs/adr/0031-processors-may-differ.md).
 
 Two processes with the same fingerprint give the same bits for the same case. If a fingerprint differs from the
 dispatcher's, a worker of a cluster is refused and a process of the pool exits. Rows are reused only under the
@@ -14,6 +14,7 @@ import hashlib
 import json
 import os
 import platform
+import textwrap
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
@@ -22,16 +23,15 @@ from pathlib import Path
 from typing import Final
 
 from sprag.worker import models
-from sprag.worker.known_answers import known_answers
 
 _SOURCES: Final = "sources of engine and worker"
-_FEATURES: Final = "processor features"
 _PACKAGES: Final = ("sprag", "numpy", "numba", "llvmlite", "scipy")
-#: Settings of numba that do not affect its code, or are covered by the processor features.
+#: Settings of numba that do not change what its code computes; those of the processor change its speed only.
 _NUMBA_HARMLESS: Final = frozenset(
     {
         "NUMBA_CACHE_DIR",
         "NUMBA_NUM_THREADS",
+        "NUMBA_CPU_NAME",
         "NUMBA_CPU_FEATURES",
         "NUMBA_ENABLE_AVX",
         "NUMBA_DISABLE_PERFORMANCE_WARNINGS",
@@ -39,8 +39,8 @@ _NUMBA_HARMLESS: Final = frozenset(
 )
 #: File in the current folder from which numba also reads settings.
 _NUMBA_FILE: Final = Path(".numba_config.yaml")
-#: Most differences of one subject that are listed.
-_NAMED: Final = 6
+#: Most characters of a value in a sentence; those of earlier versions name every feature of the processor.
+_MOST_SHOWN: Final = 160
 
 
 def _sources() -> str:
@@ -65,10 +65,8 @@ def collect() -> dict[str, str]:
         "Python": platform.python_version(),
         "C library": " ".join(platform.libc_ver()),
         "machine": platform.machine(),
-        _FEATURES: _features(),
         "compiler": models.compiler(),
         "numba settings": _numba_settings(),
-        **known_answers(),
     }
 
 
@@ -88,22 +86,6 @@ def _version(package: str) -> str:
         return version(package)
     except PackageNotFoundError:
         return "not installed"
-
-
-def _features() -> str:
-    """The processor features that numba compiles for, sorted; without AVX where numba's setting disables it.
-
-    Where the setting names them, the real processor shows in the known answers only.
-    """
-    chosen = os.environ.get("NUMBA_CPU_FEATURES")
-    if chosen is not None:
-        return " ".join(sorted(item[1:] for item in chosen.split(",") if item.startswith("+")))
-    import llvmlite.binding as llvm
-
-    present = [name for name, there in llvm.get_host_cpu_features().items() if there]
-    if os.environ.get("NUMBA_ENABLE_AVX") == "0":
-        present = [name for name in present if not name.startswith("avx")]
-    return " ".join(sorted(present))
 
 
 @cache
@@ -137,20 +119,13 @@ def differences(own: Mapping[str, str], other: object) -> str:
     found = []
     for subject in dict.fromkeys((*own, *map(str, other))):
         here, there = own.get(subject, "unknown"), str(other.get(subject, "unknown"))
-        if here == there:
-            continue
-        if subject == _FEATURES:
-            lacks, more = set(here.split()) - set(there.split()), set(there.split()) - set(here.split())
-            parts = [f"{word} {_named(names)}" for word, names in (("without", lacks), ("with", more)) if names]
-            found.append(f"{subject}: {' and '.join(parts)}")
-        else:
-            found.append(f"{subject}: {there or 'none'} instead of {here or 'none'}")
+        if here != there:
+            found.append(f"{subject}: {_shown(there)} instead of {_shown(here)}")
     return "; ".join(found)
 
 
-def _named(names: set[str]) -> str:
-    more = len(names) - _NAMED
-    return ", ".join(sorted(names)[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+def _shown(value: str) -> str:
+    return textwrap.shorten(value, _MOST_SHOWN, placeholder=" …") or "none"
 
 
 def prepare_as(expected: str) -> None:

@@ -137,7 +137,7 @@ class Origin(TypedDict):
     ]
     fingerprint: Annotated[
         str | None,
-        Doc("SHA-256 of code, libraries and processor: equal ones give equal bits; null where not recorded"),
+        Doc("SHA-256 of code and libraries: equal ones give equal bits; null where not recorded"),
     ]
     chunks: int
     cases: Annotated[int, Doc("cases of these chunks, including those copied from other studies of the fingerprint")]

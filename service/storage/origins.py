@@ -42,7 +42,7 @@ class Origin:
         `HOSTS_BETWEEN` between them. None where the cases were given up or hosts were not recorded, as before revision
         0022.
     fingerprint : str or None
-        Digest of the code, libraries and processor of the process (`sprag.worker.fingerprint`); None where the
+        Digest of the code and libraries of the process (`sprag.worker.fingerprint`); None where the
         cases were given up, and for chunks from before revision 0022.
     chunks, cases : int
     differs : str or None

@@ -52,9 +52,9 @@ _SOURCE: Final[tuple[sa.ColumnElement[Any], ...]] = (
 _NO_RESULT: Final = tuple(ending.value for ending in WorkerEnding)
 
 _MIXED: Final = WarningText(
-    "The cases of this study were not all computed by one version of Sprag and its libraries on one kind of processor: "
-    "they may differ in more than their parameters, so other studies reuse only those that were computed like their "
-    "own. A fresh study runs all of them alike.",
+    "The cases of this study were not all computed by one version of Sprag and its libraries: they may differ in more "
+    "than their parameters, so other studies reuse only those that were computed like their own. A fresh study runs "
+    "all of them alike.",
     "mixed-origins",
 )
 
@@ -264,9 +264,11 @@ def mark_origin(connection: sa.Connection, number: int) -> None:
     origin, warnings = connection.execute(sa.select(STUDIES.c.fingerprint, STUDIES.c.warnings).where(this)).one()
     if origin is None:
         connection.execute(sa.update(STUDIES).where(this).values(fingerprint=fingerprint.digest()))
-    elif origin != fingerprint.digest() and _MIXED not in (earlier := read_warnings(warnings)):
-        values = {"fingerprint": "", "warnings": write_warnings([*earlier, _MIXED])}
-        connection.execute(sa.update(STUDIES).where(this).values(values))
+    elif origin != fingerprint.digest():
+        earlier = read_warnings(warnings)
+        if _MIXED.code not in {text.code for text in earlier if isinstance(text, WarningText)}:
+            values = {"fingerprint": "", "warnings": write_warnings([*earlier, _MIXED])}
+            connection.execute(sa.update(STUDIES).where(this).values(values))
 
 
 def copy_rows(connection: sa.Connection, model: str, variant: str, chunk: Chunk, known: Known) -> bool:

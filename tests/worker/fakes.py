@@ -86,6 +86,17 @@ def spinning(task: ChunkTask) -> ChunkResult:
         pass
 
 
+def run_beside(task: ChunkTask, *, folder: str) -> ChunkResult:
+    """Run a chunk by the engine, once the workers of both kinds of processors have one.
+
+    Each writes the features by which its numpy chooses into a file.
+    """
+    Path(folder, str(os.getpid())).write_text(" ".join(numpy_features()), encoding="ascii")
+    while len(os.listdir(folder)) < 2:
+        time.sleep(0.02)
+    return models.run_task(task)
+
+
 def run_between(task: ChunkTask, *, begun: str, told: str) -> ChunkResult:
     """Say into ``begun`` that the chunk began; it is through when somebody writes into ``told``."""
     load_between(task.shape, begun=begun, told=told)
@@ -261,5 +272,13 @@ def fail_while_loading() -> None:
 
 
 def numpy_features() -> list[str]:
-    """The features of this processor by which numpy chooses its code."""
+    """The features of this processor by which numpy chooses its code, without those that a setting disables."""
     return [str(name) for name in np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])]
+
+
+def of_any_processor() -> dict[str, str]:
+    """The environment in which numpy and the C library take their code for any processor."""
+    return {
+        "NPY_DISABLE_CPU_FEATURES": " ".join(numpy_features()),
+        "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX512F",
+    }

@@ -185,7 +185,7 @@ class Model(Protocol):
         """Compile the kernel of that shape into the on-disk cache, or load it from there."""
 
     def known_answers(self, shape: KernelShape) -> bytes:
-        """Results of a short case by the loaded kernel of that shape; the same bytes in all processes that agree."""
+        """Results of a short case by the loaded kernel of that shape; the same bytes on every sound processor."""
         return b""
 
 

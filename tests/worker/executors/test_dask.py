@@ -23,10 +23,12 @@ from sprag.worker import fingerprint, models
 from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.dask import DaskExecutor
+from sprag.worker.executors.dask_jobs import Worker
 from sprag.worker.executors.dask_tasks import load_and_answer
 from sprag.worker.executors.inline import InlineExecutor
 from sprag.worker.executors.process_pool import SPARE_CHUNKS, ProcessPoolExecutor
 from sprag.worker.ports import Chunk, Executor, ExecutorError, Fate, KernelError, Outcome
+from sprag.worker.reports import processor
 from sprag.worker.states import StudyState
 from sprag.worker.study import Study
 from tests.conftest import ROOT
@@ -69,11 +71,11 @@ def run_all(executor: Executor, study: Study, size: int) -> dict[int, Outcome]:
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Cluster]:
-    """A scheduler and two workers, as processes."""
+    """A scheduler and two workers, as processes; libraries of the second one take their code for any processor."""
     with clusters() as made:
         made.start_scheduler()
         made.start_worker()
-        made.start_worker()
+        made.start_worker(**fakes.of_any_processor())
         yield made
 
 
@@ -91,9 +93,10 @@ def start(cluster: Cluster) -> Iterator[Callable[..., DaskExecutor]]:
         executor.close()
 
 
-def test_inline_pool_and_dask_give_the_same_bits(start: Callable[..., DaskExecutor]) -> None:
+def test_inline_pool_and_dask_give_the_same_bits(start: Callable[..., DaskExecutor], tmp_path: Path) -> None:
+    """On Dask's workers too, whose numpy and C library compute as on two kinds of processors."""
     study = fakes.study(30)
-    dask = start(run=models.run_task, load=load_and_answer)
+    dask = start(run=partial(fakes.run_beside, folder=str(tmp_path)), load=load_and_answer)
     processes = ProcessPoolExecutor(2, chunk_timeout=DEADLINE)
     cuts = ((InlineExecutor(), 30), (processes, 4), (dask, 7))
     try:
@@ -112,6 +115,9 @@ def test_inline_pool_and_dask_give_the_same_bits(start: Callable[..., DaskExecut
         )
     assert rows[0] == rows[1] == rows[2]
     assert len(rows[0][1]) == 30
+    assert sorted(file.read_text() for file in tmp_path.iterdir()) == ["", " ".join(fakes.numpy_features())]
+    workers = dask.report().workers
+    assert [(worker.usable, worker.processor) for worker in workers] == [(True, processor())] * 2
 
 
 def test_a_death_costs_one_chunk_and_the_worker_comes_back(start: Callable[..., DaskExecutor]) -> None:
@@ -236,6 +242,13 @@ def test_a_worker_with_another_numpy_is_refused(
     assert f"{reason} (and 1 more)." in (executor.shortage or "")
 
 
+def test_workers_of_earlier_versions_tell_nothing_of_their_processor() -> None:
+    worker = Worker("tcp://a:1", "a")
+    worker.introduced({**fingerprint.own(), "sprag": "0.0.1"}, fingerprint.own())
+    assert (worker.usable, worker.processor) == (False, "")
+    assert worker.refusal == f"sprag: 0.0.1 instead of {fingerprint.own()['sprag']}"
+
+
 def test_another_process_at_the_address_of_a_worker_runs_nothing(start: Callable[..., DaskExecutor]) -> None:
     executor, study = start(), fakes.study(8)
     ready(executor, study)
@@ -280,17 +293,10 @@ def no_sprag(folder: Path) -> dict[str, str]:
     return {}
 
 
-def no_fma(folder: Path) -> dict[str, str]:
-    """The same sources on a processor without fused multiplication and addition."""
+def other_settings(folder: Path) -> dict[str, str]:
+    """The same sources, compiled otherwise."""
     (folder / "sprag").symlink_to(ROOT / "sprag")
-    features = fingerprint.own()["processor features"].split()
-    return {"NUMBA_CPU_FEATURES": ",".join(("-" if name == "fma" else "+") + name for name in features)}
-
-
-def other_numpy(folder: Path) -> dict[str, str]:
-    """The same processor features for numba, but numpy takes its code for any processor."""
-    (folder / "sprag").symlink_to(ROOT / "sprag")
-    return {"NPY_DISABLE_CPU_FEATURES": " ".join(fakes.numpy_features())}
+    return {"NUMBA_OPT": "0"}
 
 
 def test_workers_that_would_give_other_values_run_nothing_and_the_study_says_so(
@@ -299,10 +305,8 @@ def test_workers_that_would_give_other_values_run_nothing_and_the_study_says_so(
     others: dict[Callable[[Path], dict[str, str]], str] = {
         edited_engine: "sources of engine and worker: ",
         no_sprag: "it cannot run Sprag (ImportError: there is no Sprag here)",
-        no_fma: "processor features: without fma",
+        other_settings: "numba settings: NUMBA_OPT=0 instead of ",
     }
-    if fakes.numpy_features():
-        others[other_numpy] = "known answers of numpy: "
     with clusters() as made, Store.open(f"sqlite:///{tmp_path / 'a.sqlite3'}", chunking=Chunking(cases=4)) as store:
         record = store.create_study({}, fakes.study(20))
         made.start_scheduler()
