@@ -107,10 +107,7 @@ def run(**environment: str) -> list[object]:
 
 def test_other_code_of_numpy_and_the_c_library_gives_the_same_bits() -> None:
     own = run()
-    features = fakes.numpy_features()
-    other = run(
-        NPY_DISABLE_CPU_FEATURES=" ".join(features), GLIBC_TUNABLES="glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX512F"
-    )
+    other = run(**fakes.of_any_processor())
     assert own[0] == other[0]
-    if features:  # so the libraries did choose other code
+    if fakes.numpy_features():  # so the libraries did choose other code
         assert own[1:] != other[1:]

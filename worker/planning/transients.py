@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.worker.planning.goals.draws import logarithm
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -38,8 +40,8 @@ def settling(after: Floats, multiplier: Floats, order: Floats) -> Floats:
     ``after`` are periods until the motion is settled, ``multiplier`` is that of the distance from it in ``order``
     periods.
     """
-    rate = -np.log(np.clip(multiplier, _LEAST, _MOST)) / order
-    return np.asarray(np.log(np.maximum(after, 1.0) * rate))
+    rate = -logarithm(np.clip(multiplier, _LEAST, _MOST)) / order
+    return logarithm(np.maximum(after, 1.0) * rate)
 
 
 def roughness(left: Floats, middle: Floats, right: Floats) -> Floats:
