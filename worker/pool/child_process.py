@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from sprag.worker.pool.processes import interrupts_held_back, start_pool_process
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
     from multiprocessing.connection import Connection
     from multiprocessing.context import SpawnProcess
 
@@ -101,7 +101,7 @@ class ChildProcess:
         """
         pipe = self._give(pickle.dumps((function, args), protocol=pickle.HIGHEST_PROTOCOL))
         try:
-            is_value, found = self._answer_of(pipe, timeout)
+            is_value, found = _read(pipe, *self._answer_of(pipe, timeout))
         except (EOFError, OSError) as error:
             if isinstance(error, TimeoutError):
                 raise
@@ -110,8 +110,10 @@ class ChildProcess:
             raise found
         return found
 
-    def _answer_of(self, pipe: Connection, timeout: float) -> tuple[bool, Any]:
-        """The outcome of the function; raises TimeoutError (the process is then killed), EOFError and OSError."""
+    def _answer_of(self, pipe: Connection, timeout: float) -> tuple[bytes, list[int]]:
+        """The outcome of the function, to be `_read`; raises TimeoutError (the process is then killed), EOFError and
+        OSError.
+        """
         left = timeout
         while True:
             begun = time.monotonic()
@@ -120,7 +122,7 @@ class ChildProcess:
             if in_time:
                 said: Any = pipe.recv()
                 if said != _LOADING:
-                    answer: tuple[bool, Any] = said
+                    answer: tuple[bytes, list[int]] = said
                     return answer
                 in_time = bool(wait([pipe], START_SECONDS)) and pipe.recv() == _LOADED
             if not in_time:
@@ -226,19 +228,45 @@ def _serve(pipe: Connection, parent: int, prepare: Callable[[], None]) -> None:
         while True:
             message = pipe.recv_bytes()
             pipe.send(True)
-            pipe.send_bytes(_answer(message))
+            answer, arrays = _answer(message)
+            pipe.send((answer, [array.nbytes for array in arrays]))
+            for array in arrays:
+                _write(pipe, array)
 
 
-def _answer(message: bytes) -> bytes:
-    """The value of a function with True, or its exception with False; pickled."""
+def _answer(message: bytes) -> tuple[bytes, list[memoryview]]:
+    """The value of a function with True, or its exception with False: pickled, apart from the numbers of its arrays."""
+    buffers: list[pickle.PickleBuffer] = []
     try:
         function, args = pickle.loads(message)  # noqa: S301 - it comes from the parent process
-        return pickle.dumps((True, function(*args)), protocol=pickle.HIGHEST_PROTOCOL)
+        answer = pickle.dumps((True, function(*args)), protocol=5, buffer_callback=buffers.append)
+        return answer, [buffer.raw() for buffer in buffers]
     except Exception as error:
         error.add_note("".join(traceback.format_exception(error)))
         try:
             answer = pickle.dumps((False, error))
             pickle.loads(answer)  # noqa: S301 - some errors can be written and not read
         except Exception:
-            return pickle.dumps((False, RuntimeError(f"{type(error).__name__}: {error}")))
-        return answer
+            return pickle.dumps((False, RuntimeError(f"{type(error).__name__}: {error}"))), []
+        return answer, []
+
+
+# A `Connection` copies what it sends and receives several times, into memory that is new each time: for the rows of a
+# chunk this took longer than sending them.
+def _write(pipe: Connection, array: memoryview) -> None:
+    while array:
+        array = array[os.write(pipe.fileno(), array) :]
+
+
+def _read(pipe: Connection, answer: bytes, sizes: Iterable[int]) -> tuple[bool, Any]:
+    """What `_answer` of the other process says, of which the arrays have these sizes in bytes and are still to come."""
+    arrays = [bytearray(size) for size in sizes]
+    for array in arrays:
+        left = memoryview(array)
+        while left:
+            count = os.readv(pipe.fileno(), [left])
+            if not count:
+                raise EOFError
+            left = left[count:]
+    value: tuple[bool, Any] = pickle.loads(answer, buffers=arrays)  # noqa: S301 - from a process of this program
+    return value
