@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import psutil
+import pytest
 
 from benchmarks.faults.harness import free_port, kill_family
 from tests.conftest import ROOT
 
 DEADLINE = 600.0
+#: Connections that Dask gives up while a scheduler dies are closed by the garbage collector, which warns of each.
+LEAVES_CONNECTIONS = pytest.mark.filterwarnings("ignore:unclosed <socket:ResourceWarning")
 #: Without a dashboard there is still a server of health and metrics; any port will do.
 _QUIET = ("--dashboard-address", "127.0.0.1:0")
 
@@ -67,3 +72,6 @@ def clusters() -> Iterator[Cluster]:
         for process in (*made.workers, made.scheduler):
             if process is not None:
                 kill_family(process)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ResourceWarning)
+            gc.collect()

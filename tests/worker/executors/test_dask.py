@@ -33,7 +33,9 @@ from sprag.worker.states import StudyState
 from sprag.worker.study import Study
 from tests.conftest import ROOT
 from tests.worker import fakes
-from tests.worker.executors.clusters import DEADLINE, Cluster, clusters
+from tests.worker.executors.clusters import DEADLINE, LEAVES_CONNECTIONS, Cluster, clusters
+
+pytestmark = LEAVES_CONNECTIONS
 
 
 def eventually(true: Callable[[], object]) -> None:

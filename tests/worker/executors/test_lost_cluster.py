@@ -19,8 +19,10 @@ from sprag.worker.planning.rounds import Rows
 from sprag.worker.states import StudyState
 from sprag.worker.study import Study
 from tests.worker import fakes
-from tests.worker.executors.clusters import DEADLINE, clusters
+from tests.worker.executors.clusters import DEADLINE, LEAVES_CONNECTIONS, clusters
 from tests.worker.planning import toy
+
+pytestmark = LEAVES_CONNECTIONS
 
 
 def in_rounds(rounds: int, size: int) -> Study:

@@ -19,7 +19,9 @@ from sprag.worker import fingerprint, models
 from sprag.worker.chunking import Chunking
 from sprag.worker.states import StudyState
 from tests.conftest import ROOT
-from tests.worker.executors.clusters import Cluster, clusters
+from tests.worker.executors.clusters import LEAVES_CONNECTIONS, Cluster, clusters
+
+pytestmark = LEAVES_CONNECTIONS
 
 CASES = 4000
 #: Cases that are waited for in each step: all steps together take far fewer than there are.
