@@ -184,13 +184,14 @@ def settle(
     ending = _lost(W, lay, lane)
     event = Z[lane, ev.EVENT_PENDULUM] != ev.NO_EVENT
     at_stop = W[lay.at_stop, lane] == 1.0
-    if at_stop and h > 0.0:
-        # The stop is met exactly, regardless of the rounding of the sum of steps.
+    if at_stop:
+        # The stop is met exactly, regardless of the rounding of the sum of steps. The step to it has no length where
+        # an event came at the same time.
         W[lay.f, lane] = W[lay.f_stop, lane]
     if ending == _RUNNING and event:
         ending = _take_event(W, Z, lay, lane, h, most_events)
         Z[lane, ev.EVENT_PENDULUM] = ev.NO_EVENT
-    if ending == _RUNNING and at_stop and h > 0.0:
+    if ending == _RUNNING and at_stop:
         case = Z[lane, ev.CASE]
         strobe = starts[case, FRACTION]
         at_strobe = W[lay.f, lane] == strobe

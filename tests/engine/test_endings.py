@@ -86,6 +86,19 @@ def test_a_step_budget_of_exactly_the_steps_needed_is_enough_but_for_the_last() 
 MAY_BE_NULL = {"shaft.irregularity", "efficiency", "runup.time"}
 
 
+def test_an_event_at_the_very_end_of_a_period() -> None:
+    """The shaft stops when the first period is over, to the last digit; then no time is left for a step to its end."""
+    ones = {p.path.replace("N", "0"): 1.0 for p in PARAMETERS} | clutch(0.0, 200.0, 0.0, 2e4)
+    start = {f"pendulums.0.{name}": 0.0 for name in ("backlash", "initial_angle", "initial_windup", "initial_clutch")}
+    loads = [0.9999999, 1.0, 1.0000001]
+    results = Results(
+        ones | start | {"gravity": 1.333774675151071e-05, "shaft.load": np.array(loads)}, periods(3.0, 1.0, 3.0), 3
+    )
+    assert results.endings == [Ending.OK] * 3
+    before, there, after = results.values[:, results.names.index("shaft.speed.mean")]
+    assert before > there > after > before - 1e-6
+
+
 def _wide(low: float, high: float) -> st.SearchStrategy[float]:
     """Over all magnitudes of a positive range, and zero where allowed."""
     return st.floats(math.log10(low), math.log10(high)).map(lambda exponent: 10.0**exponent)
