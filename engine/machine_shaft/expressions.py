@@ -74,7 +74,7 @@ def _pick(condition: Value | NDArray[np.bool_], u: Dual, v: Dual) -> Dual:
 
 
 def _atan2(y: Dual, x: Dual) -> Dual:
-    size = np.square(np.asarray(x[0])) + np.square(np.asarray(y[0]))
+    size = np.square(x[0]) + np.square(y[0])
     return elementary.arctan2(y[0], x[0]), _chain(lambda: x[0] / size, y[1]) + _chain(lambda: -y[0] / size, x[1])
 
 
@@ -136,8 +136,7 @@ class _Parser:
     def __init__(self, text: str, names: frozenset[str]) -> None:
         self.text, self.names, self.nodes, self.depth = text, names, 0, 0
         self.tokens: list[tuple[str, str, int]] = []
-        position = 0
-        end = len(text.rstrip())
+        position, end = 0, len(text.rstrip())
         while position < end:
             match = _TOKEN.match(text, position)
             if match is None:
