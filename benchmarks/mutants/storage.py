@@ -15,8 +15,8 @@ STORAGE: Final = (
     Mutant(
         "no epoch check",
         "service/storage/dispatchers.py",
-        "where(DISPATCHERS.c.epoch == epoch, _ALIVE)\n        if",
-        "where(DISPATCHERS.c.epoch == epoch)\n        if",
+        'where(DISPATCHERS.c.epoch == sa.bindparam("epoch"), _ALIVE)',
+        'where(DISPATCHERS.c.epoch == sa.bindparam("epoch"))',
         ("tests/contract/test_dispatchers.py",),
     ),
     Mutant(
@@ -43,8 +43,8 @@ STORAGE: Final = (
     Mutant(
         "chunks of another dispatcher's study are claimed",
         "service/storage/storing.py",
-        "sa.func.coalesce(STUDIES.c.dispatcher, epoch) == epoch,",
-        "sa.true(),",
+        'sa.func.coalesce(STUDIES.c.dispatcher, sa.bindparam("epoch")) == sa.bindparam("epoch"),',
+        'sa.bindparam("epoch", type_=sa.Integer) > 0,',
         ("tests/contract/test_dispatchers.py",),
     ),
     Mutant(

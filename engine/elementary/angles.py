@@ -9,9 +9,6 @@ import math
 from sprag.engine.compile.jit import inlined, part
 from sprag.engine.taylor.straight import COSINE, HALF_PI, ROUND, SINE
 
-#: Sine, cosine and tangent are for angles up to this, in rad; beyond it the reduction loses digits.
-LARGEST_ANGLE = 1e6
-
 _PI_1, _PI_2, _PI_3 = (float(text) for text in HALF_PI)
 _ROUND = float(ROUND)
 _S1, _S2, _S3, _S4, _S5, _S6 = (float(text) for text in SINE)
@@ -57,19 +54,19 @@ def _of_quadrant(x: float, turned: float) -> float:
 
 @part
 def sine(x: float) -> float:
-    """Sine of ``x``, up to `LARGEST_ANGLE` in modulus."""
+    """Sine of ``x``, up to `sprag.engine.taylor.straight.LARGEST_ANGLE` in modulus."""
     return _of_quadrant(x, 0.0)
 
 
 @part
 def cosine(x: float) -> float:
-    """Cosine of ``x``, up to `LARGEST_ANGLE` in modulus."""
+    """Cosine of ``x``, up to `sprag.engine.taylor.straight.LARGEST_ANGLE` in modulus."""
     return _of_quadrant(x, 1.0)
 
 
 @part
 def tangent(x: float) -> float:
-    """Tangent of ``x``, up to `LARGEST_ANGLE` in modulus."""
+    """Tangent of ``x``, up to `sprag.engine.taylor.straight.LARGEST_ANGLE` in modulus."""
     return _of_quadrant(x, 0.0) / _of_quadrant(x, 1.0)
 
 

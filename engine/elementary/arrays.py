@@ -7,97 +7,37 @@ never warn: where a function has no value it is NaN.
 import math
 from collections.abc import Callable
 from functools import cache
+from types import ModuleType
 from typing import Final, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.compile.jit import compiled
-from sprag.engine.elementary.angles import (
-    LARGEST_ANGLE,
-    arccosine,
-    arcsine,
-    arctangent,
-    arctangent_of,
-    cosine,
-    sine,
-    tangent,
-)
-from sprag.engine.elementary.powers import (
-    exponential,
-    hyperbolic_cosine,
-    hyperbolic_sine,
-    hyperbolic_tangent,
-    logarithm,
-)
-from sprag.engine.elementary.powers import power as power_of
+from sprag.engine.taylor.straight import LARGEST_ANGLE
 
 Floats = NDArray[np.float64]
 
-_SIN, _COS, _TAN, _ARCSIN, _ARCCOS, _ARCTAN, _EXP, _LOG, _SINH, _COSH, _TANH = range(11)
-_ARCTAN2, _POWER = range(2)
+#: Functions of one variable, and of two, by the numbers that compiled code has for them.
+SIN, COS, TAN, ARCSIN, ARCCOS, ARCTAN, EXP, LOG, SINH, COSH, TANH = range(11)
+ARCTAN2, POWER = range(2)
 #: Binary digits of pi for angles of any size.
 _DIGITS: Final = 1_200
 
 
-@compiled
-def _of_one(function: int, x: Floats) -> int:
-    beyond = 0
-    if function == _SIN:
-        for i in range(len(x)):
-            beyond += abs(x[i]) > LARGEST_ANGLE
-            x[i] = sine(x[i])
-    elif function == _COS:
-        for i in range(len(x)):
-            beyond += abs(x[i]) > LARGEST_ANGLE
-            x[i] = cosine(x[i])
-    elif function == _TAN:
-        for i in range(len(x)):
-            beyond += abs(x[i]) > LARGEST_ANGLE
-            x[i] = tangent(x[i])
-    elif function == _ARCSIN:
-        for i in range(len(x)):
-            x[i] = arcsine(x[i])
-    elif function == _ARCCOS:
-        for i in range(len(x)):
-            x[i] = arccosine(x[i])
-    elif function == _ARCTAN:
-        for i in range(len(x)):
-            x[i] = arctangent(x[i])
-    elif function == _EXP:
-        for i in range(len(x)):
-            x[i] = exponential(x[i])
-    elif function == _LOG:
-        for i in range(len(x)):
-            x[i] = logarithm(x[i])
-    elif function == _SINH:
-        for i in range(len(x)):
-            x[i] = hyperbolic_sine(x[i])
-    elif function == _COSH:
-        for i in range(len(x)):
-            x[i] = hyperbolic_cosine(x[i])
-    else:
-        for i in range(len(x)):
-            x[i] = hyperbolic_tangent(x[i])
-    return beyond
+@cache
+def _loops() -> ModuleType:
+    """The compiled loops: numba takes long to load, and many processes read formulas without computing any."""
+    from sprag.engine.elementary import loops
 
-
-@compiled
-def _of_two(function: int, x: Floats, y: Floats) -> None:
-    if function == _ARCTAN2:
-        for i in range(len(x)):
-            x[i] = arctangent_of(x[i], y[i])
-    else:
-        for i in range(len(x)):
-            x[i] = power_of(x[i], y[i])
+    return loops
 
 
 def _one(function: int) -> Callable[[ArrayLike], Floats]:
     def apply(x: ArrayLike) -> Floats:
         values = np.array(x, dtype=np.float64, order="C")
-        if _of_one(function, values.reshape(-1)):
+        if _loops().of_one(function, values.reshape(-1)):
             values = _within_a_turn(x)
-            _of_one(function, values.reshape(-1))
+            _loops().of_one(function, values.reshape(-1))
         return values[()]
 
     return apply
@@ -107,7 +47,7 @@ def _two(function: int) -> Callable[[ArrayLike, ArrayLike], Floats]:
     def apply(x: ArrayLike, y: ArrayLike) -> Floats:
         shape = np.broadcast_shapes(np.shape(x), np.shape(y))
         first, second = (np.array(np.broadcast_to(part, shape), dtype=np.float64, order="C") for part in (x, y))
-        _of_two(function, first.reshape(-1), second.reshape(-1))
+        _loops().of_two(function, first.reshape(-1), second.reshape(-1))
         return first[()]
 
     return apply
@@ -144,11 +84,11 @@ def _turn() -> int:
     return 8 * (4 * inverse_arctangent(5) - inverse_arctangent(239)) >> 32
 
 
-sin, cos, tan = map(_one, (_SIN, _COS, _TAN))
-arcsin, arccos, arctan, arctan2 = _one(_ARCSIN), _one(_ARCCOS), _one(_ARCTAN), _two(_ARCTAN2)
-exp, log = _one(_EXP), _one(_LOG)
-sinh, cosh, tanh = map(_one, (_SINH, _COSH, _TANH))
-_power = _two(_POWER)
+sin, cos, tan = map(_one, (SIN, COS, TAN))
+arcsin, arccos, arctan, arctan2 = _one(ARCSIN), _one(ARCCOS), _one(ARCTAN), _two(ARCTAN2)
+exp, log = _one(EXP), _one(LOG)
+sinh, cosh, tanh = map(_one, (SINH, COSH, TANH))
+_power = _two(POWER)
 _SIMPLE: Final[dict[float, Callable[[Floats], Floats]]] = {
     2.0: np.square,
     1.0: np.positive,

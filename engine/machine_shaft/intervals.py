@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sprag.engine.compile.jit import part
 from sprag.engine.elementary import angles, powers
-from sprag.engine.elementary.angles import LARGEST_ANGLE
+from sprag.engine.taylor.straight import LARGEST_ANGLE
 
 Floats = NDArray[np.float64]
 

@@ -210,6 +210,8 @@ def larger(a: str, b: str) -> str:
 
 # Cody-Waite splitting of pi/2: the first two parts have 33 bits, so that a multiple below 2^20 of them is exact.
 HALF_PI = ("1.57079632673412561417e+00", "6.07710050630396597660e-11", "2.02226624879595063154e-21")
+#: Largest angle in rad, in modulus, that is reduced without losing digits.
+LARGEST_ANGLE = 1e6
 ROUND = "6755399441055744.0"  # 1.5 * 2^52: adding and subtracting it rounds to the nearest integer
 # Minimax coefficients of sin and cos on [-pi/4, pi/4] (the classic ones of fdlibm's kernels, error below 2^-58).
 SINE = (
@@ -231,7 +233,7 @@ COSINE = (
 
 
 def sincos(code: LaneCode, x: str, tag: str) -> tuple[Term, Term]:
-    """Sine and cosine of ``|x|`` up to 1e6 within an ulp or so, without calls or branches."""
+    """Sine and cosine of ``|x|`` up to `LARGEST_ANGLE` within an ulp or so, without calls or branches."""
     q = code.let(f"q_{tag}", f"({x}*0.6366197723675814 + {ROUND}) - {ROUND}")
     r = code.let(f"r_{tag}", f"(({x} - {q}*{HALF_PI[0]}) - {q}*{HALF_PI[1]}) - {q}*{HALF_PI[2]}")
     z = code.let(f"z_{tag}", f"{r}*{r}")

@@ -154,7 +154,7 @@ def test_refusals_carry_the_fields_of_the_problem(client: Client, spec: dict[str
     assert error["allowed"] == "> 0 kg*m^2 and <= 1e+06 kg*m^2"
     assert caught.value.status == 422
     with refused(RefusedError, "study-not-found"):
-        client.study("st_0")
+        client.study("st_none")
 
 
 def test_waiting_ends_after_its_time(client: Client, spec: dict[str, Any]) -> None:
@@ -225,7 +225,7 @@ async def asynchronous(service: Service, spec: dict[str, Any], folder: Path) -> 
         with refused(RefusedError, "invalid-parameter", "invalid-choice"):
             await study.download("doc")
         with refused(RefusedError, "study-not-found"):
-            await client.study("st_0")
+            await client.study("st_none")
     async with AsyncClient("http://127.0.0.1:9") as nobody:
         with pytest.raises(UnreachableError):
             await nobody.preview(spec)
