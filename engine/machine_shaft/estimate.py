@@ -1,6 +1,6 @@
 """Estimated time of a case from the structure of its machine (measured by benchmarks/machine_shaft.py)."""
 
-from sprag.engine.machine_shaft.expressions import Expression, Node, names_of
+from sprag.engine.machine_shaft.expressions import TIME, Expression, Node, names_of
 from sprag.engine.machine_shaft.simulate import PANELS
 from sprag.engine.machine_shaft.spec import MachineSpec
 
@@ -32,7 +32,7 @@ def estimate_seconds(model: MachineSpec) -> float:
 
 
 def _formula_cost(text: str, constants: tuple[str, ...]) -> float:
-    expression = Expression(text, dict.fromkeys(("phi", "x", "omega", *constants)))
+    expression = Expression(text, dict.fromkeys(("phi", "x", "omega", TIME, *constants)))
     cost = _FORMULA + (_SPEED if "omega" in expression.used - set(constants) else 0.0)
     if expression.used & set(constants):
         cost += _OWN
@@ -45,6 +45,6 @@ def _formula_cost(text: str, constants: tuple[str, ...]) -> float:
 
 def _divides_by_angle(node: Node) -> bool:
     """Whether the formula has a divisor that changes over the cycle, such as 1/(1 + (phi/w)^2)."""
-    if node.kind == "/" and names_of(node.parts[1]) & {"phi", "x"}:
+    if node.kind == "/" and names_of(node.parts[1]) & {"phi", "x", TIME}:
         return True
     return any(map(_divides_by_angle, node.parts))

@@ -140,6 +140,8 @@ def move(
     from sprag.service.jobs.dispatching import owner_name
     from sprag.service.storage.moving import move as move_all
 
+    if not target.strip():  # elsewhere it means the database of the settings
+        raise WrongInputError("invalid-file", _("TARGET is empty: name a file or a URL"))
     with _opened(db) as source, _opened(target, needs="folder") as other:
         moved = move_all(source, other, owner_name(), say)
     if as_json:

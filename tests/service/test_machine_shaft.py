@@ -202,3 +202,11 @@ def test_rows_as_a_file(filled: tuple[Service, str]) -> None:
     assert list(rows[0])[:4] == ["case", "mean_speed", "drive.inertia", "ending"]
     assert list(rows[0])[5:] == RESULTS
     assert rows[0]["omega.max"] == ""
+
+
+def test_work_that_is_a_formula_of_the_time_is_estimated_and_accepted(service: Service) -> None:
+    """Like that of docs/guide-machine-shaft.md."""
+    operation = {"quantity": "torque", "formula": "if(t > 0.1, if(t < 0.25, 200, 0), 0)"}
+    spec = changed({"/base/operation": operation, "/axes": [{"path": "drive.inertia", "values": [900, 1200]}]})
+    assert service.http.post("/api/v1/studies:preview", json=spec).json()["cases"] > 0
+    service.submit(spec)

@@ -101,19 +101,21 @@ class ChildProcess:
         """
         pipe = self._give(pickle.dumps((function, args), protocol=pickle.HIGHEST_PROTOCOL))
         try:
-            is_value, found = _read(pipe, *self._answer_of(pipe, timeout))
+            is_value, found = _read(pipe, *self._answer_of(pipe, timeout), timeout)
+        except TimeoutError:
+            self._bury()
+            raise
         except (EOFError, OSError) as error:
-            if isinstance(error, TimeoutError):
-                raise
             raise ProcessDiedError(self._bury()) from error
+        except BaseException:  # such as a lack of memory: what is left in the pipe is not the next answer
+            self._bury()
+            raise
         if not is_value:
             raise found
         return found
 
     def _answer_of(self, pipe: Connection, timeout: float) -> tuple[bytes, list[int]]:
-        """The outcome of the function, to be `_read`; raises TimeoutError (the process is then killed), EOFError and
-        OSError.
-        """
+        """The outcome of the function, to be `_read`; raises TimeoutError, EOFError and OSError."""
         left = timeout
         while True:
             begun = time.monotonic()
@@ -126,7 +128,6 @@ class ChildProcess:
                     return answer
                 in_time = bool(wait([pipe], START_SECONDS)) and pipe.recv() == _LOADED
             if not in_time:
-                self._bury()
                 raise TimeoutError(f"not done within {timeout:g} s")
 
     def _give(self, message: bytes) -> Connection:
@@ -258,12 +259,17 @@ def _write(pipe: Connection, array: memoryview) -> None:
         array = array[os.write(pipe.fileno(), array) :]
 
 
-def _read(pipe: Connection, answer: bytes, sizes: Iterable[int]) -> tuple[bool, Any]:
-    """What `_answer` of the other process says, of which the arrays have these sizes in bytes and are still to come."""
+def _read(pipe: Connection, answer: bytes, sizes: Iterable[int], timeout: float) -> tuple[bool, Any]:
+    """What `_answer` of the other process says, of which the arrays have these sizes in bytes and are still to come.
+
+    Raises TimeoutError when nothing comes for ``timeout`` s, EOFError and OSError.
+    """
     arrays = [bytearray(size) for size in sizes]
     for array in arrays:
         left = memoryview(array)
         while left:
+            if not wait([pipe], timeout):
+                raise TimeoutError(f"not sent within {timeout:g} s")
             count = os.readv(pipe.fileno(), [left])
             if not count:
                 raise EOFError

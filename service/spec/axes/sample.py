@@ -20,6 +20,7 @@ from sprag.service.spec.draws.unit import cases_of, correlated, unit_sample
 from sprag.service.spec.fields import read_number, read_object
 from sprag.service.spec.report import Report, join
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES
+from sprag.worker.planning.goals.draws import exponential, logarithm
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -54,7 +55,7 @@ class SampleRange:
     def place(self, unit: NDArray[np.float64]) -> NDArray[np.float64]:
         """Map numbers between 0 and 1 to values of the range."""
         if self.scale == "log":
-            values = self.low * (self.high / self.low) ** unit
+            values = self.low * exponential(unit * logarithm(np.array(self.high / self.low)))
         else:
             values = self.low + (self.high - self.low) * unit
         return np.asarray(np.clip(values, min(self.low, self.high), max(self.low, self.high)), dtype=np.float64)

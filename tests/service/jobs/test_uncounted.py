@@ -79,7 +79,7 @@ def said(process: ChildProcess, function: Callable[..., Any], *args: Any) -> lis
     found = [pipe.recv()]
     while not isinstance(found[-1], tuple):
         found.append(pipe.recv())
-    return [*found[:-1], child_process._read(pipe, *found[-1])[0]]
+    return [*found[:-1], child_process._read(pipe, *found[-1], 300.0)[0]]
 
 
 @pytest.mark.parametrize("function", [partial(writable, "a"), partial(parse_spec, PRESS)], ids=["picture", "shaft"])

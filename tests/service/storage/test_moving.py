@@ -235,3 +235,10 @@ def test_a_mistyped_folder_of_the_target_is_named_and_not_created(
     assert execute(["db", "move", str(target), "--db", sqlite_url]) == 2
     assert f"{target}: there is no folder {target.parent}" in capsys.readouterr().err
     assert not target.parent.exists()
+
+
+def test_an_empty_target_is_refused(sqlite_url: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """As of a variable that is not set; it is not the user's own database."""
+    Store.open(sqlite_url).close()
+    assert execute(["db", "move", "", "--db", sqlite_url]) == 2
+    assert "TARGET" in capsys.readouterr().err

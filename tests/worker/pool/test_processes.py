@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from sprag.worker.pool.child_process import ChildProcess, ProcessDiedError
+from sprag.worker.pool.child_process import ChildProcess, ProcessDiedError, _read
 from sprag.worker.pool.processes import NICENESS, interrupts_held_back
 from tests.worker import fakes
 
@@ -81,6 +81,16 @@ class Half:
     def __reduce_ex__(self, _protocol: object) -> tuple[object, ...]:
         os.kill(os.getpid(), signal.SIGKILL)
         return Half, (self.numbers,)
+
+
+def test_numbers_that_end_early_are_no_answer() -> None:
+    ours, theirs = get_context("spawn").Pipe()
+    with pytest.raises(TimeoutError):
+        _read(ours, b"", [8], 0.0)
+    theirs.close()
+    with pytest.raises(EOFError):
+        _read(ours, b"", [8], 600.0)
+    ours.close()
 
 
 def test_a_process_that_dies_while_it_answers_is_noticed(child: ChildProcess) -> None:
