@@ -33,6 +33,7 @@ Floats = NDArray[np.float64]
 
 @compiled
 def of_one(function: int, x: Floats) -> int:
+    """Replace the elements of ``x``, shape (n,), by a function of them; how many angles are beyond `LARGEST_ANGLE`."""
     beyond = 0
     if function == SIN:
         for i in range(len(x)):
@@ -75,6 +76,7 @@ def of_one(function: int, x: Floats) -> int:
 
 @compiled
 def of_two(function: int, x: Floats, y: Floats) -> None:
+    """Replace the elements of ``x`` by a function of them and of those of ``y``, both of shape (n,)."""
     if function == ARCTAN2:
         for i in range(len(x)):
             x[i] = arctangent_of(x[i], y[i])
