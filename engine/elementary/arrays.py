@@ -99,7 +99,10 @@ _SIMPLE: Final[dict[float, Callable[[Floats], Floats]]] = {
 
 
 def power(x: ArrayLike, y: ArrayLike) -> Floats:
-    """``x`` to the power of ``y``, with the special cases of C's ``pow``; a simple number ``y`` takes less time."""
+    """``x`` to the power of ``y``, with the special cases of C's ``pow``; a simple number ``y`` takes less time.
+
+    For 1/2 and -1/2, minus zero and minus infinity are treated as by the square root.
+    """
     simple = _SIMPLE.get(float(cast("float", y))) if np.ndim(y) == 0 else None
     if simple is None:
         return _power(x, y)

@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from sprag.engine.compile.jit import bits_of, inlined, of_bits, part
+from sprag.engine.taylor.straight import ROUND
 
 _LN2_HIGH, _LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 _SQRT_TWO = 1.4142135623730951
@@ -36,8 +37,7 @@ _TWO_THIRDS, _TWO_THIRDS_LOW = 2.0 / 3.0, 3.7007434154171886e-17
 _P1, _P2, _P3, _P4, _P5, _P6, _P7, _P8, _P9, _P10, _P11 = (2.0 / n for n in range(5, 26, 2))
 #: Least number with all its digits; 2^54; the bits of a fraction, and those of 1.
 _NORMAL, _TWO_54, _FRACTION, _ONE = 2.0**-1022, 2.0**54, (1 << 52) - 1, 1023 << 52
-#: 1.5 2^52: adding and subtracting it rounds to the nearest integer.
-_ROUND = 6755399441055744.0
+_ROUND = float(ROUND)
 #: Splits a double into two halves of its digits (T. J. Dekker, 1971).
 _SPLIT = 134217729.0
 

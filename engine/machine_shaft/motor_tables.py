@@ -55,13 +55,8 @@ class MotorTable:
         for low, high in pairwise(x.tolist()):
             powers = [math.fsum(row * self._curve(low + (high - low) * u)) for row in _TO_POWERS]
             width = high - low
-            rows.append(
-                [
-                    high,
-                    low,
-                    *(c / w for c, w in zip(powers, (1.0, width, width * width, width * width * width), strict=True)),
-                ]
-            )
+            widths = (1.0, width, width * width, width * width * width)
+            rows.append([high, low, *(power / own for power, own in zip(powers, widths, strict=True))])
         rows.append([np.inf, x[-1], float(self._curve(x[-1:])[0]), self._outside[1], 0.0, 0.0])
         return np.array(rows)
 

@@ -25,7 +25,7 @@ class Me(TypedDict):
     user: Annotated[str | None, Doc("name of the user; null for a token without a user, or where no login is needed")]
     token: Annotated[str | None, Doc("name of the token, its id where it has no name; null without a token")]
     scope: Annotated[str | None, Doc("of the token: read or write; null without a token")]
-    role: Annotated[str, Doc("viewer, designer or administrator; a viewer whoever has a token that only reads")]
+    role: Annotated[str, Doc("viewer, designer or administrator; viewer for every read-only token")]
     quota: Annotated[QuotaUse | None, Doc("null where there is no user")]
 
 
