@@ -10,7 +10,7 @@ from sprag.engine.endings import Ending
 from sprag.engine.run import Run, Span
 
 #: Increased whenever a change of the engine can change a stored number.
-ENGINE_VERSION = "5"
+ENGINE_VERSION = "6"
 
 __all__ = ["ENGINE_VERSION", "Ending", "Run", "Span"]
 

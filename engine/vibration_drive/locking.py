@@ -37,12 +37,16 @@ Ints = NDArray[np.int64]
 TOUCHING = 1e-9
 #: The same for a clutch that reaches or leaves the shaft's speed: smaller values are rounding errors.
 ROUNDING = 1e-12
-#: A lock torque this near to 0 or c_1 (as a share of c_1) is at the edge of two states; its trend decides.
+#: A lock torque this near to 0 or c_1 is at the edge of two states, and its trend decides: as a share of c_1 or, where
+#: these are smaller, of the torques that meet in the lock.
 EDGE = 1e-10
+#: Rounding error of a lock torque, as a share of the moments on its pendulum.
+_TORQUE_ROUNDING = 1e-14
 
 #: Between two steps the rows of a pendulum's distances to its guards hold what is decided: the torque of the clutch at
-#: a shaft that does not accelerate, its bounds, whether it meets others, and the lock torque as a share of c_1.
-_PULL, _LEAST, _MOST, _MEETS, _SHARE = range(5)
+#: a shaft that does not accelerate, its bounds, whether it meets others, the lock torque, and how near to 0 or c_1 that
+#: is at an edge.
+_PULL, _LEAST, _MOST, _MEETS, _LOCK, _NEAR = range(6)
 
 _T_LOW, _T_HIGH = int(Band.T_LOW), int(Band.T_HIGH)
 
@@ -101,6 +105,34 @@ def typical_speed(W: Floats, lay: Layout, lane: int, i: int) -> float:
     """Size of the motion of pendulum ``i`` at the lane's state, rad/s."""
     speed = W[lay.pendulums + i * lay.stride + lay.p_speed, lane]
     return float(abs(speed) + abs(acceleration(W, lay, lane, i)) * W[lay.inverse_rate, lane])
+
+
+@part
+def _moments(W: Floats, lay: Layout, lane: int, i: int) -> float:
+    """Size in N*m of the moments on pendulum ``i`` without its clutch; they may cancel, and the base's may be 0 now."""
+    base = lay.pendulums + i * lay.stride
+    phi, w = W[base + lay.p_phi, lane], W[base + lay.p_speed, lane]
+    vibration = W[lay.acc_x, lane] + W[lay.acc_y, lane]
+    driven = abs(W[base + lay.p_ml, lane]) * (vibration + W[lay.gravity, lane] * abs(sine(phi)))
+    restoring = W[base + lay.p_spring, lane] * abs(phi) + W[base + lay.p_damping, lane] * abs(w)
+    return float(W[base + lay.p_inertia, lane] * (driven + restoring))
+
+
+@part
+def _edge_width(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, push: float) -> float:
+    """How near to 0 or c_1 the torque of the lock of pendulum ``i`` is at the edge of two states, in N*m.
+
+    Where c_1 is far above the torques that meet, these decide: a torque that accelerates the shaft against ``push`` by
+    as much as the moments on the pendulum can, at most those moments themselves.
+    """
+    base = lay.pendulums + i * lay.stride
+    moments = _moments(W, lay, lane, i)
+    meeting = moments
+    if Z[lane, SHAFT_STATE] == ROTATING:
+        inertia = W[lay.inertia, lane]
+        meeting = min(moments * inertia / (inertia + W[base + lay.p_inertia, lane]) + abs(push), moments)
+    width = max(EDGE * meeting, _TORQUE_ROUNDING * moments)
+    return float(min(EDGE * W[base + lay.p_law, lane], width))
 
 
 @part
@@ -182,8 +214,8 @@ def _consistent(W: Floats, lay: Layout, lane: int, push: float) -> float:
 
 @part
 def _shared_acceleration(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float) -> float:
-    """Acceleration of the shaft that is consistent with all clutches that meet clutch ``i``; sets each one's share of
-    c_1.
+    """Acceleration of the shaft that is consistent with all clutches that meet clutch ``i``; notes each one's lock
+    torque and the width of its edges.
 
     Each clutch opens (torque 0), locks (between) or winds up (c_1) as the shaft outruns it, keeps pace or falls behind:
     a linear complementarity problem.
@@ -192,7 +224,7 @@ def _shared_acceleration(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, siz
     for j in range(lay.n):
         base = lay.pendulums + j * lay.stride
         notes = base + lay.p_m_w_low
-        for k in range(_SHARE + 1):
+        for k in range(_NEAR + 1):
             W[notes + k, lane] = 0.0
         if j == i or _meets(W, Z, lay, lane, j, size):
             W[notes + _MEETS, lane] = 1.0
@@ -207,13 +239,13 @@ def _shared_acceleration(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, siz
         base = lay.pendulums + j * lay.stride
         notes = base + lay.p_m_w_low
         if W[notes + _MEETS, lane] > 0.0:
-            own = W[base + lay.p_inertia, lane]
-            W[notes + _SHARE, lane] = (W[notes + _PULL, lane] - own * rate) / W[base + lay.p_law, lane]
+            W[notes + _LOCK, lane] = W[notes + _PULL, lane] - W[base + lay.p_inertia, lane] * rate
+            W[notes + _NEAR, lane] = _edge_width(W, Z, lay, lane, j, push)
     return rate
 
 
 @part
-def _shared_jerk(W: Floats, Z: Ints, lay: Layout, lane: int, rate: float, near: float) -> None:
+def _shared_jerk(W: Floats, Z: Ints, lay: Layout, lane: int, rate: float) -> None:
     """Note the rate of each torque that meets, where the shaft's acceleration is ``rate``.
 
     A clutch at the edge of opening can only gain torque, one at the edge of winding up can only lose it.
@@ -223,9 +255,9 @@ def _shared_jerk(W: Floats, Z: Ints, lay: Layout, lane: int, rate: float, near: 
         base = lay.pendulums + j * lay.stride
         notes = base + lay.p_m_w_low
         if W[notes + _MEETS, lane] > 0.0:
-            share = W[notes + _SHARE, lane]
-            opening, winding = abs(share) < near, abs(share - 1.0) < near
-            beyond = not (opening or winding) and not 0.0 < share < 1.0
+            torque, first, near = W[notes + _LOCK, lane], W[base + lay.p_law, lane], W[notes + _NEAR, lane]
+            opening, winding = abs(torque) <= near, abs(torque - first) <= near
+            beyond = not (opening or winding) and not 0.0 < torque < first
             W[notes + _PULL, lane] = W[base + lay.p_inertia, lane] * _jerk(W, lay, lane, j, rate)
             W[notes + _LEAST, lane] = 0.0 if opening or beyond else -math.inf
             W[notes + _MOST, lane] = 0.0 if winding or beyond else math.inf
@@ -242,13 +274,14 @@ def _shared_jerk(W: Floats, Z: Ints, lay: Layout, lane: int, rate: float, near: 
 
 
 @part
-def _at_edge(W: Floats, lay: Layout, lane: int, near: float) -> bool:
+def _at_edge(W: Floats, lay: Layout, lane: int) -> bool:
     """Whether the lock torque of a clutch that meets others is at 0 or c_1."""
     count = 0
     for j in range(lay.n):
-        notes = lay.pendulums + j * lay.stride + lay.p_m_w_low
-        share = W[notes + _SHARE, lane]
-        if W[notes + _MEETS, lane] > 0.0 and (abs(share) < near or abs(share - 1.0) < near):
+        base = lay.pendulums + j * lay.stride
+        notes = base + lay.p_m_w_low
+        torque, near = W[notes + _LOCK, lane], W[notes + _NEAR, lane]
+        if W[notes + _MEETS, lane] > 0.0 and min(abs(torque), abs(torque - W[base + lay.p_law, lane])) <= near:
             count += 1
     return count > 0
 
@@ -287,27 +320,30 @@ def decide(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float, targ
         Whether any state changed, or a clutch was found at the edge of two.
     """
     rate = _shared_acceleration(W, Z, lay, lane, i, size)
-    near = EDGE
-    own = lay.pendulums + i * lay.stride + lay.p_m_w_low + _SHARE
+    own = lay.pendulums + i * lay.stride
     if target >= 0:
-        # Its share is at the edge up to the error of the preceding step, as are those of identical clutches.
-        passed = 1.0 if target == ENGAGED else 0.0
-        near += abs(W[own, lane] - passed)
-        W[own, lane] = passed
-    if _at_edge(W, lay, lane, near):
-        _shared_jerk(W, Z, lay, lane, rate, near)
+        # Its torque is at the edge up to the error of the preceding step, as are those of identical clutches.
+        passed = W[own + lay.p_law, lane] if target == ENGAGED else 0.0
+        error = abs(W[own + lay.p_m_w_low + _LOCK, lane] - passed)
+        for j in range(lay.n):
+            W[lay.pendulums + j * lay.stride + lay.p_m_w_low + _NEAR, lane] += error
+        W[own + lay.p_m_w_low + _LOCK, lane] = passed
+    if _at_edge(W, lay, lane):
+        _shared_jerk(W, Z, lay, lane, rate)
     put = 0
     for j in range(lay.n):
-        notes = lay.pendulums + j * lay.stride + lay.p_m_w_low
+        base = lay.pendulums + j * lay.stride
+        notes = base + lay.p_m_w_low
         if not W[notes + _MEETS, lane] > 0.0:
             continue
-        share, trend = W[notes + _SHARE, lane], W[notes + _PULL, lane]
-        state = FREE if share < 0.0 else (ENGAGED if share > 1.0 else LOCKED)
+        torque, trend, near = W[notes + _LOCK, lane], W[notes + _PULL, lane], W[notes + _NEAR, lane]
+        first = W[base + lay.p_law, lane]
+        state = FREE if torque < 0.0 else (ENGAGED if torque > first else LOCKED)
         edge = 0
-        if abs(share) < near:
+        if abs(torque) <= near:
             edge = _T_LOW
             state = LOCKED if trend > 0.0 else FREE
-        elif abs(share - 1.0) < near:
+        elif abs(torque - first) <= near:
             edge = _T_HIGH
             state = ENGAGED if trend > 0.0 else LOCKED
         if j == i and target >= 0:
