@@ -67,7 +67,7 @@ def test_the_settled_speed_does_not_depend_on_the_first_coefficient(load: float,
 
 
 def rectifier(slope: float, pendulums: int) -> Columns:
-    """Weightless pendulums, too heavy for the shaft to move, whose speeds are V sin(nu t) and, of a second, -V sin(nu t).
+    """Weightless pendulums, too heavy for the shaft to move, with the speeds V sin(nu t) and, of a second, -V sin(nu t).
 
     The load slows the free shaft by ``slope`` V nu: a rectifier, a capacitor and a constant current.
     """
@@ -86,7 +86,7 @@ def rectified(slope: float, pendulums: int) -> tuple[float, float, float]:
     """Mean speed over V, share of the period in which a clutch drives, and in which the shaft is held.
 
     With the source's speed V cos(theta) the shaft follows it up and down until the source falls faster than the load
-    slows the free shaft, sin(theta) = slope; from there it slows evenly, until the next half wave meets it, or it rests.
+    slows the free shaft, sin(theta) = slope; from there it slows evenly until the next half wave meets it, or it rests.
     """
     span = 2.0 * math.pi / pendulums
     release = math.asin(slope) if slope < 1.0 else 0.5 * math.pi
