@@ -67,7 +67,7 @@ def test_the_settled_speed_does_not_depend_on_the_first_coefficient(load: float,
 
 
 def rectifier(slope: float, pendulums: int) -> Columns:
-    """Weightless pendulums, too heavy for the shaft to move, with the speeds V sin(nu t) and, of a second, -V sin(nu t).
+    """Weightless pendulums, too heavy for the shaft to move: speeds V sin(nu t) and, of a second, -V sin(nu t).
 
     The load slows the free shaft by ``slope`` V nu: a rectifier, a capacitor and a constant current.
     """
