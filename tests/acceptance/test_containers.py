@@ -21,6 +21,7 @@ from tests import postgres
 from tests.acceptance.containers import Image, compose, interpolated, is_sent, started_before, steps
 from tests.conftest import ROOT
 from tests.service.timed_spec import SPEC
+from tests.worker.executors.certificates import require_openssl
 
 RECIPE = ROOT / "examples" / "Containerfile"
 COMPOSE = ROOT / "examples" / "compose.yaml"
@@ -106,14 +107,72 @@ def test_the_command_serves_with_a_token_only(image: Image, tmp_path: Path) -> N
     with going(image.start(image.command, log, **variables, SPRAG_TOKEN=TOKEN), log) as process:
         address = f"http://127.0.0.1:{port}"
         answers(address)
-        health = [word.replace(":8000/", f":{port}/") for word in image.health]
-        assert health != image.health
-        image.run(health, **variables)
+        image.run(image.health, **variables)
         assert httpx.get(f"{address}/api/v1/studies", trust_env=False).status_code == 401
         process.send_signal(signal.Signals[image.declared["STOPSIGNAL"]])
         assert process.wait(600) == 0, log.read_text()
     assert image.path("sprag.sqlite3").exists()
     assert "Traceback" not in log.read_text()
+
+
+@pytest.mark.parametrize(("host", "prefix"), [("0.0.0.0", ""), ("::", "/sprag")])
+def test_the_health_check_asks_where_the_service_listens(
+    image: Image, certificate: tuple[Path, Path], tmp_path: Path, host: str, prefix: str
+) -> None:
+    """By TLS, at the port, host and prefix of environment and file; it fails where nobody answers."""
+    file = tmp_path / "settings.toml"
+    file.write_text(
+        f'port = {free_port()}\nhost = "{host}"\nurl_prefix = "{prefix}"\n'
+        f'tls_certificate = "{certificate[0]}"\ntls_key = "{certificate[1]}"\n'
+    )
+    # The image sets host and port; in the environment nothing means the file.
+    variables = {**KERNELS, "SPRAG_SETTINGS": str(file), "SPRAG_HOST": "", "SPRAG_PORT": "", "SPRAG_PROCESSES": "1"}
+    log = tmp_path / "log"
+    with going(image.start(image.command, log, **variables, SPRAG_TOKEN=TOKEN), log) as process:
+        until(
+            lambda: "Sprag serves at https://" in log.read_text() or process.poll() is not None, "the service listens"
+        )
+        image.run(image.health, **variables)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(600) == 0, log.read_text()
+    with pytest.raises(AssertionError):
+        image.run(image.health, **variables)
+
+
+@pytest.fixture(scope="module")
+def certificate(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A certificate of another name than the container's addresses, and its key."""
+    require_openssl()
+    folder = tmp_path_factory.mktemp("certificate")
+    file, key = folder / "server.pem", folder / "server.key"
+    subprocess.run(
+        ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=sprag.example",
+         "-keyout", str(key), "-out", str(file)],
+        check=True, capture_output=True,
+    )  # fmt: skip
+    return file, key
+
+
+def test_the_database_is_healthy_only_when_its_first_initialisation_is_over() -> None:
+    """Meanwhile the image's entry point runs a temporary server, without a network, at the same socket."""
+    services = compose(COMPOSE)["services"]
+    kind, health, *options = services["database"]["healthcheck"]["test"]
+    listening = services["database"]["command"]
+    assert (kind, listening[:2]) == ("CMD", ["postgres", "-c"])
+    name, _, address = listening[2].partition("=")
+    asks, port = postgres.program(health), free_port()
+    assert asks
+    assert name == "listen_addresses"
+
+    def healthy(server: postgres.Server) -> bool:
+        place = {"PGHOST": str(server.folder), "PGPORT": str(port)}
+        return subprocess.run([asks, *options], env=place, capture_output=True, check=False).returncode == 0
+
+    with postgres.running(port=str(port), listen_addresses="''") as server:
+        assert not healthy(server)
+        server.stop("fast")
+        server.start(port=str(port), listen_addresses=address)
+        assert healthy(server)
 
 
 def test_the_compose_file_is_complete() -> None:
@@ -138,7 +197,8 @@ def test_the_compose_file_is_complete() -> None:
     build = own[0]["build"]
     assert (COMPOSE.parent / build["context"]).resolve() == ROOT
     assert (COMPOSE.parent / build["context"] / build["dockerfile"]).resolve() == RECIPE
-    assert services["database"]["command"] == ["postgres", "-c", "listen_addresses="]  # the socket is the only way in
+    # From outside its container the socket is the only way in.
+    assert services["database"]["command"] == ["postgres", "-c", "listen_addresses=127.0.0.1"]
     with_socket = {name for name, s in services.items() if any("database-socket" in v for v in s["volumes"])}
     assert with_socket == {"database", "schema", "service"}
 
@@ -150,6 +210,7 @@ class Composed:
     services: dict[str, Any]
     image: Image
     moved: dict[str, str]
+    more: dict[str, str]
 
     def here(self, text: str) -> str:
         for name, own in self.moved.items():
@@ -163,7 +224,7 @@ class Composed:
 
     def variables(self, name: str, **more: str) -> dict[str, str]:
         own = {key: self.here(value) for key, value in self.services[name]["environment"].items()}
-        return {**KERNELS, **own, **more}
+        return {**KERNELS, **own, **self.more, **more}
 
     def run(self, name: str) -> str:
         return self.image.run(self.command(name), **self.variables(name))
@@ -194,11 +255,18 @@ def test_the_commands_of_the_compose_file_run_one_by_one(image: Image, tmp_path:
     """In the order of their dependencies, against a real server and with a real cluster; a study ends."""
     services = compose(COMPOSE)["services"]
     head, port = free_port(), free_port()
-    with postgres.running() as server:
-        with psycopg.connect(host=str(server.folder), user="sprag", dbname="postgres", autocommit=True) as connection:
+    database = free_port()
+    with postgres.running(port=str(database), listen_addresses="127.0.0.1") as server:
+        with psycopg.connect(
+            host=str(server.folder), port=database, user="sprag", dbname="postgres", autocommit=True
+        ) as connection:
             connection.execute("CREATE DATABASE sprag")
-        moved = {"/var/run/postgresql": str(server.folder), "scheduler:8786": f"127.0.0.1:{head}", "8786": str(head)}
-        composed = Composed(services, image, moved)
+        moved = {
+            "/var/run/postgresql": str(server.folder),
+            "scheduler:8786": f"127.0.0.1:{head}",
+            "8786": str(head),
+        }
+        composed = Composed(services, image, moved, {"PGPORT": str(database)})
         started: dict[str, subprocess.Popen[bytes]] = {}
         try:
             for name in started_before(services):
@@ -209,7 +277,7 @@ def test_the_commands_of_the_compose_file_run_one_by_one(image: Image, tmp_path:
                         asks = postgres.program(health)
                         assert kind == "CMD"
                         assert asks
-                        subprocess.run([asks, *options], env={"PGHOST": str(server.folder)}, check=True)
+                        subprocess.run([asks, *options], env={"PGPORT": str(database)}, check=True)
                     case "certificates":
                         makes_certificates_once(composed)
                     case "schema":

@@ -41,10 +41,15 @@ def test_the_service_is_hardly_exposed(analyze: str) -> None:
     assert float(exposure[1]) < MOST_EXPOSURE
 
 
-def test_systemd_understands_every_line(analyze: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("optional", [False, True], ids=["as it is", "with what it offers"])
+def test_systemd_understands_every_line(analyze: str, tmp_path: Path, optional: bool) -> None:
     unit = tmp_path / UNIT.name
     text, count = re.subn(r"^ExecStart=.*$", "ExecStart=/bin/true", UNIT.read_text(), flags=re.MULTILINE)
     assert count == 1
+    if optional:
+        text, offered = re.subn(r"^#(\w+=)", r"\1", text, flags=re.MULTILINE)
+        names = dict.fromkeys(re.findall(r"^#(\w+)=", UNIT.read_text(), re.MULTILINE))
+        assert (offered, list(names)) == (6, ["LoadCredential", "Environment", "ReadWritePaths"])
     unit.write_text(text)
     # Besides what is wrong in a unit, it tells of every other unit of the machine.
     assert UNIT.name not in run(analyze, "verify", "--man=no", str(unit))

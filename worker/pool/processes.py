@@ -6,7 +6,7 @@ import math
 import os
 import signal
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar, TypeVarTuple
@@ -73,9 +73,16 @@ def start_pool_process(parent: int, prepare: Callable[[], None]) -> None:
     ignore_interrupts()
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     end_with_parent(parent, signal.SIGKILL)
-    if hasattr(os, "nice"):
-        os.nice(NICENESS)
+    give_way()
     prepare()
+
+
+def give_way() -> None:
+    """Let other processes take precedence; nothing where this system has no such call or forbids it."""
+    # A filter of system calls may forbid even what any process may do to itself. Results do not depend on it.
+    with suppress(PermissionError):
+        if hasattr(os, "nice"):
+            os.nice(NICENESS)
 
 
 def limit_memory(more: int) -> None:
