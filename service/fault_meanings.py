@@ -66,7 +66,7 @@ KIND_MEANINGS: Final[dict[Kind, str]] = {
     "database-busy": "Another process locked the database for too long.",
     "database-damaged": "The database is damaged.",
     "database-forbidden": "The user lacks the rights for this in the database.",
-    "database-in-use": "A worker is working on a database that is to be moved.",
+    "database-in-use": "Another process works on a database that is to be moved or upgraded, or uses it otherwise.",
     "database-read-only": "The database, or its folder, is read-only.",
     "database-replaced": "The file of the database was deleted, moved or replaced while it was in use.",
     "database-unreachable": "The database cannot be reached or opened.",

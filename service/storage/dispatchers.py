@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from sprag.service.storage.lock import Presence
     from sprag.worker.chunking import Chunking
 
+#: Seconds for which a dispatcher that has ended is remembered.
+TAKE_OVER_SECONDS = 600
 #: Values of a chunk that is returned to waiting.
 WAITING = {"state": ChunkState.WAITING, "epoch": None, "claimed_at": None}
 _TERMINAL = [state.value for state in TERMINAL]
@@ -95,8 +97,9 @@ class Dispatchers(Part):
             )
             remember(connection)
             present = {epoch} if self.presence is None else {epoch, *self.presence.present()}
-            self._end_all_but(connection, present, owner)
-            connection.execute(sa.delete(DISPATCHERS).where(~_ALIVE, c.epoch < epoch))
+            self._end_all_but(connection, present, now, owner)
+            forgotten = c.ended_at < now - TAKE_OVER_SECONDS * 1_000_000
+            connection.execute(sa.delete(DISPATCHERS).where(forgotten, c.epoch < epoch))
             if self.presence is not None:
                 # Before the row is visible: nobody may find it without its lock.
                 self.presence.enter(epoch)
@@ -114,15 +117,32 @@ class Dispatchers(Part):
         with self.session.write() as connection:
             self._own(connection, epoch)
             # Asked again: one that began in the meantime has its lock since then.
-            self._end_all_but(connection, {epoch, *self.presence.present()})
+            self._end_all_but(connection, {epoch, *self.presence.present()}, self._now())
         return True
 
-    def _end_all_but(self, connection: sa.Connection, present: Collection[int], owner: str = "") -> None:
-        """End all other dispatchers; ``owner`` may continue its own study."""
+    def take_overs(self) -> int:
+        """How often in the last `TAKE_OVER_SECONDS` a dispatcher of a file began before the one before it had ended.
+
+        A `run_owner`, which leaves its end to the next one, does not count.
+        """
+        with self.session.read() as connection:
+            rows = connection.execute(sa.select(DISPATCHERS)).all()
+        begun = {row.started_at: row.epoch for row in rows}
+        since = self._now() - TAKE_OVER_SECONDS * 1_000_000
+        return sum(
+            row.ended_at is not None
+            and row.ended_at >= since
+            and begun.get(row.ended_at, 0) > row.epoch
+            and not own_study(row.owner)
+            for row in rows
+        )
+
+    def _end_all_but(self, connection: sa.Connection, present: Collection[int], now: int, owner: str = "") -> None:
+        """End all other dispatchers at ``now``; ``owner`` may continue its own study."""
         c = DISPATCHERS.c
         gone = connection.execute(sa.select(c.epoch, c.owner).where(_ALIVE, c.epoch.not_in(present))).all()
         ended = sa.update(DISPATCHERS).where(_ALIVE, c.epoch.not_in(present))
-        connection.execute(ended.values(ended_at=self._now()))
+        connection.execute(ended.values(ended_at=now))
         connection.execute(sa.update(CHUNKS).where(CLAIMED, CHUNKS.c.epoch.not_in(present)).values(WAITING))
         free = STUDIES.c.dispatcher.not_in(present)
         connection.execute(sa.update(STUDIES).where(free).values(dispatcher=None))

@@ -60,7 +60,7 @@ def move(source: Session, target: Session, owner: str, say: Callable[[str], None
 
 def _name(session: Session) -> str:
     """What tells a database from others."""
-    return session.url.render_as_string() if session.on_server else str(session.path.resolve())
+    return session.url.render_as_string() if session.on_server else str(session.path)
 
 
 @contextmanager

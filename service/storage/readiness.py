@@ -7,6 +7,7 @@ from threading import Lock
 from typing import TYPE_CHECKING, Final
 
 from sprag.service.storage.clock_watch import clock_problem
+from sprag.service.storage.dispatchers import TAKE_OVER_SECONDS
 from sprag.service.storage.errors import DatabaseError
 from sprag.service.storage.part import SILENT_SECONDS
 from sprag.worker.ports import StoreError
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 LOCKED_SECONDS: Final = 5.0
 #: Seconds for which an answer is cached, because anybody may ask.
 _KEPT_SECONDS: Final = 2.0
+#: So many take-overs lately, the last of them less than so many seconds ago: workers fence each other.
+_TAKE_OVERS: Final = 3
+_YOUNG_SECONDS: Final = 60.0
 #: Seconds between two checks of all pages of a database of moderate size.
 _CHECK_SECONDS: Final = 600.0
 
@@ -64,6 +68,9 @@ class Readiness:
             if problem := clock_problem(self._store):
                 found.append(f"{problem}.")
             found += self._hindered()
+            if not self._store.session.on_server and (linked := self._store.session.file.second_name()):
+                text = str(linked)
+                found.append(f"{text[:1].upper()}{text[1:]}.")
         with suppress(StoreError):
             if late := self._late():
                 # Anyone may read this, so it must not show names.
@@ -104,12 +111,25 @@ class Readiness:
             text = str(error)
             return [text[:1].upper() + text[1:] + "."]
 
+    def _taken_over(self) -> str | None:
+        """A sentence when workers take a database in a file from each other, so that none completes its chunks."""
+        times = 0 if self._store.session.on_server else self._store.take_overs()
+        now = self._store.dispatcher() if times >= _TAKE_OVERS else None
+        if now is None or (self._store.clock.now() - now.started_at).total_seconds() > _YOUNG_SECONDS:
+            return None
+        return (
+            f"A worker has taken the database over from another one {times} times within "
+            f"{TAKE_OVER_SECONDS / 60:g} minutes: either workers end each other, or one is killed again and again."
+        )
+
     def _worker(self) -> list[str]:
         silence = self._store.silence()
         if silence is not None and silence > SILENT_SECONDS:
             return [f"No worker has responded for {silence:.0f} s: studies are not run."]
         if failing := self._dispatcher_fails():
             return [failing]
+        if fenced := self._taken_over():
+            return [fenced]
         # Another dispatcher runs the studies of one whose workers are missing.
         shortages = [(record.report or {}).get("shortage") for record in self._store.responding()]
         return [shortages[0]] if shortages and all(shortages) and shortages[0] else []

@@ -213,6 +213,8 @@ class Session:
     def close(self) -> None:
         """Close every connection."""
         self._engine.dispose()
+        if self._file is not None:
+            self._file.close()
 
 
 def _postgres() -> ModuleType:

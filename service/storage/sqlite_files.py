@@ -6,11 +6,13 @@ import os
 from contextlib import suppress
 from itertools import chain
 from pathlib import Path
+from threading import Lock
 from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
 from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError, busy
+from sprag.service.storage.one_name import HeldName, hold, linked
 from sprag.service.storage.private_files import PRIVATE_FOLDER_MODE, create_private
 from sprag.service.storage.rows import tuples
 from sprag.worker.ports import StoreError
@@ -88,9 +90,13 @@ class DatabaseFile:
     """
 
     def __init__(self, url: URL, busy_seconds: float) -> None:
-        self._url = url
-        self.path = _path_of(url)
+        self._given = _path_of(url)
+        #: The file itself, where the given name is a symbolic link.
+        self.path = Path(os.path.realpath(self._given))
+        self._url = url.set(database=str(self.path))
         self._busy_seconds = busy_seconds
+        self._name: HeldName | None = None
+        self._naming = Lock()
         #: Device and number of the file that was opened first.
         self._first: tuple[int, int] | None = None
         #: Why the database can no longer be trusted; None while nothing wrong was found.
@@ -108,7 +114,6 @@ class DatabaseFile:
         )
         sa.event.listen(engine, "do_connect", self._create)
         sa.event.listen(engine, "connect", self._set_pragmas)
-        sa.event.listen(engine, "connect", self._note)
         return engine
 
     def _check_place(self) -> None:
@@ -125,7 +130,7 @@ class DatabaseFile:
                 f"`chmod u+w {folder}`, or name another place with --db",
                 "database-read-only",
             )
-        kind = file_system_of(self.path.resolve())
+        kind = file_system_of(self.path)
         if kind in NETWORK_FILE_SYSTEMS:
             raise DatabaseError(
                 f"{self.path} lies on a network file system ({kind}), which cannot hold a database safely: "
@@ -136,11 +141,16 @@ class DatabaseFile:
     def _create(self, *_: object) -> None:
         """Create the database file before SQLite does, which would let others read it; the log gets the same rights.
 
-        Raises DatabaseError where the file opened first is gone: it is never replaced by an empty one.
+        Raises DatabaseError where the file opened first is gone: it is never replaced by an empty one. And where
+        somebody uses it under another name.
         """
         self.require_same()
         with suppress(OSError):  # it exists, or SQLite reports the error
             os.close(create_private(self.path))
+        with self._naming:
+            if self._name is None:
+                self._name = hold(self.path)
+                self._note()
 
     def _set_pragmas(self, connection: Any, _record: object) -> None:
         cursor = connection.cursor()
@@ -154,17 +164,33 @@ class DatabaseFile:
             cursor.execute(f"PRAGMA {pragma}")
         cursor.close()
 
-    def _note(self, _connection: Any, _record: object) -> None:
+    def _note(self) -> None:
         if self._first is None:
-            found = self.path.stat()
-            self._first = found.st_dev, found.st_ino
+            with suppress(OSError):
+                found = self.path.stat()
+                self._first = found.st_dev, found.st_ino
+
+    def second_name(self) -> DatabaseError | None:
+        """The error of a file that has got another name (a hard link) while it was in use; None for one name."""
+        try:
+            names = self.path.stat().st_nlink
+        except OSError:
+            return None
+        return linked(self.path, names) if names > 1 else None
+
+    def close(self) -> None:
+        """Give the name of the file up; every connection is closed by then."""
+        with self._naming:
+            held, self._name = self._name, None
+        if held is not None:
+            held.release()
 
     def require_same(self) -> None:
         """Raise DatabaseError when the file is not the one that was opened: what is written would be lost with it."""
         if self._first is None:
             return
         try:
-            found = self.path.stat()
+            found = self._given.stat()
         except OSError:
             raise DatabaseError(
                 f"the database file {self.path} was deleted or moved while it was in use: stop Sprag, put the file or "
