@@ -63,7 +63,7 @@ from sprag.service.cli.console import (
 from sprag.service.cli.groups import Groups
 from sprag.service.cli.language import OPTION, VARIABLE, chosen, code_of, refusal, translate
 from sprag.service.extras import command_for
-from sprag.service.faults import Kind
+from sprag.service.faults import FaultError, Kind
 from sprag.service.languages import N_, _
 
 #: Environment variable that shows the traceback of a bug.
@@ -241,6 +241,8 @@ def _invoke(arguments: Sequence[str]) -> int:
         return int(code)
     except CommandFailureError as failure:
         return _report(failure, as_json)
+    except FaultError as error:
+        return _report(TroubleError(cast("Kind", error.code), error.detail, error.faults), as_json)
     except (StoreError, ExecutorError) as error:
         return _report(TroubleError(cast("Kind", error.code), str(error)), as_json)
     except typer.TyperException as error:

@@ -194,8 +194,12 @@ class ServiceClient(Connection):
             yield from pieces
 
     def results(self, study_id: str, form: str, query: Query = ()) -> Iterator[bytes]:
-        """All rows of a study in the named format; the query may have ``units``."""
-        return self.download(f"{study_path(study_id)}/results", [*query, ("format", form)])
+        """All rows of a study in the named format; the query may have ``units``.
+
+        Raises UnreachableError at the end where cases are missing.
+        """
+        with self.rows(study_path(study_id), form, query) as pieces:
+            yield from pieces
 
     def report(self, study_id: str, form: str, query: Query = ()) -> Iterator[bytes]:
         """The study as a document, "html" or "pdf"; the query may have ``units`` and what the title block says."""

@@ -6,9 +6,12 @@ import ipaddress
 import math
 import re
 import ssl
-from collections.abc import Mapping, Sequence
+import uuid
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from operator import index
-from typing import Any, Final, Literal
+from pathlib import Path
+from typing import Any, BinaryIO, Final, Literal
 from urllib.parse import quote
 
 import httpx
@@ -27,6 +30,8 @@ DEFAULT_SERVER: Final = "http://127.0.0.1:8000"
 TIMEOUT: Final = httpx.Timeout(60.0, connect=10.0)
 #: Writing a whole study can take minutes before its first byte arrives.
 FILE_TIMEOUT: Final = httpx.Timeout(None, connect=10.0)
+#: Formats of rows that are text, and how many of their lines are no rows: heads and ends.
+LINES_WITHOUT_ROWS: Final[Mapping[str, int]] = {"csv": 1, "jsonl": 0, "json": 2}
 #: Longest silence of an event stream.
 EVENTS_TIMEOUT: Final = httpx.Timeout(SILENCE, connect=10.0)
 #: A token after "Bearer" (RFC 6750, section 2.1).
@@ -219,3 +224,19 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[BinaryIO]:
+    """A file that takes its name when it is complete; devices and pipes are written to as they are."""
+    if path.exists() and not path.is_file():
+        with path.open("wb") as file:
+            yield file
+        return
+    part = path.with_name(f".{path.name[:100]}.{uuid.uuid4().hex}.part")
+    try:
+        with part.open("wb") as file:
+            yield file
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)

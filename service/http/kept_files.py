@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import shutil
@@ -158,5 +159,7 @@ def _read(file: BinaryIO, first: int, end: int) -> Iterator[bytes]:
         file.seek(first)
         while first < end:
             piece = file.read(min(_PIECE, end - first))
+            if not piece:
+                raise OSError(errno.EIO, f"a kept file ends {end - first} bytes too early")
             first += len(piece)
             yield piece

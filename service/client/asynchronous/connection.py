@@ -11,12 +11,14 @@ from typing import Any
 
 import httpx
 
+from sprag.service.client.errors import UnreachableError
 from sprag.service.client.events import EventReader, StudyEvent
 from sprag.service.client.retries import RETRY_SECONDS, Retries
 from sprag.service.client.wire import (
     DEFAULT_SERVER,
     EVENTS_TIMEOUT,
     FILE_TIMEOUT,
+    LINES_WITHOUT_ROWS,
     Query,
     address,
     connection_options,
@@ -144,6 +146,37 @@ class AsyncConnection:
                 if pause is None:
                     raise unanswered(self.server, error) from error
             await asyncio.sleep(pause)
+
+    @asynccontextmanager
+    async def rows(self, path: str, form: str, query: Query = ()) -> AsyncIterator[AsyncIterator[bytes]]:
+        """All rows of the study at a path as a file in pieces; UnreachableError at its end where cases are missing.
+
+        Cases are counted in text only; see `require_cases` for other formats.
+        """
+        least = await self.ended_cases(path)
+        async with self.pieces(f"{path}/results", [*query, ("format", form)]) as pieces:
+            yield self._counted(pieces, form, least, path)
+
+    async def _counted(self, pieces: AsyncIterator[bytes], form: str, least: int, path: str) -> AsyncIterator[bytes]:
+        lines = 0
+        async for piece in pieces:
+            lines += piece.count(b"\n")
+            yield piece
+        if form in LINES_WITHOUT_ROWS:
+            await self.require_cases(path, least, lines - LINES_WITHOUT_ROWS[form])
+
+    async def ended_cases(self, path: str) -> int:
+        """Number of cases of the study at a path that have ended."""
+        progress = (await self.request("GET", path))["progress"]
+        return int(progress["done"])
+
+    async def require_cases(self, path: str, least: int, received: int) -> None:
+        """Raise UnreachableError where fewer cases were received than had ended before.
+
+        Unless cases of the study have been discarded since, to run them again.
+        """
+        if received < least and received < (least := min(least, await self.ended_cases(path))):
+            raise UnreachableError(self.server, f"the file has {received} of {least} cases; ask for it again")
 
     async def events(self, study_id: str, last: str | None = None) -> AsyncGenerator[StudyEvent | None, None]:
         """The events of a study's stream until it ends, None for each sign of life between them.

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator, Mapping, Sequence
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from sprag.service.client.asynchronous.part import AsyncStudyPart
 from sprag.service.client.frames import beside, grid_of, polars_of, table_of
 from sprag.service.client.queries import cases_query, curve_query, form_of, given
+from sprag.service.client.wire import whole_file
+from sprag.worker.codes import ENDING_CODES, PENDING
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -19,7 +22,6 @@ if TYPE_CHECKING:
 
     from sprag.service.answers.results import Case, CaseDetail
     from sprag.service.client.queries import Value
-    from sprag.service.client.wire import Query
     from sprag.service.formats import Header
 
 
@@ -59,7 +61,10 @@ class AsyncStudyTables(AsyncStudyPart):
         ``attrs["units"]`` has the unit of each column, by default SI, ``attrs["endings"]`` the number of cases of each
         ending.
         """
-        return table_of(await self.download("parquet", units))
+        least = await self._client.ended_cases(self._path)
+        table = table_of(await self.download("parquet", units))
+        await self._client.require_cases(self._path, least, table["case"].nunique())
+        return table
 
     async def side_by_side(self, cases: Sequence[int]) -> pd.DataFrame:
         """Cases beside each other: a row for each parameter and result, a column for each case, in the given order.
@@ -70,11 +75,17 @@ class AsyncStudyTables(AsyncStudyPart):
 
     async def polars(self, units: str | None = None) -> pl.DataFrame:
         """All rows with all results as a polars table, null for missing values; ``units`` as for `table`."""
-        return polars_of(await self.download("parquet", units))
+        least = await self._client.ended_cases(self._path)
+        table = polars_of(await self.download("parquet", units))
+        await self._client.require_cases(self._path, least, table["case"].n_unique())
+        return table
 
     async def grid(self) -> xr.Dataset:
         """All rows as an xarray grid whose dimensions are the axes, with units as attributes."""
-        return grid_of(await self.download("netcdf"))
+        least = await self._client.ended_cases(self._path)
+        grid = grid_of(await self.download("netcdf"))
+        await self._client.require_cases(self._path, least, int((grid["ending"] != ENDING_CODES[PENDING]).sum()))
+        return grid
 
     async def download(
         self,
@@ -89,7 +100,8 @@ class AsyncStudyTables(AsyncStudyPart):
         ``header`` of CSV: "names", with units that are not SI, or "units", with every unit. ``language`` of a report:
         a code such as "uk"; English without it. ``point`` of a report: its working point, such as "0.3 N*m".
         """
-        return await self._client.read(*self._rows(form, units, header, language, point))
+        async with self._pieces(form, units, header, language, point) as pieces:
+            return b"".join([piece async for piece in pieces])
 
     async def export(
         self,
@@ -103,23 +115,26 @@ class AsyncStudyTables(AsyncStudyPart):
     ) -> Path:
         """Write all rows, or a report, to a file; its ending determines the format unless ``form`` is given.
 
-        ``header``, ``language`` and ``point`` as for `download`.
+        ``header``, ``language`` and ``point`` as for `download`. A file that is there already stays until all of the
+        new one has arrived.
         """
         path = Path(file)
-        rows = self._rows(form or form_of(path), units, header, language, point)
-        # A refusal is raised before an existing file is opened.
-        async with self._client.pieces(*rows) as pieces:
-            with path.open("wb") as out:
-                async for piece in pieces:
-                    out.write(piece)
+        # A refusal is raised before anything is written.
+        async with self._pieces(form or form_of(path), units, header, language, point) as pieces:
+            await _written(pieces, path)
         return path
 
-    def _rows(
+    @asynccontextmanager
+    async def _pieces(
         self, form: str, units: str | None, header: Header | None, language: str | None, point: Value | None
-    ) -> tuple[str, Query]:
-        part = "/report" if form in ("html", "pdf") else "/results"
-        asked = {"format": form, "units": units, "header": header, "language": language, "point": point}
-        return self._path + part, given(asked)
+    ) -> AsyncIterator[AsyncIterator[bytes]]:
+        query = given({"units": units, "header": header, "language": language, "point": point})
+        if form in ("html", "pdf"):
+            opened = self._client.pieces(f"{self._path}/report", [*query, ("format", form)])
+        else:
+            opened = self._client.rows(self._path, form, query)
+        async with opened as pieces:
+            yield pieces
 
     async def picture(
         self,
@@ -138,3 +153,9 @@ class AsyncStudyTables(AsyncStudyPart):
         query = [*curve_query(x, y, by, at), *given(drawing)]
         path.write_bytes(await self._client.read(f"{self._path}/curves", query))
         return path
+
+
+async def _written(pieces: AsyncIterator[bytes], path: Path) -> None:
+    with whole_file(path) as out:
+        async for piece in pieces:
+            out.write(piece)

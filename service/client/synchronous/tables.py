@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from sprag.service.client.frames import beside, grid_of, polars_of, table_of
 from sprag.service.client.queries import cases_query, curve_query, form_of, given
 from sprag.service.client.synchronous.part import StudyPart
+from sprag.service.client.wire import whole_file
+from sprag.worker.codes import ENDING_CODES, PENDING
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -19,7 +22,6 @@ if TYPE_CHECKING:
 
     from sprag.service.answers.results import Case, CaseDetail
     from sprag.service.client.queries import Value
-    from sprag.service.client.wire import Query
     from sprag.service.formats import Header
 
 
@@ -59,7 +61,10 @@ class StudyTables(StudyPart):
         ``attrs["units"]`` has the unit of each column, by default SI, ``attrs["endings"]`` the number of cases of each
         ending.
         """
-        return table_of(self.download("parquet", units))
+        least = self._client.ended_cases(self._path)
+        table = table_of(self.download("parquet", units))
+        self._client.require_cases(self._path, least, table["case"].nunique())
+        return table
 
     def side_by_side(self, cases: Sequence[int]) -> pd.DataFrame:
         """Cases beside each other: a row for each parameter and result, a column for each case, in the given order.
@@ -70,11 +75,17 @@ class StudyTables(StudyPart):
 
     def polars(self, units: str | None = None) -> pl.DataFrame:
         """All rows with all results as a polars table, null for missing values; ``units`` as for `table`."""
-        return polars_of(self.download("parquet", units))
+        least = self._client.ended_cases(self._path)
+        table = polars_of(self.download("parquet", units))
+        self._client.require_cases(self._path, least, table["case"].n_unique())
+        return table
 
     def grid(self) -> xr.Dataset:
         """All rows as an xarray grid whose dimensions are the axes, with units as attributes."""
-        return grid_of(self.download("netcdf"))
+        least = self._client.ended_cases(self._path)
+        grid = grid_of(self.download("netcdf"))
+        self._client.require_cases(self._path, least, int((grid["ending"] != ENDING_CODES[PENDING]).sum()))
+        return grid
 
     def download(
         self,
@@ -89,7 +100,8 @@ class StudyTables(StudyPart):
         ``header`` of CSV: "names", with units that are not SI, or "units", with every unit. ``language`` of a report:
         a code such as "uk"; English without it. ``point`` of a report: its working point, such as "0.3 N*m".
         """
-        return self._client.read(*self._rows(form, units, header, language, point))
+        with self._pieces(form, units, header, language, point) as pieces:
+            return b"".join(list(pieces))
 
     def export(
         self,
@@ -103,22 +115,26 @@ class StudyTables(StudyPart):
     ) -> Path:
         """Write all rows, or a report, to a file; its ending determines the format unless ``form`` is given.
 
-        ``header``, ``language`` and ``point`` as for `download`.
+        ``header``, ``language`` and ``point`` as for `download`. A file that is there already stays until all of the
+        new one has arrived.
         """
         path = Path(file)
-        rows = self._rows(form or form_of(path), units, header, language, point)
-        # A refusal is raised before an existing file is opened.
-        with self._client.pieces(*rows) as pieces, path.open("wb") as out:
-            for piece in pieces:
-                out.write(piece)
+        # A refusal is raised before anything is written.
+        with self._pieces(form or form_of(path), units, header, language, point) as pieces:
+            _written(pieces, path)
         return path
 
-    def _rows(
+    @contextmanager
+    def _pieces(
         self, form: str, units: str | None, header: Header | None, language: str | None, point: Value | None
-    ) -> tuple[str, Query]:
-        part = "/report" if form in ("html", "pdf") else "/results"
-        asked = {"format": form, "units": units, "header": header, "language": language, "point": point}
-        return self._path + part, given(asked)
+    ) -> Iterator[Iterator[bytes]]:
+        query = given({"units": units, "header": header, "language": language, "point": point})
+        if form in ("html", "pdf"):
+            opened = self._client.pieces(f"{self._path}/report", [*query, ("format", form)])
+        else:
+            opened = self._client.rows(self._path, form, query)
+        with opened as pieces:
+            yield pieces
 
     def picture(
         self,
@@ -137,3 +153,9 @@ class StudyTables(StudyPart):
         query = [*curve_query(x, y, by, at), *given(drawing)]
         path.write_bytes(self._client.read(f"{self._path}/curves", query))
         return path
+
+
+def _written(pieces: Iterator[bytes], path: Path) -> None:
+    with whole_file(path) as out:
+        for piece in pieces:
+            out.write(piece)

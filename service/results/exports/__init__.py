@@ -6,12 +6,15 @@ Numbers read back as the same doubles; values that could not be computed are emp
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Iterator
 from importlib import import_module
-from typing import Final, cast
+from typing import Final
 
+from sprag.service.faults import FaultError
 from sprag.service.formats import Format
-from sprag.service.results.exports.source import Source, stored
+from sprag.service.results.exports.source import MissingRowsError, Source, StoredRows, stored
+from sprag.service.results.exports.spool import lacks_room
 from sprag.service.results.exports.text import (
     csv_pieces,
     json_pieces,
@@ -22,7 +25,9 @@ from sprag.service.results.exports.text import (
 )
 
 __all__ = [
+    "MissingRowsError",
     "Source",
+    "StoredRows",
     "csv_pieces",
     "export",
     "json_pieces",
@@ -46,6 +51,18 @@ _WRITERS: Final[dict[Format, tuple[str, str]]] = {
 
 
 def export(source: Source, form: Format) -> Iterator[bytes]:
-    """The file in pieces of about one block of rows."""
+    """The file in pieces of about one block of rows.
+
+    Raises FaultError "storage-full" where the folder for temporary files has no room, MissingRowsError where rows of a
+    stored study are missing.
+    """
     module, write = _WRITERS[form]
-    return cast("Iterator[bytes]", getattr(import_module(f"{__name__}.{module}"), write)(source))
+    try:
+        yield from getattr(import_module(f"{__name__}.{module}"), write)(source)
+    except Exception as error:
+        if not lacks_room(error):
+            raise
+        folder = tempfile.gettempdir()
+        raise FaultError(
+            "storage-full", f"The folder for temporary files, {folder}, has no room for the file."
+        ) from error

@@ -15,7 +15,7 @@ import numpy as np
 from sprag.service.formats import NAME_ATTRIBUTE
 from sprag.service.results.exports.inputs import column_description, description_of
 from sprag.service.results.exports.source import machine
-from sprag.service.results.exports.spool import spooled
+from sprag.service.results.exports.spool import require_room, spooled
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, flags_mask
 from sprag.worker.derived import blocks
@@ -52,7 +52,9 @@ def _write(source: Source, folder: Path) -> Path:
     study, path = source.study, folder / "results.nc"
     rows = _Columns(source, folder / "columns")
     grid = _Grid(study)
-    head = xr.Dataset(coords=grid.coordinates(), attrs=_about(source))
+    about = _about(source)
+    require_room(folder, _most_bytes(source, grid, about))
+    head = xr.Dataset(coords=grid.coordinates(), attrs=about)
     head["ending"] = grid.variable(rows.endings, _ending_attributes())
     head["flags"] = grid.variable(rows.flags, _flag_attributes())
     head.to_netcdf(path, engine="h5netcdf", unlimited_dims=())
@@ -66,6 +68,14 @@ def _write(source: Source, folder: Path) -> Path:
                 column.attrs["coordinates"] = " ".join(grid.labels)
         xr.Dataset(columns).to_netcdf(path, engine="h5netcdf", mode="a")
     return path
+
+
+def _most_bytes(source: Source, grid: _Grid, about: dict[str, Any]) -> int:
+    """More bytes than the file will have: numbers that cannot be compressed, and what describes each variable."""
+    variables = len(source.infos) + len(source.study.axis_paths) + len(grid.labels) + 3
+    return (
+        10 * source.study.cases * variables + 2**14 * variables + 2 * sum(len(str(a)) for a in about.values()) + 2**20
+    )
 
 
 class _Grid:
@@ -191,6 +201,14 @@ def _variable(info: ResultInfo, column: NDArray[np.float64]) -> tuple[NDArray[An
     return np.where(np.isnan(column), 0.0, column).astype(np.int8), attributes
 
 
+def _write_at(file: int, content: bytes, at: int) -> None:
+    """Write all of the content; the system may write a part only, where the disk is nearly full."""
+    left = memoryview(content)
+    while left:
+        written = os.pwrite(file, left, at)
+        left, at = left[written:], at + written
+
+
 class _Columns:
     """The rows of a study turned into columns: results in a file, endings and flags in memory."""
 
@@ -209,7 +227,7 @@ class _Columns:
                 for begin, end in zip(starts, [*starts[1:], len(block)], strict=True):
                     for index in range(len(source.infos)):
                         at = 8 * (index * cases + int(block.cases[begin]))
-                        os.pwrite(file, np.ascontiguousarray(block.values[begin:end, index]).tobytes(), at)
+                        _write_at(file, np.ascontiguousarray(block.values[begin:end, index]).tobytes(), at)
         finally:
             os.close(file)
 

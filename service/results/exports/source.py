@@ -15,6 +15,7 @@ from sprag.service.results.quantities import SI, Units, units_for
 from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.fields import TOLERANCE_FIELDS
 from sprag.worker import models
+from sprag.worker.ports import StoreError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -69,6 +70,35 @@ class Source:
         return self.units.unit(unit_of(self.study, path))
 
 
+class MissingRowsError(StoreError):
+    """The rows that were read of a study are not those that its record counts."""
+
+
+@dataclass(frozen=True, slots=True)
+class StoredRows:
+    """The rows of a study of the database in order of cases, read anew and counted by each iteration.
+
+    An iteration ends in MissingRowsError where it has not met every case that has ended. Of a study that changes in the
+    meantime it has met at least those that had ended before and after.
+    """
+
+    store: Store
+    study_id: str
+
+    def __iter__(self) -> Iterator[RowBlock]:
+        before, cases = self.store.get_study(self.study_id), 0
+        for block in self.store.iter_rows(self.study_id):
+            cases += int(np.count_nonzero(np.diff(block.cases, prepend=-1)))
+            yield block
+        after = self.store.get_study(self.study_id)
+        least = min(before.done, after.done)
+        if cases < least or (before.revision == after.revision and cases != least):
+            raise MissingRowsError(
+                f"{least:,} cases of the study {self.study_id} have ended, and {cases:,} were read: ask again; if that "
+                "does not help, `sprag db check` looks for the cause"
+            )
+
+
 def stored(store: Store, record: StudyRecord, study: Study, units: str = SI, header: Header = "names") -> Source:
     """The rows of a study of the database; raises SelectionError for ``units`` that cannot be shown."""
     origins = store.origins(record.id)
@@ -85,7 +115,7 @@ def stored(store: Store, record: StudyRecord, study: Study, units: str = SI, hea
     return Source(
         study,
         models.study_results(study),
-        store.iter_rows(record.id),
+        StoredRows(store, record.id),
         about,
         spec,
         units_for(study, spec, units),

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import re
+import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,6 +15,11 @@ from sprag.service.stale_files import marked, sweep
 
 _PREFIX: Final = "sprag-export-"
 _PIECE: Final = 1 << 20
+_NO_ROOM: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
+#: How libraries that hide the number of the error name it (HDF5: "errno = 28").
+_NAMED: Final = re.compile(
+    rf"\berrno = ({'|'.join(map(str, sorted(_NO_ROOM)))})\b|{re.escape(os.strerror(errno.ENOSPC))}"
+)
 
 
 def spooled(write: Callable[[Path], Path]) -> Iterator[bytes]:
@@ -26,3 +35,32 @@ def spooled(write: Callable[[Path], Path]) -> Iterator[bytes]:
     ):
         while piece := file.read(_PIECE):
             yield piece
+
+
+def require_room(folder: Path, size: int) -> None:
+    """Raise OSError where the disk of a folder has no room for a file of that many bytes.
+
+    For libraries that do not survive a failing write: HDF5 ends its process.
+    """
+    reserve = folder / "reserve"
+    descriptor = os.open(reserve, os.O_WRONLY | os.O_CREAT, 0o600)
+    try:
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(descriptor, 0, size)
+        elif shutil.disk_usage(folder).free < size:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder))
+    finally:
+        os.close(descriptor)
+        reserve.unlink()
+
+
+def lacks_room(error: BaseException) -> bool:
+    """Whether a full disk, or a quota of one, is the cause of an error."""
+    causes, seen = [error], set[int]()
+    while causes:
+        cause = causes.pop()
+        seen.add(id(cause))
+        if (isinstance(cause, OSError) and cause.errno in _NO_ROOM) or _NAMED.search(str(cause)):
+            return True
+        causes += [one for one in (cause.__cause__, cause.__context__) if one is not None and id(one) not in seen]
+    return False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -90,11 +91,26 @@ def xlsx_pieces(source: Source) -> Iterator[bytes]:
 def _write(source: Source, folder: Path, sheet_rows: int = SHEET_ROWS) -> Path:
     path = folder / "results.xlsx"
     options = {"constant_memory": True, "tmpdir": str(folder), "use_zip64": True, "strings_to_urls": False}
-    with xlsxwriter.Workbook(str(path), options) as book:
+    book = xlsxwriter.Workbook(str(path), options)
+    try:
         unit = book.add_format({"italic": True, "font_color": "#666666"})
         _cases(book, source, unit, sheet_rows)
         _inputs(book, source, book.add_format({"bold": True, "bottom": 1}))
+        book.close()
+    except BaseException:
+        _abandon(book)
+        raise
     return path
+
+
+def _abandon(book: Any) -> None:
+    """Close the files of a workbook that cannot be finished, which the library leaves open."""
+    book.fileclosed = True
+    for part in (book, *book.worksheets()):
+        for file in (getattr(part, "fh", None), getattr(part, "row_data_fh", None)):
+            with suppress(OSError, ValueError):  # what it holds back has no room
+                if file is not None:
+                    file.close()
 
 
 def _cases(book: Any, source: Source, unit: Any, sheet_rows: int) -> None:

@@ -17,7 +17,7 @@ from sprag.service.results.curves import Curves, Fetch, Map
 from sprag.service.results.defaults import caption, drawn_results, main_query, varying_axes
 from sprag.service.results.directions import ends_in_words
 from sprag.service.results.exports.inputs import Input, inputs
-from sprag.service.results.exports.source import given_texts
+from sprag.service.results.exports.source import StoredRows, given_texts
 from sprag.service.results.figures.answers import answers_figure
 from sprag.service.results.figures.clutch import clutch_figure
 from sprag.service.results.fronts import goal_units
@@ -144,7 +144,7 @@ def report_of(
         record,
         study,
         progress.endings,
-        store.iter_rows(study_id),
+        StoredRows(store, study_id),
         partial(store.rows_for_cases, study_id),
         spec,
         store.kinds(study_id),

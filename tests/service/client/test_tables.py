@@ -222,3 +222,37 @@ def test_a_study_without_curves_shows_its_state(study: Study, monkeypatch: pytes
     shown = study._repr_html_()
     assert "8 ok, 1 chatter" in shown
     assert "<pre>" not in shown
+
+
+class _Shortened(httpx.BaseTransport):
+    """Gives, for the rows of a study, a well-formed file of another one that has fewer."""
+
+    def __init__(self, inner: httpx.BaseTransport, other: str) -> None:
+        self._inner, self._other = inner, other
+
+    def handle_request(self, request: httpx.Request) -> httpx.Response:
+        if request.url.path.endswith("/results"):
+            request.url = request.url.copy_with(path=f"/api/v1/studies/{self._other}/results")
+        return self._inner.handle_request(request)
+
+
+def test_a_table_that_lacks_cases_is_an_error(
+    study: Study, client: Client, service: Service, portal: BlockingPortal, spec: dict[str, Any], tmp_path: Any
+) -> None:
+    spec["axes"] = [{"path": LOAD, "values": [0.1, 0.2, 0.3]}, {"path": HERTZ, "values": [16, 20]}]
+    other = client.submit(spec, fresh=True)
+    service.fill(other.id)
+    kept = tmp_path / "rows.csv"
+    kept.write_text("kept")
+    with Client("http://localhost", transport=_Shortened(PortalTransport(service.app, portal), other.id)) as short:
+        found = short.study(study.id)
+        asked: list[Any] = [found.table, found.polars, found.grid, lambda: found.export(kept)]
+        asked += [lambda form=form: found.download(form) for form in ("csv", "json", "jsonl")]
+        for ask in asked:
+            with pytest.raises(UnreachableError, match=r"6 of 9 cases"):
+                ask()
+    assert not [path.name for path in tmp_path.iterdir() if path.suffix == ".part"]
+    assert kept.read_text() == "kept"
+    with client.rows(f"/studies/{study.id}", "csv") as pieces:
+        assert sum(piece.count(b"\n") for piece in pieces) == 1 + 9
+    assert study.export(kept).read_bytes() == study.download("csv")

@@ -1,0 +1,107 @@
+"""Files of rows where no room is left: all rows or a refusal, never a well-formed file that lacks some."""
+
+from __future__ import annotations
+
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
+from random import Random
+from typing import Any
+
+import httpx
+import pytest
+
+from sprag.service.formats import FORMATS
+from sprag.service.http.api import curves
+from sprag.service.results.exports import netcdf
+from sprag.service.storage.store import Store
+from tests.service.conftest import API, Service
+from tests.serving import served
+
+#: Formats that are built in a folder of their own; the others can be sent without one.
+BUILT = ("xlsx", "netcdf")
+
+
+@pytest.fixture
+def ended(service: Service, spec: dict[str, Any]) -> str:
+    """A study of several blocks of rows that has ended."""
+    spec["axes"] = [{"path": "shaft.load", "linspace": [0.01, 0.5, 12]}]
+    study_id = service.submit(spec)
+    service.fill(study_id)
+    return study_id
+
+
+@pytest.fixture(autouse=True)
+def _small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = Store.iter_rows
+    monkeypatch.setattr(Store, "iter_rows", lambda self, study_id, block=2: rows(self, study_id, block))
+
+
+@contextmanager
+def room_for(size: int) -> Iterator[None]:
+    """Let no file of this process grow beyond ``size`` bytes: the system refuses to write more, as on a full disk."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def ask(service: Service, study_id: str, form: str) -> httpx.Response:
+    address = f"{API}/studies/{study_id}/results?format={form}"
+    return service.http.get(address, headers={"Accept-Encoding": "identity"})
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_all_rows_or_a_refusal_wherever_the_disk_ends(service: Service, ended: str, form: str) -> None:
+    random = Random(form)
+    other = service.submit({**service.store.spec(ended), "name": "whole"})
+    service.fill(other)
+    size = len(ask(service, other, form).content)
+    whole = None
+    for limit in (0, 1, *(random.randrange(size) for _ in range(8)), size - 1):
+        with room_for(limit):
+            answer = ask(service, ended, form)
+        if form in BUILT:
+            assert (answer.status_code, answer.json()["type"]) == (507, "/problems/storage-full"), limit
+        else:
+            assert answer.status_code == 200, answer.text
+            whole = whole or answer.content
+            assert answer.content == whole, limit
+    kept = ask(service, ended, form)
+    assert kept.status_code == 200
+    assert form in BUILT or kept.content == whole
+
+
+def test_a_grid_is_smaller_than_the_room_it_asks_for(
+    service: Service, ended: str, spec: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """HDF5 ends its process where a write fails, so that it must never come to that."""
+    asked: list[int] = []
+    monkeypatch.setattr(netcdf, "require_room", lambda _folder, size: asked.append(size))
+    large = service.submit({**spec, "axes": [{"path": "shaft.load", "linspace": [0.01, 0.5, 3_000]}]})
+    service.fill(large)
+    for study_id in (ended, large):
+        assert len(ask(service, study_id, "netcdf").content) < asked.pop()
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_rows_that_are_not_read_are_missed(
+    service: Service, ended: str, form: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read = Store.case_rows
+    with monkeypatch.context() as patch:
+        # Rows that the database lost: the third block is the last one.
+        patch.setattr(
+            Store, "case_rows", lambda self, study, after, limit: read(self, study, after if after < 5 else 99, limit)
+        )
+        assert ask(service, ended, form).status_code == 503
+        patch.setattr(curves, "_AT_ONCE", 0)  # as a large study, which is sent while it is read
+        with served(service.app) as address:
+            if form in BUILT:
+                assert httpx.get(f"{address}{API}/studies/{ended}/results?format={form}").status_code == 503
+            else:
+                with pytest.raises(httpx.RemoteProtocolError):
+                    httpx.get(f"{address}{API}/studies/{ended}/results?format={form}")
+    assert ask(service, ended, form).status_code == 200
