@@ -35,6 +35,10 @@ MEANINGS: Final[dict[Code, str]] = {
         "The comma could be decimal or separate: `1,234` could be 1.234 or 1234, and in a list separated by "
         "commas `0,5` could be 0.5, or 0 and 5. Write a decimal point, or semicolons between values."
     ),
+    "ambiguous-point": (
+        "No number of the table shows what its points are: `20.000` could be 20 or 20000. Write numbers without "
+        "separators of thousands, one of them with another number of decimals than three."
+    ),
     "not-a-number": "The text does not begin with a number.",
     "not-an-axis": "The path is not an axis of the study.",
     "not-finite": "The number is not finite.",
@@ -92,6 +96,7 @@ KIND_MEANINGS: Final[dict[Kind, str]] = {
 
 #: Of warnings.
 WARNING_MEANINGS: Final[dict[WarningCode, str]] = {
+    "ambiguous-point": "Points are read as decimal points, though each of them could separate thousands.",
     "assumed-units": "The file of measured data does not name every unit.",
     "exceeds-chunk-timeout": "One case takes longer than `SPRAG_CHUNK_TIMEOUT` allows.",
     "falls-over": "The spring does not hold the pendulum up against gravity.",
@@ -119,6 +124,9 @@ WARNING_MEANINGS: Final[dict[WarningCode, str]] = {
     "short-window": "The window is shorter than one excitation period.",
     "slow-excitation": "The excitation is slow for a vibration drive.",
     "stays-upright": "A pendulum that starts upright without speed stays there under vibration along y alone.",
+    "table-ends-early": (
+        "A table ends long before its cycle; over the rest its value goes from the last row back to the first."
+    ),
     "terms-cancel": "The terms of the fitted law nearly cancel and follow the scatter of the data.",
     "tolerance-cut": "Part of the distribution of a tolerance lies outside the range of its parameter and is left out.",
     "too-few-rows": "The fit has as many unknowns as the data has different windups.",

@@ -40,6 +40,7 @@ Code = Literal[
     "no-clutch-law",
     "not-a-grid",
     "ambiguous-comma",
+    "ambiguous-point",
     "not-a-number",
     "not-an-axis",
     "not-finite",
@@ -68,6 +69,7 @@ Code = Literal[
 
 #: Codes of warnings: what is allowed but probably unintended.
 WarningCode = Literal[
+    "ambiguous-point",
     "assumed-units",
     "exceeds-chunk-timeout",
     "falls-over",
@@ -93,6 +95,7 @@ WarningCode = Literal[
     "short-window",
     "slow-excitation",
     "stays-upright",
+    "table-ends-early",
     "terms-cancel",
     "tolerance-cut",
     "too-few-rows",

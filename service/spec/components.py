@@ -12,11 +12,12 @@ from functools import lru_cache
 from typing import Any, Final
 
 from sprag.service.faults import Fault
-from sprag.service.spec.csv_text import HEADING, read_csv, unescape
+from sprag.service.spec.csv_text import read_csv, unescape
 from sprag.service.spec.fields import exact, placed, read_object
 from sprag.service.spec.labels import LINES_ALLOWED, printable_lines
 from sprag.service.spec.numbers import parse_number, settled
 from sprag.service.spec.report import Report, SpecError, join
+from sprag.service.spec.table_text import heading_of
 from sprag.service.spec.units import QuantityError
 from sprag.worker import models
 from sprag.worker.limits import MAX_COMPONENTS, MAX_NAME_LENGTH, MAX_NOTES_LENGTH
@@ -210,8 +211,8 @@ def _read_csv(report: Report, text: object) -> list[tuple[str, Component]]:
     rows = read_csv(report, "/csv", text, (MAX_COMPONENTS, 40), example, texts=_TEXTS)
     if rows is None:
         return []
-    headings = [HEADING.fullmatch(cell) for cell in rows[0].cells]
-    names = [heading[1] if heading else "" for heading in headings]
+    headings = [heading_of(cell) or ("", "") for cell in rows[0].cells]
+    names = [name for name, _ in headings]
     known = {*COLUMNS, *(name for kind in KINDS for name in fields_of(kind))}
     for name, cell in zip(names, rows[0].cells, strict=True):
         if name not in known or names.count(name) > 1:
@@ -222,8 +223,8 @@ def _read_csv(report: Report, text: object) -> list[tuple[str, Component]]:
     made = []
     for row in rows[1:]:
         cells = {
-            name: f"{cell} {heading[2]}" if heading and heading[2] and parse_number(cell) is not None else cell
-            for name, heading, cell in zip(names, headings, map(str.strip, row.cells), strict=True)
+            name: f"{cell} {unit}" if unit and parse_number(cell) is not None else cell
+            for (name, unit), cell in zip(headings, map(str.strip, row.cells), strict=True)
         }
         cells |= {name: unescape(cells[name]) for name in _TEXTS if name in cells}
         line = Report(None)

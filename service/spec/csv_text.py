@@ -6,30 +6,18 @@ Numbers may have decimal commas: always where semicolons separate the columns, o
 from __future__ import annotations
 
 import csv
-import io
-import re
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
-from sprag.service.spec.numbers import settled_rows
+from sprag.service.spec.numbers import WITHOUT_DOUBT, assumption, question
+from sprag.service.spec.table_text import MAX_HEADING, CsvRow, Split, settled_table, split, with_units
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
     from sprag.service.spec.report import Report
 
-#: "shaft.load", "shaft.load [N*mm]", "shaft.load (N*mm)"
-HEADING: Final = re.compile(r"\s*+([^\s\[\(]++)\s*+(?:[\[\(]\s*+([^\]\)]+?)\s*[\]\)]\s*+)?")
-#: Characters of a heading, at most: the time that reading one takes grows faster than its length.
-MAX_HEADING: Final = 200
 #: Beginnings of text that a spreadsheet would interpret as a formula.
 _FORMULA_STARTS: Final = ("=", "+", "-", "@", "\t", "\r")
-
-
-class CsvRow(NamedTuple):
-    """The cells of a row, and the number of the line in which it ends, from 1."""
-
-    line: int
-    cells: list[str]
 
 
 def escape(text: str) -> str:
@@ -55,10 +43,11 @@ def read_csv(
         report.fault(where, "required" if text is None else "wrong-type", message, text, allowed=example)
         return None
     try:
-        rows = _rows(text.removeprefix("\ufeff"), texts)
+        table = split(text)
     except csv.Error as error:
         report.fault(where, "unreadable", f"is not CSV: {error}")
         return None
+    rows = with_units(table.rows)
     columns = len(rows[0].cells) if rows else 0
     if not 2 <= len(rows) <= most[0] + 1 or not 1 <= columns <= most[1]:
         under = f"has {len(rows) - 1} lines of {columns} columns under its headings"
@@ -80,28 +69,18 @@ def read_csv(
             report.fault(where, "unequal-lengths", message, allowed=f"{columns} cells{hint}")
         if report.full:
             break
-    return None if report.found > before else rows
+    return None if report.found > before else _settled(report, where, table._replace(rows=rows), texts)
 
 
-def _rows(text: str, texts: Collection[str]) -> list[CsvRow]:
-    """The non-empty rows. The header's separator (comma, semicolon or tab) applies to the whole text.
-
-    Lines may end with LF, CRLF or CR.
-    """
-    text = text.replace("\r\n", "\n").replace("\r", "\n")
-    header = text.lstrip().partition("\n")[0]
-    delimiter = next((sign for sign in ",;\t" if sign in header), ",")
-    reader = csv.reader(io.StringIO(text), delimiter=delimiter, strict=True)
-    rows = [CsvRow(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
-    if not rows or (delimiter == "," and '"' not in text):
-        return rows
-    kept = {place for place, heading in enumerate(rows[0].cells) if heading.strip() in texts}
-    numbers = ([("" if i in kept else cell) for i, cell in enumerate(row.cells)] for row in rows[1:])
-    below = settled_rows(numbers, decimal=delimiter == ";")
-    return [
-        rows[0],
-        *(
-            CsvRow(row.line, [row.cells[i] if i in kept else cell for i, cell in enumerate(cells)])
-            for row, cells in zip(rows[1:], below, strict=True)
-        ),
-    ]
+def _settled(report: Report, where: str, table: Split, texts: Collection[str]) -> list[CsvRow] | None:
+    """The rows with decimal points; None, and a fault recorded, where points could separate thousands."""
+    kept = {place for place, heading in enumerate(table.rows[0].cells) if heading.strip() in texts}
+    rows, doubt = settled_table(table._replace(rows=table.rows[1:]), kept)
+    if doubt is not None and not doubt.likely:
+        report.fault(
+            where, "ambiguous-point", f"line {doubt.line}: {question(doubt.text)}", doubt.text, allowed=WITHOUT_DOUBT
+        )
+        return None
+    if doubt is not None:
+        report.warn("ambiguous-point", f"{where}: line {doubt.line}: {assumption(doubt.text)}")
+    return [table.rows[0], *rows]

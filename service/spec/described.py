@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from sprag.service.spec.fields import read_choice, read_flag, read_number, read_periods, read_plain, read_whole
+from sprag.service.spec.numbers import WITHOUT_DOUBT, assumption, question, settle
 from sprag.service.spec.report import Report, join
 from sprag.worker.limits import (
     MAX_ORBIT_PERIODS,
@@ -124,12 +125,14 @@ class Listed:
         """Rows with a number for each of ``columns``; those that are wrong are noted and left out."""
         allowed = f"[{', '.join(column.path for column in columns)}]"
         rows: list[list[float]] = []
-        for index, row in enumerate(self.read(report, pointer, data) or ()):
+        given = self.read(report, pointer, data) or []
+        written = _settled(report, pointer, given)
+        for index, row in enumerate(given):
             where = join(pointer, index)
             if not isinstance(row, list) or len(row) != len(columns):
                 report.fault(where, "wrong-type", "must be a row of two numbers", row, allowed=allowed)
                 continue
-            read = [read_number(report, join(where, k), row[k], column) for k, column in enumerate(columns)]
+            read = [read_number(report, join(where, k), written[index][k], own) for k, own in enumerate(columns)]
             numbers = [number for number in read if number is not None]
             if len(numbers) == len(columns):
                 rows.append(numbers)
@@ -140,6 +143,32 @@ class Listed:
         schema = {"description": self.help} if self.help else {}
         least = {"minItems": self.low} if self.low else {}
         return {"type": "array", **least, "maxItems": self.high, "items": item, **schema}
+
+
+def _settled(report: Report, pointer: str, rows: list[Any]) -> list[list[Any]]:
+    """The rows of a table, their texts with decimal points.
+
+    Points that could separate thousands are decimal, as in every text of a spec, with a warning; beside decimal commas
+    they are a fault.
+    """
+    places = [
+        (i, k)
+        for i, row in enumerate(rows)
+        for k, cell in enumerate(row if isinstance(row, list) else ())
+        if isinstance(cell, str)
+    ]
+    texts, doubt = settle([rows[i][k] for i, k in places])
+    if doubt is not None:
+        i, k = places[doubt]
+        where, text = join(pointer, i, k), rows[i][k]
+        if any(own != rows[i][k] for (i, k), own in zip(places, texts, strict=True)):
+            report.fault(where, "ambiguous-point", question(text), text, allowed=WITHOUT_DOUBT)
+        else:
+            report.warn("ambiguous-point", f"{where}: {assumption(text)}")
+    made = [list(row) if isinstance(row, list) else [] for row in rows]
+    for (i, k), text in zip(places, texts, strict=True):
+        made[i][k] = text
+    return made
 
 
 def choice(name: str, help: str, *values: str, default: str | None = None) -> Described:

@@ -1,24 +1,32 @@
 """Measured data of a clutch from a test bench: a text file with two columns, angle and torque.
 
-Columns are separated by commas, semicolons, tabs or blanks; with semicolons or tabs numbers may have decimal commas,
-which are ambiguous only where tabs separate columns and every comma is before three digits. A header is optional and
-may name the units: ``angle_deg, torque_Nmm`` or ``angle [mrad]; torque [N*m]``. Without units the numbers are taken as
-rad and N*m, with a warning; other headers are refused. Cells may be quoted. Empty lines and lines that begin with ``#``
-are skipped.
+Columns are separated as in any table (`table_text`), or by blanks. A header is optional and may name the units, in the
+headings or in a line below: ``angle_deg, torque_Nmm`` or ``angle [mrad]; torque [N*m]``. Without units the numbers are
+taken as rad and N*m, with a warning; other headers are refused. Empty lines and comments (``#``) are skipped.
 """
 
 from __future__ import annotations
 
+import csv
+import itertools
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sprag.service.faults import Fault, FaultError
-from sprag.service.spec.numbers import is_ambiguous, parse_number, settled_rows
+from sprag.service.spec.numbers import WITHOUT_DOUBT, assumption, is_ambiguous, parse_number, question
+from sprag.service.spec.table_text import (
+    CsvRow,
+    Split,
+    lines_of,
+    settled_table,
+    split,
+    with_units,
+)
 from sprag.worker.limits import MAX_CLUTCH_ROWS
 from sprag.worker.models import WarningText
 
@@ -77,28 +85,32 @@ def parse_measured(text: str, convert: Callable[[str, str], float]) -> MeasuredD
     MeasuredDataError
         With all faults, up to a limit.
     """
-    lines = [
-        (number, stripped)
-        for number, line in enumerate(text.splitlines(), 1)
-        if (stripped := line.strip()) and not stripped.startswith("#")
-    ]
-    if not lines:
+    try:
+        table = _split(text)
+    except csv.Error as error:
+        raise MeasuredDataError([Fault("data", "unreadable", f"is not CSV: {error}")]) from None
+    rows = [CsvRow(row.line, [_unquoted(cell) for cell in row.cells]) for row in table.rows]
+    if not rows:
         raise MeasuredDataError([Fault("line 1", "empty", "there are no data", None, "rows of angle and torque")])
     factors: tuple[float | None, float | None] = (None, None)
-    if _is_header(_cells(lines[0][1])):
-        factors = _factors(*lines[0], convert)
-        lines = lines[1:]
-    return _numbers(lines, factors)
+    if _is_header(rows[0].cells):
+        rows = with_units(rows)
+        factors = _factors(rows.pop(0), convert)
+    return _numbers(table._replace(rows=rows), factors)
 
 
-def _cells(line: str) -> list[str]:
-    if ";" in line:
-        return [_unquoted(cell) for cell in line.split(";")]
-    parts = line.split("\t")
-    if len(parts) == 2 and not any(part.strip().endswith(",") for part in parts):
-        return [_unquoted(part) for part in parts]
-    separator = "," if "," in line else "\t" if "\t" in line else None
-    return [_unquoted(cell) for cell in line.split(separator)]
+def _split(text: str) -> Split:
+    """The rows; comments are left out, and blanks separate columns where no other sign does."""
+    lines = ["" if line.lstrip().startswith("#") else line for line in lines_of(text).split("\n")]
+    table = split("\n".join(lines))
+    if table.separator:
+        return table
+    rows = [CsvRow(row.line, [part for cell in row.cells for part in cell.split()]) for row in table.rows]
+    # Headings may have blanks: a bracket or two blanks end the first of them.
+    if rows and len(rows[0].cells) != len(_QUANTITIES):
+        cells = re.split(r"(?<=[\])])\s+|\s{2,}", table.rows[0].cells[0].strip())
+        rows[0] = CsvRow(rows[0].line, cells if len(cells) == len(_QUANTITIES) else rows[0].cells)
+    return Split(rows, " ", table.quoted)
 
 
 def _unquoted(cell: str) -> str:
@@ -110,30 +122,20 @@ def _is_header(cells: list[str]) -> bool:
     return all(parse_number(cell) is None and not is_ambiguous(cell) for cell in cells)
 
 
-def _factors(number: int, line: str, convert: Callable[[str, str], float]) -> tuple[float | None, float | None]:
+def _factors(row: CsvRow, convert: Callable[[str, str], float]) -> tuple[float | None, float | None]:
     """Factors of the two columns to SI from the units in the header; None for a column without a unit."""
-    cells = _cells(line)
-    if len(cells) != 2 and not any(separator in line for separator in ";,\t"):
-        cells = [cell.strip() for cell in re.split(r"(?<=[\])])\s+|\s{2,}", line) if cell.strip()]
-    if len(cells) != 2:
-        raise MeasuredDataError(
-            [
-                Fault(
-                    f"line {number}",
-                    "unequal-lengths",
-                    "the header does not have two columns",
-                    line[:80],
-                    "angle, torque",
-                )
-            ]
-        )
+    if len(row.cells) != len(_QUANTITIES):
+        text = "the header does not have two columns"
+        given = ", ".join(row.cells)[:80]
+        raise MeasuredDataError([Fault(f"line {row.line}", "unequal-lengths", text, given, "angle, torque")])
     factors: list[float | None] = []
     problems = []
-    for cell, (name, unit), words in zip(cells, _QUANTITIES, _WORDS, strict=True):
+    for cell, (name, unit), words in zip(row.cells, _QUANTITIES, _WORDS, strict=True):
         try:
             factors.append(_factor(cell, unit, words, convert))
         except ValueError as error:
-            problems.append(Fault(f"line {number}", "wrong-unit", f"column {name}: {error}", cell, f"a unit of {unit}"))
+            where = f"line {row.line}"
+            problems.append(Fault(where, "wrong-unit", f"column {name}: {error}", cell, f"a unit of {unit}"))
     if problems:
         raise MeasuredDataError(problems)
     return factors[0], factors[1]
@@ -165,29 +167,34 @@ def _assumed(factors: tuple[float | None, float | None], rows: NDArray[np.float6
         yield WarningText(text, "implausible-value")
 
 
-def _numbers(lines: list[tuple[int, str]], factors: tuple[float | None, float | None]) -> MeasuredData:
-    cells = settled_rows([_cells(line) for _, line in lines], decimal=any(";" in line for _, line in lines))
-    problems = list(_wrong_rows(lines, cells))
+def _numbers(table: Split, factors: tuple[float | None, float | None]) -> MeasuredData:
+    rows, doubt = settled_table(table)
+    problems = list(itertools.islice(_wrong_rows(table.rows, rows), _MAX_PROBLEMS))
+    if doubt is not None and not doubt.likely:
+        problems.append(Fault(f"line {doubt.line}", "ambiguous-point", question(doubt.text), doubt.text, WITHOUT_DOUBT))
     if problems:
-        raise MeasuredDataError(problems[:_MAX_PROBLEMS])
-    if not 1 <= len(lines) <= MAX_CLUTCH_ROWS:
-        message = "there are no rows under the header" if not lines else f"{len(lines)} rows"
+        raise MeasuredDataError(problems)
+    if not 1 <= len(rows) <= MAX_CLUTCH_ROWS:
+        message = "there are no rows under the header" if not rows else f"{len(rows)} rows"
         raise MeasuredDataError(
-            [Fault("data", "empty" if not lines else "too-many", message, len(lines), f"1 .. {MAX_CLUTCH_ROWS} rows")]
+            [Fault("data", "empty" if not rows else "too-many", message, len(rows), f"1 .. {MAX_CLUTCH_ROWS} rows")]
         )
-    rows = np.array([[float(cell) for cell in row] for row in cells], dtype=np.float64)
-    scaled = rows * np.array([1.0 if factor is None else factor for factor in factors])
-    return MeasuredData(scaled, tuple(number for number, _ in lines), tuple(_assumed(factors, rows)))
+    numbers = np.array([[float(cell) for cell in row.cells] for row in rows], dtype=np.float64)
+    scaled = numbers * np.array([1.0 if factor is None else factor for factor in factors])
+    warnings = list(_assumed(factors, numbers))
+    if doubt is not None:
+        warnings.append(WarningText(f"line {doubt.line}: {assumption(doubt.text)}", "ambiguous-point"))
+    return MeasuredData(scaled, tuple(row.line for row in rows), tuple(warnings))
 
 
-def _wrong_rows(lines: list[tuple[int, str]], rows: list[list[str]]) -> Iterator[Fault]:
-    for (number, line), cells in zip(lines, rows, strict=True):
+def _wrong_rows(written: Sequence[CsvRow], rows: Sequence[CsvRow]) -> Iterator[Fault]:
+    for given, (number, cells) in zip(written, rows, strict=True):
         if len(cells) != 2:
             few = f"{len(cells)} column" + ("" if len(cells) == 1 else "s")
-            allowed = "two columns: angle, torque"
-            if "," in line:
-                allowed += "; decimal commas only where tabs or semicolons separate the columns, otherwise 0.25"
-            yield Fault(f"line {number}", "unequal-lengths", few, line.replace("\t", " ")[:80], allowed)
+            allowed = (
+                "two columns: angle, torque; decimal commas only where tabs, semicolons or quotes separate the columns"
+            )
+            yield Fault(f"line {number}", "unequal-lengths", few, ", ".join(given.cells)[:80], allowed)
             continue
         for cell, (name, _) in zip(cells, _QUANTITIES, strict=True):
             value = parse_number(cell)

@@ -1,21 +1,54 @@
 """Numbers in text input: fields of forms, cells of tables, arguments of commands.
 
 A number may have a decimal comma. One comma before exactly three digits, as in ``1,234``, could also separate
-thousands, so a single such number is refused, never guessed: a wrong guess is a factor of 1000. In a list or a table
-the other numbers can settle what its commas are (`settled`).
+thousands, so a single such number is refused, never guessed: a wrong guess is a factor of 1000. A single point is
+decimal. In a list or a table the numbers settle together what their commas and points are (`settle`).
 """
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterable, Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
-_COMMA: Final = re.compile(r"\s*[+\-\u2212]?([0-9]*),([0-9]+)(?![0-9.,])")
-_POINT: Final = re.compile(r"\s*[+\-\u2212]?[0-9]*\.[0-9]")
+#: A number at the beginning of a text: its digits with all their points and commas, and whether an exponent follows.
+_NUMBER: Final = re.compile(r"\s*[+\-\u2212]?([.,]?[0-9][0-9.,]*)([eE][+\-\u2212]?[0-9])?")
 #: Two whole numbers and a comma, with or without a unit behind: also one number with a decimal comma.
 _PAIR: Final = re.compile(r"\s*[+\-\u2212]?[0-9]+,[0-9]+(?![0-9.,;])[^,;]*")
 _THOUSANDS: Final = 3
+#: Digits in groups of three, and the sign between them.
+_GROUPS: Final = re.compile(r"[1-9][0-9]{0,2}(?:\.[0-9]{3})+|[1-9][0-9]{0,2}(?:,[0-9]{3})+")
+
+#: What settles the points of a table.
+WITHOUT_DOUBT: Final = "numbers without separators of thousands, one of them with another number of decimals than three"
+
+
+class _Marks(NamedTuple):
+    """What a number says about its points and commas, as far as it is certain: "." or ",", or "" for nothing.
+
+    ``either`` is the sign that could be decimal or separate thousands.
+    """
+
+    decimal: str = ""
+    groups: str = ""
+    either: str = ""
+
+
+class Settled(NamedTuple):
+    """The texts of a list or a table with decimal points.
+
+    Attributes
+    ----------
+    texts : list of str
+        With decimal points and without separators of thousands; a comma that could be either is left for the reader to
+        refuse.
+    doubt : int or None
+        The place of the first text whose point was taken as decimal but could separate thousands.
+    """
+
+    texts: list[str]
+    doubt: int | None
 
 
 def parse_number(text: str) -> float | None:
@@ -34,16 +67,12 @@ def parse_number(text: str) -> float | None:
 
 def with_point(text: str) -> str:
     """``text`` with a decimal point where the number at its beginning has a decimal comma beyond doubt."""
-    return text if _COMMA.match(text) is None or is_ambiguous(text) else text.replace(",", ".", 1)
+    return text.replace(",", ".", 1) if _marks(text) == _Marks(decimal=",") else text
 
 
 def is_ambiguous(text: str) -> bool:
     """Whether the comma of the number at the beginning of ``text`` could be decimal or separate thousands."""
-    found = _COMMA.match(text)
-    if found is None:
-        return False
-    whole, rest = found.groups()
-    return len(rest) == _THOUSANDS and 1 <= len(whole) <= _THOUSANDS and not whole.startswith("0")
+    return _marks(text).either == ","
 
 
 def could_be_one(text: str) -> bool:
@@ -51,23 +80,97 @@ def could_be_one(text: str) -> bool:
     return _PAIR.fullmatch(text) is not None
 
 
-def settled(texts: Sequence[str], *, decimal: bool = False) -> list[str]:
-    """The texts of one list or table, with decimal points for decimal commas.
+def settle(texts: Sequence[str], *, decimal: bool = False) -> Settled:
+    """The numbers at the beginnings of the texts of one list or table, with decimal points.
 
-    Commas before three digits are decimal too where ``decimal`` says so (semicolons between columns are written where
-    commas are decimal), or where another number has a comma that can only be decimal and none has a decimal point.
+    One certain decimal comma, such as ``0,5`` or ``1.234,5``, proves for all of them that points before three digits
+    separate thousands, and one certain decimal point that such commas do. Where both are certain, or neither, nothing
+    is proved: then commas before three digits are decimal where ``decimal`` says so (semicolons between columns are
+    written where commas are decimal) and no number has a point, and points are decimal, in doubt.
     """
-    if not decimal:
-        decimal = any(map(_is_decimal, texts)) and not any(map(_POINT.match, texts))
-    return [text.replace(",", ".", 1) if decimal and _COMMA.match(text) else with_point(text) for text in texts]
+    marks = [_marks(text) for text in texts]
+    proved = _proved(marks)
+    if proved:
+        other = "." if proved == "," else ","
+        made = [_written(text, other) if any(own) else text for text, own in zip(texts, marks, strict=True)]
+        return Settled(made, None)
+    doubt = next((place for place, own in enumerate(marks) if own.either == "."), None)
+    decimal = decimal and doubt is None and not any("." in own for own in marks)
+    made = [
+        _written(text, "") if own == _Marks(decimal=",") or (decimal and own.either == ",") else text
+        for text, own in zip(texts, marks, strict=True)
+    ]
+    return Settled(made, doubt)
 
 
-def settled_rows(rows: Iterable[Sequence[str]], *, decimal: bool = False) -> list[list[str]]:
-    """The rows of one table, as `settled` does it for all its cells together."""
+def settled(texts: Sequence[str], *, decimal: bool = False) -> list[str]:
+    """The texts of `settle` alone: points that nothing proves to separate thousands are decimal."""
+    return settle(texts, decimal=decimal).texts
+
+
+def settle_rows(
+    rows: Iterable[Sequence[str]], *, decimal: bool = False
+) -> tuple[list[list[str]], tuple[int, int] | None]:
+    """The rows of one table, as `settle` does it for all its cells together, and row and column of a point in doubt."""
     given = [list(row) for row in rows]
-    cells = iter(settled([cell for row in given for cell in row], decimal=decimal))
-    return [[next(cells) for _ in row] for row in given]
+    texts, doubt = settle([cell for row in given for cell in row], decimal=decimal)
+    cells = iter(texts)
+    places = ((place, column) for place, row in enumerate(given) for column in range(len(row)))
+    doubtful = None if doubt is None else next(itertools.islice(places, doubt, None))
+    return [[next(cells) for _ in row] for row in given], doubtful
 
 
-def _is_decimal(text: str) -> bool:
-    return _COMMA.match(text) is not None and not is_ambiguous(text)
+def question(text: str) -> str:
+    """What the user has to decide about a text with a point in doubt."""
+    return "is {} or {} meant? no number of the table shows what its points are".format(*_readings(text))
+
+
+def assumption(text: str) -> str:
+    """How a text with a point in doubt is read where that is likely."""
+    small, large = _readings(text)
+    return f"'{text.strip()[:40]}' is read as {small}; write {large} if its point separates thousands"
+
+
+def _readings(text: str) -> tuple[str, str]:
+    """The two numbers that a text with a point in doubt could mean: 20 and 20000 for ``20.000``."""
+    found = _NUMBER.match(text)
+    digits = found[1] if found else text
+    return f"{float(digits):g}", digits.replace(".", "")
+
+
+def _marks(text: str) -> _Marks:
+    found = _NUMBER.match(text)
+    if found is None:
+        return _Marks()
+    digits, exponent = found.groups()
+    last = max(digits.rfind("."), digits.rfind(","))
+    if last < 0:
+        return _Marks()
+    sign, whole, rest = digits[last], digits[:last], digits[last + 1 :]
+    if not whole.isdecimal() and whole:
+        if _GROUPS.fullmatch(digits):
+            return _Marks(groups=sign)
+        other = "." if sign == "," else ","
+        grouped = rest and _GROUPS.fullmatch(whole) is not None and sign not in whole
+        return _Marks(decimal=sign, groups=other) if grouped else _Marks()
+    if len(rest) == _THOUSANDS and _GROUPS.fullmatch(digits) and not exponent:
+        return _Marks(either=sign)
+    return _Marks(decimal=sign) if rest or sign == "." else _Marks()
+
+
+def _proved(marks: Iterable[_Marks]) -> str:
+    """The decimal sign of all numbers of a list or a table; "" where nothing proves it."""
+    signs = {*marks}
+    decimals = {own.decimal for own in signs} | {"." if own.groups == "," else "," for own in signs if own.groups}
+    decimals.discard("")
+    return decimals.pop() if len(decimals) == 1 else ""
+
+
+def _written(text: str, separator: str) -> str:
+    """``text`` with a decimal point in its first number, without the separators of thousands."""
+    found = _NUMBER.match(text)
+    if found is None:
+        return text
+    start, end = found.span(1)
+    digits = found[1].replace(separator, "") if separator else found[1]
+    return text[:start] + digits.replace(",", ".") + text[end:]

@@ -23,6 +23,13 @@ _MOST_COMBINATIONS: Final = 100_000
 #: Runs of a study with many starts beyond which their number is mentioned.
 _MANY_RUNS: Final = 1_000_000
 
+_TURN: Final = 2.0 * math.pi
+#: Shares of the cycle from which a table without rows there ends early: always, and where the rest is wider than its
+#: other steps by this factor.
+_HALF: Final = 0.5 * (1.0 - 1e-9)
+_LONG: Final = 0.1
+_WIDER: Final = 1.5
+
 #: Last part of a path -> (largest plausible magnitude, its unit, the likely mistake).
 _PLAUSIBLE: Final[dict[str, tuple[float, str, str]]] = {
     "excitation.frequency": (1e3, "Hz", "was it in rpm or rad/s?"),
@@ -133,6 +140,34 @@ def _shaft_relations(report: Report, study: Study) -> None:
             for k in range(operation["steps"]):
                 _turned_step(report, study, f"{prefix}operation.steps.{k}.", wraps=operation["over"] == "angle")
     _chosen_angle(report, study)
+    _short_tables(report, study)
+
+
+def _short_tables(report: Report, study: Study) -> None:
+    """Warn of tables over the angle that end long before their cycle: the rest is filled up to the first row."""
+    structure = study.structure or {}
+    cycle = structure["cycle"]
+    tables = [("drive/torque", structure["drive"]["table"], cycle)] if not structure["drive"].get("motor") else []
+    for prefix, part in _parts(study):
+        where, mechanism, operation = prefix.replace(".", "/"), part["mechanism"], part["operation"]
+        tables.append((f"{where}operation", operation.get("table") if operation["over"] == "angle" else None, cycle))
+        table = mechanism.get("table")
+        if table:
+            one_turn = table["rows"][-1][0] - table["rows"][0][0] <= _TURN * (1.0 + 1e-9)
+            tables.append((f"{where}mechanism", table, 1 if one_turn else cycle))
+    for where, table, turns in tables:
+        if not table:
+            continue
+        angles = np.array([row[0] for row in table["rows"]])
+        period = _TURN * turns
+        missing, widest = period - (angles[-1] - angles[0]), np.diff(angles).max(initial=0.0)
+        if missing >= _HALF * period or (missing >= _LONG * period and missing > _WIDER * widest):
+            last, rest, whole = (math.degrees(angle) for angle in (angles[-1], missing, period))
+            report.warn(
+                "table-ends-early",
+                f"/base/{where}: the table ends at {last:.6g} deg, {rest:.4g} deg before its cycle of {whole:.4g} deg; "
+                "over the rest its value goes from the last row back to the first; give rows up to the end of it",
+            )
 
 
 def _discharge(report: Report, study: Study, prefix: str) -> None:

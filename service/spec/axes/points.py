@@ -9,10 +9,11 @@ import numpy as np
 
 from sprag.service.spec.axes.axes import read_paths
 from sprag.service.spec.axes.blocks import Block
-from sprag.service.spec.csv_text import HEADING, CsvRow, read_csv
+from sprag.service.spec.csv_text import read_csv
 from sprag.service.spec.fields import exact, read_object
 from sprag.service.spec.numbers import parse_number
 from sprag.service.spec.report import Report, join, shorten_text
+from sprag.service.spec.table_text import CsvRow, heading_of
 from sprag.service.spec.units import QuantityError, to_float
 from sprag.worker.limits import MAX_AXIS_VALUES, MAX_COLUMNS
 
@@ -59,14 +60,15 @@ class _Heading(NamedTuple):
 
 
 def _read_heading(report: Report, where: str, cell: str, machine: Machine) -> _Heading | None:
-    match = HEADING.fullmatch(cell)
-    if match is None:
+    heading = heading_of(cell)
+    if heading is None:
         report.fault(
             where, "invalid-path", "has a heading that names no parameter", cell, allowed="a path, its unit in brackets"
         )
         return None
-    paths = read_paths(report, where, match[1], machine)
-    return None if paths is None else _Heading(machine.parameters[paths[0]], match[2] or "")
+    name, unit = heading
+    paths = read_paths(report, where, name, machine)
+    return None if paths is None else _Heading(machine.parameters[paths[0]], unit)
 
 
 def _read_cells(

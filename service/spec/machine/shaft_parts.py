@@ -68,7 +68,7 @@ ROWS: Final = Listed("rows", 2, machine_shaft.MAX_ROWS)
 _NAME = re.compile(r"[A-Za-z_][A-Za-z_0-9]{0,39}")
 _ANY: Final = 1e30
 ANGLE = Parameter("angle", "phi", "rad", -100.0, 100.0, False, None, "angle of the shaft")
-_TIME = Parameter("time", "t", "s", 0.0, 1e6, False, None, "time since the shaft's angle 0")
+_TIME = Parameter("time", "t", "s", -1e6, 1e6, False, None, "time since the shaft's angle 0")
 #: Turns the times of a diagram into angles.
 RECORDED_AT: Final = Parameter(
     "recorded_at", "", "rad/s", 0.0, 1e6, True, None, "mean speed of the shaft while the diagram was recorded over time"

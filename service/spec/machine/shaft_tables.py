@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
-from sprag.service.spec.csv_text import HEADING, read_csv
+import re
+from typing import Final
+
+from sprag.service.spec.csv_text import read_csv
 from sprag.service.spec.fields import exact
 from sprag.service.spec.numbers import is_ambiguous, parse_number
 from sprag.service.spec.report import Report
+from sprag.service.spec.table_text import heading_of
 from sprag.service.spec.units import AmbiguousCommaError, QuantityError, parse_exact, to_float
 from sprag.worker.models import Parameter, machine_shaft
+
+#: The end of a heading that may be a unit: ``angle_deg``, ``angle deg``, ``angle / deg``.
+_LAST_WORD: Final = re.compile(r"[\s_/]([^\s_/]+)$")
 
 
 def read_csv_rows(report: Report, where: str, text: object, *columns: Parameter) -> list[list[float]]:
     """Rows with an SI number for each of ``columns``; faults, with their lines, are recorded.
 
-    A heading is a name and, in brackets, a unit, which is SI where there is none: ``angle [deg],torque [kN*m]``. A
-    fraction may be in percent.
+    A heading is a name and, in brackets or as its last word, a unit, which is SI where there is none: ``angle
+    [deg],torque_kNm``. A fraction may be in percent.
     """
     example = "headings, then at least two lines, as in " + ",".join(f"{c.path} [{c.unit}]" for c in columns)
     rows = read_csv(report, where, text, (machine_shaft.MAX_ROWS, len(columns)), example)
     if rows is None:
         return []
-    headings = [HEADING.fullmatch(cell) for cell in rows[0].cells]
+    headings = [heading_of(cell) for cell in rows[0].cells]
     if len(headings) != len(columns) or None in headings:
         report.fault(where, "wrong-type", f"must have {len(columns)} columns with headings", allowed=example)
         return []
@@ -28,7 +35,7 @@ def read_csv_rows(report: Report, where: str, text: object, *columns: Parameter)
         text = "must begin with headings: its first line has a number, which would be lost"
         report.fault(where, "wrong-type", text, ", ".join(rows[0].cells), allowed=example)
         return []
-    units = [(heading[2] or "") if heading else "" for heading in headings]
+    units = [_unit_of(*(heading or ("", "")), column) for heading, column in zip(headings, columns, strict=True)]
     before = report.found
     for unit, column in zip(units, columns, strict=True):
         if column.unit == "1":
@@ -52,6 +59,18 @@ def read_csv_rows(report: Report, where: str, text: object, *columns: Parameter)
         if report.full:
             break
     return found
+
+
+def _unit_of(name: str, unit: str, column: Parameter) -> str:
+    """The unit of a heading: that in brackets, or else its last word where this is a unit of the column."""
+    word = _LAST_WORD.search(name)
+    if unit or word is None:
+        return unit
+    try:
+        parse_exact(f"1 {word[1]}" if column.unit != "1" else 1, column.unit)
+    except QuantityError:
+        return ""
+    return word[1] if column.unit != "1" or word[1] == "%" else ""
 
 
 def _read_cell(report: Report, where: str, line: int, cell: str, unit: str, column: Parameter) -> float | None:

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from sprag.service.spec.catalogue import result_of
-from sprag.service.spec.csv_text import HEADING, CsvRow, read_csv
+from sprag.service.spec.csv_text import read_csv
 from sprag.service.spec.fields import exact
 from sprag.service.spec.numbers import parse_number
 from sprag.service.spec.report import Report, did_you_mean, shorten_text
+from sprag.service.spec.table_text import CsvRow, heading_of
 from sprag.service.spec.units import QuantityError, parse_quantity, to_float
 from sprag.worker.planning.calibrate.plan import MOST_MEASURED, Measured
 
@@ -103,11 +104,11 @@ def read_table(report: Report, where: str, text: object, machine: Machine) -> Me
 def _read_headings(report: Report, where: str, row: CsvRow) -> list[Column]:
     columns: list[Column] = []
     for place, cell in enumerate(row.cells):
-        match = HEADING.fullmatch(cell)
-        if match is None:
+        heading = heading_of(cell)
+        if heading is None:
             report.fault(where, "invalid-path", "has a heading without a name", cell, allowed=_EXAMPLE)
             continue
-        column = Column(match[1], match[2] or "", place)
+        column = Column(*heading, place)
         if column.name != SIGMA and any(other.name == column.name for other in columns):
             report.fault(where, "repeated", "names the same column twice", column.name, allowed="each once")
         columns.append(column)

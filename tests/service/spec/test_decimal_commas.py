@@ -109,7 +109,8 @@ def test_periods_have_russian_names() -> None:
 
 def test_other_numbers_of_a_list_settle_its_commas() -> None:
     assert settled(["1,234", "0,5"]) == ["1.234", "0.5"]
-    assert settled(["1,234", "0.5"]) == ["1,234", "0.5"]  # stays ambiguous
+    assert settled(["1,234", "0.5"]) == ["1234", "0.5"]  # a decimal point beside it: the comma separates thousands
+    assert settled(["1,234", "0.5", "0,5"]) == ["1,234", "0.5", "0.5"]  # stays ambiguous
     assert settled(["1,234", "2,345"]) == ["1,234", "2,345"]
     assert settled(["1,234 mm", "2,345 mm"], decimal=True) == ["1.234 mm", "2.345 mm"]
     assert parse_number("0,5") == 0.5

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Mapping
 from typing import Final
@@ -9,13 +10,21 @@ from typing import Final
 from sprag.service.http.web.form.entries import Faults, Values
 from sprag.service.http.web.form.fields import Groups
 from sprag.service.http.web.form.parts import PARTS, count_of, drop
-from sprag.service.spec.csv_text import HEADING, MAX_HEADING
-from sprag.service.spec.numbers import is_ambiguous, parse_number, settled_rows
+from sprag.service.spec.numbers import WITHOUT_DOUBT, is_ambiguous, parse_number, question
 from sprag.service.spec.report import did_you_mean
+from sprag.service.spec.table_text import (
+    MAX_HEADING,
+    heading_of,
+    settled_table,
+    split,
+    with_units,
+)
 
 #: The field into which columns are pasted.
 COLUMNS: Final = "/columns"
 _MOST_ROWS: Final = 2_000
+#: Commas are decimal in cells of a spreadsheet, which puts tabs between them.
+_SEPARATORS: Final = ("\t", ";")
 _AXES: Final = PARTS["axes"]
 
 
@@ -25,23 +34,29 @@ def take_columns(values: Values, choices: Groups) -> Faults:
     A first line without numbers names the parameters, by their paths or labels, with a unit in brackets where it is not
     the one beside the parameter. Without it the columns are values of the axes that there are, in their order.
     """
-    text = values.get(COLUMNS, "")
-    rows = [_cells(line) for line in text.splitlines() if line.strip()]
-    if not rows:
+    try:
+        table = split(values.get(COLUMNS, ""), _SEPARATORS)
+    except csv.Error as error:
+        return {COLUMNS: [f"is no table: {error}"]}
+    if not table.rows:
         return {COLUMNS: ["has no columns; paste cells of a spreadsheet, with a line of headings"]}
-    headings = rows.pop(0) if all(map(_is_name, rows[0])) else None
-    width = len(headings or rows[0])
+    named = all(map(_is_name, table.rows[0].cells))
+    lines = with_units(table.rows) if named else table.rows
+    rows = lines[named:]
+    width = len(table.rows[0].cells)
     if not rows or len(rows) > _MOST_ROWS or width > _AXES.most:
         allowed = f"1 to {_MOST_ROWS:,} lines of 1 to {_AXES.most} columns under the headings"
         return {COLUMNS: [f"has {len(rows):,} lines of {width} columns; allowed: {allowed}"]}
-    uneven = next((line for line, row in enumerate(rows, 1 if headings is None else 2) if len(row) != width), None)
+    uneven = next((row.line for row in rows if len(row.cells) != width), None)
     if uneven is not None:
         return {COLUMNS: [f"line {uneven} has another number of cells than the first one; allowed: {width}"]}
-    rows = settled_rows(rows, decimal=";" in text)
-    columns = list(zip(*rows, strict=True))
-    if headings is None:
+    rows, doubt = settled_table(table._replace(rows=rows))
+    if doubt is not None:
+        return {COLUMNS: [f"line {doubt.line}, {doubt.text}: {question(doubt.text)}; allowed: {WITHOUT_DOUBT}"]}
+    columns = list(zip(*(row.cells for row in rows), strict=True))
+    if not named:
         return _into_axes(values, columns)
-    found = [_named(heading, choices) for heading in headings]
+    found = [_named(heading.strip(), choices) for heading in lines[0].cells]
     faults = [fault for _, _, fault in found if fault]
     if faults:
         return {COLUMNS: faults}
@@ -78,12 +93,8 @@ def _finish(values: Values, columns: int) -> None:
     values[COLUMNS] = ""
 
 
-def _cells(line: str) -> list[str]:
-    separator = next((sign for sign in "\t;" if sign in line), None)
-    return [line.strip()] if separator is None else [cell.strip() for cell in line.split(separator)]
-
-
 def _is_name(cell: str) -> bool:
+    cell = cell.strip()
     return bool(re.match(r"[^\W\d]", cell)) and parse_number(cell) is None and not is_ambiguous(cell)
 
 
@@ -91,14 +102,12 @@ def _named(heading: str, choices: Groups) -> tuple[str, str, str]:
     """Path and unit of a column, and the fault of its heading."""
     if len(heading) > MAX_HEADING:
         return "", "", f"has a heading of {len(heading):,} characters; allowed: at most {MAX_HEADING}"
-    label = re.fullmatch(r"(.+?)\s*(?:[\[(]([^\])]+)[\])])?", heading)
-    match = HEADING.fullmatch(heading)
     known: Mapping[str, str] = {
         name.lower(): choice.path for _, group in choices for choice in group for name in (choice.path, choice.label)
     }
-    for found in (match, label):
-        if found is not None and found[1].lower() in known:
-            return known[found[1].lower()], found[2] or "", ""
+    name, unit = heading_of(heading) or ("", "")
+    if name.lower() in known:
+        return known[name.lower()], unit, ""
     paths = [choice.path for _, group in choices for choice in group]
     return (
         "",

@@ -1,0 +1,178 @@
+"""Tables as text, as instruments and spreadsheets write them: rows of cells, with decimal points.
+
+Columns are separated by tabs, semicolons or commas, a comma also with blanks behind it, so that ``0,5, 1,25`` has two
+cells. A first line ``sep=;`` names the separator. Cells may be in double quotes, and columns that are empty from the
+first line to the last are left out.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+import re
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from sprag.service.spec.numbers import settle_rows, settled
+from sprag.service.spec.units import QuantityError, measure
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+
+#: Separators of columns; one is a comma with blanks behind it, between numbers with decimal commas.
+SEPARATORS: Final = ("\t", ";", ", ", ",")
+#: Characters of a heading, at most: the time that reading one takes grows faster than its length.
+MAX_HEADING: Final = 200
+_NAMED: Final = re.compile(r'\s*"?sep=([,;\t|])"?[,;\t|]*[^\S\n]*(?:\n|$)', re.IGNORECASE)
+_QUOTED: Final = re.compile(r'"[^"]*"')
+#: A heading: a name and, in brackets, a unit. Names may have blanks.
+_HEADING: Final = re.compile(r"\s*+([^\[\(]*[^\[\(\s])\s*+(?:[\[\(]\s*+([^\]\)]+?)\s*[\]\)]\s*+)?")
+#: What stands between the numbers of a cell, and between a number and its unit.
+_BETWEEN: Final = re.compile(r"(,\s+|[;\s]+)")
+_IN_BRACKETS: Final = re.compile(r"[\[\(]\s*(.*?)\s*[\]\)]")
+#: What stands for a unit in a line of units where a column has none.
+_NO_UNIT: Final = frozenset({"", "-", "--", "1"})
+
+
+class CsvRow(NamedTuple):
+    """The cells of a row, and the number of the line in which it ends, from 1."""
+
+    line: int
+    cells: list[str]
+
+
+class Split(NamedTuple):
+    """The non-empty rows of a table, as written, the sign between its columns, "" without any, and whether cells are
+    quoted.
+    """
+
+    rows: list[CsvRow]
+    separator: str
+    quoted: bool = False
+
+
+class Doubt(NamedTuple):
+    """A cell whose point could be decimal or separate thousands, and its line.
+
+    ``likely`` says that it is decimal in all likelihood: commas separate the columns, so no comma is decimal.
+    """
+
+    line: int
+    text: str
+    likely: bool
+
+
+def lines_of(text: str) -> str:
+    """``text`` without a byte order mark, its lines, which may end with LF, CRLF or CR, ended by LF."""
+    return text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+
+
+def split(text: str, separators: Sequence[str] = SEPARATORS) -> Split:
+    """The rows of a table. One separator, under which all rows have as many cells, applies to the whole text.
+
+    Where there is none, it is the first of ``separators`` that the first line has.
+
+    Raises
+    ------
+    csv.Error
+        When quotes are not closed.
+    """
+    text = lines_of(text)
+    named = _NAMED.match(text)
+    if named is not None:
+        return _even(_rows("\n" + text[named.end() :], named[1]), named[1], '"' in text)
+    quoted = '"' in text
+    first = _QUOTED.sub("", text.lstrip().partition("\n")[0])
+    present = [sign for sign in separators if sign in first and not (sign == ", " and quoted)]
+    for sign in present if len(present) > 1 else ():
+        rows = _rows(text, sign)
+        if len(rows[0].cells) > 1 and len({len(row.cells) for row in rows}) == 1 and not _halved(rows, sign):
+            return _even(rows, sign, quoted)
+    sign = next((sign for sign in present if sign != ", "), "")
+    return _even(_rows(text, sign or separators[-1]), sign, quoted)
+
+
+def _halved(rows: Sequence[CsvRow], sign: str) -> bool:
+    """Whether ``sign`` separates only some columns: ``0,5,<tab>2`` at the tab, ``a, b,c`` at the comma with a blank."""
+    if sign == ", ":
+        return any("," in cell and re.search(r"[^\W\d]", cell) is not None for cell in rows[0].cells)
+    return any(cell.rstrip().endswith((",", ";")) for row in rows for cell in row.cells)
+
+
+def _rows(text: str, sign: str) -> list[CsvRow]:
+    if '"' not in text:
+        between = re.compile(r",\s+" if sign == ", " else re.escape(sign))
+        lines = (CsvRow(number, between.split(line)) for number, line in enumerate(text.split("\n"), 1))
+        return [row for row in lines if any(map(str.strip, row.cells))]
+    reader = csv.reader(io.StringIO(text), delimiter=sign, strict=True, skipinitialspace=True)
+    return [CsvRow(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
+
+
+def _even(rows: list[CsvRow], separator: str, quoted: bool) -> Split:
+    """The table without columns that are empty in every row."""
+    width = max((len(row.cells) for row in rows), default=0)
+    full = [place for place in range(width) if any(row.cells[place : place + 1] > [""] for row in rows)]
+    if len(full) < width and {len(row.cells) for row in rows} == {width}:
+        rows = [CsvRow(row.line, [row.cells[place] for place in full]) for row in rows]
+    return Split(rows, separator, quoted)
+
+
+def with_units(rows: list[CsvRow]) -> list[CsvRow]:
+    """The rows with a second line of units, such as ``deg;bar``, put in brackets into the headings."""
+    if len(rows) < 2 or len(rows[0].cells) != len(rows[1].cells):
+        return rows
+    cells = [cell.strip() for cell in rows[1].cells]
+    units = [own[1] if (own := _IN_BRACKETS.fullmatch(cell)) else cell for cell in cells]
+    given = [unit for unit in units if unit not in _NO_UNIT]
+    if not given or not all(map(_is_unit, given)):
+        return rows
+    if any(len(cell) > MAX_HEADING for cell in rows[0].cells):
+        return rows
+    headings = [heading_of(cell) for cell in rows[0].cells]
+    if any(heading is None or heading[1] not in {"", unit} for heading, unit in zip(headings, units, strict=True)):
+        return rows
+    made = [
+        f"{heading[0]} [{unit}]" if heading and unit not in _NO_UNIT else cell
+        for cell, heading, unit in zip(rows[0].cells, headings, units, strict=True)
+    ]
+    return [CsvRow(rows[0].line, made), *rows[2:]]
+
+
+def _is_unit(text: str) -> bool:
+    try:
+        measure(text)
+    except QuantityError:
+        return text == "%"
+    return True
+
+
+def heading_of(cell: str) -> tuple[str, str] | None:
+    """The name of a heading and its unit in brackets, "" where it has none; None where it is neither."""
+    found = _HEADING.fullmatch(cell)
+    return None if found is None else (found[1], found[2] or "")
+
+
+def settled_table(table: Split, texts: Collection[int] = ()) -> tuple[list[CsvRow], Doubt | None]:
+    """The rows with decimal points, except for the columns ``texts``, and the first cell whose point is in doubt.
+
+    A cell may have several numbers, such as the coefficients of a clutch.
+    """
+    pieces = [[[] if i in texts else _BETWEEN.split(own) for i, own in enumerate(row.cells)] for row in table.rows]
+    numbers = ([part for cell in row for part in cell] for row in pieces)
+    below, place = settle_rows(numbers, decimal=table.separator == ";")
+    rows = []
+    for row, cells, parts in zip(table.rows, pieces, map(iter, below), strict=True):
+        taken = [list(itertools.islice(parts, len(cell))) for cell in cells]
+        made = [_joined(*own) for own in zip(row.cells, cells, taken, strict=True)]
+        rows.append(CsvRow(row.line, made))
+    if place is None:
+        return rows, None
+    number, column = place
+    text = [part for cell in pieces[number] for part in cell][column]
+    likely = table.separator == "," and not table.quoted
+    return rows, Doubt(table.rows[number].line, text, likely)
+
+
+def _joined(text: str, pieces: list[str], made: list[str]) -> str:
+    """A cell with its numbers as the table settles them; several that say so themselves stay as they are written."""
+    return text if len(pieces) != 1 and settled(pieces) == made else "".join(made)
