@@ -39,6 +39,10 @@ MEANINGS: Final[dict[Code, str]] = {
         "No number of the table shows what its points are: `20.000` could be 20 or 20000. Write numbers without "
         "separators of thousands, one of them with another number of decimals than three."
     ),
+    "ambiguous-unit": (
+        "A number without a unit stands beside quantities in another unit, and could be in either: `50` beside "
+        "`100 N*mm` could be 50 N*m or 50 N*mm. Write its unit."
+    ),
     "not-a-number": "The text does not begin with a number.",
     "not-an-axis": "The path is not an axis of the study.",
     "not-finite": "The number is not finite.",
@@ -117,6 +121,7 @@ WARNING_MEANINGS: Final[dict[WarningCode, str]] = {
     "no-effect": "The value, or the axis, changes no result.",
     "no-such-angle": "There are not as many angles with T = T_mean as `phi_c` asks for.",
     "nothing-acts": "The machine, or one of its parts, has neither a mechanism nor an operation.",
+    "not-monotonic": "The values of a list neither rise nor fall throughout.",
     "nothing-moves": "Both amplitudes of the base are 0.",
     "replaced-value": "The value is replaced, as another field requires.",
     "rows-in-backlash": "Some measured rows lie within the backlash and were left out of the fit.",

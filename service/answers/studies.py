@@ -126,6 +126,8 @@ class AxisInfo(TypedDict):
     values: Annotated[int, Doc("number of values; of a study that chooses its own cases, of different ones so far")]
     first: Annotated[float, Doc("the first value, SI; of a study that chooses its own cases, the least")]
     last: Annotated[float, Doc("the last value, SI; of a study that chooses its own cases, the largest")]
+    least: Annotated[float, Doc("the least value, SI")]
+    largest: Annotated[float, Doc("the largest value, SI")]
 
 
 class Origin(TypedDict):

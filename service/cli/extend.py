@@ -15,6 +15,7 @@ from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId,
 from sprag.service.cli.remote import connection, submitted
 from sprag.service.languages import N_, _, ngettext
 from sprag.service.spec.numbers import could_be_one, parse_number, settled
+from sprag.service.spec.together import with_last_unit
 from sprag.worker.limits import (
     MAX_BODY_BYTES,
     MAX_NARROW_STEPS,
@@ -146,13 +147,17 @@ def _addition(axes: list[str], points: str | None) -> dict[str, Any]:
 
 
 def _values(text: str) -> list[float | str]:
-    """The values of a list: semicolons separate them where there are any, otherwise commas."""
+    """The values of a list: semicolons separate them where there are any, otherwise commas.
+
+    A unit at the end holds for the bare numbers before it.
+    """
     if could_be_one(text):
         raise wrong_option(
             "--axis", "ambiguous-comma", N_("could be one value or two"), text,
             allowed=_("semicolons between values, or a decimal point"),
         )  # fmt: skip
-    return [_value(item.strip()) for item in (settled(text.split(";")) if ";" in text else text.split(","))]
+    items = settled(text.split(";")) if ";" in text else text.split(",")
+    return [_value(item) for item in with_last_unit([item.strip() for item in items])]
 
 
 def _value(text: str) -> float | str:

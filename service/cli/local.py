@@ -121,9 +121,10 @@ def preview(
     _show_preview(made)
     if reusable:
         write_text(_("{count} of the cases need not be run: the database has them", count=reusable) + "\n")
-    heads = ((_("axis"), False), (_("unit"), False), (_("values"), True), (_("first"), True), (_("last"), True))
+    heads = ((_("axis"), False), (_("unit"), False), (_("values"), True), (_("least"), True), (_("largest"), True))
     rows = [
-        (", ".join(axis["paths"]), axis["unit"], axis["values"], axis["first"], axis["last"]) for axis in made["axes"]
+        (", ".join(axis["paths"]), axis["unit"], axis["values"], axis["least"], axis["largest"])
+        for axis in made["axes"]
     ]
     if rows:
         show_table(_("Axes"), heads, rows)

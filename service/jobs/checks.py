@@ -23,7 +23,7 @@ from sprag.service.results.selection import locate_axes
 from sprag.service.schedules.fields import ScheduleFields, change_fields, read_fields
 from sprag.service.spec import units
 from sprag.service.spec.components import Component, read_components
-from sprag.service.spec.document import load_spec, parse_spec
+from sprag.service.spec.document import accepted, load_spec, parse_spec
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.labels import StudyChange, read_change
 from sprag.service.spec.longer import longer_spec
@@ -127,7 +127,7 @@ def extended_study(
 ) -> Submission:
     """A study extended by the body of a request; raises SpecError and StudyNotFoundError."""
     store = library.store
-    parsed = parse_extended(store.spec(study_id), store.study(study_id), load_spec(content, form))
+    parsed = parse_extended(accepted(store.spec(study_id)), store.study(study_id), load_spec(content, form))
     return submission(parsed, store, now, finish_by=finish, given=given)
 
 
@@ -146,7 +146,7 @@ def longer_study(
     store = library.store
     named = {"regime" if models.is_settled(store.study(study_id).run) else "flag": kind}
     cases = store.cases_of_kind(study_id, **named)
-    parsed = parse_spec(longer_spec(store.spec(study_id), store.study(study_id), cases, at_most))
+    parsed = parse_spec(longer_spec(accepted(store.spec(study_id)), store.study(study_id), cases, at_most))
     return submission(parsed, store, now, given=given)
 
 
@@ -177,7 +177,7 @@ def narrowed_study(
         cases, indices = cases[indices[axis] == index], tuple(one[indices[axis] == index] for one in indices)
     if not cases.size:
         raise FaultError("wrong-state", "No case of the study has the flag jumped" + (" there." if fixed else "."))
-    parsed = parse_spec(narrowed_spec(store.spec(study_id), study, cases, steps, fixed))
+    parsed = parse_spec(narrowed_spec(accepted(store.spec(study_id)), study, cases, steps, fixed))
     return submission(parsed, store, now, given=given)
 
 

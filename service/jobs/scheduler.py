@@ -106,13 +106,13 @@ class Scheduler(PollingThread):
 
         from sprag.service.faults import FaultError
         from sprag.service.jobs.submission import accept
-        from sprag.service.spec.document import parse_spec
+        from sprag.service.spec.document import accepted, parse_spec
         from sprag.service.spec.report import SpecError
 
         if not self._may_overlap(run):
             return
         try:
-            parsed = parse_spec(run.fields.spec)
+            parsed = parse_spec(accepted(run.fields.spec))
             if run.fields.name:
                 parsed = replace(parsed, study=replace(parsed.study, name=run.fields.name))
             fields = run.fields

@@ -12,6 +12,7 @@ from sprag.service.answers.results import BasinData, RegimeRow
 from sprag.service.faults import FaultError, parameter_error
 from sprag.service.json_text import to_bytes
 from sprag.service.results.exports import table_csv
+from sprag.service.results.selection import ends_of_range
 from sprag.service.results.start_states import refuse_impossible
 from sprag.service.spec.report import quantity_text
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
@@ -110,7 +111,8 @@ def _ends(
     name: str, entry: Parameter, drawn: list[float] | None, given: tuple[str | None, str | None]
 ) -> tuple[float, float]:
     values: list[float] = []
-    for place, text in zip(("from", "to"), given, strict=True):
+    ends = ends_of_range((f"{name}_from", f"{name}_to"), *given, entry.unit)
+    for place, text in zip(("from", "to"), ends, strict=True):
         if text is None:
             if drawn is None:
                 allowed = f"a quantity in {entry.unit}: the study has no starts with a range of it"

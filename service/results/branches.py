@@ -14,6 +14,7 @@ from sprag.service.json_text import numbers, to_bytes
 from sprag.service.results.directions import case_values
 from sprag.service.results.exports import table_csv
 from sprag.service.results.portraits import require_strobes
+from sprag.service.results.selection import ends_of_range
 from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
@@ -103,6 +104,7 @@ def range_of(
             )
     ends = _axis_ends(study, paths[0])
     unit = unit_of(study, paths[0])
+    low, high = ends_of_range(("from", "to"), low, high, unit)
     first = _value("from", low, unit, None if ends is None else ends[0])
     last = _value("to", high, unit, None if ends is None else ends[1])
     least, most = allowed_values(study, tuple(paths))

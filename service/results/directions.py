@@ -24,9 +24,10 @@ def in_words(values: Mapping[str, float]) -> dict[str, Value]:
 
 
 def ends_in_words(axis: AxisInfo) -> tuple[Value, Value]:
-    """The first and the last value of an axis."""
-    first, last = (in_words({axis["paths"][0]: axis[end]})[axis["paths"][0]] for end in ("first", "last"))
-    return first, last
+    """The least and the largest value of an axis, whatever their order."""
+    ends = (axis["least"], axis["largest"])
+    least, largest = (in_words({axis["paths"][0]: end})[axis["paths"][0]] for end in ends)
+    return least, largest
 
 
 def case_values(study: Study, case: int) -> dict[str, Value]:

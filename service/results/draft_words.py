@@ -44,11 +44,11 @@ def _what(study: Study, spec: Mapping[str, Any], reading: Reading) -> str:
 def _axis(study: Study, axis: Axis, reading: Reading) -> str:
     values, path = shown_values(study, axis), axis.paths[0]
     unit = unit_of(study, path)
-    first, last = float(values[0]), float(values[-1])
+    least, largest = float(values.min()), float(values.max())
     name = " = ".join(reading.within(path) for path in axis.paths)
     if values.size == 1:
-        return f"{name} {reading.quantity(first, unit, _DIGITS)}"
-    ends = Phrase("{low} to {high}", low=Amount(first, unit, _DIGITS, bare=True), high=Amount(last, unit, _DIGITS))
+        return f"{name} {reading.quantity(least, unit, _DIGITS)}"
+    ends = Phrase("{low} to {high}", low=Amount(least, unit, _DIGITS, bare=True), high=Amount(largest, unit, _DIGITS))
     many = plural("{count} value", "{count} values", int(values.size))
     count = Phrase("refined") if study.plan is not None else many
     return f"{name} {reading.say(ends)} ({reading.say(count)})"

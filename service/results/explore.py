@@ -12,7 +12,7 @@ import numpy as np
 from sprag.service.answers.explore import Exploration, ExploredCase, Histogram
 from sprag.service.results import exports
 from sprag.service.results.directions import case_values
-from sprag.service.results.selection import listed, locate_axes, own_paths, refused, value_of
+from sprag.service.results.selection import listed, locate_axes, own_paths, refuse_mixed_texts, refused, value_of
 from sprag.service.spec.catalogue import result_of, unit_of
 from sprag.service.spec.report import did_you_mean
 from sprag.service.spec.units import plain_signs
@@ -140,6 +140,8 @@ def plan_of(study: Study, query: ExploreQuery) -> Plan:
         raise refused("where", "too-many", f"{len(query.where)} ranges are given", allowed=f"at most {MOST_RANGES}")
     if len(query.show) > MOST_SHOWN:
         raise refused("show", "too-many", f"{len(query.show)} quantities are given", allowed=f"at most {MOST_SHOWN}")
+    pairs = [(parts[1], parts[3]) for text in query.where if (parts := _FORM.fullmatch(plain_signs(text)))]
+    refuse_mixed_texts("where", pairs, {name: unit for name, unit in quantities(study).items() if pairs})
     ranges = tuple(_range(study, infos, text) for text in query.where)
     if query.regime and (regime is None or query.regime not in regime.categories):
         allowed = "no regime: this study has none" if regime is None else listed(regime.categories)

@@ -84,6 +84,11 @@ class Reading:
         shown = self.unit(si)
         return text if shown == si or not text.strip() or has_unit(text) else f"{text.strip()} {shown}"
 
+    def with_unit(self, text: str, si: str) -> str:
+        """As `typed`, with the SI unit too: beside other quantities the number is then in that unit."""
+        text = self.typed(text, si)
+        return text if si == "1" or not text.strip() or has_unit(text) else f"{text.strip()} {si}"
+
     def letter(self, name: str) -> Markup | None:
         """The letter of a result, as in print; None where it has none."""
         found = letter(self.model, name)

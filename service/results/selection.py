@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.service.faults import Code, Fault, FaultError, ParameterFault, shown
+from sprag.service.faults import Code, Fault, FaultError, ParameterFault, parameter_error, shown
 from sprag.service.results.phrases import Amount, Name, Phrase, term
 from sprag.service.spec.catalogue import result_of, unit_of, unknown_result
 from sprag.service.spec.report import did_you_mean, quantity_text
+from sprag.service.spec.together import AMBIGUOUS_UNIT, question, with_unit_of_end
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
 from sprag.worker.spread import DRIVE
@@ -173,11 +174,37 @@ def locate_axes(study: Study, at: Sequence[tuple[str, str]], parameter: str = "a
 
 def locate_values(study: Study, of: Sequence[tuple[str, str]], parameter: str = "of") -> dict[int, list[int]]:
     """Positions of several values on axes, by axis, in the order of the values; pairs are those of `locate_axes`."""
+    refuse_mixed_texts(parameter, of, {path: unit_of(study, path) for path, _ in of if study.axis_of(path) is not None})
     found: dict[int, dict[int, float]] = {}
     for pair in of:
         for axis, (_, index) in locate_axes(study, [pair], parameter).items():
             found.setdefault(axis, {})[index] = study.axes[axis].value(index)
     return {axis: sorted(places, key=places.__getitem__) for axis, places in found.items()}
+
+
+def refuse_mixed_texts(parameter: str, pairs: Sequence[tuple[str, str]], units: Mapping[str, str]) -> None:
+    """Raise SelectionError where a value of a name has no unit beside others of the name in units of another scale.
+
+    ``pairs`` are names with texts, ``units`` the SI units of names; others are left out.
+    """
+    for name, unit in units.items():
+        texts = [text for own, text in pairs if own == name]
+        asked = question(texts, unit)
+        if asked is not None:
+            value = f"{name}={texts[asked.place]}"
+            raise refused(parameter, AMBIGUOUS_UNIT, asked.message, value, allowed=asked.allowed, unit=unit)
+
+
+def ends_of_range(
+    names: tuple[str, str], low: str | None, high: str | None, unit: str
+) -> tuple[str | None, str | None]:
+    """The texts of two ends, a bare first one with the unit of the last; FaultError about one that remains unclear."""
+    ends = with_unit_of_end(low, high)
+    asked = question([text or "" for text in ends], unit)
+    if asked is not None:
+        place = asked.place
+        raise parameter_error(names[place], AMBIGUOUS_UNIT, asked.message, ends[place], asked.allowed)
+    return ends
 
 
 def value_of(path: str, text: str, unit: str, parameter: str = "at") -> float:

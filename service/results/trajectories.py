@@ -10,6 +10,7 @@ from sprag.service.json_text import numbers, to_bytes
 from sprag.service.results.directions import case_values
 from sprag.service.results.exports import read_table
 from sprag.service.results.quantities import Units
+from sprag.service.results.selection import ends_of_range
 from sprag.service.spec.units import PERIOD_NAMES, QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
 from sprag.worker.models.starts import motion_of
@@ -30,6 +31,7 @@ def span(study: Study, case: int, start: str | None, end: str | None) -> tuple[f
     parameter ``from`` or ``to``, when they lie outside the extent.
     """
     extent = models.extent(study, case)
+    start, end = ends_of_range(("from", "to"), start, end, extent.unit)
     last = extent.end if end is None else _place("to", end, extent)
     first = (extent.begin if extent.begin < last else 0.0) if start is None else _place("from", start, extent)
     # A client that gives the end in periods or degrees cannot know its last digit.

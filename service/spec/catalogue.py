@@ -45,6 +45,8 @@ def axes_json(study: Study) -> list[AxisInfo]:
             "values": values.size,
             "first": float(values[0]),
             "last": float(values[-1]),
+            "least": float(values.min()),
+            "largest": float(values.max()),
         }
         for axis, values in shown
     ]

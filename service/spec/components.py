@@ -18,6 +18,7 @@ from sprag.service.spec.labels import LINES_ALLOWED, printable_lines
 from sprag.service.spec.numbers import parse_number, settled
 from sprag.service.spec.report import Report, SpecError, join
 from sprag.service.spec.table_text import heading_of
+from sprag.service.spec.together import AMBIGUOUS_UNIT, questions
 from sprag.service.spec.units import QuantityError
 from sprag.worker import models
 from sprag.worker.limits import MAX_COMPONENTS, MAX_NAME_LENGTH, MAX_NOTES_LENGTH
@@ -196,7 +197,10 @@ def _faults_of_field(kind: str, name: str, text: str) -> list[Fault]:
             allowed = f"1 to {models.MAX_COEFFICIENTS} coefficients, separated by semicolons"
             return [Fault(name, "too-many", f"has {len(items)} coefficients", text, allowed)]
         pairs = [(item, placed(parameter, f"{COEFFICIENTS}.{index}")) for index, item in enumerate(items)]
-    found = []
+    found = [
+        Fault(name, AMBIGUOUS_UNIT, asked.message, pairs[asked.place][0], asked.allowed, pairs[asked.place][1].unit)
+        for asked in questions([item for item, _ in pairs], [one.unit for _, one in pairs])
+    ]
     for item, one in pairs:
         number = parse_number(item)
         try:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from sprag.service.spec.fields import read_choice, read_flag, read_number, read_periods, read_plain, read_whole
 from sprag.service.spec.numbers import WITHOUT_DOUBT, assumption, question, settle
 from sprag.service.spec.report import Report, join
+from sprag.service.spec.together import refuse_mixed
 from sprag.worker.limits import (
     MAX_ORBIT_PERIODS,
     MAX_SETTLED,
@@ -136,7 +137,16 @@ class Listed:
             numbers = [number for number in read if number is not None]
             if len(numbers) == len(columns):
                 rows.append(numbers)
-        return rows
+        return rows if not self._mixed(report, pointer, data, columns) else []
+
+    def _mixed(self, report: Report, pointer: str, data: object, columns: Sequence[Parameter]) -> bool:
+        """Whether a column has bare numbers beside quantities of another scale; each is recorded as a fault."""
+        rows = [(index, row) for index, row in enumerate(data if isinstance(data, list) else ())
+                if isinstance(row, list) and len(row) == len(columns)]  # fmt: skip
+        before = report.found
+        for k, column in enumerate(columns):
+            refuse_mixed(report, [(join(pointer, index, k), row[k]) for index, row in rows], column.unit)
+        return report.found > before
 
     def schema(self, item: dict[str, Any]) -> dict[str, Any]:
         """Its JSON Schema, ``item`` being that of each item."""

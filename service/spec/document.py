@@ -6,6 +6,7 @@ Its parts are the modules beside it (`text`, `units`, `run`, `warnings`, the `re
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
@@ -21,16 +22,18 @@ from sprag.service.spec.plan.outline import Outline, chooses, first_round, read_
 from sprag.service.spec.report import Report, SpecError, did_you_mean
 from sprag.service.spec.starts import read_starts
 from sprag.service.spec.text import Format, load_spec
+from sprag.service.spec.together import AMBIGUOUS_UNIT
 from sprag.worker import models
 from sprag.worker.limits import MAX_NAME_LENGTH
 from sprag.worker.study import Study
 
 if TYPE_CHECKING:
+    from sprag.service.faults import Fault
     from sprag.service.spec.machine.machine import Machine
     from sprag.worker.models import ClutchFit
     from sprag.worker.study import Combine
 
-__all__ = ["VERSION", "ParsedSpec", "SpecError", "format_of", "load_spec", "parse_spec"]
+__all__ = ["VERSION", "ParsedSpec", "SpecError", "accepted", "format_of", "load_spec", "parse_spec"]
 
 #: The supported version of the spec.
 VERSION: Final = 1
@@ -122,6 +125,42 @@ def parse_spec(data: object) -> ParsedSpec:
         warn_of_invalid_drives(report, study)
     part.warn(report, study)
     return ParsedSpec(study, tuple(report.warnings), machine.fits, dict(found))
+
+
+def accepted(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """A spec that was accepted before, bare numbers beside quantities of another scale with their SI unit.
+
+    Earlier versions read them as SI without a question, so that is what they are.
+    """
+    settled: dict[str, Any] = dict(spec)
+    while unclear := _unclear(settled):
+        settled = copy.deepcopy(settled)
+        for fault in unclear:
+            *parents, last = (part.replace("~1", "/").replace("~0", "~") for part in (fault.where or "").split("/")[1:])
+            place: Any = settled
+            for key in parents:
+                place = place[int(key)] if isinstance(place, list) else place[key]
+            index: Any = int(last) if isinstance(place, list) else last
+            place[index] = f"{place[index]!r} {fault.unit}"
+    return settled
+
+
+def _unclear(spec: Mapping[str, Any]) -> list[Fault]:
+    """The faults of bare numbers beside quantities of another scale."""
+    if not _mixed(spec):
+        return []
+    try:
+        parse_spec(spec)
+    except SpecError as error:
+        return [fault for fault in error.faults if fault.code == AMBIGUOUS_UNIT]
+    return []
+
+
+def _mixed(data: object) -> bool:
+    """Whether a list, rows or an object have both numbers and texts."""
+    items = list(data.values()) if isinstance(data, Mapping) else data if isinstance(data, list) else []
+    every = [part for item in items for part in (item if isinstance(item, list) else [item])]
+    return {str} < {type(item) for item in every} & {str, int, float} or any(map(_mixed, items))
 
 
 def _read_version(report: Report, found: Mapping[str, Any]) -> None:

@@ -30,13 +30,15 @@ FIELDS: Final = ("axes", "cases", "name")
 def parse_extended(spec: Mapping[str, Any], study: Study, addition: object) -> ParsedSpec:
     """Check and return the study of `extended_spec`; pointers of faults in ``addition`` refer to ``addition``."""
     try:
-        return parse_spec(extended_spec(spec, study, addition))
+        made = parse_spec(extended_spec(spec, study, addition))
     except SpecError as error:
         if not (isinstance(addition, Mapping) and "cases" in addition):
             raise
         # The study itself is the first axis; additions follow.
         before = 1 if study.axes else 0
         raise SpecError([_moved(fault, before) for fault in error.faults]) from error
+    # Further values stand behind those of the study, whatever their size.
+    return replace(made, warnings=tuple(text for text in made.warnings if getattr(text, "code", "") != "not-monotonic"))
 
 
 def _moved(fault: Fault, before: int) -> Fault:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from sprag.service.spec.described import ANY_RUN, SETTLED_RUN
 from sprag.service.spec.fields import read_object
 from sprag.service.spec.report import Report, join
+from sprag.service.spec.together import refuse_mixed
 from sprag.service.spec.units import PERIOD_NAMES, QuantityError, exact_number, parse_exact, split_quantity, to_float
 from sprag.worker.limits import MAX_RUN_PERIODS
 from sprag.worker.models import MEANS_FROM_PERIODS
@@ -139,6 +140,8 @@ def _read_window(report: Report, data: object) -> list[Time] | None:
             data,
             allowed=f"two times in {_TIME}",
         )
+        return None
+    if refuse_mixed(report, [(join("/run/window", index), item) for index, item in enumerate(data)], "s"):
         return None
     times = [_read_time(report, join("/run/window", index), item) for index, item in enumerate(data)]
     return None if None in times else [time for time in times if time is not None]

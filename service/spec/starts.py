@@ -14,6 +14,7 @@ from sprag.service.spec.draws.unit import unit_sample
 from sprag.service.spec.fields import read_number, read_object
 from sprag.service.spec.report import Report, join
 from sprag.service.spec.schema.quantity import QUANTITY, Schema, object_schema
+from sprag.service.spec.together import refuse_mixed
 from sprag.worker.limits import MAX_START_RANGES, MAX_STARTS
 from sprag.worker.models import START_STATES, is_settled
 from sprag.worker.models.start_states import LOCKED, is_initial
@@ -137,6 +138,8 @@ def _add_range(
                 pointer, "wrong-type", "must be a list of two ends", ends,
                 allowed=f"[low, high], {entry.range_text()}", unit=entry.unit,
             )  # fmt: skip
+            return
+        if refuse_mixed(report, [(join(pointer, k), end) for k, end in enumerate(ends)], entry.unit):
             return
         low, high = (read_number(report, join(pointer, k), end, entry) for k, end in enumerate(ends))
         if low is None or high is None:

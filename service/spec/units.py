@@ -183,6 +183,12 @@ def split_quantity(text: str) -> tuple[Fraction, str]:
     QuantityError
         When it does not begin with a number, or with one whose comma could be decimal or separate thousands.
     """
+    number, unit = split_typed(text)
+    return number, latin(unit)
+
+
+def split_typed(text: str) -> tuple[Fraction, str]:
+    """As `split_quantity`, the unit in the letters in which it was typed."""
     if len(text) > MAX_QUANTITY_LENGTH:
         raise QuantityError("too-long", f"is longer than {MAX_QUANTITY_LENGTH} characters")
     text = text.translate(_SIGNS).strip()
@@ -194,7 +200,7 @@ def split_quantity(text: str) -> tuple[Fraction, str]:
     to_float(number)
     if match[2].startswith((",", ".")):
         raise QuantityError("not-a-number", "must have one decimal point or comma and no thousands separators")
-    return number, latin(match[2].strip())
+    return number, match[2].strip()
 
 
 def _refuse_ambiguous(text: str) -> None:

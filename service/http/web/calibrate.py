@@ -14,7 +14,7 @@ from sprag.service.faults import Fault, FaultError
 from sprag.service.http.context import Context, Ctx
 from sprag.service.http.problems import api_error
 from sprag.service.http.routers import page_router
-from sprag.service.http.web.form.entries import plain
+from sprag.service.http.web.form.entries import range_of
 from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
@@ -67,7 +67,7 @@ def calibration_spec(spec: Mapping[str, Any], values: Mapping[str, str]) -> dict
     """The spec of a calibration of the machine of ``spec``, with the fields of the page."""
     kept = {key: value for key, value in spec.items() if key not in WHICH_CASES}
     unknown = [
-        {"path": path, **{name: plain(values.get(f"{name}{row}", "")) for name in ("from", "to")}}
+        {"path": path, **range_of({name: values.get(f"{name}{row}", "") for name in ("from", "to")}, "")}
         for row in range(ROWS)
         if (path := values.get(f"path{row}", "").strip())
     ]

@@ -34,6 +34,7 @@ from sprag.service.results.phrases import meanings
 from sprag.service.results.reading import Choice, Reading
 from sprag.service.results.selection import SelectionError, own_paths
 from sprag.service.spec.numbers import parse_number
+from sprag.service.spec.together import with_last_unit
 from sprag.worker import models
 from sprag.worker.limits import MAX_SELECTED
 
@@ -90,9 +91,10 @@ def read_choice(given: QueryParams, study: Study, reading: Reading) -> tuple[Exp
 
     for text in filter(str.strip, given.getlist("where")):
         ask("where", text, where=(*query.where, text))
-    for key, value in _ranges(given):
-        end = reading.typed(value.strip(), units.get(key[4:], "1"))
-        ask(key, value.strip(), where=(*query.where, f"{key[4:]} {_SIGNS[key[:4]]} {end}"))
+    ends = dict(_ranges(given))
+    for key, value in _with_unit_of_end(ends).items():
+        end = reading.with_unit(value.strip(), units.get(key[4:], "1"))
+        ask(key, ends[key].strip(), where=(*query.where, f"{key[4:]} {_SIGNS[key[:4]]} {end}"))
     for name in ("ending", "regime", "flag", "sort"):
         if value := given.get(name, ""):
             ask(name, value, **{name: value})
@@ -117,6 +119,16 @@ def _whole(choice: tuple[ExploreQuery, tuple[Fault, ...]]) -> ExploreQuery:
 
 def _ranges(given: QueryParams) -> list[tuple[str, str]]:
     return [(key, value) for key, value in given.multi_items() if key[:4] in _SIGNS and value.strip()]
+
+
+def _with_unit_of_end(ends: dict[str, str]) -> dict[str, str]:
+    """The ends of ranges, a bare lower one with the unit of the upper one."""
+    found = dict(ends)
+    for key, text in ends.items():
+        least = f"min:{key[4:]}"
+        if key.startswith("max:") and least in ends:
+            found[least], found[key] = with_last_unit([ends[least], text])
+    return found
 
 
 def explore_view(library: Library, study_id: str, given: Sequence[tuple[str, str]], choice: Choice) -> ExploreView:

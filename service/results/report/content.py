@@ -70,8 +70,8 @@ class AxisRow:
     paths: str
     unit: str
     values: int
-    first: float | str
-    last: float | str
+    least: float | str
+    largest: float | str
 
 
 @dataclass(frozen=True, slots=True)

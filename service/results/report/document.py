@@ -156,14 +156,14 @@ def _axes(report: Report) -> Iterator[Block]:
         (
             read.caption(axis.paths),
             number(axis.values),
-            number(read.value(axis.first, axis.unit)),
-            number(read.value(axis.last, axis.unit)),
+            number(read.value(axis.least, axis.unit)),
+            number(read.value(axis.largest, axis.unit)),
             unit_text(read.unit(axis.unit)),
         )
         for axis in report.axes
     )
     if rows:
-        yield Table((_("Parameter"), _("Values"), _("First"), _("Last"), _("Unit")), rows, (1, 2, 3))
+        yield Table((_("Parameter"), _("Values"), _("Least"), _("Largest"), _("Unit")), rows, (1, 2, 3))
 
 
 def _curves(report: Report) -> Iterator[Block]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 
 from sprag.service.results.phrases import Amount, Name, Phrase, term
-from sprag.service.results.selection import listed, numeric_results, refused
+from sprag.service.results.selection import listed, numeric_results, refuse_mixed_texts, refused
 from sprag.service.spec.catalogue import result_of
 from sprag.service.spec.units import QuantityError, parse_quantity, plain_signs, split_quantity, to_float
 from sprag.worker import models
@@ -83,6 +83,11 @@ def read_conditions(infos: Sequence[ResultInfo], texts: Sequence[str]) -> tuple[
         raise refused("condition", "required", "is required", allowed=EXAMPLES)
     if len(texts) > MOST:
         raise refused("condition", "too-many", f"{len(texts)} conditions are given", allowed=f"at most {MOST}")
+    pairs = [(parts[1], parts[3]) for text in texts if (parts := _FORM.fullmatch(plain_signs(text)))]
+    units = {
+        info.name: info.unit for info in infos if info.kind == "real" and any(name == info.name for name, _ in pairs)
+    }
+    refuse_mixed_texts("condition", pairs, units)
     return tuple(_read(infos, text) for text in texts)
 
 

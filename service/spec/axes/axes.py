@@ -49,9 +49,24 @@ def read_axes(report: Report, data: object, combine: Combine, machine: Machine) 
         if values is None:
             return None
         axes.append(Axis(paths, values))
+        if plan.listed and combine == "grid":
+            _warn_of_order(report, plan.pointer, values, machine.parameters[paths[0]])
     if combine == "zip" and not _rows_differ(report, axes, machine):
         return None
     return tuple(axes)
+
+
+def _warn_of_order(report: Report, pointer: str, values: NDArray[np.float64], parameter: Parameter) -> None:
+    """Warn of values that neither rise nor fall throughout: one of them may be in another unit than was meant."""
+    steps = np.diff(values)
+    turns = np.flatnonzero(np.sign(steps) != np.sign(steps[0])) if steps.size else steps
+    if turns.size:
+        before, after = (quantity_text(float(values[turns[0] + k]), parameter.unit) for k in (0, 1))
+        trend = "rise" if steps[0] > 0.0 else "fall"
+        report.warn(
+            "not-monotonic",
+            f"{pointer} ({parameter.path}): the values {trend} at first, but {after} stands after {before}",
+        )
 
 
 def axis_values(

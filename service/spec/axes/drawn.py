@@ -12,6 +12,7 @@ from sprag.service.spec.draws.described import DISTRIBUTION, read_measured, read
 from sprag.service.spec.draws.distributions import Distribution
 from sprag.service.spec.fields import read_number, read_object
 from sprag.service.spec.report import Report, join
+from sprag.service.spec.together import refuse_mixed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -56,6 +57,9 @@ def read_distribution(report: Report, pointer: str, data: object, machine: Machi
                 report.fault(join(pointer, field), "conflict", "cannot be combined with `values`", found[field])
         values = read_measured(report, join(pointer, "values"), found["values"], parameters)
         return None if values is None else SampleDistribution(paths, Distribution("values", values=tuple(values)))
+    together = [(join(pointer, name), found.get(name)) for name in ("nominal", "plus_minus")]
+    if refuse_mixed(report, together, parameters[0].unit):
+        return None
     kind = DISTRIBUTION.read(report, pointer, found)
     nominal = _read_nominal(report, pointer, found, parameters, machine)
     read = read_plus_minus(report, pointer, found, parameters[0])

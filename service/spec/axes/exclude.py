@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from sprag.service.spec.fields import read_number, read_object
 from sprag.service.spec.report import Report, join
+from sprag.service.spec.together import refuse_mixed
 from sprag.worker.limits import MAX_AXIS_VALUES
 from sprag.worker.study import SAME_VALUE
 
@@ -62,6 +63,8 @@ def _parts(report: Report, pointer: str, path: str, data: object, machine: Machi
         return []
     if not found:
         report.fault(pointer, "required", "has no condition", data, allowed="one of " + ", ".join(FIELDS))
+    if refuse_mixed(report, _quantities(pointer, found), parameter.unit):
+        return []
     parts: list[tuple[str, float]] = []
     for name in FIELDS:
         if name not in found:
@@ -77,6 +80,15 @@ def _parts(report: Report, pointer: str, path: str, data: object, machine: Machi
             values = [read_number(report, join(pointer, name), given, parameter)]
         parts += [(name, value) for value in values if value is not None]
     return parts
+
+
+def _quantities(pointer: str, found: Mapping[str, Any]) -> Iterator[tuple[str, object]]:
+    """Every value of a condition with its JSON Pointer."""
+    for name, given in found.items():
+        if isinstance(given, list):
+            yield from ((join(pointer, name, index), item) for index, item in enumerate(given))
+        else:
+            yield join(pointer, name), given
 
 
 def kept(

@@ -19,6 +19,7 @@ from sprag.service.spec.draws.correlations import read_correlations
 from sprag.service.spec.draws.unit import cases_of, correlated, unit_sample
 from sprag.service.spec.fields import read_number, read_object
 from sprag.service.spec.report import Report, join
+from sprag.service.spec.together import refuse_mixed
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES
 from sprag.worker.planning.goals.draws import exponential, logarithm
 
@@ -140,7 +141,9 @@ def _read_range(report: Report, pointer: str, data: object, machine: Machine) ->
         return None
     paths = read_paths(report, join(pointer, "path"), found.get("path"), machine)
     scale = SCALE.read(report, pointer, found)
-    if paths is None:
+    unit = "" if paths is None else machine.parameters[paths[0]].unit
+    given = [(join(pointer, name), found.get(name)) for name in ("from", "to")]
+    if paths is None or refuse_mixed(report, given, unit):
         return None
     ends = []
     for name in ("from", "to"):
@@ -150,7 +153,6 @@ def _read_range(report: Report, pointer: str, data: object, machine: Machine) ->
                 return None
         ends.append(value)
     low, high = (float(end) for end in ends if end is not None)
-    unit = machine.parameters[paths[0]].unit
     if low == high:
         report.fault(
             join(pointer, "to"), "invalid-range", "is the same as `from`", high, allowed="another value", unit=unit

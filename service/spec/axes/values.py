@@ -12,6 +12,7 @@ import numpy as np
 
 from sprag.service.spec.fields import read_exact, read_number, read_whole
 from sprag.service.spec.report import Report, join
+from sprag.service.spec.together import refuse_mixed
 from sprag.service.spec.units import QuantityError, parse_exact, to_float
 from sprag.worker.limits import MAX_AXIS_VALUES
 from sprag.worker.models import Parameter
@@ -61,6 +62,8 @@ def plan_values(report: Report, pointer: str, data: object, parameter: Parameter
     plain = _plain_numbers(data)
     if plain is not None and in_range(plain, parameter).all():
         return Plan(pointer, plain.size, lambda: plain, listed=True)
+    if _mixed(report, pointer, data, parameter):
+        return None
     numbers = [read_number(report, join(pointer, index), value, parameter) for index, value in enumerate(data)]
     known = [number for number in numbers if number is not None]
     if len(known) < len(numbers):
@@ -76,6 +79,11 @@ def _plain_numbers(data: list[Any]) -> Values | None:
         return np.array(data, dtype=np.float64)
     except OverflowError:
         return None
+
+
+def _mixed(report: Report, pointer: str, items: Sequence[Any], parameter: Parameter) -> bool:
+    """Whether bare numbers stand beside quantities of another scale; each is recorded as a fault."""
+    return refuse_mixed(report, [(join(pointer, index), item) for index, item in enumerate(items)], parameter.unit)
 
 
 def plan_linspace(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:
@@ -103,7 +111,7 @@ def plan_geomspace(report: Report, pointer: str, data: object, parameter: Parame
 def plan_range(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:
     """The plan of ``[from, to, step]``; ``to`` is included when a whole number of steps reaches it."""
     items = _three(report, pointer, data, "[from, to, step]")
-    if items is None:
+    if items is None or _mixed(report, pointer, items, parameter):
         return None
     start = read_exact(report, join(pointer, 0), items[0], parameter)
     stop = read_exact(report, join(pointer, 1), items[1], parameter)
@@ -149,7 +157,7 @@ def _division(
     report: Report, pointer: str, data: object, parameter: Parameter
 ) -> tuple[Fraction, Fraction, int] | None:
     items = _three(report, pointer, data, "[from, to, count]")
-    if items is None:
+    if items is None or _mixed(report, pointer, items[:2], parameter):
         return None
     start = read_exact(report, join(pointer, 0), items[0], parameter)
     stop = read_exact(report, join(pointer, 1), items[1], parameter)

@@ -10,6 +10,7 @@ from sprag.service.spec.draws.distributions import SIGMAS
 from sprag.service.spec.fields import read_number
 from sprag.service.spec.report import Report, join
 from sprag.service.spec.shares import in_percent
+from sprag.service.spec.together import refuse_mixed
 from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker.limits import MAX_CORRELATIONS, MAX_DRIVES, MAX_TOLERANCES
 
@@ -84,7 +85,8 @@ def read_plus_minus(
 def read_measured(report: Report, pointer: str, data: object, parameters: Sequence[Parameter]) -> list[float] | None:
     """Measured values (SI), in the range of every one of ``parameters``; None, and faults recorded, where invalid."""
     items = MEASURED.read(report, pointer, data)
-    if items is None:
+    given = [(join(pointer, index), item) for index, item in enumerate(items or ())]
+    if items is None or refuse_mixed(report, given, parameters[0].unit):
         return None
     read = [
         [read_number(report, join(pointer, index), item, parameter) for parameter in parameters]

@@ -23,7 +23,8 @@ from sprag.service.spec.machine.shaft_parts import (
     read_operation,
     read_parts,
 )
-from sprag.service.spec.report import Report, did_you_mean
+from sprag.service.spec.report import Report, did_you_mean, join
+from sprag.service.spec.together import refuse_mixed
 from sprag.worker import models
 from sprag.worker.models import machine_shaft
 from sprag.worker.models.parameters import model_parameter
@@ -90,8 +91,25 @@ def read_shaft(report: Report, data: object) -> ShaftMachine:
     machine.structure = structure
     machine.parameters = machine_shaft.parameters_of(structure)
     _unused(report, found, structure)
+    _refuse_mixed_steps(report, found, machine)
     read_numbers(report, found, machine)
     return machine
+
+
+def _refuse_mixed_steps(report: Report, found: Mapping[str, Any], machine: Machine) -> None:
+    """Record bare numbers in a column of steps beside quantities of another scale."""
+    owners = [("/base", found), *((join("/base/parts", k), part) for k, part in enumerate(found.get("parts") or ()))]
+    for pointer, owner in owners:
+        operation = owner.get("operation")
+        steps = operation.get("steps") if isinstance(operation, Mapping) else None
+        where = join(pointer, "operation", "steps")
+        prefix = where.removeprefix("/base/").replace("/", ".")
+        for names in (("from", "to"), ("value",)):
+            entry = machine.parameters.get(f"{prefix}.0.{names[0]}")
+            column = [(join(where, k, name), step[name]) for k, step in enumerate(steps or ()) for name in names
+                      if name in step]  # fmt: skip
+            if entry is not None:
+                refuse_mixed(report, column, entry.unit)
 
 
 def check_shaft(report: Report, machine: Machine) -> None:

@@ -8,6 +8,7 @@ from sprag.service.spec.axes.axes import read_paths
 from sprag.service.spec.catalogue import result_of, unknown_result
 from sprag.service.spec.fields import read_number
 from sprag.service.spec.report import Report, join, quantity_text
+from sprag.service.spec.together import refuse_mixed
 from sprag.service.spec.units import QuantityError, example, parse_quantity
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ def read_ends(
 
     ``ends`` are the two pointers, each with its value.
     """
+    if refuse_mixed(report, ends, machine.parameters[paths[0]].unit):
+        return None
     read: list[float] = []
     for where, value in ends:
         numbers = [read_number(report, where, value, machine.parameters[path]) for path in paths]

@@ -13,6 +13,7 @@ from sprag.service.spec.plan.fields import read_ends, read_path_of, read_result,
 from sprag.service.spec.plan.robust import ROBUST, YIELD, check_drives, read_quantile, refuse_beside_yield
 from sprag.service.spec.report import Report, did_you_mean, join
 from sprag.service.spec.shares import in_percent, read_share
+from sprag.service.spec.together import refuse_mixed
 from sprag.worker.limits import MAX_PLANNED_CASES
 
 if TYPE_CHECKING:
@@ -82,6 +83,7 @@ def read_points(
     if items is None:
         return None
     before = report.found
+    _refuse_mixed_points(report, items, machine)
     varied = {path for found in variables or () for path in found["paths"]}
     points: list[dict[str, float]] = []
     for index, item in enumerate(items):
@@ -117,6 +119,17 @@ def read_points(
                 allowed="each point once",
             )  # fmt: skip
     return None if report.found > before else points
+
+
+def _refuse_mixed_points(report: Report, items: Sequence[Any], machine: Machine) -> None:
+    """Record bare numbers that a parameter has at some points beside quantities of another scale at others."""
+    columns: dict[str, list[tuple[str, object]]] = {}
+    for index, item in enumerate(items):
+        for path, value in item.items() if isinstance(item, Mapping) else ():
+            columns.setdefault(path, []).append((join("/goal/at", index, path), value))
+    for path, column in columns.items():
+        if path in machine.parameters:
+            refuse_mixed(report, column, machine.parameters[path].unit)
 
 
 def read_goal(
@@ -241,6 +254,9 @@ def _read_constraint(
         report.fault(
             join(where, kind), "not-numeric", "compares a category", fields[kind], allowed="`is` for a category"
         )
+        return None
+    together = [(join(where, name), fields[name]) for name in (kind, "within") if name in fields]
+    if info.kind == "real" and refuse_mixed(report, together, info.unit):
         return None
     value = read_value(report, join(where, kind), fields[kind], info)
     if value is not None and kind == "is" and info.kind == "count" and not value.is_integer():

@@ -33,7 +33,8 @@ def inertia(columns: Any) -> Any:
 
 AXES: dict[str, dict[str, Any]] = {
     "grid": {
-        "/axes": [{"path": MASS, "values": ["400 g", 0.5, 0.6]}, {"path": ARM, "linspace": ["20 mm", "30 mm", 3]}]
+        "/axes": [{"path": MASS, "values": ["400 g", "500 g", "0.6 kg"]},
+                  {"path": ARM, "linspace": ["20 mm", "30 mm", 3]}]
     },
     "zip": {
         "/axes": [{"path": MASS, "values": [0.4, 0.5]}, {"path": ARM, "values": ["20 mm", "25 mm"]}],

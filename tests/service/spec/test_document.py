@@ -88,7 +88,7 @@ def test_units_do_not_change_the_physics() -> None:
         "/base/pendulums/0/arm": "3 cm",
         "/base/shaft/load": 0.1,
         "/base/clutch/coefficients/3": "2e4 N*m/rad^3",
-        "/axes/1/linspace": [0.001, "0.3 cm", 4],
+        "/axes/1/linspace": ["1 mm", "0.3 cm", 4],
         "/axes/0/linspace": ["960 rpm", "2100 rpm", 16],
         "/name": "the same",
     }

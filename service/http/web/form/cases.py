@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from sprag.service.http.web.form.entries import Faults, Values, list_of, path_values, paths_of, plain, text_of
+from sprag.service.http.web.form.entries import Faults, Values, list_of, path_values, paths_of, plain, range_of, text_of
 from sprag.service.http.web.form.parts import PARTS, filled
 from sprag.service.languages import N_, _
 from sprag.service.spec.axes.exclude import FIELDS as KINDS
@@ -63,8 +63,11 @@ def blocks_of(values: Mapping[str, str]) -> dict[str, dict[str, Any]]:
 def _range(values: Mapping[str, str], index: int) -> dict[str, Any]:
     pointer = f"{PARTS['ranges'].pointer}/{index}"
     scale = values.get(f"{pointer}/scale", "")
-    ends = {name: plain(values.get(f"{pointer}/{name}", "")) for name in ("from", "to")}
-    return {"path": paths_of(values, pointer), **ends, **({"scale": scale} if scale == "log" else {})}
+    return {
+        "path": paths_of(values, pointer),
+        **range_of(values, f"{pointer}/"),
+        **({"scale": scale} if scale == "log" else {}),
+    }
 
 
 def exclusions_of(values: Mapping[str, str]) -> list[dict[str, Any]]:

@@ -26,7 +26,7 @@ from sprag.service.results.reading import Choice, reading_for
 from sprag.service.results.wording import duration, unit_text
 from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
 from sprag.service.spec.derive import with_values
-from sprag.service.spec.document import ParsedSpec, SpecError, load_spec, parse_spec
+from sprag.service.spec.document import ParsedSpec, SpecError, accepted, load_spec, parse_spec
 from sprag.service.spec.machine.clutch import read_clutch
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
 from sprag.service.spec.report import Report
@@ -252,7 +252,7 @@ def fits_of(spec: dict[str, Any]) -> dict[str, tuple[ClutchFitReport, FitChart]]
     # The fit is not stored, because it follows from the spec exactly.
     found = {}
     alone = {key: value for key, value in spec.items() if key in ("sprag", "model", "name", "base", "derive", "run")}
-    parsed = parse_spec(alone)
+    parsed = parse_spec(accepted(alone))
     for pointer, fit in parsed.fits.items():
         known = backlashes(_with_derived(spec, parsed.study), pointer)
         found[pointer] = (fit_json(fit), fit_chart(fit, clutch_at(spec, pointer), known[0] if known else 0.0))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from sprag.service.spec.numbers import settled, with_point
+from sprag.service.spec.together import with_last_unit, with_unit_of_range
 
 Values = dict[str, str]
 Faults = dict[str, list[str]]
@@ -27,8 +28,26 @@ def plain(text: str) -> Any:
 
 
 def list_of(text: str) -> list[Any]:
-    """The entries of a list, whose commas are decimal for all of them where one settles it."""
-    return [plain(item) for item in settled([item for item in _BETWEEN.split(text) if item.strip()])]
+    """The entries of a list, whose commas are decimal for all of them where one settles it.
+
+    A unit at the end holds for the bare numbers before it.
+    """
+    return [plain(item) for item in with_last_unit(items_of(text))]
+
+
+def items_of(text: str) -> list[str]:
+    """The items of a list as texts, with decimal points."""
+    return settled([item for item in _BETWEEN.split(text) if item.strip()])
+
+
+def range_of(values: Mapping[str, str], pointer: str, names: Sequence[str] = ("from", "to")) -> dict[str, Any]:
+    """The ends of a range, and its step where it has one, by name; a unit at the end holds for the bare numbers."""
+    texts = {name: values.get(f"{pointer}{name}", "").strip() for name in names}
+    if "step" in texts:
+        texts["from"], texts["to"], texts["step"] = with_unit_of_range(texts["from"], texts["to"], texts["step"])
+    else:
+        texts["from"], texts["to"] = with_last_unit([texts["from"], texts["to"]])
+    return {name: plain(text) for name, text in texts.items()}
 
 
 def names_of(text: str) -> list[str]:

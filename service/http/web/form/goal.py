@@ -6,10 +6,11 @@ import re
 from collections.abc import Mapping
 from typing import Any, Final
 
-from sprag.service.http.web.form.entries import Faults, Values, list_of, path_values, paths_of, plain, text_of
+from sprag.service.http.web.form.entries import Faults, Values, list_of, path_values, paths_of, plain, range_of, text_of
 from sprag.service.http.web.form.parts import PARTS, filled
 from sprag.service.languages import N_
 from sprag.service.spec.plan import goal
+from sprag.service.spec.together import with_last_unit
 
 #: What a search asks for in a form that was not about one.
 GOAL_DEFAULTS: Final[Values] = {
@@ -48,9 +49,7 @@ def _variable(values: Mapping[str, str], index: int) -> dict[str, Any]:
     way = values.get(f"{pointer}/way", "from")
     if way == "values":
         return {"path": paths_of(values, pointer), "values": list_of(values.get(f"{pointer}/values", ""))}
-    return {"path": paths_of(values, pointer)} | {
-        name: plain(values.get(f"{pointer}/{name}", "")) for name in ("from", "to")
-    }
+    return {"path": paths_of(values, pointer)} | range_of(values, f"{pointer}/")
 
 
 def _best(values: Mapping[str, str], index: int) -> dict[str, Any]:
@@ -62,10 +61,11 @@ def _best(values: Mapping[str, str], index: int) -> dict[str, Any]:
 def _limit(values: Mapping[str, str], index: int) -> dict[str, Any]:
     pointer = f"/goal/subject_to/{index}"
     kind = values.get(f"{pointer}/kind", "at_most")
-    within = values.get(f"{pointer}/within", "").strip() if kind == "is" else ""
+    value, within = values.get(f"{pointer}/value", ""), values.get(f"{pointer}/within", "") if kind == "is" else ""
+    value, within = (text.strip() for text in with_last_unit([value, within]))
     return {
         "result": values.get(f"{pointer}/result", "") or None,
-        kind: plain(values.get(f"{pointer}/value", "")),
+        kind: plain(value),
         **({"within": plain(within)} if within else {}),
     }
 

@@ -14,7 +14,7 @@ from sprag.service.http.views import preset_of
 from sprag.service.http.web.form.check import message
 from sprag.service.spec.derive import with_values
 from sprag.service.spec.design import design_spec
-from sprag.service.spec.document import parse_spec
+from sprag.service.spec.document import accepted, parse_spec
 from sprag.service.spec.fields import WHICH_CASES
 from sprag.service.spec.report import SpecError
 from sprag.worker import models
@@ -41,6 +41,7 @@ def single_machine(spec: Mapping[str, Any]) -> dict[str, Any]:
     Formulas have their values, measured clutches the coefficients of their fit, and what only an axis gives has the
     value in the middle of the axis.
     """
+    spec = accepted(spec)
     axes = parse_spec(spec).study.axes
     middle = {path: axis.values[len(axis.values) // 2] for axis in axes for path in axis.paths}
     given = {

@@ -61,7 +61,7 @@ from sprag.service.http.work import Attended, Work
 from sprag.service.jobs.submission import Submission, take_in
 from sprag.service.presets import preset_names
 from sprag.service.spec.design import design_spec
-from sprag.service.spec.document import UNNAMED
+from sprag.service.spec.document import UNNAMED, accepted
 from sprag.service.spec.report import SpecError
 from sprag.worker import models
 from sprag.worker.models import MAX_PENDULUMS
@@ -137,9 +137,9 @@ def _start(
     if clone is not None and case is not None:
         study = study_with(context, clone, case)
         known = along is None or (along in study.base and along not in study.derive)
-        return design_spec(context.store.spec(clone), study, case, along if known else None)
+        return design_spec(accepted(context.store.spec(clone)), study, case, along if known else None)
     if clone is not None:
-        spec, name = context.store.spec(clone), context.store.get_study(clone).name
+        spec, name = accepted(context.store.spec(clone)), context.store.get_study(clone).name
         # A study that was given another name is cloned under that.
         return spec if spec.get("name", UNNAMED) == name else {**spec, "name": name}
     if preset is None:

@@ -10,6 +10,7 @@ from sprag.service.http.web.form.entries import Faults, Values, plain, text_of
 from sprag.service.http.web.form.shaft import CONSTANTS, DRIVE, Entry, blocks, owners, parts_of, stages_of
 from sprag.service.spec.machine.shaft_drive import MOTOR
 from sprag.service.spec.machine.shaft_parts import MECHANISM_CHOICES
+from sprag.service.spec.together import with_last_unit
 from sprag.service.spec.units import QuantityError, parse_quantity
 
 _STEP: Final = ("from", "to", "value")
@@ -62,14 +63,21 @@ def _put(base: dict[str, Any], entry: Entry, text: str, faults: Faults) -> None:
     if entry.name == CONSTANTS:
         place[name] = _constants(text, faults)
     elif entry.lines and name == "steps":
-        place[name] = [_step(line) for line in text.splitlines() if line.strip()]
+        place[name] = _steps(text)
     else:
         place[name] = text.strip() if entry.lines or entry.field.choices else plain(text)
 
 
-def _step(line: str) -> dict[str, Any]:
+def _steps(text: str) -> list[dict[str, Any]]:
+    """The steps of an operation, one a line; a unit at the end of a column holds for the bare numbers above it."""
+    rows = [[text.strip() for text in line.split(";")] for line in text.splitlines() if line.strip()]
+    places = iter(with_last_unit([text for row in rows for text in row[:2]]))
+    levels = iter(with_last_unit([text for row in rows for text in row[2:3]]))
+    return [_step([*(next(places) for _ in row[:2]), *(next(levels) for _ in row[2:3]), *row[3:]]) for row in rows]
+
+
+def _step(texts: list[str]) -> dict[str, Any]:
     """One step of an operation; what is missing is reported by the reader of the spec."""
-    texts = [text.strip() for text in line.split(";")]
     found = {name: plain(text) for name, text in zip(_STEP, texts, strict=False) if text}
     return found | ({"further": "; ".join(texts[3:])} if len(texts) > len(_STEP) else {})
 

@@ -20,11 +20,13 @@ from sprag.service.http.web.form.entries import (
     Faults,
     Values,
     count_in,
+    items_of,
     list_of,
     names_of,
     path_values,
     paths_of,
     plain,
+    range_of,
     text_of,
 )
 from sprag.service.http.web.form.fields import FORM_MODEL, pendulum, sections
@@ -39,6 +41,7 @@ from sprag.service.spec.derive import formulas_of, with_values
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
 from sprag.service.spec.plan import refine
 from sprag.service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
+from sprag.service.spec.together import with_last_unit
 from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker.models import MACHINE_SHAFT, MAX_PENDULUMS, SETTLED
 
@@ -191,7 +194,8 @@ def _clutch(values: Mapping[str, str], pointer: str, faults: Faults) -> dict[str
         if re.fullmatch(r"(?:[-+0-9.eE\s]|,[0-9])+", coefficients):
             coefficients = "; ".join(coefficients.split())
         return {
-            **({"coefficients": list_of(coefficients)} if coefficients.strip() else {}),
+            # Each coefficient has a unit of its own: that of the last one holds for no other.
+            **({"coefficients": [plain(item) for item in items_of(coefficients)]} if coefficients.strip() else {}),
             **_given(values, f"{pointer}/windup_limit", "windup_limit"),
         }
     found: dict[str, Any] = {"data": None}
@@ -219,7 +223,7 @@ def _run(values: Mapping[str, str]) -> dict[str, Any]:
     run = _object(
         values, "/run", ["/run/at_most", "/run/max_period", "/run/settled", "/run/duration", "/run/tolerance"]
     )
-    window = [plain(values.get(f"/run/window/{index}", "")) for index in (0, 1)]
+    window = [plain(text) for text in with_last_unit([values.get(f"/run/window/{index}", "") for index in (0, 1)])]
     if any(window):
         run["window"] = window
     if values.get("/run/until", SETTLED) == SETTLED:
@@ -241,7 +245,7 @@ def _axis(values: Mapping[str, str], index: int) -> dict[str, Any] | None:
     if not path and not any(texts):
         return None
     axis: dict[str, Any] = {"path": path}
-    axis[way] = list_of(texts[0]) if way == "values" else [plain(text) for text in texts]
+    axis[way] = list_of(texts[0]) if way == "values" else list(range_of(values, f"{pointer}/", names).values())
     swept = values.get(f"{pointer}/{SWEPT.name}", "")
     return axis | ({SWEPT.name: swept} if swept else {})
 

@@ -33,7 +33,8 @@ def test_a_study_is_accepted_and_found_where_it_says(service: Service) -> None:
     shown = service.get(f"/studies/{body['id']}")
     fits(studies.StudyDetail, shown)
     assert shown["spec"] == SPEC
-    assert shown["axes"][1] == {"paths": ["shaft.load"], "unit": "N*m", "values": 3, "first": 0.02, "last": 0.3}
+    assert shown["axes"][1] == {"paths": ["shaft.load"], "unit": "N*m", "values": 3, "first": 0.02, "last": 0.3,
+                                "least": 0.02, "largest": 0.3}  # fmt: skip
     assert datetime.fromisoformat(shown["created_at"]).tzinfo is not None
     assert shown["progress"]["seconds_left"] is None
     assert shown["finished_at"] is None

@@ -27,7 +27,7 @@ SAMPLE: dict[str, Any] = {
 POINTS = {"points": "excitation.frequency [rpm],gravity\n1500,9.81\n1800,0\n"}
 EXCLUDE: list[dict[str, Any]] = [
     {"shaft.load": {"above": "0.2 N*m", "at_most": 0.25}},
-    {"shaft.load": {"below": 0.05}, "excitation.amplitude_x": {"is": ["1 mm", 0.002]}},
+    {"shaft.load": {"below": 0.05}, "excitation.amplitude_x": {"is": ["1 mm", "2 mm"]}},
 ]
 
 
@@ -133,7 +133,7 @@ def test_the_page_submits_what_commands_submit(service: Service) -> None:
     page = service.http.post("/new", data={**values, "do": "check"}).text
     assert 'name="/sample/ranges/1/tied"' in page
     assert 'data-into="/points"' in page
-    assert 'name="/exclude/1/and/value" value="1 mm; 0.002"' in page
+    assert 'name="/exclude/1/and/value" value="1 mm; 2 mm"' in page
     answer = service.http.post("/new", data={**values, "do": "submit"}, follow_redirects=False)
     assert answer.status_code == 303
     by_form = service.store.study(answer.headers["location"].rpartition("/")[2])

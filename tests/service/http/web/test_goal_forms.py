@@ -19,7 +19,7 @@ from tests.service.http.web.controls import Controls
 GOAL: dict[str, Any] = {
     "vary": [
         {"path": "excitation.frequency", "from": "20 Hz", "to": "35 Hz"},
-        {"path": ["excitation.amplitude_x", "excitation.amplitude_y"], "values": ["1 mm", "2 mm", 0.003]},
+        {"path": ["excitation.amplitude_x", "excitation.amplitude_y"], "values": ["1 mm", "2 mm", "0.003 m"]},
     ],
     "best": [{"result": "efficiency", "max": True}, {"result": "shaft.irregularity"}],
     "subject_to": [

@@ -47,11 +47,11 @@ def test_tolerances_stand_beside_their_parameters() -> None:
 
 def test_measured_values_are_a_list_in_the_field() -> None:
     spec = json.loads(EXAMPLE.read_text())
-    measured = {"path": "pendulums.0.damping", "values": [0.01, "12 N*mm*s/rad", 0.011]}
+    measured = {"path": "pendulums.0.damping", "values": ["10 N*mm*s/rad", "12 N*mm*s/rad", "0.011 N*m*s/rad"]}
     spec["tolerances"] = [*spec["tolerances"], measured]
     values = values_of(spec)
     damping = "/tolerances/pendulums/0/damping"
-    assert values[f"{damping}/plus_minus"] == "0.01; 12 N*mm*s/rad; 0.011"
+    assert values[f"{damping}/plus_minus"] == "10 N*mm*s/rad; 12 N*mm*s/rad; 0.011 N*m*s/rad"
     assert values[f"{damping}/distribution"] == "values"
     assert parse_spec(spec_of(values)[0]).study == parse_spec(spec).study
     # One column of a spreadsheet, with decimal commas; the fault of one value is at the field.

@@ -138,7 +138,7 @@ def test_another_process_draws_the_same_bits() -> None:
 
 
 def test_measured_values_are_drawn_as_they_are() -> None:
-    spread = spread_of({"path": BACKLASH, "values": ["0.2 deg", 0.004, 0.005, 0.006]}, drives=400)
+    spread = spread_of({"path": BACKLASH, "values": ["0.2 deg", "4 mrad", "5 mrad", "0.006 rad"]}, drives=400)
     values, counts = np.unique(spread.array, return_counts=True)
     assert values.tolist() == [pytest.approx(0.2 * np.pi / 180), 0.004, 0.005, 0.006]
     assert counts.min() >= 98

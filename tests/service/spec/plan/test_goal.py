@@ -105,7 +105,7 @@ def test_a_goal_is_read_in_si() -> None:
             "not-used",
         ),
         ({"at": [{"shaft.load": 0.2}, {"shaft.inertia": 0.2}]}, "/goal/at/1", "conflict"),
-        ({"at": [{"shaft.load": 0.2}, {"shaft.load": "200 N*mm"}]}, "/goal/at/1", "repeated"),
+        ({"at": [{"shaft.load": "0.2 N*m"}, {"shaft.load": "200 N*mm"}]}, "/goal/at/1", "repeated"),
         ({"at": [{"pendulums.0.arm": 0.2}]}, "/goal/at/0/pendulums.0.arm", "repeated"),
         ({"at": [{"shaft.lod": 0.2}]}, "/goal/at/0/shaft.lod", "invalid-path"),
         ({"at": [0.2]}, "/goal/at/0", "wrong-type"),

@@ -93,7 +93,7 @@ def test_ends_may_be_given_in_any_order_and_unit_and_fields_have_defaults() -> N
         ({"/refine/most": 0}, "/refine/most", "out-of-range"),
         ({"/refine/errors": 1}, "/refine/errors", "unknown-field"),
         ({"/axes/1/adaptive": [0.1]}, "/axes/1/adaptive", "wrong-type"),
-        ({"/axes/1/adaptive": [0.1, "100 N*mm"]}, "/axes/1/adaptive", "invalid-range"),
+        ({"/axes/1/adaptive": ["0.1 N*m", "100 N*mm"]}, "/axes/1/adaptive", "invalid-range"),
         ({"/axes/1/adaptive": [-1, 1]}, "/axes/1/adaptive/0", "out-of-range"),
         ({"/axes/0/path": "shaft.load", "/axes/0/values": [0.1]}, "/axes/1/path", "repeated"),
         ({"/axes/1": {"path": "shaft.load", "values": [0.1]}}, "/axes", "exactly-one"),

@@ -1,0 +1,145 @@
+"""Quantities that somebody types together: the values of a list, the ends and the step of a range.
+
+A unit at the end holds for the bare numbers before it: ``0; 50; 100 N*mm`` are three torques in N*mm (`with_last_unit`,
+for one text and for fields that stand beside each other). Items of a spec are read one by one, and a bare number is in
+the SI unit: beside quantities in units of another scale it is never guessed but asked about (`question`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, Final
+
+from sprag.service.faults import Code
+from sprag.service.spec.cyrillic import latin
+from sprag.service.spec.units import PERIOD_NAMES, QuantityError, measure, parse_exact, split_typed
+
+if TYPE_CHECKING:
+    from sprag.service.spec.report import Report
+
+#: Code of a bare number that could be in several units.
+AMBIGUOUS_UNIT: Final[Code] = "ambiguous-unit"
+_LISTED: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """What is asked about a bare number: ``place`` is that of the number among the values."""
+
+    place: int
+    message: str
+    allowed: str
+
+
+def with_last_unit(texts: Sequence[str]) -> list[str]:
+    """The texts, the bare numbers among them with the unit of the last one.
+
+    Where other units stand before it, or the unit is not at the end, they stay as they are: the reader of the spec
+    asks.
+    """
+    units = [_typed_unit(text) for text in texts]
+    last = next((unit for text, unit in zip(reversed(texts), reversed(units), strict=True) if text.strip()), None)
+    if not last or _kind(last) is None or len({_kind(unit) for unit in units if unit}) > 1:
+        return list(texts)
+    return [f"{text.strip()} {last}" if unit == "" else text for text, unit in zip(texts, units, strict=True)]
+
+
+def with_unit_of_range(first: str, last: str, step: str) -> tuple[str, str, str]:
+    """The ends and the step of a range with the unit of its end, or of the step where only that has one."""
+    if _typed_unit(step) == "":
+        first, step, last = with_last_unit([first, step, last])
+    else:
+        first, last, step = with_last_unit([first, last, step])
+    return first, last, step
+
+
+def with_unit_of_end(first: str | None, last: str | None) -> tuple[str | None, str | None]:
+    """Two ends of a range, None where one is not given."""
+    if first is None or last is None:
+        return first, last
+    low, high = with_last_unit([first, last])
+    return low, high
+
+
+def question(values: Sequence[object], unit: str) -> Question | None:
+    """What is asked about the first bare number that stands beside quantities in units of another scale.
+
+    ``values`` are numbers, and texts with or without a unit; ``unit`` is the SI unit of bare numbers. Zero is the same
+    in every unit.
+    """
+    return next(iter(questions(values, [unit] * len(values))), None)
+
+
+def questions(values: Sequence[object], units: Sequence[str]) -> list[Question]:
+    """As `question`, about every such number of values that have SI units of their own: coefficients of a series."""
+    if not any(isinstance(value, str) for value in values):
+        return []
+    typed = [_typed_unit(value) if isinstance(value, str) else None for value in values]
+    others = [(name, unit) for name, unit in zip(typed, units, strict=True) if name and _differs(name, unit)]
+    asked = []
+    for place, (value, own) in enumerate(zip(values, typed, strict=True)):
+        number = _bare(value, own) if others else None
+        if number is not None:
+            names = list(dict.fromkeys([units[place], *(_carried(*other, units[place]) for other in others)]))[:_LISTED]
+            choice = f"{', '.join(f'in {name}' for name in names[:-1])} or in {names[-1]}"
+            message = f"has no unit beside values that have one: {number} {choice}?"
+            asked.append(Question(place, message, ", ".join(f"{number} {name}" for name in names)))
+    return asked
+
+
+def refuse_mixed(report: Report, items: Iterable[tuple[str, object]], unit: str | Sequence[str]) -> bool:
+    """Record a fault for each bare number beside quantities in units of another scale; whether there is one.
+
+    ``items`` are JSON Pointers with their values, ``unit`` is their SI unit, or that of each.
+    """
+    pairs = list(items)
+    units = [unit] * len(pairs) if isinstance(unit, str) else unit
+    asked = questions([value for _, value in pairs], units)
+    for one in asked:
+        pointer, value = pairs[one.place]
+        report.fault(pointer, AMBIGUOUS_UNIT, one.message, value, allowed=one.allowed, unit=units[one.place])
+    return bool(asked)
+
+
+def _carried(name: str, unit: str, wanted: str) -> str:
+    """The unit of another coefficient that goes with a typed one: "N*mm/rad^2" (of N*m/rad^2) for N*m is "N*mm"."""
+    per, wanted_per = (text[len(text.partition("/")[0]) :] for text in (unit, wanted))
+    return name.removesuffix(per) + wanted_per if name.endswith(per) else f"another unit, as {name}"
+
+
+def _bare(value: object, unit: str | None) -> str | None:
+    """A number other than 0 without a unit, as it was written; None for anything else."""
+    if isinstance(value, str):
+        return value.strip() if unit == "" and split_typed(value)[0] else None
+    return repr(value) if isinstance(value, int | float) and not isinstance(value, bool) and value else None
+
+
+def _typed_unit(text: object) -> str | None:
+    """The unit of a text as it was typed, "" of a bare number; None for what is no quantity."""
+    try:
+        return split_typed(str(text))[1]
+    except QuantityError:
+        return None
+
+
+def _kind(unit: str) -> Hashable:
+    """Equal for units that mean the same, as "N*mm" and "Nmm"; None for what is no unit, as "%"."""
+    if latin(unit) in PERIOD_NAMES:
+        return "periods"
+    try:
+        factor, powers = measure(unit)
+    except QuantityError:
+        return None
+    return factor, frozenset(powers.items())
+
+
+def _differs(name: str, unit: str) -> bool:
+    """Whether a unit of the quantity is another one than its SI unit; False for a unit of another quantity."""
+    if latin(name) in PERIOD_NAMES and unit in {"s", "rad"}:
+        return True
+    try:
+        return parse_exact(f"1 {name}", unit) != Fraction(1)
+    except QuantityError:
+        return False
