@@ -99,7 +99,7 @@ def test_rows_that_are_not_read_are_missed(
         assert ask(service, ended, form).status_code == 503
         patch.setattr(curves, "_AT_ONCE", 0)  # as a large study, which is sent while it is read
         with served(service.app) as address:
-            if form in BUILT:
+            if form in (*BUILT, "parquet"):  # nothing is sent before all rows of a group are read
                 assert httpx.get(f"{address}{API}/studies/{ended}/results?format={form}").status_code == 503
             else:
                 with pytest.raises(httpx.RemoteProtocolError):
