@@ -4,12 +4,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
 
+from sprag.worker.errors import SpragError
+
 #: Packages of the project itself, for which no extra helps.
 _OWN: Final = frozenset({"sprag"})
 
 
-class MissingExtraError(ImportError):
+class MissingExtraError(SpragError, ImportError):
     """A feature needs a package outside the base installation; ``str()`` explains how to install it."""
+
+    code = "missing-extra"
 
 
 def command_for(missing: ModuleNotFoundError, extra: str = "server") -> str | None:

@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypedDict, TypeVar
 
+from sprag.worker.errors import SpragError
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -230,7 +232,7 @@ class ParameterFault(Fault):
     place = "parameter"
 
 
-class FaultError(Exception):
+class FaultError(SpragError):
     """A failure that is reported to the caller; ``sprag.service.http.problems`` defines its form over HTTP.
 
     Attributes
@@ -246,6 +248,7 @@ class FaultError(Exception):
     """
 
     code: str
+    faults: tuple[Fault, ...]
 
     def __init__(self, code: Kind, detail: str, faults: Iterable[Fault] = (), retry_after: int | None = None) -> None:
         super().__init__(detail)

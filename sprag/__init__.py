@@ -30,6 +30,9 @@ if TYPE_CHECKING:
         with_units,
     )
     from sprag.service.extras import MissingExtraError
+    from sprag.service.spec.report import SpecError
+    from sprag.worker.errors import SpragError
+    from sprag.worker.ports import ExecutorError, StoreError
 
     __version__: str
 
@@ -46,15 +49,27 @@ _OF_CLIENT: Final = (
     "UnreachableError",
     "with_units",
 )
+#: Errors that need nothing but the base installation, and their modules.
+_ERRORS: Final = {
+    "ExecutorError": "sprag.worker.ports",
+    "MissingExtraError": "sprag.service.extras",
+    "SpecError": "sprag.service.spec.report",
+    "SpragError": "sprag.worker.errors",
+    "StoreError": "sprag.worker.ports",
+}
 __all__ = [
     "AsyncClient",
     "AsyncStudy",
     "Client",
     "Curves",
+    "ExecutorError",
     "MissingExtraError",
     "RefusedError",
     "ServiceError",
+    "SpecError",
     "SpecFileError",
+    "SpragError",
+    "StoreError",
     "Study",
     "StudyTimeoutError",
     "UnreachableError",
@@ -73,9 +88,9 @@ def __getattr__(name: str) -> Any:
         return version("sprag")
     if name in _OF_CLIENT:
         return getattr(import_module("sprag.service.client"), name)
+    if name in _ERRORS:
+        return getattr(import_module(_ERRORS[name]), name)
     extras = import_module("sprag.service.extras")
-    if name == "MissingExtraError":
-        return extras.MissingExtraError
     if name == "engine":
         return import_module("sprag.engine")
     with extras.naming_extra(f"sprag.{name}"):

@@ -61,7 +61,7 @@ def run(
     SpecFileError, SpecError
         For an unreadable file and for an invalid spec: every fault with pointer, value and allowed range.
     StoreError, ExecutorError
-        When the database or a process fails.
+        When the database or a process fails. All of them are a SpragError.
     """
     parsed = parse_spec(spec_of(spec))
     study = parsed.study

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, Protocol
+
+from sprag.worker.errors import SpragError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -97,10 +99,8 @@ class ActiveStudy:
     fingerprint: str = ""
 
 
-class StoreError(Exception):
+class StoreError(SpragError):
     """An error of the store; the message is one sentence for a user, ``code`` is its stable kind."""
-
-    code: str = "unavailable"
 
 
 class StoreFullError(StoreError):
@@ -111,10 +111,8 @@ class EpochLostError(StoreError):
     """Another dispatcher has taken over: this one must stop and commit nothing more."""
 
 
-class ExecutorError(Exception):
+class ExecutorError(SpragError):
     """The executor can no longer run anything; the message is one sentence for a user."""
-
-    code: ClassVar[str] = "unavailable"
 
 
 class KernelError(Exception):

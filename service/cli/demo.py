@@ -17,8 +17,9 @@ import typer
 
 from sprag.service.cli.console import ExitCode, TroubleError, say, show_table, write_json
 from sprag.service.cli.files import file_failure, write_pieces
+from sprag.service.cli.following import follow
 from sprag.service.cli.options import JsonFlag
-from sprag.service.cli.remote import connection, follow
+from sprag.service.cli.remote import connection
 from sprag.service.languages import N_, _, decimal
 
 if TYPE_CHECKING:

@@ -10,6 +10,7 @@ from sprag.service.cli import completion
 from sprag.service.cli.console import Column, say, show_table, write_json
 from sprag.service.cli.file_formats import file_format
 from sprag.service.cli.files import write_pieces
+from sprag.service.cli.following import submitted, submitting
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import (
     DEFAULT_SERVER,
@@ -26,7 +27,7 @@ from sprag.service.cli.options import (
     in_units,
 )
 from sprag.service.cli.pictures import heading
-from sprag.service.cli.remote import connection, submitted
+from sprag.service.cli.remote import connection
 from sprag.service.languages import _
 from sprag.worker.limits import MAX_POINTS_SELECTED, MAX_SELECTED
 
@@ -67,7 +68,9 @@ def select(
     query = explore_query(where or (), sort, limit, (), ending, regime, flag)
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
-        submitted(client, client.select(study_id, query), wait, timeout, as_json)
+        with submitting():
+            study = client.select(study_id, query)
+        submitted(client, study, wait, timeout, as_json)
 
 
 def explore(

@@ -10,9 +10,10 @@ import typer
 from sprag.service.cli import completion
 from sprag.service.cli.console import say, wrong_option
 from sprag.service.cli.files import decode, read_bytes
+from sprag.service.cli.following import submitted, submitting
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token, Wait, WaitTimeout
-from sprag.service.cli.remote import connection, submitted
+from sprag.service.cli.remote import connection
 from sprag.service.languages import N_, _, ngettext
 from sprag.service.spec.numbers import could_be_one, parse_number, settled
 from sprag.service.spec.together import with_last_unit
@@ -50,7 +51,8 @@ def extend(
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
         old = client.study(study_id)
-        study = client.extend(study_id, addition)
+        with submitting():
+            study = client.extend(study_id, addition)
         say(_what_is_new(old, study))
         submitted(client, study, wait, timeout, as_json)
 
@@ -84,7 +86,9 @@ def longer(
     """Submit a study of the unsettled cases of another, with more time for each."""
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
-        submitted(client, client.run_longer(study_id, regime, at_most), wait, timeout, as_json)
+        with submitting():
+            study = client.run_longer(study_id, regime, at_most)
+        submitted(client, study, wait, timeout, as_json)
 
 
 def narrow(
@@ -109,7 +113,9 @@ def narrow(
     query = [("steps", str(steps)), *(("at", text) for text in at or [])]
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
-        submitted(client, client.narrow(study_id, query), wait, timeout, as_json)
+        with submitting():
+            study = client.narrow(study_id, query)
+        submitted(client, study, wait, timeout, as_json)
 
 
 def _what_is_new(old: Mapping[str, Any], study: Mapping[str, Any]) -> str:

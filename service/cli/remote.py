@@ -11,24 +11,19 @@ import typer
 
 from sprag.service.cli import completion
 from sprag.service.cli.console import (
-    OK,
     CommandFailureError,
-    ExitCode,
     TroubleError,
     WrongInputError,
     cell_text,
-    progress_bar,
-    progress_text,
     say,
     show_table,
-    state_text,
     time_text,
-    warning_lines,
     write_json,
     wrong_option,
 )
 from sprag.service.cli.file_formats import TableFormat, require_csv, table_format
 from sprag.service.cli.files import naming_points, read_spec, to_file, write_pieces
+from sprag.service.cli.following import exit_as, follow, outlived, show_study, submitted, submitting
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import (
     DEFAULT_SERVER,
@@ -52,7 +47,6 @@ from sprag.service.faults import Fault, Kind
 from sprag.service.formats import Format
 from sprag.service.languages import N_, _, recorded
 from sprag.worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
-from sprag.worker.states import TERMINAL, StudyState
 
 if TYPE_CHECKING:
     from sprag.service.client import Query, RefusedError, ServiceClient
@@ -113,7 +107,11 @@ def refusal(error: RefusedError) -> CommandFailureError:
     kind = cast("Kind", error.code)
     if error.status == 401:
         return TroubleError(
-            kind, _("{refusal} Give the service's token with --token or in SPRAG_TOKEN.", refusal=_(str(error)))
+            kind,
+            _(
+                "{refusal} Give the service's token with --token or in SPRAG_TOKEN.",
+                refusal=recorded.said(_(str(error))),
+            ),
         )
     if error.status in (403, 421) or error.status >= 500:
         return TroubleError(kind, str(error))
@@ -156,17 +154,9 @@ def submit(
     """Submit a study to the service and print its id."""
     data = read_spec(spec, points, MAX_BODY_BYTES, tables)
     with naming_points(points), connection(server, token) as client:
-        submitted(client, client.create_study(data, key, priority, fresh, finish_by), wait, timeout, as_json)
-
-
-def submitted(client: ServiceClient, study: dict[str, Any], wait: bool, timeout: float | None, as_json: bool) -> None:
-    """Tell of a study that was submitted, at once or when it has ended."""
-    say(*warning_lines(study.get("warnings", ()), study.get("warning_codes", ())))
-    if wait:
-        study = follow(client, study["id"], timeout)
-    show_study(study, as_json)
-    if wait:
-        _exit_as(study)
+        with submitting():
+            study = client.create_study(data, key, priority, fresh, finish_by)
+        submitted(client, study, wait, timeout, as_json)
 
 
 def watch(
@@ -180,93 +170,10 @@ def watch(
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
         client.study(study_id, timeout)  # a wrong address or id fails immediately
-        study = follow(client, study_id, timeout)
+        with outlived(study_id):
+            study = follow(client, study_id, timeout)
     show_study(study, as_json)
-    _exit_as(study)
-
-
-def follow(
-    client: ServiceClient, study_id: str, timeout: float | None = None, *, patient: bool = True
-) -> dict[str, Any]:
-    """Wait, with a bar on standard error, until a study has ended or reached its deadline; returns its final state.
-
-    For a held study the reason is printed, and watching continues until it is resumed or cancelled. The same applies to
-    a service that does not answer; with ``patient`` false, the command fails instead.
-    """
-    from sprag.service.client.synchronous.following import wait_for
-    from sprag.service.client.waiting import Waiting
-
-    reasons: set[str | None] = set()
-    with progress_bar(study_id) as update:
-
-        def tell(study: dict[str, Any]) -> None:
-            progress = study["progress"]
-            update(progress["done"], progress["total"], _remark(study))
-            held = study["state"] == StudyState.PAUSED and not study["time_over"]
-            if held and study.get("reason") not in reasons:
-                reasons.add(study.get("reason"))
-                why = recorded.said(_(study["reason"])) if study.get("reason") else _("on request")
-                say(_("{study} is paused: {why}", study=study_id, why=why))
-
-        return wait_for(client, study_id, Waiting(tell, timeout, patient=patient, notify=say))
-
-
-def _remark(study: dict[str, Any]) -> str:
-    progress = study["progress"]
-    left = progress["seconds_left"]
-    interval = None if left is None else (left["low"], left["high"])
-    rounds = _rounds(study)
-    return progress_text(study["state"], progress["rate"], interval, study["finish_by"], progress["in_time"], rounds)
-
-
-def _rounds(study: dict[str, Any]) -> str | None:
-    """The rounds of a study that chooses its own cases, in words; None of another, or of a service without rounds."""
-    rounds = study["progress"].get("rounds")
-    return None if rounds is None else str(rounds["sentence"])
-
-
-def _exit_as(study: dict[str, Any]) -> None:
-    """Exit with the code that shows whether every case ended ok."""
-    progress = study["progress"]
-    if progress["ok"] != progress["total"]:
-        raise typer.Exit(ExitCode.NOT_ALL_OK)
-
-
-def show_study(study: dict[str, Any], as_json: bool) -> None:
-    """Print the current study: its id and progress, or everything as JSON."""
-    if as_json:
-        write_json(study)
-        return
-    print(study["id"])
-    progress = study["progress"]
-    endings = ", ".join(f"{count} {name}" for name, count in progress.get("endings", {}).items() if name != OK)
-    counts = _(
-        "{name}: {state}, {done} of {total} cases done, {ok} ok",
-        name=study["name"] or study["model"],
-        state=state_text(study["state"]),
-        **{name: progress[name] for name in ("done", "total", "ok")},
-    )
-    say("; ".join([counts + (f" ({endings})" if endings else ""), *_remarks(study)]))
-    if study["time_over"]:
-        say(f"{study['id']}: {recorded.said(_(study['reason']))}")
-
-
-def _remarks(study: dict[str, Any]) -> Iterator[str]:
-    """What else is known of a study: rounds, reuse, hosts, deadline."""
-    if rounds := _rounds(study):
-        yield rounds
-    if study.get("reused"):
-        yield _("{count} taken from other studies", count=study["reused"])
-    found = [origin["host"] for origin in study.get("computed_by", []) if origin["host"]]
-    if hosts := sorted({host for names in found for host in names.split(", ")}):
-        yield _("computed by {hosts}", hosts=", ".join(hosts))
-    if _is_due(study):
-        yield _("to be finished by {time}", time=study["finish_by"])
-
-
-def _is_due(study: dict[str, Any]) -> bool:
-    """Whether the study has a future deadline."""
-    return bool(study.get("finish_by")) and not (study["time_over"] or study["state"] in TERMINAL)
+    exit_as(study)
 
 
 def act_on(study_id: str, verb: str, server: str, token: str | None, as_json: bool, query: Query = ()) -> None:

@@ -11,9 +11,10 @@ import typer
 from sprag.service.answers.studies import StudyOrder
 from sprag.service.cli import completion
 from sprag.service.cli.console import confirmed, say, show_table, time_text, write_json, wrong_option
+from sprag.service.cli.following import show_study
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
-from sprag.service.cli.remote import act_on, connection, show_study
+from sprag.service.cli.remote import act_on, connection
 from sprag.service.languages import N_, _
 from sprag.worker.states import StudyState
 

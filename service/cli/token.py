@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 from datetime import UTC, timedelta
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -15,13 +15,20 @@ from sprag.service.cli.names import token_of, user_of
 from sprag.service.cli.options import Database, JsonFlag
 from sprag.service.cli.user import users_of
 from sprag.service.languages import N_, _
-from sprag.service.storage.scopes import TokenScope
+from sprag.service.storage.scopes import TokenScope, TokenState
 from sprag.worker.limits import MAX_NAME_LENGTH
 
 if TYPE_CHECKING:
     from datetime import datetime
 
     from sprag.service.storage.tokens import TokenRecord
+
+_STATES: Final = {
+    TokenState.VALID: N_("valid"),
+    TokenState.EXPIRED: N_("expired"),
+    TokenState.REVOKED: N_("revoked"),
+    TokenState.USER_REMOVED: N_("its user is removed"),
+}
 
 app = typer.Typer(
     help="Create, list and revoke tokens; without a command: print a secret for SPRAG_TOKEN.",
@@ -84,17 +91,21 @@ def create(
 
 @app.command("list")
 def list_tokens(db: Database = None, as_json: JsonFlag = False) -> None:
-    """List all tokens with owner, expiry and last use, newest first, without their secrets."""
+    """List all tokens with owner, state, expiry and last use, newest first, without their secrets."""
     with users_of(db) as store:
-        found = [_json(record) for record in store.tokens()]
+        now, users = store.clock.now(), {user.name: user for user in store.users()}
+        records = store.tokens()
+    states = [record.state_at(now, users.get(record.owner or "")) for record in records]
+    found = [{**_json(record), "state": state.value} for record, state in zip(records, states, strict=True)]
     if as_json:
         write_json({"tokens": found})
         return
-    fields = ("id", "name", "user", "scope", "created_at", "expires_at", "used_at", "revoked_at")
+    fields = ("id", "name", "user", "scope", "state", "created_at", "expires_at", "used_at", "revoked_at")
     times = (_("created"), _("expires"), _("used"), _("revoked"))
-    heads = (_("id"), _("name"), _("user"), _("scope"), *times)
+    heads = (_("id"), _("name"), _("user"), _("scope"), _("state"), *times)
     columns = [(head, False, place == 0) for place, head in enumerate(heads)]
-    show_table("", columns, [[t[field] for field in fields] for t in found])
+    words = {state.value: _(_STATES[state]) for state in TokenState}
+    show_table("", columns, [[words[t[field]] if field == "state" else t[field] for field in fields] for t in found])
 
 
 @app.command()

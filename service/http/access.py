@@ -24,9 +24,10 @@ from sprag.service.faults import shown
 from sprag.service.http.attempts import Attempts
 from sprag.service.http.problems import ApiError
 from sprag.service.languages import N_
+from sprag.service.languages.recorded import TOKEN_EXPIRED, TOKEN_OF_REMOVED_USER, TOKEN_REVOKED
 from sprag.service.logs import REQUEST_ID
 from sprag.service.storage.part import micros_of
-from sprag.service.storage.scopes import MAX_USER_NAME, TokenScope
+from sprag.service.storage.scopes import MAX_USER_NAME, TokenScope, TokenState
 from sprag.service.storage.sessions import SessionSecrets
 from sprag.service.storage.tokens import TokenRecord, digest_of
 from sprag.service.storage.users import UserRecord
@@ -134,8 +135,8 @@ class Access:
         self._store = store
         self._key = secrets.token_bytes(32) if store is None else None
         self._logged_out: dict[str, int] = {}
-        self._by_digest: dict[str, tuple[TokenRecord, Grant]] = {}
-        self._by_id: dict[str, tuple[TokenRecord, Grant]] = {}
+        self._by_digest: dict[str, TokenRecord] = {}
+        self._by_id: dict[str, TokenRecord] = {}
         self._users: dict[str, UserRecord] = {}
         self._uses: dict[str, int] = {}
         self._any = False
@@ -153,9 +154,8 @@ class Access:
             seal: end for seal, end in (*self._logged_out.items(), *found.ended.items()) if end > now_seconds
         }
         self._users = {user.name: user for user in users}
-        alive = [(r, grant) for r in records if r.revoked_at is None and (grant := self._of_record(r)) is not None]
-        self._by_digest = {record.digest: (record, grant) for record, grant in alive}
-        self._by_id = {record.id: (record, grant) for record, grant in alive}
+        self._by_digest = {record.digest: record for record in records}
+        self._by_id = {record.id: record for record in records}
         self._any, self._read_at = bool(records or users), now
 
     @property
@@ -171,21 +171,48 @@ class Access:
 
     def of_header(self, header: str) -> Grant | None:
         """The grant of the token in an Authorization header; None when it is invalid."""
-        scheme, _, value = header.partition(" ")
-        return self.of_token(value.strip().encode("utf-8", "replace")) if scheme.lower() == "bearer" else None
+        token = token_in(header)
+        return None if token is None else self.of_token(token)
 
     def of_cookies(self, cookies: Mapping[str, str]) -> Grant | None:
         """The grant of the session in the cookies; None when there is none or it has ended."""
-        value = cookies.get(COOKIE, "")
-        identity, dot, seal = value.rpartition(".")
+        token_id = self._session_of(cookies)
+        if token_id == _SETTING and self._setting is not None:
+            return Grant(_SETTING, "SPRAG_TOKEN", Role.ADMINISTRATOR, TokenScope.WRITE)
+        return None if token_id is None else self._used(self._by_id.get(token_id))
+
+    def _session_of(self, cookies: Mapping[str, str]) -> str | None:
+        """The id of the token of the session in the cookies; None when there is none or it has ended."""
+        identity, dot, seal = cookies.get(COOKIE, "").rpartition(".")
         token_id, _, end = identity.partition(".")
         if not dot or not hmac.compare_digest(seal.encode("utf-8", "replace"), self._sealed(identity).encode()):
             return None
-        if int(end) <= time.time() or seal in self._logged_out:
+        return None if int(end) <= time.time() or seal in self._logged_out else token_id
+
+    def why_not(self, token: bytes) -> str | None:
+        """Why a token lets nobody in, as a sentence for its holder; None for one that does, or never was one."""
+        return self._reason(self._by_digest.get(digest_of(token)))
+
+    def why_ended(self, cookies: Mapping[str, str]) -> str | None:
+        """Why the token of the session in the cookies lets nobody in any more; None where it does, or there is none."""
+        return self._reason(self._by_id.get(self._session_of(cookies) or ""))
+
+    def _reason(self, record: TokenRecord | None) -> str | None:
+        if record is None:
             return None
-        if token_id == _SETTING and self._setting is not None:
-            return Grant(_SETTING, "SPRAG_TOKEN", Role.ADMINISTRATOR, TokenScope.WRITE)
-        return self._used(self._by_id.get(token_id))
+        name = f"{record.name} ({record.id})"
+        match self._state(record, datetime.now(UTC)):
+            case TokenState.EXPIRED if record.expires_at is not None:
+                ended = record.expires_at.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+                return TOKEN_EXPIRED.format(token=name, time=ended)
+            case TokenState.REVOKED:
+                return TOKEN_REVOKED.format(token=name)
+            case TokenState.USER_REMOVED:
+                return TOKEN_OF_REMOVED_USER.format(token=name, user=record.owner)
+        return None
+
+    def _state(self, record: TokenRecord, now: datetime) -> TokenState:
+        return record.state_at(now, self._users.get(record.owner or ""))
 
     def of_proxy(self, scope: Scope, headers: Headers) -> Grant | None:
         """The grant of the user whom a trusted proxy names; None where none does. Raises ApiError for others."""
@@ -220,24 +247,22 @@ class Access:
         if uses and self._store is not None:
             self._store.note_uses(uses)
 
-    def _used(self, known: tuple[TokenRecord, Grant] | None) -> Grant | None:
-        """The grant of a token that is being used; None where it has expired."""
+    def _used(self, record: TokenRecord | None) -> Grant | None:
+        """The grant of a token that is being used; None where it is not valid."""
         now = datetime.now(UTC)
-        if known is None or not known[0].valid_at(now):
+        if record is None or self._state(record, now) is not TokenState.VALID:
             return None
         minute = now.replace(second=0, microsecond=0)
-        if known[0].used_at is None or known[0].used_at < minute:
-            self._uses[known[0].id] = micros_of(minute)
-        return known[1]
+        if record.used_at is None or record.used_at < minute:
+            self._uses[record.id] = micros_of(minute)
+        return self._of_record(record)
 
-    def _of_record(self, record: TokenRecord) -> Grant | None:
-        """The grant of a token: its user's role, or a viewer's for a token that only reads; None for a removed user."""
+    def _of_record(self, record: TokenRecord) -> Grant:
+        """The grant of a valid token: its user's role, or a viewer's for a token that only reads."""
         reads = record.scope is TokenScope.READ
         if record.owner is None:
             return Grant(record.id, record.name, Role.VIEWER if reads else Role.DESIGNER, record.scope)
-        user = self._users.get(record.owner)
-        if user is None or user.removed_at is not None:
-            return None
+        user = self._users[record.owner]
         role = Role.VIEWER if reads else user.role
         return Grant(record.id, record.name, role, record.scope, user.name, user.quota.checks)
 
@@ -264,6 +289,12 @@ class Access:
             # A session does not outlive its token: another value of the setting gives another signature.
             message += digest_of(self._setting).encode("ascii")
         return hmac.new(self._key or secrets.token_bytes(32), message, hashlib.sha256).hexdigest()
+
+
+def token_in(header: str) -> bytes | None:
+    """The token of an Authorization header; None for one of another scheme."""
+    scheme, _, value = header.partition(" ")
+    return value.strip().encode("utf-8", "replace") if scheme.lower() == "bearer" else None
 
 
 def _read(store: TokenStore) -> tuple[tuple[TokenRecord, ...], tuple[UserRecord, ...], SessionSecrets]:

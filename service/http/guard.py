@@ -11,7 +11,7 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from sprag.service.actor import Actor, Role, act_as
-from sprag.service.http.access import ASKING, OPEN, Access, Grant
+from sprag.service.http.access import ASKING, OPEN, Access, Grant, token_in
 from sprag.service.http.problems import ApiError, problem_response
 from sprag.service.http.roles import LOOKING
 from sprag.service.http.web.problem_page import problem_page
@@ -140,7 +140,7 @@ class Guard:
             raise ApiError("unavailable", f"The tokens cannot be read: {error}.") from error
         if not self._access.needed:
             return OPEN
-        sent = headers.getlist("authorization")
+        sent, cookies = headers.getlist("authorization"), cookie_parser(headers.get("cookie", ""))
         try:
             grant = self._access.of_proxy(scope, headers) if not any(map(_is_bearer, sent)) else None
         except ApiError:
@@ -153,7 +153,7 @@ class Guard:
             if grant is None:
                 await self._access.attempts.failed(scope, "header Authorization")
         else:
-            grant = grant or self._access.of_cookies(cookie_parser(headers.get("cookie", "")))
+            grant = grant or self._access.of_cookies(cookies)
             # The browser adds the session, or the proxy the user, to whatever page sent the request.
             if grant is not None and not safe and not _names_its_site(headers):
                 raise ApiError("cross-site", "This request does not name the page that sent it, as browsers do.")
@@ -162,7 +162,10 @@ class Guard:
         if grant is None:
             # Any other challenge would make a browser ask for a password and lose the form that it was to send.
             headers_of_answer = {"WWW-Authenticate": "Bearer"}
-            raise ApiError("unauthorized", "This request carries no valid token.", headers=headers_of_answer)
+            token = token_in(sent[0]) if len(sent) == 1 else None
+            reason = self._access.why_not(token) if token is not None else self._access.why_ended(cookies)
+            detail = reason or "This request carries no valid token."
+            raise ApiError("unauthorized", detail, headers=headers_of_answer)
         if grant.role is Role.VIEWER and not safe and scope["path"] not in LOOKING:
             scope["sprag.grant"] = grant  # the login page shows who is logged in
             raise ApiError("read-only", f"{grant.label} {grant.reading}.")

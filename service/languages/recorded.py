@@ -45,6 +45,10 @@ LATE_PART: Final = N_(
 LATE: Final = N_("its deadline passed at {time}: {done} of {cases} cases are done. Resume it to run the others too.")
 ROUNDS_DONE: Final = N_("round {round} of at most {most} is done")
 NO_ROUND: Final = N_("no round is done")
+#: Why a token lets nobody in.
+TOKEN_EXPIRED: Final = N_("The token {token} expired at {time}; `sprag token create` creates another.")
+TOKEN_REVOKED: Final = N_("The token {token} was revoked.")
+TOKEN_OF_REMOVED_USER: Final = N_("The token {token} belongs to the user {user}, who was removed.")
 #: What workers write (`sprag.worker`), which has no languages.
 _OF_WORKERS: Final = (
     N_("no pass of {total} is complete"),
@@ -88,7 +92,7 @@ _ALL: Final = (
     OUTSIDE_WINDOW, WINDOW, NO_ROOM, DISK, LARGEST_FILE, EARLIER, PAUSED, DELETED, NOT_IN_TIME, TRIED_AGAIN,
     NOTICED_LATE, NOT_MADE_UP, GRACE, NOTHING_RAN, NOT_TAKEN, NOT_TAKEN_SILENT, NOT_SUBMITTED, NO_WORKER, WAITS_SILENT,
     WAITS_STALLED, WAITS, MANY_STUDIES, NO_ROOM_FOR_RESULTS, SILENT, LATE_PART, LATE,
-    ROUNDS_DONE, NO_ROUND,
+    ROUNDS_DONE, NO_ROUND, TOKEN_EXPIRED, TOKEN_REVOKED, TOKEN_OF_REMOVED_USER,
     *_OF_WORKERS, *_OF_ERRORS,
 )  # fmt: skip
 

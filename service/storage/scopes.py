@@ -12,3 +12,12 @@ class TokenScope(StrEnum):
 
     READ = "read"
     WRITE = "write"
+
+
+class TokenState(StrEnum):
+    """Whether a token lets anybody in, and if not, why."""
+
+    VALID = "valid"
+    EXPIRED = "expired"
+    REVOKED = "revoked"
+    USER_REMOVED = "user-removed"

@@ -15,7 +15,7 @@ import sqlalchemy as sa
 from sprag.service.storage.audit import note
 from sprag.service.storage.errors import TokenNotFoundError
 from sprag.service.storage.part import Part, micros_of, moment, optional_moment
-from sprag.service.storage.scopes import TokenScope
+from sprag.service.storage.scopes import TokenScope, TokenState
 from sprag.service.storage.tables import METADATA
 from sprag.service.storage.users import require_user
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from datetime import datetime
     from typing import Any
+
+    from sprag.service.storage.users import UserRecord
 
 #: Prefix of a token, so that people and secret scanners recognise it.
 TOKEN_PREFIX: Final = "sprag_"  # noqa: S105 - the beginning of all tokens is no secret
@@ -66,9 +68,13 @@ class TokenRecord:
     expires_at: datetime | None = None
     used_at: datetime | None = None
 
-    def valid_at(self, now: datetime) -> bool:
-        """Whether the token is neither revoked nor expired."""
-        return self.revoked_at is None and (self.expires_at is None or now < self.expires_at)
+    def state_at(self, now: datetime, user: UserRecord | None) -> TokenState:
+        """The state of the token; ``user`` is the record of its owner, None where there is none."""
+        if self.revoked_at is not None:
+            return TokenState.REVOKED
+        if self.owner is not None and (user is None or user.removed_at is not None):
+            return TokenState.USER_REMOVED
+        return TokenState.VALID if self.expires_at is None or now < self.expires_at else TokenState.EXPIRED
 
 
 def digest_of(token: bytes) -> str:

@@ -226,6 +226,38 @@ def test_an_interrupted_run_leaves_nothing_behind(tmp_path: Path, number: signal
     assert sorted(path.name for path in tmp_path.iterdir()) == ["long.json", "tmp"]
 
 
+@pytest.mark.parametrize("command", ["submit", "watch"])
+def test_an_interrupt_of_a_command_that_follows_names_the_study_that_goes_on(
+    running: Service, tmp_path: Path, sprag: Sprag, command: str
+) -> None:
+    at = ("--server", running.address)
+    spec = {**json.loads(SPEC.read_text()), "run": {"duration": "1000000 periods"}}
+    long = tmp_path / "long.json"
+    long.write_text(json.dumps(spec))
+    if command == "watch":
+        study = sprag("submit", long, *at).out.strip()
+        arguments = ["watch", study, *at]
+    else:
+        study, arguments = "", ["submit", str(long), "--wait", "--key", str(tmp_path), *at]
+    with subprocess.Popen([*INTERRUPTIBLE, *arguments], stderr=subprocess.PIPE, env=environment()) as process:
+        assert process.stderr is not None
+        study = study or sprag("submit", long, "--key", str(tmp_path), *at).out.strip()
+        # A pause shows that the command follows the study.
+        assert sprag("pause", study, *at).code == 0
+        lines = iter(process.stderr.readline, b"")
+        assert any(b"is paused" in line for line in lines)
+        assert sprag("resume", study, *at).code == 0
+        process.send_signal(signal.SIGINT)
+        said = process.stderr.read().decode()
+        assert process.wait(SECONDS) == 130
+    assert "interrupted" in said.splitlines()
+    assert f"{study} goes on" in said
+    assert f"sprag cancel {study}" in said
+    state = json.loads(sprag("list", "--json", *at).out)
+    assert {item["id"]: item["state"] for item in state["studies"]}[study] in ("queued", "running")
+    assert sprag("cancel", study, *at).code == 0
+
+
 def test_a_full_disk_is_storage_trouble(sprag: Sprag) -> None:
     if not os.path.exists("/dev/full"):  # only Linux has it
         return

@@ -199,8 +199,11 @@ def test_tokens_have_an_end_and_a_last_use(store: Store, clock: fakes.HandClock)
     store.add_user("dora", Role.DESIGNER)
     end = store.clock.now() + timedelta(days=1)
     _, made = store.create_token("laptop", TokenScope.WRITE, owner="dora", expires_at=end)
-    assert made.valid_at(end - timedelta(microseconds=1))
-    assert not made.valid_at(end)
+    (dora,) = store.users()
+    assert made.state_at(end - timedelta(microseconds=1), dora) == "valid"
+    assert made.state_at(end, dora) == "expired"
+    assert made.state_at(store.clock.now(), store.change_user("dora", removed=True)) == "user-removed"
+    assert store.revoke_token(made.id).state_at(end, dora) == "revoked"
     for micros, expected in ((2_000_000, 2), (1_000_000, 2), (3_000_000, 3)):
         store.note_uses({made.id: micros, "tk_none": micros})
         (kept,) = store.tokens()

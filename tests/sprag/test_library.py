@@ -259,6 +259,24 @@ def test_the_module_is_the_command_line_whatever_lies_in_the_folder(tmp_path: Pa
     assert (done.returncode, done.stdout) == (0, f"sprag {version('sprag')}\n"), done.stderr
 
 
+def test_a_wrong_spec_is_one_error_here_and_of_a_service() -> None:
+    """Code and faults are the same; so are those of errors of the database, the processes and the connection."""
+    wrong = {**SPEC, "axes": [{"path": "shaft.load", "values": ["0 kg"]}]}
+    with pytest.raises(sprag.SpragError) as here:
+        sprag.run(wrong)
+    assert isinstance(here.value, sprag.SpecError)
+    errors = [fault.to_json() for fault in here.value.faults]
+    refused = sprag.RefusedError(422, {"type": "/problems/invalid-spec", "detail": "no", "errors": errors})
+    assert isinstance(refused, sprag.SpragError)
+    assert (refused.code, refused.faults) == (here.value.code, here.value.faults)
+    offered = [getattr(sprag, name) for name in sprag.__all__ if name.endswith("Error")]
+    assert all(issubclass(error, sprag.SpragError) for error in offered)
+    with pytest.raises(sprag.SpragError) as full:
+        sprag.run(SPEC, processes=0, database="/dev/null/x.sqlite3")
+    assert isinstance(full.value, sprag.StoreError)
+    assert (full.value.code, full.value.faults) == ("write-failed", ())
+
+
 def test_what_is_offered_is_listed_and_nothing_else_is_there() -> None:
     assert set(sprag.__all__) <= set(dir(sprag))
     for name in sprag.__all__:

@@ -11,7 +11,7 @@ from sprag.service.http.problems import ApiError
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.way_in import LOGIN_PATH, access_of, kept_form, kept_page, login_page, within
-from sprag.service.languages import _
+from sprag.service.languages import _, recorded
 
 router = page_router()
 
@@ -29,10 +29,12 @@ async def log_in(request: Request, values: Form) -> Response:
     access = access_of(request)
     try:
         access.attempts.admit(request.scope)
-        grant = access.of_token(values.get("token", "").strip().encode("utf-8", "replace"))
+        token = values.get("token", "").strip().encode("utf-8", "replace")
+        grant = access.of_token(token)
         if grant is None:
             await access.attempts.failed(request.scope, "page /login")
-            return login_page(request, access, wanted, fault=_("This token is not valid."), status=401, kept=kept)
+            fault = recorded.said(access.why_not(token) or "") or _("This token is not valid.")
+            return login_page(request, access, wanted, fault=fault, status=401, kept=kept)
     except ApiError as error:
         response = login_page(request, access, wanted, fault=error.detail, status=error.type.status, kept=kept)
         response.headers.update(error.headers)

@@ -53,10 +53,7 @@ def audit(
 @router.get("/users")
 def users(context: Ctx) -> Response:
     """Every user with role, quotas and tokens."""
-    tokens = context.store.tokens()
-    return page(
-        "users.html",
-        users=[user_json(context.store, user) for user in context.store.users()],
-        tokens=tokens,
-        now=context.store.clock.now(),
-    )
+    now, listed = context.store.clock.now(), context.store.users()
+    records = {user.name: user for user in listed}
+    tokens = [(token, token.state_at(now, records.get(token.owner or ""))) for token in context.store.tokens()]
+    return page("users.html", users=[user_json(context.store, user) for user in listed], tokens=tokens)

@@ -18,8 +18,8 @@ from sprag.service import client as clients
 from sprag.service import languages
 from sprag.service.cli.app import command_line
 from sprag.service.cli.console import ExitCode, WrongInputError, confirmed, duration_text, warning_lines
+from sprag.service.cli.following import show_study
 from sprag.service.cli.language import chosen, refusal
-from sprag.service.cli.remote import show_study
 from sprag.service.client.plain import ServiceClient
 from sprag.service.fault_meanings import MEANINGS, WARNING_MEANINGS
 from sprag.service.faults import Fault

@@ -44,7 +44,7 @@ HEADS = (
     ("name", "role", "cases waiting", "limit", "bytes", "limit", "checks", "removed"),
     ("id", "when", "window", "finish by", "last run", "next run", "name"),
     ("host", "workers", "usable", "busy", "idle threads", "refused", "cases/s"),
-    ("id", "name", "user", "scope", "created", "expires", "used", "revoked"),
+    ("id", "name", "user", "scope", "state", "created", "expires", "used", "revoked"),
     ("degree", "RMS [N*m]", "largest residual [N*m]", "rank", "condition number"),
 )
 

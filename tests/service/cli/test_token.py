@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from datetime import timedelta
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from sprag.service import languages
+from sprag.service.actor import Role
 from sprag.service.cli.app import execute
+from sprag.service.storage.scopes import TokenScope
 from sprag.service.storage.store import Store
 from sprag.service.storage.tokens import digest_of
 
@@ -46,6 +50,33 @@ def test_tokens_are_created_listed_and_revoked(settings: Settings, capsys: pytes
         assert "--name: is not the name of a token" in err
     made = json.loads(run("create", "--name", "x", "--json", *db)[1])
     assert (made["scope"], made["token"][:6]) == ("write", "sprag_")
+
+
+def test_the_list_marks_every_token_that_lets_nobody_in(settings: Settings, sprag: Callable[..., Any]) -> None:
+    with Store.open(settings.database_url) as store:
+        for name in ("dora", "emil"):
+            store.add_user(name, Role.DESIGNER)
+        now = store.clock.now()
+        made = {
+            "valid": store.create_token("a", TokenScope.WRITE, owner="dora", expires_at=now + timedelta(days=1)),
+            "expired": store.create_token("b", TokenScope.READ, expires_at=now - timedelta(seconds=1)),
+            "user-removed": store.create_token("c", TokenScope.WRITE, owner="emil"),
+            "revoked": store.create_token("d", TokenScope.WRITE, owner="emil", expires_at=now),
+        }
+        store.revoke_token(made["revoked"][1].id)
+        store.change_user("emil", removed=True)
+    db = ("--db", settings.database)
+    listed = sprag("token", "list", "--json", *db).data["tokens"]
+    assert {token["id"]: token["state"] for token in listed} == {
+        record.id: state for state, (_, record) in made.items()
+    }
+    lines = sprag("token", "list", *db).out.splitlines()
+    words = {"valid": "valid", "expired": "expired", "user-removed": "its user is removed", "revoked": "revoked"}
+    for state, (_, record) in made.items():
+        (line,) = [line for line in lines if record.id in line]
+        assert words[state] in line
+    with languages.language("uk"):
+        assert languages.gettext("its user is removed") != "its user is removed"
 
 
 def test_alone_it_makes_a_secret_and_keeps_nothing(capsys: pytest.CaptureFixture[str]) -> None:

@@ -7,6 +7,7 @@ import html
 import re
 import time
 from collections.abc import Callable
+from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ import httpx
 import pytest
 from pydantic import SecretStr
 
+from sprag.service.actor import Role
 from sprag.service.http import access
 from sprag.service.http.app import create_app
 from sprag.service.settings import Settings
@@ -92,6 +94,40 @@ def test_a_revoked_token_is_worthless_and_the_service_stays_shut(
     assert browser.get("/").status_code == 303
     with pytest.raises(TokenNotFoundError):
         office.store.revoke_token("tk_0")
+
+
+def test_whoever_has_a_token_is_told_why_it_lets_nobody_in(office: Office, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By programs, at the login, and by a browser whose session ends with its token; others are told nothing."""
+    monkeypatch.setattr(access, "BELIEVED_SECONDS", 0.0)
+    store, browser = office.store, office.browser(**OWN)
+    store.add_user("dora", Role.DESIGNER)
+    soon = store.clock.now() + timedelta(days=1)
+    of_dora, dora = store.create_token("laptop", TokenScope.WRITE, owner="dora", expires_at=soon)
+    old, expired = store.create_token("old", TokenScope.READ, expires_at=store.clock.now())
+    assert browser.post("/login", data={"token": of_dora}).status_code == 303
+    assert browser.get("/").status_code == 200
+    store.revoke_token(office.reader.id)
+    store.change_user("dora", removed=True)
+    assert expired.expires_at is not None
+    time_of = expired.expires_at.strftime("%Y-%m-%dT%H:%M:%SZ")
+    sentences = {
+        old: f"The token old ({expired.id}) expired at {time_of}; `sprag token create` creates another.",
+        office.read: f"The token manager ({office.reader.id}) was revoked.",
+        of_dora: f"The token laptop ({dora.id}) belongs to the user dora, who was removed.",
+        "sprag_" + "x" * 43: "This request carries no valid token.",
+    }
+    for secret, sentence in sentences.items():
+        answer = office.program(secret).get("/api/v1/studies")
+        assert (answer.status_code, answer.json()["detail"]) == (401, sentence)
+        at_login = office.browser(**OWN).post("/login", data={"token": secret})
+        assert at_login.status_code == 401
+        shown = sentence if sentence.startswith("The token") else "This token is not valid."
+        assert shown in html.unescape(at_login.text)
+    led = browser.get(browser.get("/").headers["location"])
+    assert sentences[of_dora] in html.unescape(led.text)
+    assert "The token" not in office.browser(**OWN).get("/login").text
+    said = office.browser(**OWN, **{"Accept-Language": "uk"}).post("/login", data={"token": old}).text
+    assert f"Строк дії токена old ({expired.id}) минув {time_of}" in html.unescape(said)
 
 
 def test_a_service_of_this_machine_needs_a_token_as_soon_as_there_was_one(
