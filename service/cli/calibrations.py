@@ -27,6 +27,7 @@ from sprag.service.cli.pictures import heading
 from sprag.service.cli.remote import connection
 from sprag.service.cli.running import run_parsed
 from sprag.service.cli.settings import read_settings
+from sprag.service.cli.stores import store_of
 from sprag.service.faults import Fault
 from sprag.service.languages import N_, _
 
@@ -93,6 +94,8 @@ def _run(parsed: ParsedSpec, db: str | None, processes: int | None) -> tuple[Cal
     from sprag.service.results.rounds import sentence
 
     settings = read_settings(database=db, processes=processes)
+    if db is not None:
+        store_of(db).close()
     with run_parsed(
         parsed,
         settings,

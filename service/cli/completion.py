@@ -150,17 +150,12 @@ def _asked(context: typer.Context, ask: Callable[[ServiceClient], list[Offered]]
 def _stored(context: typer.Context, read: Callable[[Store], Sequence[Kept]]) -> Sequence[Kept]:
     """What the database of the command has; nothing where there is none, which is not created."""
     from sprag.service.cli.console import CommandFailureError
-    from sprag.service.cli.settings import read_settings
+    from sprag.service.cli.stores import database_of
     from sprag.service.storage.errors import StoreError
-    from sprag.service.storage.session import file_of
     from sprag.service.storage.store import Store
 
     try:
-        url = read_settings(database=context.params.get("db")).database_url
-        file = file_of(url)
-        if file is not None and not file.exists():
-            return ()
-        with Store.open(url) as store:
+        with Store.open(database_of(context.params.get("db")), create=False) as store:
             return read(store)
     except (CommandFailureError, StoreError):
         return ()

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,6 +16,7 @@ from sprag.service.cli.files import write_pieces
 from sprag.service.cli.groups import Groups
 from sprag.service.cli.options import Database, JsonFlag, OutputFile
 from sprag.service.cli.settings import read_settings
+from sprag.service.cli.stores import database_of, named_store
 from sprag.service.faults import FaultError
 from sprag.service.languages import _
 
@@ -38,19 +39,30 @@ app = typer.Typer(
 
 
 @app.command()
-def upgrade(db: Database = None, as_json: JsonFlag = False) -> None:
-    """Bring the database to the revision of this program, or create it."""
-    from sprag.service.storage.maintenance import upgrade as bring_up
+def upgrade(
+    no_backup: Annotated[
+        bool, typer.Option("--no-backup", help="Do not copy the database file beside itself before.")
+    ] = False,
+    db: Database = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Bring the database to the revision of this program, or create it; stop Sprag first. A file is copied before."""
+    from sprag.service.jobs.dispatching import owner_name
+    from sprag.service.storage.alone import upgrade as bring_up
 
-    with _opened(db, needs="nothing") as session:
-        before, after = bring_up(session)
+    done = bring_up(read_settings(database=db).database_url, owner_name(), copy=not no_backup)
+    where = {"database": done.location}
     if as_json:
-        write_json({"database": session.location, "before": before, "after": after})
-    elif before == after:
-        print(_("{database}: already at revision {revision}", database=session.location, revision=after))
+        copy = None if done.backup is None else str(done.backup)
+        write_json({**where, "before": done.before, "after": done.after, "backup": copy})
+        return
+    if done.backup is not None:
+        say(_("{file} is a copy of the database before the upgrade", file=done.backup))
+    if done.before == done.after:
+        print(_("{database}: already at revision {revision}", revision=done.after, **where))
     else:
-        steps = {"before": before or _("none"), "after": after}
-        print(_("{database}: from revision {before} to {after}", database=session.location, **steps))
+        steps = {"before": done.before or _("none"), "after": done.after}
+        print(_("{database}: from revision {before} to {after}", **where, **steps))
 
 
 @app.command()
@@ -89,7 +101,7 @@ def backup(
     if as_json:
         write_json({"database": session.location, "backup": str(target), "bytes": size})
     else:
-        say(_("{file}: {size} bytes", file=file, size=size))
+        say(_("{file}: {size} bytes, a copy of {database}", file=file, size=size, database=session.location))
 
 
 @app.command()
@@ -105,17 +117,15 @@ def prune(
     from datetime import timedelta
 
     from sprag.service.storage.clock_watch import distrust
-    from sprag.service.storage.store import Store
 
-    with _opened(db) as session:
-        location = session.url.render_as_string(hide_password=False)
-    with Store.open(location) as store:
+    with named_store(db, quiet=as_json) as store:
         if not dry_run and (problem := distrust(store)):
             raise TroubleError("unavailable", f"{problem}.")
         found = store.prune(store.clock.now() - timedelta(days=older_than), dry=dry_run)
         store.purge()
     if as_json:
-        write_json({"deleted": [] if dry_run else found, "found": found})
+        deleted = [] if dry_run else found
+        write_json({"database": store.session.location, "deleted": deleted, "found": found})
     else:
         print("\n".join(found), end="\n" if found else "")
         count = len(found)
@@ -142,7 +152,7 @@ def move(
 
     if not target.strip():  # elsewhere it means the database of the settings
         raise WrongInputError("invalid-file", _("TARGET is empty: name a file or a URL"))
-    with _opened(db) as source, _opened(target, needs="folder") as other:
+    with _opened(db) as source, _opened(target, create=True) as other:
         moved = move_all(source, other, owner_name(), say)
     if as_json:
         write_json({"source": source.location, "target": other.location, **asdict(moved)})
@@ -177,31 +187,26 @@ def audit(
     """Write the audit log: who changed what, when and from where; earliest first."""
     from sprag.service.results.exports.audit import audit_pieces
     from sprag.service.storage.audit import audit_filter
-    from sprag.service.storage.store import Store
 
     try:
         wanted = audit_filter(since, until, actor, action, target)
     except FaultError as error:
         named = [replace(fault, where=f"--{fault.where}") for fault in error.faults]
         raise WrongInputError("invalid-parameter", _("invalid option"), named) from error
-    with _opened(db) as session:
-        url = session.url.render_as_string(hide_password=False)
-    with Store.open(url) as store:
+    with named_store(db, quiet=False) as store:
         write_pieces(output, audit_pieces(store.audit_rows(wanted), form.value))
 
 
 @contextmanager
-def _opened(db: str | None, *, needs: Literal["database", "folder", "nothing"] = "database") -> Iterator[Session]:
-    """Connections to the database; where a file or its folder ``needs`` to be there, a mistyped name creates none."""
+def _opened(db: str | None, *, create: bool = False) -> Iterator[Session]:
+    """Connections to the database, which is there; where it may be created, its folder is."""
     from sprag.service.storage.session import Session, file_of
 
-    location = read_settings(database=db).database_url
+    location = read_settings(database=db).database_url if create else database_of(db)
     file = file_of(location)
-    if file is not None and needs == "database" and not file.exists():
-        raise WrongInputError("invalid-file", _("{file}: no such database", file=file))
-    if file is not None and needs == "folder" and not (folder := file.absolute().parent).is_dir():
+    if file is not None and not (folder := file.absolute().parent).is_dir():
         raise WrongInputError("invalid-file", _("{file}: there is no folder {folder}", file=file, folder=folder))
-    session = Session(location)
+    session = Session(location, create=create)
     try:
         yield session
     finally:
@@ -211,11 +216,7 @@ def _opened(db: str | None, *, needs: Literal["database", "folder", "nothing"] =
 @app.command()
 def clock(db: Database = None) -> None:
     """Confirm the clock of this machine, after it jumped ahead or the worker was off for long."""
-    from sprag.service.storage.store import Store
-
-    with _opened(db) as session:
-        url = session.url.render_as_string(hide_password=False)
-    with Store.open(url) as store:
+    with named_store(db, quiet=False) as store:
         now = store.clock.now()
         store.note_clock(now)
         store.note_change("database.clock", "", now=now.isoformat(timespec="seconds"))

@@ -150,7 +150,7 @@ def _database(url: str, file: Path | None) -> tuple[bool, str]:
 
     if file is not None and not file.exists():
         return True, _("{file} (not created yet)", file=file)
-    session = Session(url)
+    session = Session(url, create=False)
     try:
         found, location = revision(session), session.location
         if found is not None and found.startswith(MOVING):
@@ -190,7 +190,7 @@ def _clock(url: str, file: Path | None) -> tuple[bool, str]:
     now = _("it is {time}", time=datetime.now(UTC).isoformat(timespec="seconds"))
     if file is not None and not file.exists():
         return True, now
-    with Store.open(url) as store:
+    with Store.open(url, create=False) as store:
         problem = clock_problem(store)
     return problem is None, problem or now
 
@@ -202,7 +202,7 @@ def _workers(url: str, file: Path | None) -> tuple[bool, str]:
 
     if file is not None and not file.exists():
         return True, _("none yet")
-    with Store.open(url) as store:
+    with Store.open(url, create=False) as store:
         found = worker_list(store)
     alive = [item for item in found["dispatchers"] if not (item["silent"] or item["ended_at"])]
     silent = [item["owner"] for item in found["dispatchers"] if item["silent"] and not item["ended_at"]]
@@ -235,7 +235,7 @@ def _schedules(url: str, file: Path | None) -> tuple[bool, str]:
 
     if file is not None and not file.exists():
         return True, _("none yet")
-    with Store.open(url) as store:
+    with Store.open(url, create=False) as store:
         late, schedules = late_runs(store), len(store.list_schedules())
     if late:
         return False, " ".join(f"{each.run.name or each.run.id}: {each.sentence}" for each in late)

@@ -154,14 +154,13 @@ def _show_preview(made: Mapping[str, Any]) -> None:
 
 def _reusable(settings: Settings, parsed: ParsedSpec) -> int:
     """Number of cases in the database; 0 where there is no database yet."""
-    from sprag.service.storage.session import Session
+    from sprag.service.storage.session import file_of
     from sprag.service.storage.store import Store
 
-    session = Session(settings.database_url)
-    session.close()
-    if not session.on_server and not session.path.exists():
+    file = file_of(settings.database_url)
+    if file is not None and not file.exists():
         return 0
-    with Store.open(settings.database_url) as store:
+    with Store.open(settings.database_url, create=False) as store:
         return store.reusable(parsed.study)
 
 
@@ -343,7 +342,7 @@ def _with_start(settings: Settings, spec: object) -> object:
     base = spec.get("base") if isinstance(spec, Mapping) else None
     if not (isinstance(base, Mapping) and START in base):
         return spec
-    with Store.open(settings.database_url) as store:
+    with Store.open(settings.database_url, create=False) as store:
         return with_start(store, spec)
 
 

@@ -12,6 +12,7 @@ from sprag.service import languages
 from sprag.service.cli.console import TroubleError, WrongInputError, write_json
 from sprag.service.cli.options import ChunkCases, Database, JsonFlag, Processes
 from sprag.service.cli.settings import read_settings
+from sprag.service.cli.stores import database_of
 
 Host = Annotated[
     str | None, typer.Option("--host", metavar="ADDRESS", help="Address to listen on; default: this machine only.")
@@ -86,6 +87,7 @@ def worker(
     from sprag.service.jobs.dispatching import run_dispatcher, stop_on_signals, worker_settings
 
     settings = read_settings(database=db, processes=processes)
+    database_of(db)
     logs.configure(settings.log_format, requests=False)
     with languages.language(languages.ENGLISH):
         run_dispatcher(worker_settings(settings), stop_on_signals(), take_over=take_over)

@@ -77,28 +77,28 @@ def create(
     if not 1 <= len(name) <= MAX_NAME_LENGTH or not name.isprintable() or not name.strip():
         allowed = _("1 to {most} printable characters in one line", most=MAX_NAME_LENGTH)
         raise wrong_option("--name", "invalid-text", N_("is not the name of a token"), name, allowed=allowed)
-    with users_of(db) as store:
+    with users_of(db, as_json) as store:
         ends = None if expires is None else store.clock.now() + timedelta(days=expires)
         owner = None if user is None else user_of(store, user, "--user")
         secret, record = store.create_token(name, scope, owner=owner, expires_at=ends)
     if as_json:
-        write_json({"token": secret, **_json(record)})
+        write_json({"database": store.session.location, "token": secret, **_json(record)})
     else:
         print(secret)
-        said = _("It is shown only once; every request now needs a token.")
+        said = _("It is shown only once; every request to a service of this database now needs a token.")
         say(f"{record.id}: {record.name}, {record.scope}. {said}")
 
 
 @app.command("list")
 def list_tokens(db: Database = None, as_json: JsonFlag = False) -> None:
     """List all tokens with owner, state, expiry and last use, newest first, without their secrets."""
-    with users_of(db) as store:
+    with users_of(db, as_json) as store:
         now, users = store.clock.now(), {user.name: user for user in store.users()}
         records = store.tokens()
     states = [record.state_at(now, users.get(record.owner or "")) for record in records]
     found = [{**_json(record), "state": state.value} for record, state in zip(records, states, strict=True)]
     if as_json:
-        write_json({"tokens": found})
+        write_json({"database": store.session.location, "tokens": found})
         return
     fields = ("id", "name", "user", "scope", "state", "created_at", "expires_at", "used_at", "revoked_at")
     times = (_("created"), _("expires"), _("used"), _("revoked"))
@@ -124,13 +124,13 @@ def revoke(
     """Revoke a token and end the browser sessions that it started, within two seconds."""
     from sprag.service.storage.errors import TokenNotFoundError
 
-    with users_of(db) as store:
+    with users_of(db, as_json) as store:
         try:
             record = store.revoke_token(token_of(store, token_id))
         except TokenNotFoundError as error:
             raise WrongInputError("token-not-found", str(error)) from error
     if as_json:
-        write_json(_json(record))
+        write_json({"database": store.session.location, **_json(record)})
     else:
         say(_("{token} ({name}) is revoked", token=record.id, name=record.name))
 

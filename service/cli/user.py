@@ -13,7 +13,7 @@ from sprag.service.cli.console import WrongInputError, say, show_table, time_tex
 from sprag.service.cli.groups import Groups
 from sprag.service.cli.names import user_of
 from sprag.service.cli.options import Database, JsonFlag
-from sprag.service.cli.settings import read_settings
+from sprag.service.cli.stores import named_store
 from sprag.service.languages import N_, _
 from sprag.service.storage.scopes import MAX_USER_NAME
 
@@ -72,22 +72,28 @@ def add(
     if not 1 <= len(name) <= MAX_USER_NAME or not name.isprintable() or name != name.strip():
         allowed = _("1 to {most} printable characters, no blank at either end", most=MAX_USER_NAME)
         raise wrong_option("NAME", "invalid-text", N_("is not the name of a user"), name, allowed=allowed)
-    with users_of(db) as store:
+    with users_of(db, as_json) as store:
         record = store.add_user(name, role or Role.DESIGNER, _quota(cases, storage, checks))
     _show(
+        store,
         record,
         as_json,
-        _("{name} is a user: {role}; every request now needs a token", name=record.name, role=record.role),
+        _(
+            "{name} is a user: {role}; every request to a service of this database now needs a token",
+            name=record.name,
+            role=record.role,
+        ),
     )
 
 
 @app.command("list")
 def list_users(db: Database = None, as_json: JsonFlag = False) -> None:
     """List all users with role, quotas, and what is used of them."""
-    with users_of(db) as store:
+    with users_of(db, as_json) as store:
         found = [(record, store.usage(record.name)) for record in store.users()]
+        where = {"database": store.session.location}
     if as_json:
-        write_json({"users": [{**_json(u), "cases": used.cases, "bytes": used.bytes} for u, used in found]})
+        write_json({**where, "users": [{**_json(u), "cases": used.cases, "bytes": used.bytes} for u, used in found]})
         return
     limit = _("limit")
     waiting, size, checks = _("cases waiting"), _("bytes"), _("checks")
@@ -115,17 +121,18 @@ def change(
     """Change the role or the quotas of a user, within two seconds; what is not given is kept."""
     if role is None and cases is None and storage is None and checks is None:
         raise WrongInputError("invalid-parameter", _("nothing to change; `sprag user change --help` lists the options"))
-    with users_of(db) as store:
+    with users_of(db, as_json) as store:
         record = store.change_user(user_of(store, name), role, _quota(cases, storage, checks))
-    _show(record, as_json, _("{name} is changed: {role}", name=record.name, role=record.role))
+    _show(store, record, as_json, _("{name} is changed: {role}", name=record.name, role=record.role))
 
 
 @app.command()
 def remove(name: Known, db: Database = None, as_json: JsonFlag = False) -> None:
     """Remove a user, whose tokens and sessions end within two seconds; studies and schedules are kept."""
-    with users_of(db) as store:
+    with users_of(db, as_json) as store:
         record = store.change_user(user_of(store, name), removed=True)
     _show(
+        store,
         record,
         as_json,
         _("{name} is removed; `sprag user hand-over` gives what was theirs to another user", name=record.name),
@@ -135,9 +142,9 @@ def remove(name: Known, db: Database = None, as_json: JsonFlag = False) -> None:
 @app.command()
 def restore(name: Known, db: Database = None, as_json: JsonFlag = False) -> None:
     """Let a removed user in again, with the same tokens."""
-    with users_of(db) as store:
+    with users_of(db, as_json) as store:
         record = store.change_user(user_of(store, name), removed=False)
-    _show(record, as_json, _("{name} is a user again: {role}", name=record.name, role=record.role))
+    _show(store, record, as_json, _("{name} is a user again: {role}", name=record.name, role=record.role))
 
 
 @app.command("hand-over")
@@ -156,23 +163,22 @@ def hand_over(
     as_json: JsonFlag = False,
 ) -> None:
     """Give the studies and schedules of one user to another."""
-    with users_of(db) as store:
+    with users_of(db, as_json) as store:
         name, to = user_of(store, name), user_of(store, to, "--to")
         studies, schedules = store.hand_over(name, to)
     if as_json:
-        write_json({"studies": studies, "schedules": schedules})
+        write_json({"database": store.session.location, "studies": studies, "schedules": schedules})
     else:
         counts = {"studies": studies, "schedules": schedules}
         say(_("{studies} studies and {schedules} schedules of {name} belong to {to} now", name=name, to=to, **counts))
 
 
 @contextmanager
-def users_of(db: str | None) -> Iterator[Store]:
+def users_of(db: str | None, as_json: bool) -> Iterator[Store]:
     """The store of a database; an unknown user, or one who exists already, is wrong input."""
     from sprag.service.storage.errors import UserExistsError, UserNotFoundError
-    from sprag.service.storage.store import Store
 
-    with Store.open(read_settings(database=db).database_url) as store:
+    with named_store(db, quiet=as_json) as store:
         try:
             yield store
         except UserNotFoundError as error:
@@ -187,9 +193,9 @@ def _quota(cases: int | None, storage: int | None, checks: int | None) -> Quota:
     return Quota(cases, None if storage is None else storage * 2**20, checks)
 
 
-def _show(record: UserRecord, as_json: bool, sentence: str) -> None:
+def _show(store: Store, record: UserRecord, as_json: bool, sentence: str) -> None:
     if as_json:
-        write_json(_json(record))
+        write_json({"database": store.session.location, **_json(record)})
     else:
         say(sentence)
 

@@ -79,7 +79,7 @@ class Library:
 @lru_cache(maxsize=1)
 def _library(url: str, chunking: Chunking) -> Library:
     with uncounted():
-        return Library(Store.open(url, chunking=chunking))
+        return Library(Store.open(url, chunking=chunking, create=False))
 
 
 def begin(library: Library) -> None:

@@ -151,7 +151,7 @@ def run_dispatcher(
     Raises StoreError (EpochLostError when another dispatcher took over) and ExecutorError, each with one sentence.
     """
     chunking = Chunking(settings.chunk_cases, settings.processes, settings.chunk_timeout)
-    with Store.open(settings.database_url, chunking=chunking) as store:
+    with Store.open(settings.database_url, chunking=chunking, create=False) as store:
         store.require_sound()
         store.default_quota = settings.quota
         lock = lock_of(store)

@@ -3,6 +3,7 @@
 from sprag.worker.ports import StoreError, StoreFullError
 
 __all__ = [
+    "CREATED_BY",
     "ComponentNotFoundError",
     "DatabaseBusyError",
     "DatabaseError",
@@ -27,7 +28,11 @@ __all__ = [
     "UserNotFoundError",
     "ViewNotFoundError",
     "busy",
+    "in_use",
 ]
+
+#: What makes a database, at the end of a sentence.
+CREATED_BY = "`sprag serve`, `sprag run --db` and `sprag db upgrade` create one"
 
 
 class DatabaseError(StoreError):
@@ -54,6 +59,15 @@ class DatabaseBusyError(DatabaseError):
 def busy(where: str) -> DatabaseBusyError:
     """The error of a writer that waited in vain for the database at ``where``."""
     return DatabaseBusyError(f"another process locked the database {where} for too long; try again")
+
+
+def in_use(where: str, who: str = "") -> DatabaseError:
+    """The error of work that needs the database at ``where`` alone, while others (``who``) use it."""
+    return DatabaseError(
+        f"the database {where} is in use{who and f' by {who}'}: stop every service, worker and command that has it "
+        "open, and try again",
+        "database-in-use",
+    )
 
 
 class EndingError(DatabaseError):

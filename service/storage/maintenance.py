@@ -15,7 +15,7 @@ import sqlalchemy as sa
 from sprag.service.stale_files import mark, sweep
 from sprag.service.storage import component_tables, schedule_tables, sessions, tokens, user_tables  # noqa: F401 - their tables are made, too
 from sprag.service.storage.audit import note
-from sprag.service.storage.errors import DatabaseError, SchemaError
+from sprag.service.storage.errors import CREATED_BY, DatabaseError, SchemaError
 from sprag.service.storage.part import SystemClock, micros_of
 from sprag.service.storage.private_files import create_private, sync_folder
 from sprag.service.storage.records import CheckReport
@@ -49,10 +49,10 @@ def revision(session: Session) -> str | None:
     return None
 
 
-def require_current(session: Session) -> None:
-    """Initialise an empty database; raise SchemaError when its revision is not that of this program."""
+def require_current(session: Session, *, create: bool) -> None:
+    """Raise SchemaError when the revision is not that of this program; ``create``: initialise an empty database."""
     found = revision(session)
-    if found is None:
+    if found is None and create:
         upgrade(session)
     elif found != HEAD_REVISION:
         raise other_revision(session, found)
@@ -80,7 +80,7 @@ def other_revision(session: Session, found: str | None) -> SchemaError:
     """The error of a database whose revision is not that of this program, with the command that helps."""
     where = f"the database {session.location}"
     if found is None:
-        return SchemaError(f"{where} is empty")
+        return SchemaError(f"{where} is empty, and not a database of Sprag yet: {CREATED_BY}")
     if found.startswith(MOVING):
         return SchemaError(f"{where} is the target of a move that is not complete: run the same `sprag db move` again")
     if found in known_revisions():

@@ -62,6 +62,15 @@ class ServerLock:
         rows = self._ask(f"SELECT DISTINCT a.application_name {_HELD} AND l.objid = %s::oid", LOCKS, USERS)
         return ", ".join(sorted(str(name) for (name,) in rows))
 
+    def clients(self) -> list[str]:
+        """Process ids of the server's other connections to this database by Sprag. Raises DatabaseError."""
+        statement = (
+            "SELECT pid::text FROM pg_stat_activity WHERE datname = current_database() AND pid <> pg_backend_pid() "
+            "AND (application_name = 'sprag' OR pid IN (SELECT pid FROM pg_locks WHERE locktype = 'advisory' "
+            "AND classid IN (%s::oid, %s::oid))) ORDER BY pid"
+        )
+        return [f"connection {pid}" for (pid,) in self._ask(statement, LOCKS, EPOCHS)]
+
     def _try(self, function: str, kind: int, purpose: int, *, keep: bool = False) -> bool:
         done = bool(self._ask(f"SELECT {function}(%s::int, %s::int)", kind, purpose)[0][0])
         self._shared = self._shared or (done and keep)

@@ -51,10 +51,11 @@ class Session:
     """Connections to one database.
 
     ``url`` is a SQLAlchemy URL of an SQLite file or of a database on a PostgreSQL server. Raises DatabaseError when it
-    cannot be used. ``location`` is the database for display.
+    cannot be used. ``location`` is the database for display. Without ``create`` a file has to be there; ``alone``: no
+    other connection to the file may be open, on a server see `sprag.service.storage.alone`.
     """
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, *, create: bool = True, alone: bool = False) -> None:
         try:
             self.url: URL = make_url(url)
         except (sa.exc.ArgumentError, ValueError):  # the latter for an invalid port
@@ -73,7 +74,7 @@ class Session:
         self._file: sqlite_files.DatabaseFile | None = None
         match self.url.get_backend_name():
             case "sqlite":
-                self._file = sqlite_files.DatabaseFile(self.url, BUSY_SECONDS)
+                self._file = sqlite_files.DatabaseFile(self.url, BUSY_SECONDS, create=create, alone=alone)
                 self.location = str(self._file.path)
                 self._engine = self._file.make_engine(POOL_CONNECTIONS)
                 begin = {"read": "BEGIN", "write": "BEGIN IMMEDIATE"}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
-from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError, busy
+from sprag.service.storage.errors import CREATED_BY, DatabaseBusyError, DatabaseError, DatabaseFullError, busy, in_use
 from sprag.service.storage.one_name import HeldName, hold, linked
 from sprag.service.storage.private_files import PRIVATE_FOLDER_MODE, create_private
 from sprag.service.storage.rows import tuples
@@ -86,10 +86,14 @@ def _path_of(url: URL) -> Path:
 class DatabaseFile:
     """One database file, which is never another one than the file that was opened first.
 
+    Without ``create`` it has to be there. ``alone``: on one connection, which nobody else may have beside it.
+
     Raises DatabaseError for a URL that is not understood, and where the place cannot hold a database.
     """
 
-    def __init__(self, url: URL, busy_seconds: float) -> None:
+    def __init__(self, url: URL, busy_seconds: float, *, create: bool = True, alone: bool = False) -> None:
+        self._may_create = create
+        self._alone = alone
         self._given = _path_of(url)
         #: The file itself, where the given name is a symbolic link.
         self.path = Path(os.path.realpath(self._given))
@@ -109,8 +113,8 @@ class DatabaseFile:
             self._url,
             module=sqlite_driver(),
             connect_args={"timeout": self._busy_seconds, "isolation_level": None},
-            pool_size=connections,
-            max_overflow=64,
+            pool_size=1 if self._alone else connections,
+            max_overflow=0 if self._alone else 64,
         )
         sa.event.listen(engine, "do_connect", self._create)
         sa.event.listen(engine, "connect", self._set_pragmas)
@@ -118,6 +122,8 @@ class DatabaseFile:
 
     def _check_place(self) -> None:
         folder = self.path.parent
+        if not self._may_create:
+            self._require_present()
         try:
             folder.mkdir(PRIVATE_FOLDER_MODE, parents=True, exist_ok=True)
         except OSError as error:
@@ -145,6 +151,8 @@ class DatabaseFile:
         somebody uses it under another name.
         """
         self.require_same()
+        if not self._may_create:
+            self._require_present()
         with suppress(OSError):  # it exists, or SQLite reports the error
             os.close(create_private(self.path))
         with self._naming:
@@ -152,10 +160,16 @@ class DatabaseFile:
                 self._name = hold(self.path)
                 self._note()
 
+    def _require_present(self) -> None:
+        if not self.path.exists():
+            raise DatabaseError(f"there is no database {self.path}: {CREATED_BY}", "database-unreachable")
+
     def _set_pragmas(self, connection: Any, _record: object) -> None:
         cursor = connection.cursor()
         for pragma in (
-            f"busy_timeout = {int(self._busy_seconds * 1000)}",
+            f"busy_timeout = {0 if self._alone else int(self._busy_seconds * 1000)}",
+            # Before the first look at the file: then not even a reader may have it open.
+            f"locking_mode = {'EXCLUSIVE' if self._alone else 'NORMAL'}",
             f"page_size = {PAGE_BYTES}",
             "journal_mode = WAL",
             "synchronous = FULL",
@@ -232,7 +246,7 @@ class DatabaseFile:
             return moved
         text = str(error.orig)
         known = {
-            "database is locked": busy(str(self.path)),
+            "database is locked": in_use(str(self.path)) if self._alone else busy(str(self.path)),
             "database or disk is full": DatabaseFullError(f"the disk that holds {self.path} is full"),
             "disk I/O error": DatabaseFullError(
                 f"the disk that holds {self.path} reports an error on reading or writing"

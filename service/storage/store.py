@@ -52,17 +52,21 @@ class Store(
     """One database. Safe to use from several threads; close it at the end (it is a context manager)."""
 
     @classmethod
-    def open(cls, url: str, *, chunking: Chunking | None = None, clock: Clock | None = None) -> Store:
+    def open(
+        cls, url: str, *, chunking: Chunking | None = None, clock: Clock | None = None, create: bool = True
+    ) -> Store:
         """Open and prepare the database at ``url`` (SQLAlchemy URL of an SQLite file or a PostgreSQL server).
+
+        Without ``create`` an absent or empty database is refused.
 
         Raises
         ------
         DatabaseError
             When it cannot be used; SchemaError when its revision is not that of this program.
         """
-        store = cls(Session(url), clock or SystemClock(), chunking or Chunking())
+        store = cls(Session(url, create=create), clock or SystemClock(), chunking or Chunking())
         try:
-            maintenance.require_current(store.session)
+            maintenance.require_current(store.session, create=create)
         except BaseException:
             store.close()
             raise
@@ -70,7 +74,7 @@ class Store(
 
     def ping(self) -> None:
         """Raise DatabaseError when the database does not answer or has another revision."""
-        maintenance.require_current(self.session)
+        maintenance.require_current(self.session, create=False)
 
     def require_sound(self) -> None:
         """Raise DatabaseError when a database of moderate size is damaged."""

@@ -217,6 +217,8 @@ LOCAL: dict[str, tuple[str, ...]] = {
 @pytest.mark.usefixtures("pseudo", "files")
 @pytest.mark.parametrize("line", LOCAL)
 def test_commands_say_nothing_without_a_translation(sprag: Sprag, line: str) -> None:
+    if "users.sqlite3" in line:
+        sprag("db", "upgrade", "--db", "users.sqlite3")
     if "users.sqlite3" in line and "add" not in line:
         sprag("user", "add", "dora", "--db", "users.sqlite3")
     done = sprag(*line.split(" "))

@@ -1,0 +1,49 @@
+"""The database of a command: only those that start or run something create one, and every answer names it."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from sprag.service.cli.console import WrongInputError, say
+from sprag.service.cli.settings import read_settings
+from sprag.service.languages import _
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from sprag.service.storage.store import Store
+
+
+def database_of(db: str | None) -> str:
+    """The URL of a database that is there: that of ``db`` (the option), or of the settings.
+
+    Raises WrongInputError for a file that does not exist.
+    """
+    from sprag.service.storage.session import file_of
+
+    url = read_settings(database=db).database_url
+    file = file_of(url)
+    if file is not None and not file.exists():
+        missing = _(
+            "{file}: there is no database; `sprag serve`, `sprag run --db` and `sprag db upgrade` create one",
+            file=file.absolute(),
+        )
+        raise WrongInputError("invalid-file", missing)
+    return url
+
+
+def store_of(db: str | None) -> Store:
+    """The store of that database; raises DatabaseError for an empty one. Close it at the end."""
+    from sprag.service.storage.store import Store
+
+    return Store.open(database_of(db), create=False)
+
+
+@contextmanager
+def named_store(db: str | None, *, quiet: bool) -> Iterator[Store]:
+    """The store of that database, which is named before the answer unless ``quiet``: JSON has it as ``database``."""
+    with store_of(db) as store:
+        yield store
+        if not quiet:
+            say(_("database {database}:", database=store.session.location))

@@ -1,0 +1,181 @@
+"""Which commands make a database, what `sprag db upgrade` asks for, and that answers name the database."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sprag.service.cli.app import execute
+from sprag.service.storage.errors import DatabaseError, SchemaError
+from sprag.service.storage.maintenance import revision
+from sprag.service.storage.session import Session
+from sprag.service.storage.sqlite_files import sqlite_driver
+from sprag.service.storage.store import Store
+from sprag.service.storage.tables import HEAD_REVISION
+from tests.faults import refused
+from tests.migrations.freeze import FOLDER
+from tests.service.calibrating import spec_of
+from tests.service.cli.test_changing_commands import CHANGING, OTHERS
+from tests.service.timed_spec import SPEC
+
+#: Those that make a database where there is none; `preview` and `doctor` say what there would be.
+CREATORS = {"serve", "run", "db upgrade"}
+SILENT = {"preview", "doctor"}
+#: Arguments of the commands of `OTHERS`.
+ARGUMENTS = {"db backup": "copy.sqlite3", "db move": "target.sqlite3", "preview": "SPEC"}
+
+
+@pytest.fixture
+def old(tmp_path: Path) -> Path:
+    """A database of revision 0020."""
+    database = tmp_path / "old.sqlite3"
+    connection = sqlite3.connect(database)
+    connection.executescript((FOLDER / "0020.sql").read_text(encoding="utf-8"))
+    connection.close()
+    return database
+
+
+@pytest.mark.parametrize("command", sorted({*CHANGING, *OTHERS} - CREATORS))
+def test_a_mistyped_database_is_not_made(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name, spec in (("SPEC", SPEC), ("BENCH", spec_of())):
+        Path(name).write_text(json.dumps(spec))
+    Path("copy").mkdir()
+    before = sorted(tmp_path.rglob("*"))
+    arguments = CHANGING[command][1] if command in CHANGING else ARGUMENTS.get(command, "")
+    for place in ("no.sqlite3", "no/such/folder/no.sqlite3"):
+        code = execute([*command.split(), *arguments.split(), "--db", place])
+        told = capsys.readouterr()
+        if command not in SILENT:
+            assert code == 2, told
+            assert f"{tmp_path / place}: there is no database" in told.err
+        assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_an_empty_database_is_not_made_into_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "empty.sqlite3"
+    file.touch()
+    assert execute(["token", "create", "--name", "x", "--db", str(file)]) == 3
+    assert "is empty" in capsys.readouterr().err
+    session = Session(f"sqlite:///{file}", create=False)
+    assert revision(session) is None
+    session.close()
+    with refused(DatabaseError, "database-unreachable"):
+        Session(f"sqlite:///{tmp_path / 'absent'}", create=False)
+
+
+def test_an_empty_database_on_a_server_is_not_made_into_one(postgres_url: str) -> None:
+    with Store.open(postgres_url) as store, store.session.write() as connection:
+        connection.exec_driver_sql("DROP SCHEMA public CASCADE")
+        connection.exec_driver_sql("CREATE SCHEMA public")
+    with pytest.raises(SchemaError, match="is empty"):
+        Store.open(postgres_url, create=False)
+    Store.open(postgres_url).close()
+    with Store.open(postgres_url, create=False) as store:
+        store.ping()
+
+
+@pytest.fixture
+def sprag(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Iterator[Callable[..., tuple[str, str]]]:
+    """Runs a command on a database with two users; its output."""
+    file = tmp_path / "known.sqlite3"
+    Store.open(f"sqlite:///{file}").close()
+
+    def run(*words: str) -> tuple[str, str]:
+        assert execute([*words, "--db", str(file)]) == 0, words
+        return capsys.readouterr()
+
+    for name in ("dora", "ada"):
+        run("user", "add", name)
+    return run
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "token create --name laptop",
+        "token list",
+        "user add emil",
+        "user list",
+        "user change dora --role viewer",
+        "user remove dora",
+        "user hand-over dora --to ada",
+        "db prune --older-than 3",
+        "db upgrade",
+        "db check",
+        "db backup COPY",
+    ],
+)
+def test_every_administrative_answer_names_the_database(
+    sprag: Callable[..., tuple[str, str]], command: str, tmp_path: Path
+) -> None:
+    def words(copy: str) -> list[str]:
+        return command.replace("COPY", str(tmp_path / copy)).split()
+
+    assert str(tmp_path / "known.sqlite3") in "".join(sprag(*words("a")))
+    answer: dict[str, Any] = json.loads(
+        sprag(*words("b") if "add" not in command else ["user", "add", "ida"], "--json")[0]
+    )
+    assert (answer.get("database") or answer["location"]) == str(tmp_path / "known.sqlite3")
+
+
+def test_an_upgrade_copies_the_file_before(old: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert execute(["db", "upgrade", "--db", str(old), "--json"]) == 0
+    done = json.loads(capsys.readouterr().out)
+    assert (done["before"], done["after"]) == ("0020", HEAD_REVISION)
+    copy = Session(f"sqlite:///{done['backup']}")
+    assert revision(copy) == "0020"
+    copy.close()
+    with Store.open(f"sqlite:///{old}") as store:
+        assert store.session.path == old
+    assert execute(["db", "upgrade", "--db", str(old), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["backup"] is None, "nothing to do"
+
+
+def test_an_upgrade_can_do_without_the_copy(old: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert execute(["db", "upgrade", "--no-backup", "--db", str(old), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["backup"] is None
+    assert list(old.parent.glob("*.backup")) == []
+
+
+@pytest.mark.parametrize("state", ["idle", "reading", "writing"])
+def test_an_upgrade_is_refused_while_anybody_has_the_database_open(
+    old: Path, capsys: pytest.CaptureFixture[str], state: str
+) -> None:
+    before = old.read_bytes()
+    other = sqlite_driver().connect(old, isolation_level=None)  # whatever release it is of
+    other.execute("PRAGMA journal_mode = WAL")
+    other.execute("SELECT count(*) FROM studies").fetchone()
+    if state != "idle":
+        other.execute({"reading": "BEGIN", "writing": "BEGIN IMMEDIATE"}[state])
+        other.execute("SELECT count(*) FROM studies").fetchone()
+    assert execute(["db", "upgrade", "--db", str(old)]) == 3
+    assert "is in use" in capsys.readouterr().err
+    other.close()
+    assert list(old.parent.glob("*.backup")) == []
+    session = Session(f"sqlite:///{old}")
+    assert revision(session) == "0020"
+    session.close()
+    assert len(before) <= old.stat().st_size
+    assert execute(["db", "upgrade", "--db", str(old)]) == 0
+
+
+def test_an_upgrade_on_a_server_is_refused_while_anybody_is_connected(
+    postgres_url: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store = Store.open(postgres_url)
+    with store.session.write() as connection:
+        connection.exec_driver_sql("UPDATE alembic_version SET version_num = '0030'")
+    assert execute(["db", "upgrade", "--db", postgres_url]) == 3
+    assert "is in use by connection" in capsys.readouterr().err
+    with store.session.write() as connection:
+        connection.exec_driver_sql(f"UPDATE alembic_version SET version_num = '{HEAD_REVISION}'")
+    store.close()
+    assert execute(["db", "upgrade", "--db", postgres_url]) == 0
