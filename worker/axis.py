@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -64,6 +65,22 @@ class Axis:
 
     def __len__(self) -> int:
         return int(self.array.size)
+
+    @cached_property
+    def levels(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """The different values, ascending, and for each of `values` its place among them; see `SAME_VALUE`."""
+        order = np.argsort(self.array, kind="stable")
+        ascending = self.array[order]
+        larger = np.maximum(np.abs(ascending[1:]), np.abs(ascending[:-1]))
+        new = np.append(True, np.diff(ascending) > SAME_VALUE * larger)
+        places = np.empty(self.array.size, dtype=np.int64)
+        places[order] = np.cumsum(new) - 1
+        return ascending[new], places
+
+    def place_of(self, value: float) -> int | None:
+        """The place in `levels` of a value (SI); None when the axis does not have it."""
+        index = self.index_of(value)
+        return None if index is None else int(self.levels[1][index])
 
     def index_of(self, value: float) -> int | None:
         """Position of the value that equals ``value`` (SI) within `SAME_VALUE`; None when there is none."""

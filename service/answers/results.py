@@ -107,7 +107,7 @@ class CurveAxis(TypedDict):
 
     path: str
     unit: str
-    values: Annotated[list[float], Doc("ascending; of a zip, in order of the cases")]
+    values: Annotated[list[float], Doc("ascending")]
 
 
 class ResultMeaning(TypedDict):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import parse_qsl
@@ -12,6 +12,7 @@ import numpy as np
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import (
     MOST_CHOICES,
+    listed_held,
     main_query,
     main_results,
     many_values,
@@ -20,7 +21,7 @@ from sprag.service.results.defaults import (
 )
 from sprag.service.results.refined import curve_plan, families, plan_along
 from sprag.service.results.refined_maps import map_plan
-from sprag.service.results.selection import refused, value_of
+from sprag.service.results.selection import locate_axes, refused, value_of
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 from sprag.worker.sweeps import SWEEP
@@ -74,7 +75,7 @@ def characteristic(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | No
 
 
 def curve_query(study: Study, infos: Sequence[ResultInfo], given: Given) -> CurveQuery | None:
-    """The curves requested by a URL; None for a study in which nothing varies.
+    """The curves requested by a URL; None for a study whose cases lie on no curves.
 
     Open axes are held at their usual value. Invalid choices are left for `select` to refuse.
     """
@@ -85,21 +86,23 @@ def curve_query(study: Study, infos: Sequence[ResultInfo], given: Given) -> Curv
     y = tuple(name for name in given.getlist("y") if name) or main.y
     by = tuple(path for path in given.getlist("by") if path) if given.get("x") else main.by
     by = tuple(path for path in by if not _same_axis(study, path, x))
-    of = _family(study, given, main, by)
-    return CurveQuery(x, y, by, held(study, given.getlist("at"), (x, *by)), of=of)
+    at = held(study, given.getlist("at"), (x, *by))
+    return CurveQuery(x, y, by, at, of=_family(study, given, main, by, at))
 
 
-def _family(study: Study, given: Given, main: CurveQuery, by: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+def _family(
+    study: Study, given: Given, main: CurveQuery, by: tuple[str, ...], at: tuple[tuple[str, str], ...]
+) -> tuple[tuple[str, str], ...]:
     """The values that have a curve: as given, those of the main curves, some of an axis with many; () for all."""
     chosen = tuple((path, value) for path, _, value in (item.partition("=") for item in given.getlist("of") if item))
     chosen = tuple(pair for pair in chosen if any(_same_axis(study, pair[0], path) for path in by))
     if curve_plan(study) is not None:
         return chosen
     if given.get("every"):
-        return tuple(pair for path in by for pair in many_values(study, path, MOST_CHOICES))
+        return tuple(pair for path in by for pair in many_values(study, path, MOST_CHOICES, at))
     if by == main.by:
         return chosen or main.of
-    return chosen or tuple(pair for path in by for pair in many_values(study, path))
+    return chosen or tuple(pair for path in by for pair in many_values(study, path, at=at))
 
 
 def value_choices(study: Study, query: CurveQuery) -> list[dict[str, Any]]:
@@ -152,8 +155,8 @@ def held(
 ) -> tuple[tuple[str, str], ...]:
     """Pairs of path and value for the axes that are not drawn: as given, others at their usual value.
 
-    The direction of a sweep is left open unless ``one_direction``: curves show both. Axes of listed cases are only held
-    as given, except the fixed ones of refined curves.
+    The direction of a sweep is left open unless ``one_direction``: curves show both. Of listed cases, axes that make
+    few curves are left open too.
     """
     pairs: dict[str, str] = {}
     for item in given:
@@ -164,13 +167,25 @@ def held(
             raise refused("at", "invalid-text", "must be path=value", item)
         pairs[path.strip()] = value.strip()
     plan = plan_along(study, drawn[0]) or map_plan(study)
-    fixed = families(plan) if plan is not None else study.axis_paths if study.combine == "grid" else ()
+    if plan is None and study.combine == "zip":
+        return (*pairs.items(), *_listed_held(study, drawn, pairs))
+    fixed = families(plan) if plan is not None else study.axis_paths
     for axis in study.axes:
         if axis.paths == (SWEEP,) and not one_direction:
             continue
         if len(axis) > 1 and axis.paths[0] in fixed and not any(path in axis.paths for path in (*drawn, *pairs)):
             pairs[axis.paths[0]] = repr(usual_value(study, axis))
     return tuple(pairs.items())
+
+
+def _listed_held(study: Study, drawn: Sequence[str], given: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
+    """Values of the axes of listed cases that are neither ``drawn`` (x first) nor ``given``."""
+    fixed = locate_axes(study, tuple(given.items()))
+    x, *by = (study.axis_of(path) for path in drawn)
+    if x is None:
+        return ()
+    values = {position: [study.axes[position].value(index)] for position, (_, index) in fixed.items()}
+    return listed_held(study, x, [position for position in by if position is not None], values)
 
 
 def pairs_of(query: CurveQuery | MapQuery) -> list[tuple[str, str]]:

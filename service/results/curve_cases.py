@@ -16,6 +16,7 @@ import numpy as np
 
 from sprag.service.faults import ParameterFault
 from sprag.service.results.curves import Curve, CurveQuery, Curves, Fetch, Line, Map, Selection, not_run
+from sprag.service.results.listed_cases import cases_with, left_open, machines
 from sprag.service.results.refined import families, plan_along, refined_curves
 from sprag.service.results.refined_maps import draw_refined_map, map_plan
 from sprag.service.results.regimes import kind_columns, kinds_of
@@ -59,7 +60,8 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
     Raises
     ------
     SelectionError
-        For an unknown path or result, a value that is not on its axis, an open axis, or too many numbers.
+        For an unknown path or result, a value that is not on its axis, an open axis, or too many numbers. Axes of
+        listed cases that are left open distinguish curves, too, where these are few.
     """
     results = numeric_results(infos, "y", query.y)
     x_axis = require_axis(study, "x", query.x)
@@ -78,7 +80,7 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
         by_axes |= {SWEEP: last} if len(study.axes[last]) > 1 else {}
     _no_axis_twice({query.x: x_axis}, "by", by_axes, fixed)
     fixed = with_nominal(study, fixed, {x_axis, *by_axes.values()})
-    chooser = _zip_lines if study.combine == "zip" else _grid_lines
+    chooser = _listed_lines if study.combine == "zip" else _grid_lines
     x_values, lines = chooser(study, x_axis, by_axes, fixed, len(results), only=only)
     made = tuple(lines)
     units = {path: unit_of(study, path) for path in (query.x, *made[0].by, *made[0].at)}
@@ -222,7 +224,7 @@ def _grid_lines(
     return x_values, lines()
 
 
-def _zip_lines(
+def _listed_lines(
     study: Study,
     x_axis: int,
     by: dict[str, int],
@@ -231,35 +233,41 @@ def _zip_lines(
     *,
     only: Mapping[int, Sequence[int]] = NOTHING,
 ) -> tuple[tuple[float, ...], Iterator[Line]]:
+    """Lines through listed cases: a line for each machine, its cases in order of x."""
     axes = study.axes
-    chosen = np.ones(study.cases, dtype=np.bool_)
-    for i, (_, index) in fixed.items():
-        chosen &= axes[i].array == axes[i].value(index)
-    for i, indices in only.items():
-        chosen &= np.isin(axes[i].array, [axes[i].value(index) for index in indices])
-    cases = np.flatnonzero(chosen).astype(np.int64)
+    wanted = {i: [axes[i].value(index)] for i, (_, index) in fixed.items()}
+    wanted |= {i: [axes[i].value(index) for index in indices] for i, indices in only.items()}
+    cases = cases_with(study, wanted)
     if cases.size == 0:
         message = "no case has all these values together"
         raise refused("at", "unknown-value", message, listed(p for p, _ in fixed.values()))
     _check_size(cases.size, results)
+    by = _with_open(study, x_axis, by, cases)
     at = {path: axes[i].value(index) for i, (path, index) in fixed.items()}
     x_all = axes[x_axis].array
-
-    def line(values: dict[str, float], part: NDArray[np.int64]) -> Line:
-        if study.plan is not None:  # its cases are in the order in which they were chosen
-            part = part[np.argsort(x_all[part], kind="stable")]
-        return Line(values, at, tuple(x_all[part].tolist()), part)
+    member = machines(study, by.values(), cases)
+    order = np.lexsort((x_all[cases], member))
+    parts = np.split(cases[order], np.cumsum(np.bincount(member))[:-1])
 
     def lines() -> Iterator[Line]:
-        if not by:
-            yield line({}, cases)
-            return
-        keys = np.stack([axes[i].array[cases] for i in by.values()], axis=1)
-        groups, member = np.unique(keys, axis=0, return_inverse=True)
-        order = np.argsort(member.reshape(-1), kind="stable")
-        parts = np.split(cases[order], np.cumsum(np.bincount(member.reshape(-1)))[:-1])
-        for values, part in zip(groups.tolist(), parts, strict=True):
-            yield line(dict(zip(by, values, strict=True)), part)
+        for part in parts:
+            values = {path: axes[i].value(int(part[0])) for path, i in by.items()}
+            yield Line(values, at, tuple(x_all[part].tolist()), part)
 
-    x_values = x_all[cases] if study.plan is None else np.unique(x_all[cases])
-    return tuple(x_values.tolist()), lines()
+    return tuple(np.unique(x_all[cases]).tolist()), lines()
+
+
+def _with_open(study: Study, x_axis: int, by: dict[str, int], cases: NDArray[np.int64]) -> dict[str, int]:
+    """The axes that distinguish curves, with those that were left open where they add few curves or none."""
+    left, few = left_open(study, x_axis, by.values(), cases)
+    if not few:
+        faults = []
+        for axis in (study.axes[position] for position in left):
+            path, values = axis.paths[0], np.unique(axis.array[cases]).tolist()
+            message = (
+                f"of which {path} should the curve be? It has {len(values):,} values in these cases, and a curve is of "
+                f"one machine: give its value as at={path}=VALUE, or name it in by="
+            )
+            faults.append(ParameterFault("at", "not-fixed", message, None, listed(values), unit_of(study, path)))
+        raise SelectionError(faults)
+    return by | {study.axes[position].paths[0]: position for position in left}

@@ -4,27 +4,31 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.service.languages import N_
 from sprag.service.results.curves import CurveQuery
-from sprag.service.results.phrases import Name, Part, Phrase, joined, plural
+from sprag.service.results.listed_cases import MOST_CURVES, cases_with, left_open, longest, open_axes, usual_machine
+from sprag.service.results.phrases import Name, Part, Phrase, joined, lower_first, plural
 from sprag.service.results.refined import curve_plan, families
 from sprag.service.results.refined_maps import map_plan, squares
-from sprag.service.results.selection import axis_name, held_text, refused, value_of
+from sprag.service.results.selection import axis_name, held_text, locate_axes, refused, value_of
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 from sprag.worker.models import NO_PARAMETERS
+from sprag.worker.spread import DRIVE
 from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Axis, Study
 
-#: Curves that can be distinguished by colour; of an axis with more values, so many of these are drawn first.
-_MOST_CURVES: Final = 8
+#: Of an axis with more values than `MOST_CURVES`, so many of these are drawn first.
 _CHOSEN_CURVES: Final = 6
 #: Values of an axis that a page lists; of more, one is typed.
 MOST_CHOICES: Final = 200
@@ -33,7 +37,7 @@ _MOST_MAIN: Final = 10
 
 
 def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
-    """What to draw for ``study``; None when nothing varies.
+    """What to draw for ``study``; None where its cases lie on no curves (`no_curves` says why).
 
     Axes that are not drawn are held at the base's value where they contain it, otherwise at their middle value, and the
     drives at the nominal one. There is a curve for each value of one axis; where all axes have many values, for some.
@@ -49,17 +53,13 @@ def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
     shown = models.presentation_of(study)
     names = [info.name for info in infos]
     y = tuple(name for name in shown.drawn if name in names) or (names[0],)
-    x = study.sweep or next(
-        (path for path in shown.along for axis in varying if path in axis.paths), varying[0].paths[0]
-    )
+    along = [path for path in shown.along for axis in varying if path in axis.paths]
     if study.combine == "zip":
-        return CurveQuery(x, y)
+        return _listed_query(study, dict.fromkeys([*along, *(axis.paths[0] for axis in varying)]), y)
+    x = study.sweep or (*along, varying[0].paths[0])[0]
     others = [axis for axis in varying if x not in axis.paths]
-    few = [axis for axis in others if len(axis) <= _MOST_CURVES]
-    apart = few or others
-    by = next(
-        (path for path in shown.apart for axis in apart if path in axis.paths), apart[0].paths[0] if apart else None
-    )
+    few = [axis for axis in others if len(axis) <= MOST_CURVES]
+    by = _told_apart(study, few or others)
     held = [axis for axis in others if by not in axis.paths]
     at = tuple((axis.paths[0], repr(usual_value(study, axis))) for axis in held)
     both = (SWEEP,) if study.sweep is not None and len(study.axes[-1]) > 1 else ()
@@ -67,15 +67,82 @@ def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
     return CurveQuery(x, y if by is None and not both else y[:1], (*(() if by is None else (by,)), *both), at, of=of)
 
 
-def many_values(study: Study, path: str, most: int = _CHOSEN_CURVES) -> tuple[tuple[str, str], ...]:
+def _told_apart(study: Study, axes: Sequence[Axis]) -> str | None:
+    """Path of the axis whose values are drawn as curves beside each other; None without axes."""
+    named = (path for path in models.presentation_of(study).apart for axis in axes if path in axis.paths)
+    return next(named, axes[0].paths[0] if axes else None)
+
+
+def _listed_query(study: Study, paths: Iterable[str], y: tuple[str, ...]) -> CurveQuery | None:
+    """Curves along the first of ``paths`` on which several of the listed cases are of one machine."""
+    cases = cases_with(study, _nominal(study))
+    positions = {path: position for path in paths if (position := study.axis_of(path)) is not None}
+    x = next((path for path, position in positions.items() if longest(study, position, cases)[0] > 1), None)
+    if x is None:  # each case is a machine of its own
+        x = next(iter(positions))
+        if longest(study, positions[x], cases)[1] > MOST_CURVES:
+            return None
+    by, at = _listed_rest(study, positions[x], cases)
+    of = tuple(pair for path in by for pair in many_values(study, path, at=at)) if len(by) == 1 else ()
+    return CurveQuery(x, y[:1] if by else y, by, at, of=of)
+
+
+def _nominal(study: Study) -> dict[int, list[float]]:
+    """The values of the axis of drives that curves show: the nominal one."""
+    drives = study.axis_of(DRIVE)
+    return {} if drives is None else {drives: [float(study.axes[drives].array.min())]}
+
+
+def _listed_rest(study: Study, x: int, cases: NDArray[np.int64]) -> tuple[tuple[str, ...], tuple[tuple[str, str], ...]]:
+    """What distinguishes the curves of listed cases along axis ``x``, and what is held.
+
+    All other axes distinguish the curves where these are few; otherwise one does, and the others are held.
+    """
+    left, few = left_open(study, x, (), cases)
+    by = _told_apart(study, [study.axes[position] for position in left])
+    if few or by is None:
+        return tuple(study.axes[position].paths[0] for position in left), ()
+    held = usual_machine(study, [position for position in left if by not in study.axes[position].paths], cases)
+    together = np.intersect1d(cases, cases_with(study, {position: [value] for position, value in held.items()}))
+    if not open_axes(study, together, {x}):
+        return (), _pairs(study, usual_machine(study, left, together))
+    return (by,), _pairs(study, held)
+
+
+def listed_held(
+    study: Study, x: int, by: Collection[int], fixed: Mapping[int, Sequence[float]]
+) -> tuple[tuple[str, str], ...]:
+    """Values of the axes of listed cases that are neither drawn nor ``fixed`` (SI), held where these are many."""
+    cases = cases_with(study, {**_nominal(study), **fixed})
+    left, few = left_open(study, x, by, cases)
+    return () if few else _pairs(study, usual_machine(study, left, cases))
+
+
+def _pairs(study: Study, held: Mapping[int, float]) -> tuple[tuple[str, str], ...]:
+    return tuple((study.axes[position].paths[0], repr(value)) for position, value in held.items())
+
+
+def no_curves(study: Study) -> str:
+    """Why there is nothing to draw along an axis: a sentence, not yet translated."""
+    if not varying_axes(study):
+        return N_("Nothing varies in this study, so there is no curve.")
+    return N_("No two cases of this study differ in one parameter only, so there is no curve.")
+
+
+def many_values(
+    study: Study, path: str, most: int = _CHOSEN_CURVES, at: Sequence[tuple[str, str]] = ()
+) -> tuple[tuple[str, str], ...]:
     """At most ``most`` values of an axis with many of them, for a family of curves: pairs as those of `CurveQuery.of`.
 
     Its first, its last, that at which it is held otherwise, and others evenly between; () for an axis with few values,
-    which are all drawn.
+    which are all drawn. Of listed cases, the values of those that are ``at`` the held ones count.
     """
     axis = study.axis_with(path)
-    values = np.unique(axis.array)
-    if values.size <= _MOST_CURVES:
+    values = axis.levels[0]
+    if study.combine == "zip" and at:
+        fixed = {axis: [study.axes[axis].value(index)] for axis, (_, index) in locate_axes(study, at).items()}
+        values = np.unique(values[axis.levels[1][cases_with(study, {**_nominal(study), **fixed})]])
+    if values.size <= MOST_CURVES:
         return ()
     if values.size <= most:
         return tuple((path, repr(value)) for value in values.tolist())
@@ -100,11 +167,11 @@ def completed(
     """
     if x and y:
         return CurveQuery(x, y, by, at, of=of)
+    if x:
+        return CurveQuery(x, drawn_results(study, infos), by, at, of=of)
     main = main_query(study, infos)
     if main is None:
-        raise refused("x", "not-an-axis", "nothing varies in this study, so there are no curves")
-    if x:
-        return CurveQuery(x, main.y, by, at, of=of)
+        raise refused("x", "not-an-axis", lower_first(no_curves(study)).removesuffix("."))
     taken = {study.axis_of(path) for path in (*by, *(path for path, _ in (*at, *of)))}
     families = by or tuple(path for path in main.by if study.axis_of(path) not in taken)
     return CurveQuery(

@@ -139,7 +139,8 @@ def answers_of_model(study: Study, infos: Sequence[ResultInfo]) -> tuple[Answer,
 def answers_query(study: Study, infos: Sequence[ResultInfo], chosen: CurveQuery | None = None) -> CurveQuery | None:
     """The curves of the main results that answers are read from: those of the page, or of the ``chosen`` ones.
 
-    None where the cases of the study lie on no curves: nothing varies, or it chooses its own cases.
+    None where the cases of the study lie on no curves: nothing varies, it chooses its own cases, or each is a machine
+    of its own.
     """
     if study.plan is not None and curve_plan(study) is None:
         return None

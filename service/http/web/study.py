@@ -30,7 +30,7 @@ from sprag.service.json_text import timestamp
 from sprag.service.languages import N_, _
 from sprag.service.results.choice import characteristic, map_query, pairs_of
 from sprag.service.results.curve_cases import select
-from sprag.service.results.defaults import caption, drawn_numbers, varying_axes
+from sprag.service.results.defaults import caption, drawn_numbers, main_query, no_curves, varying_axes
 from sprag.service.results.directions import ends_in_words
 from sprag.service.results.phrases import meanings
 from sprag.service.results.pictures import curves as pictures
@@ -88,7 +88,7 @@ def study_frame(context: Context, study_id: str) -> dict[str, Any]:
         *([("/front", N_("Designs"))] if _has_goal(study) else []),
         *([("/calibration", N_("Calibration"))] if _calibrates(study) else []),
         *([("/drives", N_("Drives"))] if study.spread is not None and study.plan is None else []),
-        *([("/curves", N_("Curves"))] if varying else []),
+        *([("/curves", N_("Curves"))] if main_query(study, models.study_results(study)) is not None else []),
         *([("/map", N_("Map"))] if mapped else []),
         *([("/sensitivity", N_("Sensitivity"))] if varying and study.plan is None else []),
     ]
@@ -149,7 +149,7 @@ def _study_page(
     study = context.store.study(study_id)
     frame = study_frame(context, study_id)
     query = view.query or usual
-    first = context.store.case_row(study_id, 0) if query is None else None
+    first = context.store.case_row(study_id, 0) if query is None and study.cases == 1 else None
     kinds = context.store.kinds(study_id)
     return page(
         "study.html",
@@ -237,6 +237,7 @@ def _main_figure(
     if query is None:
         return {
             "heading": "",
+            "without": "" if study.cases == 1 or study.plan is not None else no_curves(study),
             "figure": None,
             "picture": None,
             "others": None,

@@ -21,7 +21,7 @@ _AS_TYPED: Final = Choice(TYPED)
 
 
 def small_curve(store: Store, study_id: str) -> bytes | None:
-    """The figure or the curve as PNG; None for a study in which nothing varies.
+    """The figure or the curve as PNG; None for a study whose cases lie on no curves.
 
     Raises StudyNotFoundError, and SelectionError for curves that cannot be drawn.
     """

@@ -14,7 +14,7 @@ from sprag.service.languages import _
 from sprag.service.results.chosen_figures import ChosenFigure, chosen_figures
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import Curves, Fetch, Map
-from sprag.service.results.defaults import caption, drawn_results, main_query, varying_axes
+from sprag.service.results.defaults import caption, drawn_results, main_query, no_curves, varying_axes
 from sprag.service.results.directions import ends_in_words
 from sprag.service.results.exports.inputs import Input, inputs
 from sprag.service.results.exports.source import StoredRows, given_texts
@@ -337,7 +337,7 @@ def _pictures(
     """The study's main curves of all results but those ``already`` drawn, a page each; or why there are none."""
     query = main_query(study, infos)
     if query is None:
-        return (), _("Nothing varies in this study, so there is no curve.")
+        return (), "" if study.plan is not None else _(no_curves(study))
     if study.plan is not None and curve_plan(study) is None:  # its cases lie on no curves
         return (), ""
     checks = models.presentation_of(study).checks

@@ -81,10 +81,10 @@ def test_a_further_axis_is_held_at_the_value_of_the_base(spec: dict[str, Any]) -
     )
 
 
-def test_zipped_axes_are_drawn_along_the_load(spec: dict[str, Any]) -> None:
+def test_zipped_axes_distinguish_curves_along_the_load(spec: dict[str, Any]) -> None:
     query = query_of(spec, combine="zip", axes=[axis("excitation.frequency", 4), axis("shaft.load", 4)])
     assert query is not None
-    assert (query.x, query.by, query.at) == ("shaft.load", (), ())
+    assert (query.x, query.by, query.at) == ("shaft.load", ("excitation.frequency",), ())
 
 
 def test_nothing_varies(spec: dict[str, Any]) -> None:
