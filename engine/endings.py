@@ -22,6 +22,7 @@ class Ending(StrEnum):
     QUADRATURE_NOT_REACHED = "quadrature_not_reached"
     MOTOR_OVERRUN = "motor_overrun"
     NEAR_SINGULAR = "near_singular"
+    UNSTABLE = "unstable_motion"
 
     @property
     def sentence(self) -> str:
@@ -74,6 +75,11 @@ _SENTENCES = {
     Ending.NEAR_SINGULAR: (
         "The mechanism passes so close to a singular position (links nearly in line, or a pivot nearly on the crank's "
         "circle) that double precision cannot resolve its inertia or its motion: change the dimensions."
+    ),
+    Ending.UNSTABLE: (
+        "The steady motion is unstable: a small deviation of the speed grows in every cycle, by the factor that is the "
+        "multiplier of the cycle, a result, so that the shaft runs away or stops. Choose a drive whose torque falls "
+        "with the speed, or a load whose torque rises with it."
     ),
 }
 

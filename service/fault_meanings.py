@@ -135,6 +135,7 @@ WARNING_MEANINGS: Final[dict[WarningCode, str]] = {
     "terms-cancel": "The terms of the fitted law nearly cancel and follow the scatter of the data.",
     "tolerance-cut": "Part of the distribution of a tolerance lies outside the range of its parameter and is left out.",
     "too-few-rows": "The fit has as many unknowns as the data has different windups.",
+    "unstable-motion": "The steady motion of the machine is unstable: its shaft runs away from it, or stops.",
     "wide-limit": "An equality is as wide as its value, so that 0 fulfils it.",
     "wraps-around": "A step over the angle begins after its end and continues past the end of the cycle.",
 }

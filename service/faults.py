@@ -103,6 +103,7 @@ WarningCode = Literal[
     "terms-cancel",
     "tolerance-cut",
     "too-few-rows",
+    "unstable-motion",
     "wide-limit",
     "wraps-around",
 ]

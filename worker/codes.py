@@ -26,6 +26,7 @@ ENDING_CODES: Final[dict[str, int]] = {
     "quadrature_not_reached": 10,
     "motor_overrun": 11,
     "near_singular": 12,
+    "unstable_motion": 13,
     "crashed": 100,
     "timed_out": 101,
     "cancelled": 102,

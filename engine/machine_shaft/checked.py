@@ -27,8 +27,10 @@ from sprag.engine.machine_shaft.spec import MachineSpec
 _NAMES = tuple(info.name for info in result_infos())
 
 
-def check(model: MachineSpec, columns: Mapping[str, ArrayLike]) -> None:
+def check(model: MachineSpec, columns: Mapping[str, ArrayLike]) -> Ending:
     """Refuse a base machine without steady motion, with all available reasons.
+
+    An unstable motion is allowed: the ending tells it.
 
     Parameters
     ----------
@@ -53,6 +55,7 @@ def check(model: MachineSpec, columns: Mapping[str, ArrayLike]) -> None:
     problem = _problem(model, ending, result, row)
     if problem is not None:
         raise problem
+    return ending
 
 
 def _problem(spec: MachineSpec, ending: Ending, result: Mapping[str, float], row: Columns) -> MachineError | None:

@@ -1,7 +1,7 @@
 """A motor whose torque depends on its speed, and the resulting limit cycle of a machine."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal, cast
 
 import numpy as np
@@ -11,6 +11,7 @@ from sprag.engine.machine_shaft.motor_tables import MotorTable, motor_table
 from sprag.engine.machine_shaft.operations import SpeedLaw
 from sprag.engine.machine_shaft.panels import Panels
 from sprag.engine.machine_shaft.spec import Drive
+from sprag.engine.machine_shaft.stability import Stability
 
 Floats = NDArray[np.float64]
 
@@ -105,14 +106,17 @@ class LimitCycle:
         The torques of motor and load in N*m.
     omega : array of that shape
         Speed in rad/s.
+    stability : Stability
+        Of the motion; unstable where a periodic motion was found, but none from which deviations die away.
     stalled, overrun : arrays of bool, shape (cases,)
-        Where there is no stable periodic motion, because the shaft stops or because it runs away.
+        Where there is no periodic motion, because the shaft stops or because it runs away.
     """
 
     start: Floats
     drive: Floats
     resistance: Floats
     omega: Floats
+    stability: Stability
     stalled: NDArray[np.bool_]
     overrun: NDArray[np.bool_]
 
@@ -156,12 +160,63 @@ def limit_cycle(
         given = resistance if law is None else resistance + law(np.broadcast_to(speed, inertia.shape))[0]
         needed = -(panels.integral(given) / cycle)[:, None, None]
         speed = np.maximum(steady_speed(motor, values, needed), 0.05 * free)
+    found = _solved(motor, values, panels, inertia, resistance, law, speed)
+    grows = found.periodic & ~found.attracts
+    if grows.any():
+        # Above an unstable cycle there may be a stable one, to which the shaft comes from its speed without load.
+        again = _solved(motor, values, panels, inertia, resistance, law, np.where(grows[:, None, None], free, speed))
+        found = found.replaced(grows & again.periodic & again.attracts, again)
+    none = ~(found.periodic & found.attracts)
+    with np.errstate(all="ignore"):
+        # A load that follows the speed is judged by its torque at the last guess.
+        overrun = none & _overruns(motor, values, panels, inertia, given, -needed[:, 0, 0] * cycle, none)
+        omega = np.sqrt(2.0 * found.energy / inertia)
+        stability = Stability.of(panels, found.slope)
+    stability.unstable[~(none & ~overrun & found.periodic)] = False
+    stalled = none & ~overrun & ~stability.unstable
+    return LimitCycle(found.start, found.drive, found.load, omega, stability, stalled, overrun)
+
+
+@dataclass(frozen=True, slots=True)
+class _Solution:
+    """Energy, torques and their derivative by the energy, (cases, panels, nodes); energy at the angle 0; whether these
+    are a periodic motion, and whether it attracts, (cases,).
+    """
+
+    energy: Floats
+    start: Floats
+    drive: Floats
+    load: Floats
+    slope: Floats
+    periodic: NDArray[np.bool_]
+    attracts: NDArray[np.bool_]
+
+    def replaced(self, cases: NDArray[np.bool_], other: "_Solution") -> "_Solution":
+        """This solution with the ``cases`` of another one."""
+        pairs = ((getattr(self, part.name), getattr(other, part.name)) for part in fields(self))
+        return _Solution(*(np.where(cases.reshape(-1, *[1] * (own.ndim - 1)), new, own) for own, new in pairs))
+
+
+def _solved(
+    motor: Characteristic,
+    values: Mapping[str, Floats],
+    panels: Panels,
+    inertia: Floats,
+    resistance: Floats,
+    law: SpeedLaw | None,
+    speed: Floats,
+) -> _Solution:
+    """The periodic motion to which Newton's method comes from a ``speed`` (cases, 1, 1) in rad/s.
+
+    The other parameters are those of ``limit_cycle``.
+    """
+    every = np.arange(len(inertia))
     energy = 0.5 * inertia * np.square(speed)
     start = energy[:, 0, 0].copy()
-    active = np.arange(len(inertia))
+    active = every
     previous = np.full(len(inertia), np.inf)
     for _ in range(_MAX_ITERATIONS):
-        own = {name: value[active] if len(value) > 1 else value for name, value in values.items()}
+        own = _of_rows(values, active)
         own_panels, last = panels.take(active), energy[active]
         with np.errstate(all="ignore"):
             load = _load(inertia, resistance, law, energy, active)
@@ -177,13 +232,17 @@ def limit_cycle(
             break
     with np.errstate(all="ignore"):
         drive, by_energy = _torque_and_slope(motor, values, inertia, energy)
-        load = _load(inertia, resistance, law, energy, np.arange(len(inertia)))
+        load = _load(inertia, resistance, law, energy, every)
         final, _ = _linear_step(motor, values, panels, inertia, load, energy)
         error = panels.largest(final - energy) / panels.largest(energy)
-        none = ~((error < 1e-9) & (start > 0.0) & (panels.integral(by_energy + load[1]) < 0.0))
-        # A load that follows the speed is judged by its torque at the last guess.
-        overrun = none & _overruns(motor, values, panels, inertia, given, -needed[:, 0, 0] * cycle, none)
-    return LimitCycle(start, drive, load[0], np.sqrt(2.0 * energy / inertia), none & ~overrun, overrun)
+        slope = by_energy + load[1]
+        attracts = panels.integral(slope) < 0.0
+    return _Solution(energy, start, drive, load[0], slope, (error < 1e-9) & (start > 0.0), attracts)
+
+
+def _of_rows(values: Mapping[str, Floats], rows: NDArray[np.int64]) -> dict[str, Floats]:
+    """The parameters of some of the cases."""
+    return {name: value[rows] if len(value) > 1 else value for name, value in values.items()}
 
 
 def _load(

@@ -22,6 +22,7 @@ from sprag.engine.machine_shaft.resolution import compare, linkage_unresolved, n
 from sprag.engine.machine_shaft.results import result_infos
 from sprag.engine.machine_shaft.spec import MachineSpec
 from sprag.engine.machine_shaft.speed_course import follows_speed, speed_course
+from sprag.engine.machine_shaft.stability import Stability
 from sprag.engine.machine_shaft.start import Shape, Stop, least_mean_speed, start_energy
 from sprag.engine.outcome import Batch
 
@@ -66,6 +67,8 @@ class Solved:
     unknown : array of bool, shape (cases,)
         Cases with a formula that cannot be enclosed and may have hidden features between any two angles, or for whose
         loads no speed was found.
+    unstable : array of bool, shape (cases,)
+        Cases whose motion does not last.
     omega : array, shape (cases, panels, nodes), or None
         The speeds in rad/s at which loads that follow the speed were evaluated.
     """
@@ -77,6 +80,7 @@ class Solved:
     slow: Bools
     rough_pace: Bools
     unknown: Bools
+    unstable: Bools
     omega: Floats | None = None
 
 
@@ -125,9 +129,14 @@ def _mark_unreached(spec: MachineSpec, columns: Columns, solved: Solved) -> None
 
 def _stop(solved: Solved, cases: Bools) -> None:
     """End ``cases`` for insufficient inertia, without the results of a motion."""
-    solved.endings[cases] = _CODE[Ending.INERTIA_INSUFFICIENT]
+    _end(solved, cases, Ending.INERTIA_INSUFFICIENT, (*_OF_MOTION, "cycle."))
+
+
+def _end(solved: Solved, cases: Bools, ending: Ending, without: tuple[str, ...]) -> None:
+    """Give ``cases`` an ending, and no results whose names begin as those ``without``."""
+    solved.endings[cases] = _CODE[ending]
     for name, values in solved.results.items():
-        if name.startswith(_OF_MOTION):
+        if name.startswith(without):
             solved.results[name] = np.where(cases, np.nan, values)
 
 
@@ -156,6 +165,8 @@ def settle(spec: MachineSpec, columns: Columns, solved: Solved) -> Bools:
             singular[rows] = linkage_unresolved(machine, panels, rows.size, MAX_PANELS * spec.cycle)
     lost = (lost & ~negative) | singular
     _stop(solved, slow & ~lost)
+    unstable = solved.unstable & (solved.endings == _CODE[Ending.OK])
+    _end(solved, unstable, Ending.UNSTABLE, _OF_MOTION + (_OF_MOTOR if spec.balance == "motor" else ()))
     solved.endings[lost] = _CODE[Ending.QUADRATURE_NOT_REACHED]
     solved.endings[singular] = _CODE[Ending.NEAR_SINGULAR]
     return np.asarray(lost)
@@ -180,6 +191,7 @@ def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
     results["work.drive"], results["work.resistance"] = d.drive.ends[:, -1], d.resistance.ends[:, -1]
     results["least_mean_speed"], results["balance.factor"] = moved.least, moved.factor
     results["resisting_torque.mean"] = d.resistance.ends[:, -1] / cycle
+    results["cycle.multiplier"] = np.where(np.isnan(start), np.nan, moved.stability.multiplier)
     for name in ("omega.angle_at_max", "omega.angle_at_min"):
         results[name] = np.where(np.isnan(start), np.nan, results[name])
     results["inertia.min"] = np.where(negative, least_inertia, results["inertia.min"])
@@ -196,7 +208,8 @@ def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
     (rough, slow), pace = rough_panels(d), rough_pace(d)
     slow = slow | pace if spec.mean_speed_is == "time" else slow
     # Where the load is stiff, shorter panels may bring the speed that was not found.
-    return Solved(d, results, endings, rough | moved.stiff, slow, pace, moved.lost, moved.omega)
+    unstable = moved.stability.unstable
+    return Solved(d, results, endings, rough | moved.stiff, slow, pace, moved.lost, unstable, moved.omega)
 
 
 class _Moved(NamedTuple):
@@ -211,6 +224,7 @@ class _Moved(NamedTuple):
     omega: Floats | None
     lost: Bools
     stiff: Bools
+    stability: Stability
 
 
 def _moved(machine: Machine, columns: Columns, panels: Panels, fields: Fields, endings: Codes) -> _Moved:
@@ -229,13 +243,17 @@ def _moved(machine: Machine, columns: Columns, panels: Panels, fields: Fields, e
         endings[found.overrun & ok] = _CODE[Ending.MOTOR_OVERRUN]
         if law is not None:
             fields, omega = replace(fields, resistance=found.resistance), found.omega
-        return _Moved(fields, found.drive, found.resistance, found.start, none, none, omega, lost, stiff)
+        return _Moved(
+            fields, found.drive, found.resistance, found.start, none, none, omega, lost, stiff, found.stability
+        )
+    stability = Stability.neutral(columns.cases)
     if law is not None:
         course = speed_course(machine, columns, panels, fields, law)
         endings[course.stopped & ok] = _CODE[Ending.INERTIA_INSUFFICIENT]
         omega, lost, stiff = course.omega, course.lost & ok & ~course.stiff.any(axis=1), course.stiff & ok[:, None]
         with np.errstate(all="ignore"):
             fields = fields.less(-law(omega)[0])
+            stability = Stability.of(panels, course.slope)
     balance = balanced(
         spec.balance, spec.balance_side, panels, cycle, fields.drive, fields.resistance, fields.operation
     )
@@ -244,7 +262,7 @@ def _moved(machine: Machine, columns: Columns, panels: Panels, fields: Fields, e
     start, least = _started(spec, columns, panels, cycle, fields.inertia, drive + resistance, endings)
     # The least speed of a load that follows the speed is another than at these torques.
     least = none if law is not None else least
-    return _Moved(fields, drive, resistance, start, least, balance.factor, omega, lost, stiff)
+    return _Moved(fields, drive, resistance, start, least, balance.factor, omega, lost, stiff, stability)
 
 
 def _motored(

@@ -43,6 +43,8 @@ class SpeedCourse:
     ----------
     omega : array, shape (cases, panels, nodes)
         In rad/s; the machine's ``pace`` where there is none.
+    slope : array of that shape
+        Derivative of the loads that follow the speed by the kinetic energy, in N*m/J.
     stopped, lost : arrays of bool, shape (cases,)
         Where the shaft would stop; where no solution was found for another reason.
     stiff : array of bool, shape (cases, panels)
@@ -50,6 +52,7 @@ class SpeedCourse:
     """
 
     omega: Floats
+    slope: Floats
     stopped: Bools
     lost: Bools
     stiff: Bools
@@ -171,4 +174,4 @@ def speed_course(machine: Machine, columns: Columns, panels: Panels, fields: Fie
         stiff = np.abs(slopes).max(axis=2) * panels.half > _STIFF
         omega = np.where(done[:, None, None], np.sqrt(2.0 * energy / fields.inertia), pace)
     stopped = ~turning & ~np.isnan(previous)
-    return SpeedCourse(omega, stopped, ~done & ~stopped, np.asarray(stiff & ~done[:, None]))
+    return SpeedCourse(omega, slopes, stopped, ~done & ~stopped, np.asarray(stiff & ~done[:, None]))

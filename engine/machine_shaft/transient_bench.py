@@ -123,7 +123,7 @@ class Bench:
                 found = limit_cycle(
                     characteristic(self.model.drive), self.motor, panels, self.cycle, inertia, resistance, law
                 )
-            if found.stalled[0] or found.overrun[0]:
+            if found.stalled[0] or found.overrun[0] or found.stability.unstable[0]:
                 return None
             start, drive, resistance = found.start, found.drive, found.resistance
         if not np.isfinite(start[0]):

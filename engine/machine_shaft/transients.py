@@ -86,7 +86,7 @@ def transient(model: MachineSpec, columns: Mapping[str, ArrayLike], course: Cour
     if bench is None:
         return _nothing(ending, ending.sentence)
     before = None if course.kind == "run-up" else bench.steady(1.0)
-    if course.kind == "coasting" or (course.kind == "load-step" and not bench.motor):
+    if course.kind == "coasting" or (not bench.motor and (course.kind == "load-step" or ending is Ending.UNSTABLE)):
         after = None
     run = Run(bench, course, before, after)
     if not run.loads:

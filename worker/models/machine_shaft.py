@@ -155,11 +155,11 @@ def check_structure(structure: Mapping[str, Any]) -> None:
     engine_check(spec_of(structure))
 
 
-def check(structure: Mapping[str, Any], values: Mapping[str, float]) -> None:
-    """Raise MachineError, with the reason, where the machine has no steady motion."""
+def check(structure: Mapping[str, Any], values: Mapping[str, float]) -> Ending:
+    """The ending of the machine, ok or unstable; raise MachineError, with the reason, where it has no steady motion."""
     from sprag.engine.machine_shaft.checked import check as engine_check
 
-    engine_check(spec_of(structure), values)
+    return engine_check(spec_of(structure), values)
 
 
 def base_results(structure: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, float]:
@@ -200,6 +200,7 @@ class MachineShaft(Model):
             Ending.QUADRATURE_NOT_REACHED,
             Ending.MOTOR_OVERRUN,
             Ending.NEAR_SINGULAR,
+            Ending.UNSTABLE,
         }
     )
     presentation = PRESENTATION

@@ -102,6 +102,7 @@ CAPTIONS: Final[dict[str, str]] = {
     "omega.harmonics.K": "Harmonic {} of the speed",
     "torque.harmonics.K": "Harmonic {} of the torque",
     "resisting_torque.mean": "Mean resisting torque",
+    "cycle.multiplier": "Multiplier of the cycle",
     "flywheel.inertia": "Inertia of the flywheel",
     "flywheel.speed": "Largest speed of the rim",
     "flywheel.stress": "Stress of the flywheel",

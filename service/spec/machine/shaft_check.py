@@ -29,6 +29,10 @@ _POINTERS: Final[dict[Ending | None, str]] = {
     Ending.MOTOR_STALLED: "/base/drive/motor",
     Ending.MOTOR_OVERRUN: "/base/drive/motor",
 }
+_UNSTABLE: Final = (
+    "the steady motion of this machine is unstable: deviations of the speed grow in every cycle, so a case of it ends "
+    "as `unstable_motion`, with the multiplier of the cycle"
+)
 _NEUTRAL: Final[dict[str, dict[str, Any]]] = {"drive": {}, "mechanism": {"kind": "none"}, "operation": {}}
 
 
@@ -86,7 +90,8 @@ def check_machine(
     if report.found > before:
         return
     try:
-        machine_shaft.check(structure, values)
+        if machine_shaft.check(structure, values) is Ending.UNSTABLE:
+            report.warn("unstable-motion", f"/base: {_UNSTABLE}")
     except ExpressionError as error:
         formula = _at(structure, error.part).get("formula") if error.part in places else None
         report.fault(places.get(error.part, "/base"), "invalid-formula", str(error), formula)
