@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 import errno
 import glob
 import os
@@ -19,6 +18,7 @@ from sprag.service.cli.table_files import named, with_tables
 from sprag.service.faults import Fault, Kind
 from sprag.service.languages import N_, _
 from sprag.service.spec.report import SpecError
+from sprag.service.spec.table_text import decoded
 from sprag.service.stale_files import mark, sweep
 from sprag.worker.limits import MAX_BODY_BYTES
 
@@ -61,16 +61,12 @@ def read_bytes(path: str, limit: int) -> bytes:
 
 
 def decode(path: str, data: bytes) -> str:
-    """The text of a UTF-8 file, with or without a byte order mark.
+    """The text of a table: in UTF-8, in UTF-16 with a byte order mark, or in a code page of Windows.
 
     Raises WrongInputError when it is not text.
     """
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        raise WrongInputError(
-            "invalid-file", _("{file}: UTF-16 text; save it as UTF-8 (spreadsheets call it CSV UTF-8)", file=path)
-        )
     try:
-        text = data.decode("utf-8-sig")
+        text = decoded(data)
     except UnicodeDecodeError as error:
         raise WrongInputError(
             "invalid-file",

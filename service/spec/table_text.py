@@ -7,6 +7,7 @@ first line to the last are left out.
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 import itertools
@@ -24,6 +25,7 @@ SEPARATORS: Final = ("\t", ";", ", ", ",")
 #: Characters of a heading, at most: the time that reading one takes grows faster than its length.
 MAX_HEADING: Final = 200
 _NAMED: Final = re.compile(r'\s*"?sep=([,;\t|])"?[,;\t|]*[^\S\n]*(?:\n|$)', re.IGNORECASE)
+_CYRILLIC_WORD: Final = re.compile(r"(?<![^\W\d_])[\u0400-\u04ff]{2,}(?![^\W\d_])")
 _QUOTED: Final = re.compile(r'"[^"]*"')
 #: A heading: a name and, in brackets, a unit. Names may have blanks.
 _HEADING: Final = re.compile(r"\s*+([^\[\(]*[^\[\(\s])\s*+(?:[\[\(]\s*+([^\]\)]+?)\s*[\]\)]\s*+)?")
@@ -60,6 +62,27 @@ class Doubt(NamedTuple):
     line: int
     text: str
     likely: bool
+
+
+def decoded(data: bytes) -> str:
+    """The text of a file: in UTF-8, in UTF-16 with a byte order mark, or in a code page of Windows.
+
+    That is 1252, where degrees and accented letters are, or 1251 where whole words are Cyrillic.
+
+    Raises
+    ------
+    UnicodeDecodeError
+        When it is no text in any of them.
+    """
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode("utf-16")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        cyrillic = _CYRILLIC_WORD.search(data.decode("cp1251", "replace"))
+        if b"\0" in data:
+            raise
+        return data.decode("cp1251" if cyrillic else "cp1252")
 
 
 def lines_of(text: str) -> str:

@@ -2,6 +2,7 @@
 
 import errno
 import json
+import math
 import os
 from collections.abc import Callable
 from importlib.metadata import version
@@ -135,13 +136,40 @@ def test_what_is_wrong_with_points_is_told_of_their_file(
     assert [(item["pointer"], item["code"]) for item in both.failure["problems"]] == [("--points", "conflict")]
 
 
-def test_a_file_of_utf_16_is_told_what_to_do_with(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("encoding", "heading"),
+    [
+        ("utf-16", "shaft.load [N·m];excitation.phase [°]"),
+        ("cp1252", "shaft.load [N·m];excitation.phase [°]"),
+        ("cp1251", "shaft.load [Н·м];excitation.phase [град]"),
+        ("utf-8-sig", "shaft.load [Н·м];excitation.phase [°]"),
+    ],
+)
+def test_a_table_may_have_the_encodings_of_spreadsheets(
+    sprag: Sprag, examples: Path, tmp_path: Path, encoding: str, heading: str
+) -> None:
     points = tmp_path / "points.csv"
-    for encoding in ("utf-16-le", "utf-16-be"):
-        points.write_bytes("\ufeffshaft.load\n0.1\n".encode(encoding))
-        done = sprag("validate", examples / "one_pendulum.json", "--points", points)
-        assert (done.code, done.out) == (2, "")
-        assert done.err == f"sprag: {points}: UTF-16 text; save it as UTF-8 (spreadsheets call it CSV UTF-8)\n"
+    points.write_bytes(f"{heading}\r\n0,25;60,5\r\n0,5;90\r\n".encode(encoding))
+    preview = sprag("preview", examples / "one_pendulum.json", "--points", points, "--json").data
+    ends = {axis["paths"][0]: (axis["first"], axis["last"]) for axis in preview["axes"]}
+    assert ends == {
+        "shaft.load": (0.25, 0.5),
+        "excitation.phase": (pytest.approx(math.radians(60.5)), pytest.approx(math.pi / 2.0)),
+    }
+    data = tmp_path / "clutch.csv"
+    units = heading.replace("shaft.load ", "m ").replace("excitation.phase ", "phi ").split(";")
+    data.write_bytes((";".join(units[::-1]) + "\n0,25;0,878\n0,5;1,79\n").encode(encoding))
+    fit = sprag("fit", data, "--accuracy", "1", "--max-degree", "1", "--json").data
+    angles = [math.radians(0.25), math.radians(0.5)]
+    slope = (angles[0] * 0.878 + angles[1] * 1.79) / (angles[0] ** 2 + angles[1] ** 2)
+    assert fit["coefficients"] == [0.0, pytest.approx(slope, rel=1e-9)]
+
+
+def test_a_binary_file_is_no_table(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+    points = tmp_path / "points.csv"
+    points.write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")
+    done = sprag("validate", examples / "one_pendulum.json", "--points", points, "--json")
+    assert (done.code, done.failure["code"]) == (2, "invalid-file")
 
 
 def test_points_take_the_place_of_what_varies(sprag: Sprag, examples: Path, tmp_path: Path) -> None:

@@ -72,12 +72,23 @@ const check = async () => {
   form.dataset.checked = String(mine);
 };
 
+// The text of a file in UTF-8, UTF-16 with a byte order mark, or a code page of Windows, as `decoded` in table_text.py has it.
+const textOf = async (file) => {
+  const bytes = new Uint8Array(await file.arrayBuffer());
+  const text = (encoding, fatal = false) => new TextDecoder(encoding, { fatal }).decode(bytes);
+  if (bytes[0] === 0xff && bytes[1] === 0xfe) return text("utf-16le");
+  if (bytes[0] === 0xfe && bytes[1] === 0xff) return text("utf-16be");
+  try { return text("utf-8", true); } catch { /* not UTF-8 */ }
+  const cyrillic = text("windows-1251");
+  return /(?<!\p{L})\p{Script=Cyrillic}{2,}(?!\p{L})/u.test(cyrillic) ? cyrillic : text("windows-1252");
+};
+
 // The text of a chosen file goes into the field that is sent; the file itself is not.
 const takeFile = async (event) => {
   const file = event.target.files && event.target.files[0];
   if (!file || !event.target.dataset.into) return;
   const field = document.getElementById(event.target.dataset.into);
-  field.value = await file.text();
+  field.value = await textOf(file);
   edited = field.name;
   touched.add(field.name);
   soon();
