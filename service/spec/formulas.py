@@ -1,7 +1,9 @@
 """Formulas of derived parameters: quantities with units are converted to SI, and units are checked by dimension.
 
-A number takes all units that follow it, so ``1 / 5 N/mm`` is one over 5 N/mm. Angles are checked as in practice, where
-the radian is often left out, with one exception: a frequency (Hz) is never taken for an angular speed (rad/s).
+A number takes all units that follow it, so ``1 / 5 N/mm`` is one over 5 N/mm, and an exponent behind a unit belongs to
+the unit. Angles are checked as in practice, where the radian is often left out, with one exception: a frequency (Hz) is
+never taken for an angular speed (rad/s), nor what follows from one for what follows from the other, such as Hz times s
+for an angle. A factor pi is taken as the conversion by hand.
 """
 
 from __future__ import annotations
@@ -13,23 +15,36 @@ from fractions import Fraction
 from typing import Final
 
 from sprag.service.faults import Code
+from sprag.service.spec.cyrillic import latin
 from sprag.service.spec.units import QuantityError, is_unit, measure, plain_signs, to_float
 from sprag.worker.models.formulas import MAX_LENGTH, RESERVED, Expression, ExpressionError, Node
 
-#: Powers of gram, meter, second and radian; None for the number 0, which has any unit.
+#: Powers of gram, meter, second and radian, of hertz ("cycle") and of the number pi; None for the number 0, which has
+#: any unit.
 Powers = dict[str, Fraction] | None
 
 _PIECE: Final = re.compile(
     r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?)"
     r"|(?P<name>[A-Za-z_][A-Za-z_0-9]*(?:\.[A-Za-z_0-9]+)*)"
 )
+#: An exponent of a unit: a whole number, which may have a decimal point or brackets.
+_POWER: Final = re.compile(
+    r"\s*(?:\*\*|\^)\s*(?:([+-]?[0-9]{1,2})(?:\.0*)?(?![0-9.])|\(\s*([+-]?[0-9]{1,2})(?:\.0*)?\s*\))"
+)
+_OTHER_POWER: Final = re.compile(r"\s*(?:\*\*|\^)")
 _UNIT: Final = re.compile(
     r"\s*(?P<name>[A-Za-zµ°А-Яа-яЁё][A-Za-zµ°А-Яа-яЁё_0]*)(?![A-Za-zА-Яа-яЁё_0-9.(])"
-    r"(?:\s*(?:\*\*|\^)\s*[+-]?[0-9]{1,2}(?![0-9.])|[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+)?"
+    rf"(?:{_POWER.pattern}|[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+)?"
 )
 _BETWEEN_UNITS: Final = re.compile(r"\s*[*/](?!\*)|(?=\s)")
 _PLAIN: Final[dict[str, Fraction]] = {}
 _ANGLE: Final = {"radian": Fraction(1)}
+_PI: Final = {"pi": Fraction(1)}
+#: What has no dimension of its own.
+_BESIDE: Final = frozenset({"radian", "cycle", "pi"})
+_HERTZ: Final = re.compile(r"(?<![A-Za-z])([num\u00b5cdkMG]?)(?:Hz|hertz)(?![A-Za-z])")
+#: Functions of an angle.
+_OF_ANGLE: Final = frozenset({"sin", "cos", "tan"})
 #: Functions of a plain number (or an angle) with a plain number or an angle.
 _TO_PLAIN: Final = frozenset({"sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "floor"})
 _TO_ANGLE: Final = frozenset({"asin", "acos", "atan"})
@@ -118,12 +133,12 @@ class _Scan:
             if match is not None and match["number"]:
                 last = self._last_unit(text, end)
                 if last > end:
-                    part, self.quantities[length] = self._converted(match[0], text[end:last])
+                    part, self.quantities[length] = self._converted(match[0], text[end:last], text[last : last + 100])
                     end = last
             elif match is not None:
                 self._check_name(match[0])
-                if match[0] == "deg":
-                    self.quantities[length] = _ANGLE
+                if match[0] in {"deg", "pi"}:
+                    self.quantities[length] = _ANGLE if match[0] == "deg" else _PI
             parts.append(part)
             length, position = length + len(part), end
             self._places.append((length, position))
@@ -149,13 +164,20 @@ class _Scan:
         return position
 
     @staticmethod
-    def _converted(number: str, unit: str) -> tuple[str, Powers]:
+    def _converted(number: str, unit: str, after: str) -> tuple[str, Powers]:
+        if _OTHER_POWER.match(after):
+            raise FormulaError(
+                "invalid-formula",
+                f"'{number}{unit}' has an exponent that is no whole number behind its unit, to which it would belong: "
+                f"write '({number}{unit})^ ..' for a power of the quantity",
+            )
         try:
-            factor, powers = measure(unit.strip())
+            text = _POWER.sub(lambda power: f"^{power[1] or power[2]}", unit.strip())
+            factor, powers = _measured(text)
             value = to_float(Fraction(number) * factor)
         except QuantityError as error:
             raise FormulaError(error.code, f"'{number}{unit}' {error}") from None
-        return repr(value), {name: Fraction(power) for name, power in powers.items()}
+        return repr(value), powers
 
     def _check_name(self, name: str) -> None:
         if name not in self._known and name not in RESERVED:
@@ -200,19 +222,25 @@ class _Dimensions:
 
     def _power(self, node: Node) -> Powers:
         base, exponent = node.parts
+        inner = exponent.parts[0] if exponent.kind == "negative" else exponent
+        if inner.kind == "number" and self._quantities.get(inner.position) == _ANGLE:
+            text = "an exponent has the unit that follows it: put the power in brackets, as in '(x^2) * 1 deg'"
+            raise FormulaError("wrong-unit", text)
         self._require_plain("^", self.of(exponent))
         unit = self.of(base)
         if unit is None or not any(unit.values()):
             return unit
         number = _constant(exponent)
         if number is None:
-            if not any(power for name, power in unit.items() if name != "radian"):
+            if not _without_angle(unit):
                 return _PLAIN
             raise FormulaError("wrong-unit", f"raises {_text(unit)} to a power that is not a plain number")
         return {name: power * number for name, power in unit.items()}
 
     @staticmethod
     def _require_plain(kind: str, unit: Powers) -> None:
+        if kind in _OF_ANGLE and unit is not None and not _without_angle(unit) and not _alike(unit, _ANGLE):
+            raise FormulaError("wrong-unit", f"{kind} takes an angle, not {_text(unit)}; {_HZ_HINT}")
         if not _alike(unit, _PLAIN):
             what = "the exponent" if kind == "^" else kind
             raise FormulaError("wrong-unit", f"{what} takes a plain number or an angle, not {_text(unit)}")
@@ -224,11 +252,23 @@ class _Dimensions:
             if not _alike(unit, given[0]):
                 what = {"+": "adds", "-": "subtracts"}.get(kind, f"'{kind}' compares")
                 raise FormulaError("wrong-unit", f"{what} {_text(given[0])} and {_text(unit)}{_hint(unit, given[0])}")
-        return given[0] if given else None
+        return next((unit for unit in given if _cycles(unit)), given[0]) if given else None
 
 
 def _powers(unit: str) -> dict[str, Fraction]:
-    return {name: Fraction(power) for name, power in measure(unit)[1].items()}
+    return _measured(unit)[1]
+
+
+def _measured(unit: str) -> tuple[Fraction, dict[str, Fraction]]:
+    """Factor of a unit to SI and its powers, with that of hertz, which is 1/s otherwise."""
+    text = latin(unit)
+    factor, powers = measure(text)
+    found = {name: Fraction(power) for name, power in powers.items()}
+    if _HERTZ.search(text):
+        # A revolution per second has the radian that a hertz has not.
+        turns = measure(_HERTZ.sub(r"\1rps", text))[1].get("radian", 0) - powers.get("radian", 0)
+        found["cycle"] = Fraction(turns)
+    return factor, found
 
 
 def _constant(node: Node) -> Fraction | None:
@@ -244,7 +284,7 @@ def _constant(node: Node) -> Fraction | None:
 
 
 def _without_angle(unit: dict[str, Fraction]) -> dict[str, Fraction]:
-    return {name: power for name, power in unit.items() if power and name != "radian"}
+    return {name: power for name, power in unit.items() if power and name not in _BESIDE}
 
 
 def _alike(one: Powers, other: Powers) -> bool:
@@ -253,7 +293,16 @@ def _alike(one: Powers, other: Powers) -> bool:
         return True
     if _without_angle(one) != _without_angle(other):
         return False
-    return not _per_second(one) or one.get("radian", 0) == other.get("radian", 0)
+    turned = one.get("radian", Fraction()) - other.get("radian", Fraction())
+    if _per_second(one):
+        return not turned
+    # Of plain numbers, angles and times; in other products both may stand, as in the energy of a period.
+    return _without_angle(one).keys() - {"second"} != set() or turned * (_cycles(one) - _cycles(other)) >= 0
+
+
+def _cycles(unit: dict[str, Fraction]) -> Fraction:
+    """The power of hertz, 0 where a factor pi converts it."""
+    return Fraction() if unit.get("pi") else unit.get("cycle", Fraction())
 
 
 def _per_second(unit: dict[str, Fraction]) -> bool:
@@ -261,8 +310,9 @@ def _per_second(unit: dict[str, Fraction]) -> bool:
 
 
 def _hint(one: Powers, other: Powers) -> str:
-    alike = one is not None and other is not None and _per_second(one) and _per_second(other)
-    return f"; {_HZ_HINT}" if alike else ""
+    if one is None or other is None or _without_angle(one) != _without_angle(other):
+        return ""
+    return f"; {_HZ_HINT}"
 
 
 def _text(unit: Powers) -> str:
@@ -275,4 +325,7 @@ def _text(unit: Powers) -> str:
         return [name if power == 1 else f"{name}^{power}" for name, power in found]
 
     above, below = "*".join(powers(1)), "/".join(["", *powers(-1)])
+    cycles = _cycles(unit or {})
+    if cycles and not _without_angle(unit or {}):
+        return "a number of periods (Hz times s)" if cycles == 1 and not above else f"{above or '1'}{below} beside Hz*s"
     return f"{above or '1'}{below}" if above or below else "a plain number"
