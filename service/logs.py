@@ -11,7 +11,7 @@ import re
 import sys
 from contextvars import ContextVar
 from datetime import UTC, datetime
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 LogFormat = Literal["text", "json"]
 
@@ -46,8 +46,16 @@ def _time(record: logging.LogRecord) -> str:
     return datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds")
 
 
+def plain(text: str) -> str:
+    """``text`` with an escape for each character that would break a line or control a terminal."""
+    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
 class TextFormatter(logging.Formatter):
-    """A record as plain text: time (UTC), level, message; a traceback follows on further lines."""
+    """A record as plain text: time (UTC), level, message; a traceback follows on further lines.
+
+    A message has whatever a request had in its path, so nothing of it controls a terminal or begins a line.
+    """
 
     def __init__(self) -> None:
         super().__init__("%(asctime)s %(levelname)s %(message)s")
@@ -55,6 +63,17 @@ class TextFormatter(logging.Formatter):
     def formatTime(self, record: logging.LogRecord, datefmt: str | None = None) -> str:  # noqa: N802, ARG002
         """Time of the record in ISO 8601."""
         return _time(record)
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802
+        """The line; further ones of a message of a library are indented."""
+        own = record.name.partition(".")[0] == "sprag"
+        lines = [record.message] if own else record.message.rstrip("\n").split("\n")
+        record.message = "\n  ".join(map(plain, lines))
+        return super().formatMessage(record)
+
+    def formatException(self, ei: Any) -> str:  # noqa: N802
+        """A traceback, whose last lines are the message of an error."""
+        return "\n".join(map(plain, super().formatException(ei).split("\n")))
 
 
 class JsonFormatter(logging.Formatter):

@@ -1,8 +1,29 @@
 """The command line: ``sprag``. Its entry is `main`; each module contains the commands of one subject."""
 
+import os
 import signal
 import sys
 from typing import NoReturn
+
+
+def _replace_closed_streams() -> None:
+    """Put something in the place of standard streams that are closed, whose numbers files opened later would have.
+
+    There is nothing to read. Standard output becomes a pipe whose reader went away, which commands expect; what is said
+    on standard error is dropped.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is not None:
+            continue
+        if name == "stdout":
+            reader, opened = os.pipe()
+            os.close(reader)
+        else:
+            opened = os.open(os.devnull, os.O_RDWR)
+        os.dup2(opened, number)
+        if opened != number:
+            os.close(opened)
+        setattr(sys, name, os.fdopen(number, "r" if name == "stdin" else "w", encoding="utf-8"))
 
 
 def main() -> NoReturn:
@@ -14,6 +35,7 @@ def main() -> NoReturn:
         if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.default_int_handler)
     try:
+        _replace_closed_streams()
         from sprag.service.cli.app import execute
 
         code = execute(sys.argv[1:])

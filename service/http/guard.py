@@ -11,6 +11,7 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from sprag.service.actor import Actor, Role, act_as
+from sprag.service.faults import ParameterFault, shown
 from sprag.service.http.access import ASKING, OPEN, Access, Grant, token_in
 from sprag.service.http.problems import ApiError, problem_response
 from sprag.service.http.roles import LOOKING
@@ -128,6 +129,9 @@ class Guard:
             raise ApiError("bad-request", "Content-Length is not a number.")
         if len(length) > 18 or int(length) > MAX_BODY_BYTES:
             raise body_too_large()
+        coding = headers.get("content-encoding", "").strip()
+        if coding.lower() not in ("", "identity") and (int(length) or "transfer-encoding" in headers):
+            raise encoded_body(coding)
 
     async def _grant(self, scope: Scope, headers: Headers) -> Grant | None:
         """The grant of the request; ApiError where a token or a role is missing."""
@@ -177,6 +181,15 @@ def body_too_large() -> ApiError:
     return ApiError(
         "body-too-large", f"The body is limited to {MAX_BODY_BYTES} bytes.", headers={"Connection": "close"}
     )
+
+
+def encoded_body(coding: str) -> ApiError:
+    """The error for a compressed body; without it, its bytes would be read as text."""
+    fault = ParameterFault(
+        "Content-Encoding", "invalid-choice", "is not a supported content coding", shown(coding), "identity"
+    )
+    detail = "The body must be sent as it is, without Content-Encoding."
+    return ApiError("unsupported-media-type", detail, (fault,), headers={"Accept-Encoding": "identity"})
 
 
 def _is_bearer(header: str) -> bool:

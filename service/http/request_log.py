@@ -111,5 +111,5 @@ def pattern_of(scope: Scope) -> str:
 
 
 def _plain(path: str) -> str:
-    """A path without characters that would break a log line or control a terminal."""
+    """A path in ASCII, with escapes of other characters."""
     return path if path.isprintable() and path.isascii() else ascii(path)[1:-1]

@@ -180,6 +180,8 @@ class Server(uvicorn.Server):
         super().__init__(config)
         self._certificate = certificate
         self._listening = listening
+        #: Why it could not say that it listens; it ends then.
+        self.failure: OSError | None = None
         self._ending = ending
         self._cut = cut
         self._last = threading.Timer(last_seconds, give_up)
@@ -189,7 +191,10 @@ class Server(uvicorn.Server):
         """Begin to listen."""
         await super().startup(sockets)
         if self.started:
-            self._listening()
+            try:
+                self._listening()
+            except OSError as error:  # nobody reads where it says its address
+                self.failure, self.should_exit = error, True
             self._look_for_renewal()
 
     def _look_for_renewal(self) -> None:
@@ -276,6 +281,8 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
         finally:
             supervisor.stop()
             server.ended()
+        if server.failure is not None:
+            raise server.failure
 
 
 def _say(address: str) -> None:

@@ -201,6 +201,33 @@ def test_a_reader_that_goes_away_is_no_failure_to_talk_about(tmp_path: Path) -> 
         assert process.wait(SECONDS) == 141
 
 
+#: Commands that write with each of the ways to write: tables, plain text, JSON, click's help, a service.
+WRITING = ("presets", "token", "presets --json", "run --help", "serve --json --port 0 --db x.sqlite3")
+
+
+@pytest.mark.parametrize("redirection", [">&-", ">&- <&-", "| true"])
+@pytest.mark.parametrize("command", WRITING)
+def test_a_closed_standard_output_ends_quietly(tmp_path: Path, command: str, redirection: str) -> None:
+    script = f'{{ "$@"; echo $? >code; }} 2>said {redirection}'
+    done = subprocess.run(
+        ["sh", "-c", script, "sh", *COMMAND, *command.split()],
+        cwd=tmp_path, env=environment(SPRAG_PROCESSES="1"), timeout=SECONDS, check=False,
+    )  # fmt: skip
+    assert done.returncode in (0, 2)  # that of true, or of the shell that cannot close what is closed
+    assert ((tmp_path / "said").read_text(), (tmp_path / "code").read_text()) == ("", "141\n")
+
+
+def test_files_do_not_get_the_number_of_a_closed_stream(tmp_path: Path) -> None:
+    """What is said would otherwise be written into the database."""
+    command = [*COMMAND, "validate", str(tmp_path / "none.json")]
+    for redirection in ("2>&-", "<&- >&- 2>&-"):
+        done = subprocess.run(
+            ["sh", "-c", f'"$@" {redirection}', "sh", *command],
+            stdout=subprocess.PIPE, env=environment(), timeout=SECONDS, check=False,
+        )  # fmt: skip
+        assert (done.returncode, done.stdout) == (2, b"")
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_an_interrupted_run_leaves_nothing_behind(tmp_path: Path, number: signal.Signals) -> None:
     spec = json.loads(SPEC.read_text())

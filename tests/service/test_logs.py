@@ -17,7 +17,8 @@ from pydantic import SecretStr
 
 from sprag.service.http.app import create_app
 from sprag.service.http.request_log import REQUEST_HEADER
-from sprag.service.logs import JsonFormatter, configure
+from sprag.service.logs import JsonFormatter, TextFormatter, configure
+from sprag.worker.ports import StoreError
 from tests.service.http.people import Office
 
 if TYPE_CHECKING:
@@ -125,6 +126,47 @@ def test_no_address_breaks_a_line(service: Service, log: io.StringIO, path: str)
     (line,) = [line for line in lines(log) if "path" in line]
     assert line["path"].isprintable()
     assert line["path"].isascii()
+
+
+@pytest.mark.parametrize(
+    "sent", ["\x1b[2J", "\x9b31m", "\u202e", "\r", "\n2027-01-01 ERROR forged", "\x00", "\ud800", "\x7f"]
+)
+def test_no_message_controls_a_terminal_or_begins_a_line(sent: str) -> None:
+    """In text; letters of any language stay. JSON escapes all of them by itself."""
+    line = logging.LogRecord("sprag.service", logging.WARNING, "", 0, "GET /%s: %s", (sent, "строк минув"), None)
+    text = TextFormatter().format(line)
+    assert text.isprintable()
+    assert ascii(sent)[1:-1] in text
+    assert text.endswith(": строк минув")
+    library = logging.LogRecord("uvicorn.error", logging.ERROR, "", 0, f"one{sent}\nERROR two\n", None, None)
+    first, *further = TextFormatter().format(library).split("\n")
+    assert first.isprintable()
+    assert further[-1] == "  ERROR two"
+    assert all(item.isprintable() and item.startswith("  ") for item in further)
+    try:
+        raise ValueError(f"about {sent}")
+    except ValueError:
+        failed = logging.LogRecord("sprag", logging.ERROR, "", 0, "failed", None, sys.exc_info())
+    assert all(item.isprintable() for item in TextFormatter().format(failed).split("\n"))
+
+
+def test_a_refused_path_reaches_the_log_as_text(
+    settings: Settings, service: Service, connect: Callable[..., httpx.Client], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The guard refuses before a route is looked for, and says which address it was."""
+    stream = io.StringIO()
+    handler = logging.StreamHandler(stream)
+    handler.setFormatter(TextFormatter())
+    logging.getLogger("sprag.service").addHandler(handler)
+    app = create_app(settings, store=service.store, computer=service.computer, checker=service.checker)
+    monkeypatch.setattr(service.store, "tokens", lambda: (_ for _ in ()).throw(StoreError("gone")))
+    try:
+        assert connect(app).get("/%1b%5b2J%0aforged").status_code == 503
+    finally:
+        logging.getLogger("sprag.service").removeHandler(handler)
+    (line,) = stream.getvalue().splitlines()
+    assert line.isprintable()
+    assert r"GET /\x1b[2J" in line
 
 
 def test_a_fault_is_told_with_its_trace_and_request(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+import gzip
+import json
 from collections.abc import AsyncIterator, Callable
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +45,25 @@ def test_an_address_with_a_line_feed_is_another_address(service: Service) -> Non
     ):
         assert service.http.request(method, path + "%0a").status_code == 404, (method, path)
     assert service.get(f"/studies/{study_id}")["id"] == study_id
+
+
+@pytest.mark.parametrize("coding", ["gzip", "GZIP", "x-gzip", "deflate", "br", "zstd", "identity, gzip", "gzip, gzip"])
+@pytest.mark.parametrize("streamed", [False, True])
+def test_a_compressed_body_is_refused_as_such(service: Service, coding: str, streamed: bool) -> None:
+    """At every door, whatever the length is said to be; without a body the header says nothing."""
+    body = gzip.compress(json.dumps(SPEC).encode())
+    head = {"Content-Encoding": coding, "Content-Type": "application/json"}
+    for path in ("/api/v1/studies", "/api/v1/studies:preview", "/api/v1/schedules", "/new"):
+        answer = service.http.post(path, content=iter([body]) if streamed else body, headers=head)
+        assert answer.status_code == 415, path
+        assert answer.headers["accept-encoding"] == "identity"
+    problem = service.http.post("/api/v1/studies", content=body, headers=head).json()
+    assert problem["errors"][0]["parameter"] == "Content-Encoding"
+    assert problem["errors"][0]["value"] == coding
+    assert "UTF-8" not in json.dumps(problem)
+    assert service.http.get("/api/v1/studies", headers=head).status_code == 200
+    plain = {"Content-Encoding": "identity"}
+    assert service.http.post("/api/v1/studies", json=SPEC, headers=plain).status_code == 202
 
 
 def test_no_route_is_open_without_the_token(guarded: httpx.Client, service: Service) -> None:
