@@ -9,10 +9,11 @@ import pandas as pd
 from sprag.service.client.frames import table_of
 from sprag.service.client.queries import spec_of
 from sprag.service.jobs.local import pool_size, run_here
+from sprag.service.plain_data import plain
 from sprag.service.results.exports import export, stored
 from sprag.service.settings import Settings
 from sprag.service.spec.catalogue import unit_of
-from sprag.service.spec.document import parse_spec
+from sprag.service.spec.document import SpecError, parse_spec
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,7 +38,8 @@ def run(
     Parameters
     ----------
     spec : mapping, str or path
-        A spec, or the name of a JSON or TOML file with one.
+        A spec, or the name of a JSON or TOML file with one. Values may be numbers of numpy and decimal, arrays, columns
+        of pandas and quantities of pint.
     processes : int, optional
         Number of processes; 0 runs the cases in this process. By default one per core, or 0 where the study takes about
         a second. A script that starts processes needs ``if __name__ == "__main__":`` around its own code.
@@ -63,7 +65,10 @@ def run(
     StoreError, ExecutorError
         When the database or a process fails. All of them are a SpragError.
     """
-    parsed = parse_spec(spec_of(spec))
+    data, faults = plain(spec_of(spec))
+    if faults:
+        raise SpecError(faults)
+    parsed = parse_spec(data)
     study = parsed.study
     given = {"database": database, "processes": processes}
     settings = Settings(**{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ipaddress
-import math
 import re
 import ssl
 import uuid
@@ -18,6 +17,7 @@ import httpx
 
 from sprag.service.client.errors import ArgumentError, RefusedError, ServiceError, UnreachableError, UntrustedError
 from sprag.service.languages import N_
+from sprag.service.plain_data import plain
 
 #: Seconds without a byte after which an event stream is abandoned; the service sends one every 15 s.
 SILENCE: Final = 30.0
@@ -97,24 +97,24 @@ def document(server: str, response: httpx.Response) -> dict[str, Any]:
     return data
 
 
-def require_finite(data: object, pointer: str = "") -> None:
-    """Raise RefusedError, as the service would, at the first number in ``data`` that is not finite."""
-    if isinstance(data, Mapping):
-        for key, item in data.items():
-            require_finite(item, f"{pointer}/{str(key).replace('~', '~0').replace('/', '~1')}")
-    elif isinstance(data, list | tuple):
-        for index, item in enumerate(data):
-            require_finite(item, f"{pointer}/{index}")
-    elif isinstance(data, float) and not math.isfinite(data):
-        fault = {"pointer": pointer, "code": "not-finite", "message": "must be a finite number", "value": str(data)}
-        problem = {
-            "type": "/problems/invalid-spec",
-            "title": "The study spec is not valid",
-            "status": 422,
-            "detail": f"{pointer}: must be a finite number (got {data})",
-            "errors": [fault],
-        }
-        raise RefusedError(422, problem)
+def plain_body(data: object) -> Any:
+    """The body of a request as plain JSON data; RefusedError, as the service would, where values have no form in it."""
+    made, faults = plain(data)
+    if not faults:
+        return made
+    errors = [
+        {"pointer": fault.where, "code": fault.code, "message": fault.message, "value": fault.value}
+        | ({} if fault.allowed is None else {"allowed": fault.allowed})
+        for fault in faults
+    ]
+    problem = {
+        "type": "/problems/invalid-spec",
+        "title": "The study spec is not valid",
+        "status": 422,
+        "detail": "\n".join(map(str, faults)),
+        "errors": errors,
+    }
+    raise RefusedError(422, problem)
 
 
 def named(argument: str, value: object) -> str:

@@ -23,8 +23,8 @@ from sprag.service.client.wire import (
     address,
     connection_options,
     document,
+    plain_body,
     refusal,
-    require_finite,
     study_path,
     unanswered,
     within,
@@ -96,7 +96,8 @@ class AsyncConnection:
     async def _send(
         self, method: str, path: str, *, key: str | None = None, once: bool = False, **arguments: Any
     ) -> httpx.Response:
-        require_finite(arguments.get("json"))
+        if "json" in arguments:
+            arguments["json"] = plain_body(arguments["json"])
         if key is not None:
             arguments["headers"] = {"Idempotency-Key": key or uuid.uuid4().hex}
         retries = Retries(method, path, key is not None, self._seconds(once))
