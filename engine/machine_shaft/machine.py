@@ -180,6 +180,13 @@ class Machine:
             breaks += formula_breaks(self._drive_formula, self._environment, self.spec.cycle)
         return breaks
 
+    def given_breaks(self) -> list[Floats]:
+        """Those of ``breaks`` that the rows of tables and the ends of steps give."""
+        breaks = [angles for part in self.parts for angles in part.given_breaks()]
+        if self._drive_curve is not None:
+            breaks.append(np.mod(self._drive_curve.knots, self.cycle)[None, :])
+        return breaks
+
     def formulas(self) -> list[Formula]:
         """The formulas of the fields, except of torques that balancing replaces."""
         own = [formula for part in self.parts for formula in part.formulas()]

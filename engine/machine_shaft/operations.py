@@ -345,6 +345,10 @@ class Operation:
         """The formula of its diagram, if any."""
         return None if self._choice.quantity in {"none", "gas"} else self._expression
 
+    def given_breaks(self) -> list[Floats]:
+        """Those of ``breaks`` that are numbers of a step or of a table, or follow from them through the stroke."""
+        return self.breaks() if self._strokes or self._curve is not None or self._choice.form == "steps" else []
+
     def breaks(self) -> list[Floats]:
         """Angles at which the torque jumps or has a kink, arrays of shape (cases or 1, n); NaN is none."""
         choice, values = self._choice, self._values

@@ -67,6 +67,10 @@ def series(coefficients: Floats, t: Floats) -> Floats:
     return out
 
 
+#: Cuts that are nearer, as a share of the cycle, are one: computed ones, and those that are given.
+_COMPUTED, GIVEN = 1e-11, 1e-14
+
+
 @dataclass(frozen=True, slots=True)
 class Points:
     """Points in the cycle, one per case: panel, position -1 .. 1 within it, and angle in rad; all of shape (cases,)."""
@@ -112,20 +116,35 @@ class Panels:
     def __init__(self, cuts: Floats) -> None:
         self.cuts = cuts
         self.half = 0.5 * (cuts[:, 1:] - cuts[:, :-1])
-        self.angles = cuts[:, :-1, None] + self.half[..., None] * (1.0 + POSITIONS)
+        # A node of a very short panel may round to its end, which belongs to the next one.
+        within = np.where(self.half > 0.0, np.nextafter(cuts[:, 1:], 0.0), cuts[:, 1:])
+        self.angles = np.minimum(cuts[:, :-1, None] + self.half[..., None] * (1.0 + POSITIONS), within[..., None])
         self.weights = self.half[..., None] * WEIGHTS
 
     @classmethod
-    def over(cls, cycle: float, breaks: Sequence[Floats], panels: int) -> "Panels":
-        """``panels`` equal panels cut further at ``breaks``, arrays of shape (cases or 1, n); NaN is no break."""
+    def over(cls, cycle: float, breaks: Sequence[Floats], panels: int, given: Sequence[Floats] = ()) -> "Panels":
+        """``panels`` equal panels cut further at ``breaks``, arrays of shape (cases or 1, n); NaN is no break.
+
+        Two breaks at almost the same angle are merged: the sliver between them would contain an unresolvable jump.
+        Those that are ``given`` as numbers, ends of a narrow step for instance, are exact and stay apart.
+        """
         parts = [np.linspace(0.0, cycle, panels + 1)[None, :], *[np.nan_to_num(b, nan=0.0) for b in breaks if b.size]]
-        rows = max(part.shape[0] for part in parts)
+        rows = max(part.shape[0] for part in (*parts, *given))
         cuts = np.concatenate([np.broadcast_to(part, (rows, part.shape[1])) for part in parts], axis=1)
-        cuts = np.sort(np.clip(cuts, 0.0, cycle), axis=1)
-        # Two cuts at almost the same angle are merged: the sliver between them would contain an unresolvable jump.
+        exact = _close_pairs(cycle, given, rows)
+        if exact.size:
+            near = (np.abs(cuts[:, :, None] - exact[:, None, :]) < _COMPUTED * cycle).any(axis=2)
+            ends = np.full((rows, 2), np.nan)
+            ends[:] = 0.0, cycle
+            cuts = np.concatenate([np.where(near, np.nan, cuts), ends, exact], axis=1)
+        cuts = np.sort(np.clip(np.where(np.isnan(cuts), 0.0, cuts), 0.0, cycle), axis=1)
         for column in range(1, cuts.shape[1]):
-            close = cuts[:, column] - cuts[:, column - 1] < 1e-11 * cycle
-            cuts[:, column] = np.where(close, cuts[:, column - 1], cuts[:, column])
+            this, before = cuts[:, column], cuts[:, column - 1]
+            apart = np.full(rows, _COMPUTED)
+            if exact.size:
+                both = (exact == this[:, None]).any(axis=1) & ((exact == before[:, None]).any(axis=1))
+                apart = np.where(both, GIVEN, _COMPUTED)
+            cuts[:, column] = np.where(this - before < apart * cycle, before, this)
         cuts[:, -1] = cycle
         return cls(cuts)
 
@@ -251,6 +270,22 @@ class Panels:
         before, after = height[case, panel, place], height[case, panel, place + 1]
         kernels.series_roots(rows, SAMPLES[place], SAMPLES[place + 1], before, after, t)
         return Crossings(case, panel, t, self._angle(case, panel, t), ~above[case, panel, place])
+
+
+def _close_pairs(cycle: float, given: Sequence[Floats], rows: int) -> Floats:
+    """Those of the ``given`` angles, and of the ends of the cycle, that lie nearer to another than computed ones may.
+
+    Shape (rows, n); NaN where a case has fewer.
+    """
+    every = [np.broadcast_to(part, (rows, part.shape[1])) for part in (np.array([[0.0, cycle]]), *given) if part.size]
+    known = np.sort(np.concatenate(every, axis=1), axis=1)
+    gaps = np.diff(known, axis=1)
+    close = (gaps >= GIVEN * cycle) & (gaps < _COMPUTED * cycle)
+    chosen = np.zeros(known.shape, dtype=np.bool_)
+    chosen[:, 1:] |= close
+    chosen[:, :-1] |= close
+    found = np.sort(np.where(chosen, known, np.nan), axis=1)
+    return found[:, : int(chosen.sum(axis=1).max(initial=0))]
 
 
 @dataclass(frozen=True, slots=True)

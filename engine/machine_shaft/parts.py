@@ -181,6 +181,17 @@ class ShaftPart:
         # A formula need not repeat itself: the end of the part's own cycle is a cut, too.
         return [self.shaft_angle(angles) for angles in (*breaks, np.zeros((1, 1)))]
 
+    @property
+    def turned(self) -> bool:
+        """Whether its angle is not that of the shaft."""
+        return self._ahead is not None
+
+    def given_breaks(self) -> list[Floats]:
+        """Angles of the shaft that are given for its operation, (cases or 1, n); NaN is none."""
+        return [
+            angles if self._ahead is None else self.shaft_angle(angles) for angles in self._operation.given_breaks()
+        ]
+
     def formulas(self) -> list[Formula]:
         """The formulas of its inertia and its resistance."""
         own = (("inertia", self.inertia_formula), ("resistance", self._operation.expression))

@@ -7,7 +7,7 @@ from sprag.engine.machine_shaft.balance import largest_work
 from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.decomposition import Decomposition
 from sprag.engine.machine_shaft.machine import Machine
-from sprag.engine.machine_shaft.panels import Panels
+from sprag.engine.machine_shaft.panels import GIVEN, Panels
 from sprag.engine.machine_shaft.parts import ShaftPart
 from sprag.engine.machine_shaft.pieces import Part, Pieces, courses, missed
 from sprag.engine.machine_shaft.spec import MachineSpec
@@ -41,6 +41,31 @@ def rough_pace(d: Decomposition) -> Bools:
     with np.errstate(invalid="ignore", divide="ignore"):
         fine = _resolved(d.panels, 1.0 / np.sqrt(d.squares), 1e-6)
     return np.asarray(~(fine | np.isnan(d.start)[:, None]))
+
+
+def lost_by_rounding(machine: Machine, d: Decomposition) -> Bools:
+    """Cases with given angles so near to each other that the work between them is lost in rounding, (cases,).
+
+    Neither may the work between angles that count as one be more than 1e-10 of the largest, nor may a rounding of the
+    angle by 1e-15 rad, as that of a part's crank angle, move more than 1e-8 of it.
+    """
+    cases, panels = len(d.start), d.panels
+    lost = np.zeros(cases, dtype=np.bool_)
+    given = [part for part in machine.given_breaks() if part.size]
+    if not given:
+        return lost
+    rows = max(len(part) for part in given)
+    known = np.sort(np.concatenate([np.broadcast_to(part, (rows, part.shape[1])) for part in given], axis=1), axis=1)
+    gaps = np.diff(known, axis=1)
+    merged = (gaps > 0.0) & (gaps < GIVEN * machine.cycle)
+    if merged.any():
+        between = np.where(merged, known[:, :-1] + 0.5 * gaps, 0.0)[:, None, :]
+        fields = machine.fields(between)
+        size = np.abs(fields.drive) + np.abs(fields.resistance)
+        lost |= (np.where(merged[:, None, :], size * gaps[:, None, :], 0.0).sum(axis=(1, 2))) > 1e-10 * d.most_work
+    if any(part.turned for part in machine.parts):
+        lost |= 1e-15 * panels.largest(d.fields.operation) > 1e-8 * d.most_work
+    return lost
 
 
 def near_singular(machine: Machine, d: Decomposition, rough: Bools) -> Bools:

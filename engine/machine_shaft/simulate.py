@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sprag.engine.endings import ENDINGS, Ending
+from sprag.engine.machine_shaft import resolution
 from sprag.engine.machine_shaft.balance import balanced
 from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.decomposition import Decomposition, characteristics
@@ -18,7 +19,6 @@ from sprag.engine.machine_shaft.motor import LimitCycle, characteristic, limit_c
 from sprag.engine.machine_shaft.operations import SpeedLaw
 from sprag.engine.machine_shaft.panels import Panels
 from sprag.engine.machine_shaft.pieces import Pieces, pieces
-from sprag.engine.machine_shaft.resolution import compare, linkage_unresolved, near_singular, rough_pace, rough_panels
 from sprag.engine.machine_shaft.results import result_infos
 from sprag.engine.machine_shaft.spec import MachineSpec
 from sprag.engine.machine_shaft.speed_course import follows_speed, speed_course
@@ -103,7 +103,7 @@ def attempts(spec: MachineSpec, columns: Columns) -> Iterator[tuple[NDArray[np.i
             found = [pieces(formula, panels, 2.0 * np.pi * spec.cycle) for formula in Machine(spec, columns).formulas()]
         for own in found:
             solved.unknown[...] |= np.broadcast_to(own.unknown, (columns.cases,))[rows]
-        compare(spec, columns, rows, found, solved.decomposition, solved.rough, solved.omega)
+        resolution.compare(spec, columns, rows, found, solved.decomposition, solved.rough, solved.omega)
         yield rows, solved
         chosen = solved.rough | solved.slow | solved.rough_pace
         real = np.broadcast_to((panels.half > 0.0).sum(axis=1), rows.shape)
@@ -156,13 +156,13 @@ def settle(spec: MachineSpec, columns: Columns, solved: Solved) -> Bools:
     singular = np.zeros_like(lost)
     if (lost | negative).any():
         # Close to a singular position the inertia is so large that any other looks like rounding error.
-        singular = near_singular(Machine(spec, columns), solved.decomposition, solved.rough)
+        singular = resolution.near_singular(Machine(spec, columns), solved.decomposition, solved.rough)
         # No panels were halved for unknown formulas, whose variation may come from the linkage.
         rows = np.nonzero(solved.unknown)[0]
         if rows.size:
             panels = solved.decomposition.panels.take(rows)
             machine = Machine(spec, columns.take(rows))
-            singular[rows] = linkage_unresolved(machine, panels, rows.size, MAX_PANELS * spec.cycle)
+            singular[rows] = resolution.linkage_unresolved(machine, panels, rows.size, MAX_PANELS * spec.cycle)
     lost = (lost & ~negative) | singular
     _stop(solved, slow & ~lost)
     unstable = solved.unstable & (solved.endings == _CODE[Ending.OK])
@@ -175,7 +175,7 @@ def settle(spec: MachineSpec, columns: Columns, solved: Solved) -> Bools:
 def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
     machine = Machine(spec, columns)
     cycle = machine.cycle
-    panels = Panels.over(cycle, [*machine.breaks(), cuts], PANELS * spec.cycle)
+    panels = Panels.over(cycle, [*machine.breaks(), cuts], PANELS * spec.cycle, machine.given_breaks())
     with np.errstate(all="ignore"):
         fields = machine.fields(panels.angles)
     endings = np.full(columns.cases, _CODE[Ending.OK])
@@ -205,11 +205,11 @@ def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
         for name, values in results.items():
             if name.startswith(_OF_MOTOR):
                 results[name] = np.where(no_cycle, np.nan, values)
-    (rough, slow), pace = rough_panels(d), rough_pace(d)
+    (rough, slow), pace = resolution.rough_panels(d), resolution.rough_pace(d)
     slow = slow | pace if spec.mean_speed_is == "time" else slow
     # Where the load is stiff, shorter panels may bring the speed that was not found.
-    unstable = moved.stability.unstable
-    return Solved(d, results, endings, rough | moved.stiff, slow, pace, moved.lost, unstable, moved.omega)
+    lost, unstable = moved.lost | resolution.lost_by_rounding(machine, d), moved.stability.unstable
+    return Solved(d, results, endings, rough | moved.stiff, slow, pace, lost, unstable, moved.omega)
 
 
 class _Moved(NamedTuple):
