@@ -172,6 +172,8 @@ class Dispatcher:
         studies = self._opening.studies()
         if not self._has_room(studies):
             studies = self._opening.studies()
+        known = {number: name for number, name in self._ids.items() if number in self._machine.studies}
+        self._ids = known | {study.number: study.id for study in studies}
         given = self._opening.given(studies, self._executor.shortage)
         for study in filter(self._opening.chosen, studies):
             over = study.finish_by is not None and study.finish_by <= self._clock.now()
@@ -220,7 +222,6 @@ class Dispatcher:
         number = study.number
         if number not in self._studies:
             self._studies[number] = self._store.study_of(number)
-            self._ids[number] = study.id
         try:
             return self._opening.loaded(number, self._studies[number], self._executor)
         except KernelError as error:
@@ -243,7 +244,6 @@ class Dispatcher:
     def _forget(self, number: int) -> None:
         self._studies.pop(number, None)
         self._rounds.forget(number)
-        self._ids.pop(number, None)
         self._opening.forget(number)
 
     def _begin_again(self, number: int, reason: str) -> None:

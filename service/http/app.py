@@ -55,6 +55,7 @@ from sprag.service.http.prefix import Prefixed
 from sprag.service.http.read_ahead import keep_reading_ahead
 from sprag.service.http.request_log import Noted, RequestLog
 from sprag.service.http.shares import Shares
+from sprag.service.http.sound_store import sound_store
 from sprag.service.http.web import basin as basin_pages
 from sprag.service.http.web import branch as branch_pages
 from sprag.service.http.web import (
@@ -245,7 +246,7 @@ def create_app(
     settings = settings or Settings()
     _require_free(settings.url_prefix)
     own_store = store is None
-    used_store = store or _sound_store(settings)
+    used_store = store or sound_store(settings, chunking(settings))
     try:
         settings.require_safe(stored=any(token.revoked_at is None for token in used_store.tokens()))
     except UnsafeSettingsError:
@@ -366,16 +367,6 @@ def _checker(settings: Settings) -> ProcessComputer:
         settings.check_timeout, settings.check_memory * 2**20, MAX_CHECKS, "too-costly", "SPRAG_CHECK_TIMEOUT"
     )
     return ProcessComputer(limits, settings.check_processes, checks.prepare)
-
-
-def _sound_store(settings: Settings) -> Store:
-    store = Store.open(settings.database_url, chunking=chunking(settings))
-    try:
-        store.require_sound()
-    except BaseException:
-        store.close()
-        raise
-    return store
 
 
 def chunking(settings: Settings) -> Chunking:

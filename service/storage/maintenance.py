@@ -64,7 +64,7 @@ def set_revision(session: Session, found: str) -> None:
         connection.execute(_VERSION.update().values(version_num=found))
 
 
-def create(session: Session) -> None:
+def create(session: Session, found: str = HEAD_REVISION) -> None:
     """Make the tables of an empty SQLite database as the code has them.
 
     They are those that the migrations make, which take ten times as long.
@@ -73,7 +73,7 @@ def create(session: Session) -> None:
         if not sa.inspect(connection).get_table_names():  # no other process was faster
             all_tables().create_all(connection, checkfirst=False)
             _VERSION.create(connection)
-            connection.execute(_VERSION.insert().values(version_num=HEAD_REVISION))
+            connection.execute(_VERSION.insert().values(version_num=found))
 
 
 def other_revision(session: Session, found: str | None) -> SchemaError:
@@ -113,15 +113,23 @@ def upgrade(session: Session) -> tuple[str | None, str]:
     before = revision(session)
     if before is not None and before not in known_revisions():
         raise other_revision(session, before)
-    if before is None and not session.on_server:
-        create(session)
+    if before is None:
+        make(session)
     else:
         migrate(session)
     return before, HEAD_REVISION
 
 
-def migrate(session: Session) -> None:
-    """Run the migrations that the database lacks, in one transaction."""
+def make(session: Session, found: str = HEAD_REVISION) -> None:
+    """Make the tables of an empty database, with ``found`` as its revision, in one transaction."""
+    if session.on_server:
+        migrate(session, found)
+    else:
+        create(session, found)
+
+
+def migrate(session: Session, after: str = HEAD_REVISION) -> None:
+    """Run the migrations that the database lacks, in one transaction, with ``after`` as its revision at the end."""
     from alembic import command
     from alembic.config import Config
 
@@ -136,6 +144,8 @@ def migrate(session: Session) -> None:
         if before not in {None, HEAD_REVISION}:
             now = micros_of(SystemClock().now())
             note(connection, now, "database.upgrade", "", before=before, after=HEAD_REVISION)
+        if after != HEAD_REVISION:
+            connection.execute(_VERSION.update().values(version_num=after))
 
 
 def require_sound(session: Session) -> None:

@@ -104,8 +104,9 @@ def _prepare(target: Session, mark: str) -> bool:
             f"{target.location} has an unfinished move of another database; name an empty one", "target-not-empty"
         )
     if found is None:
-        maintenance.upgrade(target)
-    elif found != HEAD_REVISION:
+        maintenance.make(target, mark)
+        return False
+    if found != HEAD_REVISION:
         raise maintenance.other_revision(target, found)
     with target.read() as connection:
         full = [table.name for table in all_tables().sorted_tables if _has_rows(connection, table)]

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Final
 import sqlalchemy as sa
 
 from sprag.service.storage.audit import note, require_own
-from sprag.service.storage.errors import StudyBusyError, StudyNotFoundError
+from sprag.service.storage.errors import DatabaseFullError, StudyBusyError, StudyNotFoundError
 from sprag.service.storage.part import micros_of
+from sprag.service.storage.reserve import makes_room
 from sprag.service.storage.tables import (
     CHUNKS,
     ENDINGS,
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 
 #: Rows deleted in one transaction: other writers wait for it.
 PURGED_ROWS: Final = 5_000
+#: On a full disk fewer and fewer, down to so many.
+LEAST_PURGED_ROWS: Final = 50
 
 
 class Purging(Users):
@@ -42,6 +45,7 @@ class Purging(Users):
     #: For how long a deleted study can be restored; set by the service.
     restorable = timedelta(0)
 
+    @makes_room
     def delete_study(self, study_id: str, *, at_once: bool = False) -> None:
         """Delete a study that has ended or is held at its deadline.
 
@@ -115,33 +119,53 @@ class Purging(Users):
         with self.session.read() as connection:
             if connection.execute(sa.select(c.number).where(over).limit(1)).first() is None:
                 return
-        with self.session.write() as connection:
-            # A clock that is set back does not let a study be restored of which half is gone.
-            gone = connection.execute(
-                sa.update(STUDIES).where(over).values(purge_at=0).returning(c.number, c.model, c.variant)
-            ).all()
-        for number, model, variant in gone:
+        for number, model, variant in self._taken_away(over):
             rows = results_table(model, variant)
             yield from self._emptied(rows, rows.c.case_number, number)
             if (further := further_table(model, variant)) is not None:
                 yield from self._emptied(further, further.c.case_number, number)
             yield from self._emptied(CHUNKS, CHUNKS.c["first"], number)
-            with self.session.write() as connection:
-                for table in (ENDINGS, ROUNDS, SAVED_VIEWS):
-                    connection.execute(sa.delete(table).where(table.c.study == number))
-                connection.execute(sa.delete(STUDIES).where(c.number == number))
+            self._remove(number)
             yield 1
+
+    @makes_room
+    def _taken_away(self, over: sa.ColumnElement[bool]) -> list[tuple[int, str, str]]:
+        """Number, model and variant of the studies that are ``over``, which cannot be restored from now on."""
+        c = STUDIES.c
+        with self.session.write() as connection:
+            # A clock that is set back does not let a study be restored of which half is gone.
+            gone = sa.update(STUDIES).where(over).values(purge_at=0).returning(c.number, c.model, c.variant)
+            return [(row.number, row.model, row.variant) for row in connection.execute(gone)]
+
+    @makes_room
+    def _remove(self, number: int) -> None:
+        """Delete a study that has no rows any more."""
+        with self.session.write() as connection:
+            for table in (ENDINGS, ROUNDS, SAVED_VIEWS):
+                connection.execute(sa.delete(table).where(table.c.study == number))
+            connection.execute(sa.delete(STUDIES).where(STUDIES.c.number == number))
 
     def _emptied(self, table: sa.Table, key: sa.Column[int], number: int) -> Iterator[int]:
         """Delete the rows of a study from a table, in the order of ``key``, which few rows share."""
+        rows, left = PURGED_ROWS, True
+        while left:
+            try:
+                deleted, left = self._delete_first(table, key, number, rows)
+            except DatabaseFullError:
+                if rows <= LEAST_PURGED_ROWS:
+                    raise
+                rows //= 10  # even a deletion writes pages to the log
+            else:
+                yield deleted
+
+    @makes_room
+    def _delete_first(self, table: sa.Table, key: sa.Column[int], number: int, rows: int) -> tuple[int, bool]:
+        """Delete about that many rows of a study: how many, and whether any are left."""
         mine = table.c.study == number
-        while True:
-            with self.session.write() as connection:
-                # The first row that is kept; none where the rest is small enough.
-                edge = connection.execute(
-                    sa.select(key).where(mine).order_by(key).offset(PURGED_ROWS).limit(1)
-                ).scalar_one_or_none()
-                deleted = connection.execute(sa.delete(table).where(mine, sa.true() if edge is None else key < edge))
-            yield deleted.rowcount
-            if edge is None:
-                return
+        with self.session.write() as connection:
+            # The first row that is kept; none where the rest is small enough.
+            edge = connection.execute(
+                sa.select(key).where(mine).order_by(key).offset(rows).limit(1)
+            ).scalar_one_or_none()
+            deleted = connection.execute(sa.delete(table).where(mine, sa.true() if edge is None else key < edge))
+        return deleted.rowcount, edge is not None

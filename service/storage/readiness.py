@@ -106,6 +106,8 @@ class Readiness:
                     "it hangs or was stopped (`sprag worker --take-over` ends a hung worker).",
                     *self._worker(),
                 ]
+            if held := self._store.full():
+                return [f"Studies are held: {held}.", *self._worker()]
             return self._worker()
         except (DatabaseError, StoreError) as error:
             text = str(error)

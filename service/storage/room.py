@@ -7,10 +7,8 @@ a reserve: a file beside the database that is removed when there is no other spa
 
 from __future__ import annotations
 
-import os
 import resource
 import shutil
-from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import sqlalchemy as sa
@@ -18,7 +16,7 @@ import sqlalchemy as sa
 from sprag.service.languages import recorded
 from sprag.service.storage.dispatchers import Dispatchers, return_claims
 from sprag.service.storage.errors import DatabaseFullError
-from sprag.service.storage.private_files import create_private
+from sprag.service.storage.reserve import holds, keep_reserve
 from sprag.service.storage.tables import STUDIES, WAITS_FOR_ROOM
 from sprag.worker.states import GOING, StudyEvent
 
@@ -29,8 +27,6 @@ if TYPE_CHECKING:
 
 #: Bytes kept free for the running chunks and for recording the reason of a hold.
 RESERVE_BYTES = 4 * 1024 * 1024
-#: Size in bytes of the reserve file, which is removed when not even the reason can be recorded.
-RESERVE_FILE_BYTES = 1024 * 1024
 #: Value for unknown free space: enough for any request.
 UNKNOWN_BYTES = 1 << 62
 GOES_ON = recorded.NO_ROOM.rpartition("; ")[2]
@@ -93,35 +89,25 @@ class Room(Dispatchers):
         left, limit = room(self.session)
         if left < RESERVE_BYTES:
             return recorded.NO_ROOM.format(limit=limit)
-        self._keep_reserve()
+        keep_reserve(self.session)
         return None
 
-    @property
-    def _reserve(self) -> Path:
-        return self.session.path.with_name(f"{self.session.path.name}.reserve")
+    def full(self) -> str | None:
+        """Why every study is held, or will be when one is to run, as a sentence; None while there is room."""
+        held = sa.select(STUDIES.c.reason).where(STUDIES.c.waits_for == WAITS_FOR_ROOM, STUDIES.c.deleted_at.is_(None))
+        with self.session.read() as connection:
+            reason: str | None = connection.execute(held.limit(1)).scalar_one_or_none()
+        if reason is None:
+            left, limit = room(self.session)
+            reason = recorded.NO_ROOM.format(limit=limit) if left < RESERVE_BYTES else None
+        return reason
 
-    def _keep_reserve(self) -> None:
-        """Create the reserve file for a full disk; a server has to provide for that itself."""
-        if self.session.on_server or self._reserve.exists():
-            return
-        with suppress(OSError), os.fdopen(create_private(self._reserve), "wb") as file:
-            file.write(os.urandom(RESERVE_FILE_BYTES))  # a file of zeros could be sparse
-            os.fsync(file.fileno())
-
+    @holds
     def hold(self, epoch: int, reason: str, *, returned: bool) -> None:
         """Pause every study of this dispatcher or of none that is queued or running, with the reason, until `let_go`.
 
         With ``returned`` every claim of this epoch goes back to waiting in the same transaction.
         """
-        try:
-            self._hold(epoch, reason, returned)
-        except DatabaseFullError:
-            if self.session.on_server:
-                raise
-            self._reserve.unlink(missing_ok=True)
-            self._hold(epoch, reason, returned)
-
-    def _hold(self, epoch: int, reason: str, returned: bool) -> None:
         with self.session.write() as connection:
             self._own(connection, epoch)
             if returned:

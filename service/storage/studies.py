@@ -32,6 +32,7 @@ from sprag.service.storage.part import (
 )
 from sprag.service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
 from sprag.service.storage.records import Progress, RoundProgress, StudyRecord, record_of
+from sprag.service.storage.reserve import makes_room
 from sprag.service.storage.round_table import add_round, latest_round
 from sprag.service.storage.schedule_runs import submit_run
 from sprag.service.storage.searching import search_text
@@ -288,6 +289,7 @@ class Studies(Users, Orders, Dispatchers):
         """Request the end of the study; raises StudyNotFoundError, TransitionError when it is finished or failed."""
         return self._wish(study_id, StudyEvent.CANCEL)
 
+    @makes_room
     def _wish(self, study_id: str, event: StudyEvent) -> StudyRecord:
         with self.session.write() as connection:
             row = self._row(connection, study_id, STUDIES.c.number, *_CHANGED, STUDIES.c.waits_for)

@@ -10,6 +10,7 @@ import sqlalchemy as sa
 from sprag.service.languages import grouped, recorded
 from sprag.service.storage.dispatchers import WAITING, return_claims
 from sprag.service.storage.part import add_chunks, moment, optional_moment
+from sprag.service.storage.reserve import makes_room
 from sprag.service.storage.round_table import add_round, latest_round
 from sprag.service.storage.storing import Storing, is_chunk
 from sprag.service.storage.tables import (
@@ -187,6 +188,7 @@ class Work(Storing):
                 sa.update(CHUNKS).where(CHUNKS.c.study == number, CHUNKS.c.state != ChunkState.DONE).values(failures=0)
             )
 
+    @makes_room
     def settle(self, epoch: int, number: int, summary: Mapping[str, Any] | None = None) -> StudyState:
         """End a study without open claims: as cancelled when that was requested, otherwise as finished or failed.
 

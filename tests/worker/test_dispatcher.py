@@ -382,3 +382,13 @@ def test_with_news_the_store_is_looked_at_when_it_has_changed_and_seldom_otherwi
     assert seen[60][1] is StudyState.FINISHED
     assert seen[100][0] + 1 == seen[-1][0]
     assert news.closed
+
+
+def test_the_log_names_a_study_by_its_id_whether_it_ran_or_not(store: Store, caplog: pytest.LogCaptureFixture) -> None:
+    ran, cancelled = submit(store, 8), submit(store, 8)
+    store.cancel_study(cancelled.id)
+    with caplog.at_level("INFO", "sprag.worker.dispatcher"):
+        work(store, InlineExecutor(fakes.run))
+    assert f"The study {cancelled.id} is cancelled." in caplog.text
+    assert f"The study {ran.id} is finished." in caplog.text
+    assert f"The study {ran.number} " not in caplog.text

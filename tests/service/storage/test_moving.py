@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 import sqlalchemy as sa
 
 from sprag.service.cli.app import execute
-from sprag.service.storage import moved_rows
+from sprag.service.storage import maintenance, moved_rows
 from sprag.service.storage.errors import DatabaseError, SchemaError
 from sprag.service.storage.lock import DispatcherLock
 from sprag.service.storage.moved_rows import TableOf
@@ -128,6 +129,33 @@ def test_studies_go_on_where_they_were(opened: tuple[Session, Session], urls: tu
 
 class _PowerError(Exception):
     """The power went."""
+
+
+def test_a_move_that_is_killed_before_it_begins_leaves_no_sound_empty_database(
+    opened: tuple[Session, Session], urls: tuple[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After each transaction: the mark belongs to the one that makes the tables."""
+    source, target = opened
+    _fill(source)
+    write = Session.write
+
+    @contextmanager
+    def killed(self: Session) -> Iterator[Any]:
+        with write(self) as connection:
+            yield connection
+        if self is target:
+            raise _PowerError
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Session, "write", killed)
+        with pytest.raises(_PowerError):
+            _move(source, target)
+    report = maintenance.check(target)
+    assert any("run the same `sprag db move` again" in problem for problem in report.problems), report
+    with pytest.raises(SchemaError, match="run the same `sprag db move` again"):
+        Store.open(urls[1])
+    _move(source, target)
+    assert _contents(target) == _contents(source)
 
 
 def test_an_interrupted_move_is_continued_with_what_changed_meanwhile(

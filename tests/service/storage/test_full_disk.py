@@ -1,0 +1,96 @@
+"""A disk that is full to the last byte: people make room all the same, and readiness says why studies are held.
+
+The disk is a small one in memory, in a namespace of a process of its own.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import ROOT
+
+SCRIPT = """
+import os, sys
+from pathlib import Path
+from sprag.service.storage.errors import DatabaseFullError
+from sprag.service.storage.readiness import Readiness
+from sprag.service.storage.store import Store
+from sprag.worker.chunking import Chunking
+from tests.worker import fakes
+
+place = Path(sys.argv[1])
+
+
+def fill_up():
+    descriptor = os.open(place / "others", os.O_CREAT | os.O_WRONLY | os.O_APPEND)
+    for size in (65536, 512, 1):
+        try:
+            while True:
+                os.write(descriptor, os.urandom(size))
+        except OSError:
+            pass
+    os.close(descriptor)
+
+
+with Store.open(f"sqlite:///{place / 'a.sqlite3'}", chunking=Chunking(cases=500)) as store:
+    record = store.create_study({}, fakes.study(20_000))
+    waiting = store.create_study({}, fakes.study(500))
+    epoch = store.take_over("test")
+    for chunk in store.open_chunks(record.number):
+        store.claim(epoch, [chunk])
+        store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+    store.settle(epoch, record.number)
+    assert store.shortage() is None, "makes the reserve"
+    assert Readiness(store).problems() == ()
+    with store.session.plain() as connection:
+        connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
+    fill_up()
+    try:
+        store.create_study({}, fakes.study(500))
+    except DatabaseFullError:
+        print("full", flush=True)
+    store.hold(epoch, store.shortage(), returned=False)
+    print(Readiness(store).problems()[0], flush=True)
+    fill_up()
+    store.cancel_study(waiting.id)
+    store.settle(epoch, waiting.number)
+    store.delete_study(record.id, at_once=True)
+    store.purge()
+    listed = {study.id: study.state.value for study in store.list_studies(page_size=1000).studies}
+    assert record.id not in listed
+    assert listed[waiting.id] == "cancelled"
+    print("room", store.room() > 5e6, flush=True)
+    store.let_go(epoch)
+    print(Readiness(store).problems(), flush=True)
+    again = store.create_study({}, fakes.study(500))
+    (chunk,) = store.open_chunks(again.number)
+    store.claim(epoch, [chunk])
+    assert store.commit(epoch, chunk, fakes.result(0, 500))
+    print(store.check().problems, flush=True)
+"""
+
+
+def test_studies_can_be_deleted_on_a_full_disk(tmp_path: Path) -> None:
+    unshare = shutil.which("unshare")
+    if unshare is None or subprocess.run([unshare, "-rm", "true"], capture_output=True, check=False).returncode:
+        pytest.skip("no disk in memory can be mounted here: unshare of mounts is not allowed")
+    inside = 'mount -t tmpfs -o size=36m small "$0" && exec "$1" -c "$2" "$0"'
+    done = subprocess.run(
+        [unshare, "-rm", "sh", "-c", inside, tmp_path, sys.executable, SCRIPT],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert done.returncode == 0, done.stderr
+    full, held, room, ready, problems = done.stdout.splitlines()
+    assert full == "full"
+    assert held.startswith("Studies are held: no room: the disk that holds")
+    assert (room, ready, problems) == ("room True", "()", "()")
