@@ -272,7 +272,8 @@ def _cache() -> tuple[bool, str]:
         probe.write(b"x")
     if not cache_is_wanted():
         return False, _(
-            "the configured folder is not writable, so kernels are kept in {folder}: set SPRAG_KERNEL_CACHE",
+            "the configured folder is not one that only this user can write to, so kernels are kept in {folder}: set "
+            "SPRAG_KERNEL_CACHE",
             folder=folder,
         )
     return os.access(folder, os.W_OK | os.X_OK), str(folder)

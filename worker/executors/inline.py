@@ -8,6 +8,7 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 from sprag.worker import models
+from sprag.worker.executors import known_answers
 from sprag.worker.ports import Chunk, Fate, Outcome
 from sprag.worker.reports import ExecutorReport, WorkerReport, processor
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 class InlineExecutor:
     """An `Executor` without processes. A chunk cannot be stopped or timed out once it runs."""
 
-    def __init__(self, run: Callable[[models.ChunkTask], models.ChunkResult] = models.run_task) -> None:
+    def __init__(self, run: Callable[[models.ChunkTask], models.ChunkResult] = known_answers.run_task) -> None:
         self._run = run
         self._waiting: deque[tuple[int, models.ChunkTask]] = deque()
         self._stopped: list[Outcome] = []

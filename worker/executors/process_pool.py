@@ -10,6 +10,7 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
 from sprag.worker import fingerprint, models
+from sprag.worker.executors import known_answers
 from sprag.worker.fingerprint import prepare_as
 from sprag.worker.limits import LOAD_SECONDS, WALL_TIMES
 from sprag.worker.pool.child_pool import ChildPool, JobStoppedError
@@ -58,7 +59,8 @@ class ProcessPoolExecutor:
         long.
     run, load, prepare : functions
         Called for a chunk, for a new kernel, and at the start of a process; importable by name. Replaced in tests. By
-        default processes load the engine and exit where their fingerprint is not that of this process.
+        default processes load the engine and exit where their fingerprint is not that of this process, and kernels give
+        their known answers before they run a chunk.
     compiled : function
         Whether a kernel is already in the cache on disk.
     load_timeout : float
@@ -70,8 +72,8 @@ class ProcessPoolExecutor:
         processes: int,
         *,
         chunk_timeout: float,
-        run: Callable[[models.ChunkTask], models.ChunkResult] = models.run_task,
-        load: Callable[[models.KernelShape], None] = models.load,
+        run: Callable[[models.ChunkTask], models.ChunkResult] = known_answers.run_task,
+        load: Callable[[models.KernelShape], None] = known_answers.load,
         compiled: Callable[[models.KernelShape], bool] = models.is_compiled,
         prepare: Callable[[], None] | None = None,
         load_timeout: float = LOAD_SECONDS,

@@ -149,6 +149,8 @@ __all__ = [
     "load",
     "model_names",
     "model_of",
+    "note_answers",
+    "noted_answers",
     "numbered_by",
     "parameter_catalogue",
     "parameters_of",
@@ -358,6 +360,20 @@ def load(shape: KernelShape) -> None:
 def is_compiled(shape: KernelShape) -> bool:
     """Whether `load` has put the kernel of that shape into the on-disk cache, on this machine and for this engine."""
     return _mark(shape).exists()
+
+
+def noted_answers(shape: KernelShape) -> str:
+    """What `note_answers` wrote beside the kernel of that shape; "" where there is nothing."""
+    try:
+        return _mark(shape).read_text(encoding="ascii")
+    except (OSError, UnicodeDecodeError):
+        return ""
+
+
+def note_answers(shape: KernelShape, answers: str) -> None:
+    """Keep the known answers of a kernel beside it in the cache, as long as it is there."""
+    with suppress(OSError):
+        _mark(shape).write_text(answers, encoding="ascii")
 
 
 def _mark(shape: KernelShape) -> Path:
