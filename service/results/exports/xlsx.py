@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 #: Rows of a sheet, including those of units and names; further cases continue on another sheet.
 SHEET_ROWS: Final = 1_048_576
 _HEAD_ROWS: Final = 2
+#: Most UTF-16 units of a text in a cell.
 _LONGEST_TEXT: Final = 32_767
 #: Widths in characters: of a number as spreadsheets show it at first, of the button of a filter, and the largest one.
 _NUMBER, _BUTTON, _WIDEST = 12, 4, 60
@@ -50,7 +51,7 @@ class _ExactSheet(Worksheet):  # type: ignore[misc]
         for column, cell in enumerate(cells):
             if isinstance(cell, str):
                 if cell:
-                    self.write_string(row, column, cell[:_LONGEST_TEXT], style)
+                    self.write_string(row, column, cell, style)
                     self.widths[column] = max(self.widths[column], len(cell))
             elif cell is not None and not math.isnan(cell):
                 self.write_number(row, column, cell, style)
@@ -160,6 +161,32 @@ def _rows(source: Source, block: RowBlock) -> Iterator[list[Any]]:
         ]
 
 
+def _lines(cells: Sequence[float | int | str]) -> Iterator[list[float | int | str]]:
+    """The cells of a line; texts that are too long for a cell go on below it, in lines that name it again."""
+    texts = [text_pieces(cell) if isinstance(cell, str) else [cell] for cell in cells]
+    for number in range(max(map(len, texts), default=1)):
+        part: list[float | int | str] = [text[number] if number < len(text) else "" for text in texts]
+        if number > 0 and not part[0]:
+            part[0] = f"{cells[0]} (continued)"
+        yield part
+
+
+def text_pieces(text: str) -> list[str]:
+    """A text in pieces that fit into a cell and joined are the text.
+
+    They end with lines where these fit, otherwise after a separator, so that no number is cut.
+    """
+    pieces, rest = [], text
+    while len(rest.encode("utf-16-le")) > 2 * _LONGEST_TEXT:
+        most = rest[:_LONGEST_TEXT]
+        most = most.encode("utf-16-le")[: 2 * _LONGEST_TEXT].decode("utf-16-le", "ignore")
+        places = [most.rfind(mark) + 1 for mark in ("\n", ";", ",", "\t", " ")]
+        end = next((place for place in places if place > 0), len(most))
+        pieces.append(rest[:end])
+        rest = rest[end:]
+    return [*pieces, rest]
+
+
 def _inputs(book: Any, source: Source, title: Any) -> None:
     sheet: _ExactSheet = book.add_worksheet("inputs", _ExactSheet)
     sheet.begin(5)
@@ -167,8 +194,10 @@ def _inputs(book: Any, source: Source, title: Any) -> None:
 
     def line(*cells: object, style: Any = None) -> None:
         nonlocal row
-        sheet.write_cells(row, [cell if isinstance(cell, float | int) else str(cell or "") for cell in cells], style)
-        row += 1
+        values = [cell if isinstance(cell, float | int) else str(cell or "") for cell in cells]
+        for part in _lines(values):
+            sheet.write_cells(row, part, style)
+            row += 1
 
     line("study", style=title)
     for name, value in source.about.items():
