@@ -15,7 +15,7 @@ from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token, Wait, WaitTimeout
 from sprag.service.cli.remote import connection
 from sprag.service.languages import N_, _, ngettext
-from sprag.service.spec.numbers import could_be_one, parse_number, settled
+from sprag.service.spec.numbers import could_be_one, in_language, parse_number, settled
 from sprag.service.spec.together import with_last_unit
 from sprag.worker.limits import (
     MAX_BODY_BYTES,
@@ -162,7 +162,7 @@ def _values(text: str) -> list[float | str]:
             "--axis", "ambiguous-comma", N_("could be one value or two"), text,
             allowed=_("semicolons between values, or a decimal point"),
         )  # fmt: skip
-    items = settled(text.split(";")) if ";" in text else text.split(",")
+    items = settled([in_language(item) for item in text.split(";")]) if ";" in text else text.split(",")
     return [_value(item) for item in with_last_unit([item.strip() for item in items])]
 
 

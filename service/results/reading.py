@@ -13,6 +13,7 @@ from sprag.service.results.phrases import Name, Phrase, lower_first
 from sprag.service.results.quantities import SI, Units, units_for
 from sprag.service.results.selection import refused
 from sprag.service.results.wording import number, unit_text
+from sprag.service.spec.numbers import in_language
 from sprag.service.spec.units import has_unit
 from sprag.worker.models.vocabulary import caption, letter
 
@@ -81,7 +82,7 @@ class Reading:
 
     def typed(self, text: str, si: str) -> str:
         """What somebody typed beside a label with the shown unit: a bare number gets this unit."""
-        shown = self.unit(si)
+        shown, text = self.unit(si), in_language(text)
         return text if shown == si or not text.strip() or has_unit(text) else f"{text.strip()} {shown}"
 
     def with_unit(self, text: str, si: str) -> str:

@@ -15,6 +15,7 @@ from sprag.service.results.exports import table_csv
 from sprag.service.results.portraits import require_strobes
 from sprag.service.results.start_states import refuse_impossible
 from sprag.service.spec.catalogue import unit_of
+from sprag.service.spec.numbers import in_language
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker.models.common import case_machine
 from sprag.worker.models.sections import Sampling, run_sections
@@ -37,6 +38,7 @@ def phase_of(text: str | None) -> float:
     if text is None or not text.strip():
         return 0.0
     try:
+        text = in_language(text)
         number, given = split_quantity(text)
         angle = parse_quantity(text, "rad") if given else to_float(number)
     except QuantityError as error:

@@ -11,6 +11,7 @@ import numpy as np
 from sprag.service.faults import Code, Fault, FaultError, ParameterFault, parameter_error, shown
 from sprag.service.results.phrases import Amount, Name, Phrase, term
 from sprag.service.spec.catalogue import result_of, unit_of, unknown_result
+from sprag.service.spec.numbers import in_language
 from sprag.service.spec.report import did_you_mean, quantity_text
 from sprag.service.spec.together import AMBIGUOUS_UNIT, question, with_unit_of_end
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
@@ -199,6 +200,7 @@ def ends_of_range(
     names: tuple[str, str], low: str | None, high: str | None, unit: str
 ) -> tuple[str | None, str | None]:
     """The texts of two ends, a bare first one with the unit of the last; FaultError about one that remains unclear."""
+    low, high = (None if text is None else in_language(text) for text in (low, high))
     ends = with_unit_of_end(low, high)
     asked = question([text or "" for text in ends], unit)
     if asked is not None:
@@ -211,6 +213,7 @@ def value_of(path: str, text: str, unit: str, parameter: str = "at") -> float:
     """The value (SI) of a path in a text with or without a unit; SelectionError about ``parameter`` otherwise."""
     if path == SWEEP and text in DIRECTIONS:
         return float(DIRECTIONS.index(text))
+    text = in_language(text)
     try:
         number, unit_text = split_quantity(text)
         return parse_quantity(text, unit) if unit_text else to_float(number)

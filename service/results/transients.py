@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 from sprag.service.faults import FaultError, choice_of, parameter_error
 from sprag.service.json_text import to_bytes
 from sprag.service.results.trajectories import timed_values, trajectory_csv
+from sprag.service.spec.numbers import in_language
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
 from sprag.worker.limits import MIN_TRAJECTORY_POINTS
@@ -80,8 +81,9 @@ def _value(name: str, text: str | None, end: float, motor: bool) -> float:
     high = end if name == "angle" else high
     shown = "a number" if unit == "1" else f"a value in {unit}"
     try:
-        number, own = split_quantity(text or "")
-        value = parse_quantity(text or "", unit) if own else to_float(number)
+        text = in_language(text or "")
+        number, own = split_quantity(text)
+        value = parse_quantity(text, unit) if own else to_float(number)
     except QuantityError as error:
         raise parameter_error(name, error.code, str(error), text, shown) from error
     least = 1e-9 if name == "within" and motor else low

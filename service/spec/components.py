@@ -16,6 +16,7 @@ from sprag.service.spec.csv_text import read_csv, unescape
 from sprag.service.spec.fields import exact, placed, read_object
 from sprag.service.spec.labels import LINES_ALLOWED, printable_lines
 from sprag.service.spec.numbers import parse_number, settled
+from sprag.service.spec.printed import could_be_several
 from sprag.service.spec.report import Report, SpecError, join
 from sprag.service.spec.table_text import heading_of
 from sprag.service.spec.together import AMBIGUOUS_UNIT, questions
@@ -191,6 +192,9 @@ def _faults_of_field(kind: str, name: str, text: str) -> list[Fault]:
     assert parameter is not None
     if name != COEFFICIENTS:
         pairs = [(text, parameter)]
+    elif could_be_several(text):
+        message = "could be one coefficient or several"
+        return [Fault(name, "invalid-text", message, text, "semicolons between coefficients, or no blanks")]
     else:
         items = list_text(text)
         if not 1 <= len(items) <= models.MAX_COEFFICIENTS:

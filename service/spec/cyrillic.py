@@ -1,4 +1,7 @@
-"""Cyrillic names of units, such as ``Н/мм`` and ``град``, and the Latin names that the rest of the program uses."""
+"""Cyrillic names of units, such as ``Н/мм`` and ``об/хв``, and the Latin names that the rest of the program uses.
+
+They are Ukrainian and Russian.
+"""
 
 from __future__ import annotations
 
@@ -27,19 +30,30 @@ NAMES: Final = {
     **{prefix + name: latin + unit for prefix, latin in _PREFIXES.items() for name, unit in _WITH_PREFIX.items()},
     "т": "t",
     "сек": "s",
-    "мин": "min",
-    "ч": "h",
-    "час": "h",
+    **dict.fromkeys(("мин", "хв"), "min"),
+    **dict.fromkeys(("ч", "час", "год"), "h"),
     "бар": "bar",
     "кгс": "kgf",
     "град": "deg",
-    "об": "rev",
+    "гон": "gon",
+    **dict.fromkeys(("об", "оберт", "оберти", "обертів", "оборот", "оборота", "оборотов"), "rev"),
+    "атм": "atm",
+    # Moments of inertia without the multiplication sign; the power stands behind.
+    **{
+        f"{gram}{length}": f"{latin_gram}{latin_length}"
+        for gram, latin_gram in (("кг", "kg"), ("г", "g"))
+        for length, latin_length in (("м", "m"), ("мм", "mm"))
+    },
     "дюйм": "in",
     "фут": "ft",
     "фунт": "lb",
-    **dict.fromkeys(("период", "периода", "периодов", "периоды"), "periods"),
+    **dict.fromkeys(("фунт-сил", "фунт-сила", "фунт-сили"), "lbf"),
+    **dict.fromkeys(
+        ("период", "периода", "периодов", "периоды", "період", "періоду", "періодів", "періоди"), "periods"
+    ),
 }
-_WORD: Final = re.compile("[А-Яа-яЁё]+")
+#: Words, and the pound-force, which has a hyphen.
+_WORD: Final = re.compile("фунт-сил[аиі]?|[А-Яа-яЁёІіЇїЄєҐґ]+")
 
 
 def latin(text: str) -> str:

@@ -12,6 +12,9 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
+from sprag.service.languages import decimal
+from sprag.service.spec.printed import keyboard
+
 #: A number at the beginning of a text: its digits with all their points and commas, and whether an exponent follows.
 _NUMBER: Final = re.compile(r"\s*[+\-\u2212]?([.,]?[0-9][0-9.,]*)([eE][+\-\u2212]?[0-9])?")
 #: Two whole numbers and a comma, with or without a unit behind: also one number with a decimal comma.
@@ -52,11 +55,12 @@ class Settled(NamedTuple):
 
 
 def parse_number(text: str) -> float | None:
-    """Parse ``text`` as a number, ignoring surrounding blanks; None when it is not a number, or an ambiguous one.
+    """Parse ``text`` as a number, typed or as pages print it; None when it is not a number, or an ambiguous one.
 
     "nan" and "inf" are accepted, so that the caller can refuse them by name. Python's own extensions are not: digits of
     other scripts, and underscores between digits.
     """
+    text = keyboard(text).replace("\N{MINUS SIGN}", "-")
     if not text.strip().isascii() or "_" in text:
         return None
     try:
@@ -73,6 +77,17 @@ def with_point(text: str) -> str:
 def is_ambiguous(text: str) -> bool:
     """Whether the comma of the number at the beginning of ``text`` could be decimal or separate thousands."""
     return _marks(text).either == ","
+
+
+def in_language(text: str) -> str:
+    """A text that somebody types on a page: where the language writes decimal commas, a comma in its number is one.
+
+    Such a language prints 1.234 as ``1,234`` and never separates thousands by a comma.
+    """
+    if decimal(".") != ",":
+        return text
+    typed = keyboard(text)
+    return typed.replace(",", ".", 1) if is_ambiguous(typed) else text
 
 
 def could_be_one(text: str) -> bool:

@@ -12,7 +12,6 @@ Numbers are kept as fractions, so "1.1 mm" is the double nearest to 0.0011 and "
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections import Counter
@@ -23,6 +22,8 @@ from typing import TYPE_CHECKING, Final
 from sprag.service.faults import Code
 from sprag.service.spec.cyrillic import latin
 from sprag.service.spec.numbers import is_ambiguous, with_point
+from sprag.service.spec.printed import keyboard
+from sprag.service.spec.unit_names import DEFINITIONS, TWO_PI, refusal, resolved
 from sprag.worker.limits import MAX_QUANTITY_LENGTH
 
 if TYPE_CHECKING:
@@ -30,33 +31,6 @@ if TYPE_CHECKING:
 
 #: Words for the excitation period in times of a run.
 PERIOD_NAMES: Final = frozenset({"period", "periods", "cycle", "cycles"})
-
-#: Twice pi to 50 digits, so that its rounding never affects a double.
-_TWO_PI: Final = "6.2831853071795864769252867665590057683943387987502"
-
-_DEFINITIONS: Final = (
-    *("nano- = 1e-9 = n-", "micro- = 1e-6 = µ- = u-", "milli- = 1e-3 = m-", "centi- = 1e-2 = c-", "deci- = 1e-1 = d-"),
-    *("kilo- = 1e3 = k-", "mega- = 1e6 = M-", "giga- = 1e9 = G-"),
-    *("meter = [length] = m = metre", "gram = [mass] = g", "second = [time] = s = sec", "radian = [angle] = rad"),
-    *(
-        "inch = 0.0254 * meter = in",
-        "foot = 0.3048 * meter = ft",
-        "tonne = 1e6 * gram = t",
-        "pound = 453.59237 * gram = lb",
-    ),
-    *("minute = 60 * second = min", "hour = 3600 * second = h = hr"),
-    f"turn = {_TWO_PI} * radian = _ = revolution = rev = cycle = r",  # r: IEC nameplates of motors use r/min
-    *("degree = turn / 360 = deg = °", "arcminute = degree / 60 = arcmin", "arcsecond = degree / 3600 = arcsec"),
-    *("revolution_per_minute = turn / minute = rpm", "revolution_per_second = turn / second = rps"),
-    *("hertz = 1 / second = Hz", "newton = 1000 * gram * meter / second**2 = N", "joule = newton * meter = J"),
-    *("pascal = newton / meter**2 = Pa", "bar = 1e5 * pascal"),
-    *("watt = joule / second = W", "kilogram_force = 9.80665 * newton = kgf = kp"),
-    "pound_force = 4.4482216152605 * newton = lbf",
-    "standard_gravity = 9.80665 * meter / second**2 = g_0 = g0",
-    # Torques are often written without the multiplication sign.
-    *("newton_meter = newton * meter = Nm", "newton_centimeter = newton_meter / 100 = Ncm"),
-    *("newton_millimeter = newton_meter / 1000 = Nmm", "newton_meter_second = newton_meter * second = Nms"),
-)
 
 _EXAMPLES: Final = {
     "Hz": '"25 Hz", "1500 rpm" or "157 rad/s"',
@@ -76,12 +50,17 @@ _EXAMPLES: Final = {
     "1": "0.05",
 }
 
+_PER_MINUTE: Final = Fraction(1, 60)
 _QUANTITY: Final = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?)\s*(.*)", re.DOTALL)
 _TOKEN: Final = re.compile(
-    r"\s*(?:(?P<name>[A-Za-zµ°А-Яа-яЁё][A-Za-zµ°А-Яа-яЁё_0]*)|(?:\*\*|\^)\s*(?P<power>[+-]?[0-9]{1,2})(?![0-9])"
+    r"\s*(?:(?P<name>[A-Za-zµ°А-Яа-яЁёІіЇїЄєҐґ][A-Za-zµ°А-Яа-яЁёІіЇїЄєҐґ_0]*)|(?:\*\*|\^)\s*(?P<power>[+-]?[0-9]{1,2})(?![0-9])"
     r"|(?P<operator>[*/()])|(?P<one>1)(?![0-9]))"
 )
 _SUPERSCRIPT: Final = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+")
+#: A power without its sign, as in "mm2" and "min-1"; no name of a unit has another digit than 0.
+_DIGIT: Final = re.compile(r"([A-Za-zµ°])(-?[1-9])(?![0-9.])")
+#: Moments of inertia without the multiplication sign, as in "kgm2".
+_INERTIA: Final = re.compile(r"(?<![A-Za-z])(k?g)(m|cm|mm)\^?2(?![0-9.])")
 _LONGEST_UNIT: Final = 40
 _SUPERSCRIPTS: Final = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _SIGNS: Final = str.maketrans("\u2212\u2013·⋅×\u2219μ\u00a0\u202f\u2009", "--****µ   ")
@@ -191,7 +170,7 @@ def split_typed(text: str) -> tuple[Fraction, str]:
     """As `split_quantity`, the unit in the letters in which it was typed."""
     if len(text) > MAX_QUANTITY_LENGTH:
         raise QuantityError("too-long", f"is longer than {MAX_QUANTITY_LENGTH} characters")
-    text = text.translate(_SIGNS).strip()
+    text = keyboard(text.strip()).translate(_SIGNS).strip()
     _refuse_ambiguous(text)
     match = _QUANTITY.fullmatch(with_point(text))
     if match is None:
@@ -255,19 +234,9 @@ def _registry() -> pint.UnitRegistry[Fraction]:
     import pint
 
     registry: pint.UnitRegistry[Fraction] = pint.UnitRegistry(None, non_int_type=Fraction, cache_folder=None)
-    for line in _DEFINITIONS:
+    for line in DEFINITIONS:
         registry.define(line)
     return registry
-
-
-@lru_cache(maxsize=1)
-def _names() -> dict[str, str]:
-    """Unit names to compare a misspelled one with, by their lower-case form."""
-    names = ["kg", "mm", "cm", "km", "kN"]
-    for line in _DEFINITIONS:
-        name, _definition, *aliases = (part.strip() for part in line.split("="))
-        names += [alias for alias in (name, *aliases) if alias != "_" and not alias.endswith("-")]
-    return {name.lower(): name for name in reversed(names)}
 
 
 @lru_cache(maxsize=1024)
@@ -284,7 +253,9 @@ def _factor(text: str, unit: str) -> Fraction:
         if angle == wanted.get("radian", 0):
             return factor / wanted_factor
         if unit == "Hz" and angle == 1:
-            return factor / wanted_factor / Fraction(_TWO_PI)
+            return factor / wanted_factor / Fraction(TWO_PI)
+        if unit == "rad/s" and angle == 0 and factor == _PER_MINUTE:
+            return factor / wanted_factor * Fraction(TWO_PI)  # min^-1 of nameplates are revolutions
         if unit == "N*m*s/rad" and angle == 0:
             return factor / wanted_factor  # N*m*s, the usual notation in textbooks
     raise QuantityError("wrong-unit", f"is in '{text}', which is not a unit of this field; {expected}")
@@ -301,12 +272,11 @@ def _measure(text: str) -> tuple[Fraction, dict[str, int]]:
     tokens: list[str] = []
     position = 0
     spelled = _SUPERSCRIPT.sub(lambda found: "^" + found[0].translate(_SUPERSCRIPTS), text)
+    spelled = _DIGIT.sub(r"\1^\2", _INERTIA.sub(r"\1*\2^2", spelled.replace("\N{SUBSCRIPT ZERO}", "0")))
     while position < len(spelled):
         match = _TOKEN.match(spelled, position)
         if match is None:
-            raise QuantityError(
-                "wrong-unit", f"has a unit that cannot be read: '{text}'{_power_hint(spelled, position)}"
-            )
+            raise QuantityError("wrong-unit", f"has a unit that cannot be read: '{text}'")
         tokens.append(f"^{match['power']}" if match["power"] else match[0].strip())
         position = match.end()
     tokens.reverse()
@@ -314,13 +284,6 @@ def _measure(text: str) -> tuple[Fraction, dict[str, int]]:
     if tokens:
         raise QuantityError("wrong-unit", f"has a unit that cannot be read: '{text}'")
     return factor, {name: power for name, power in powers.items() if power}
-
-
-def _power_hint(text: str, position: int) -> str:
-    """A hint such as "m^2" for "m2", where ``position`` is that of the digit; "" otherwise."""
-    name = re.search(r"[A-Za-zµ°]+$", text[:position])
-    power = re.match(r"-?[0-9](?![0-9.])", text[position:])
-    return f" (did you mean '{name[0]}^{power[0]}'?)" if name and power else ""
 
 
 @lru_cache(maxsize=64)
@@ -362,16 +325,9 @@ def _operand(tokens: list[str], text: str) -> tuple[Fraction, Counter[str]]:
 @lru_cache(maxsize=1024)
 def _named(name: str) -> tuple[Fraction, tuple[tuple[str, int], ...]]:
     """Factor and powers of the root units for the name of one unit, from pint."""
-    import pint
-
-    registry = _registry()
-    try:
-        factor, root = registry.get_root_units(registry.parse_units(name))
-    except pint.UndefinedUnitError:
-        raise QuantityError("wrong-unit", _unknown(name)) from None
-    return Fraction(str(factor)), tuple((str(unit), int(str(power))) for unit, power in root._units.items())
-
-
-def _unknown(name: str) -> str:
-    near = difflib.get_close_matches(name.lower(), _names(), n=1, cutoff=0.5)
-    return f"has an unknown unit '{name}'" + (f" (did you mean '{_names()[near[0]]}'?)" if near else "")
+    known = resolved(name)
+    if known is None:
+        raise QuantityError("wrong-unit", refusal(name))
+    prefix, unit = known
+    factor, root = _registry().get_root_units(unit)
+    return prefix * Fraction(str(factor)), tuple((str(unit), int(str(power))) for unit, power in root._units.items())

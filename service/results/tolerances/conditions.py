@@ -12,6 +12,7 @@ import numpy as np
 from sprag.service.results.phrases import Amount, Name, Phrase, term
 from sprag.service.results.selection import listed, numeric_results, refuse_mixed_texts, refused
 from sprag.service.spec.catalogue import result_of
+from sprag.service.spec.numbers import in_language
 from sprag.service.spec.units import QuantityError, parse_quantity, plain_signs, split_quantity, to_float
 from sprag.worker import models
 
@@ -104,6 +105,7 @@ def _read(infos: Sequence[ResultInfo], text: str) -> Condition:
     if kind == "is" and info.kind != "count":
         message = f"{name} is a real number, which equals no value exactly"
         raise refused("condition", "invalid-choice", message, text, allowed=">= and <=")
+    value = in_language(value)
     given = _PART.fullmatch(value)
     try:
         if given is not None:

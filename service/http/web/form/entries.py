@@ -6,7 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from sprag.service.spec.numbers import settled, with_point
+from sprag.service.spec.numbers import in_language, settled, with_point
+from sprag.service.spec.printed import keyboard
 from sprag.service.spec.together import with_last_unit, with_unit_of_range
 
 Values = dict[str, str]
@@ -20,10 +21,10 @@ _BETWEEN: Final = re.compile(r"[;\n]|,\s")
 
 def plain(text: str) -> Any:
     """A field's text for the spec: a number where it is one, otherwise the text with its unit."""
-    text = text.strip()
-    if _WHOLE.fullmatch(text):
-        return int(text)
-    number = with_point(text)
+    text = in_language(text.strip())
+    number = with_point(keyboard(text).replace("\N{MINUS SIGN}", "-"))
+    if _WHOLE.fullmatch(number):
+        return int(number)
     return float(number) if _NUMBER.fullmatch(number) else text
 
 
@@ -37,7 +38,7 @@ def list_of(text: str) -> list[Any]:
 
 def items_of(text: str) -> list[str]:
     """The items of a list as texts, with decimal points."""
-    return settled([item for item in _BETWEEN.split(text) if item.strip()])
+    return settled([in_language(item) for item in _BETWEEN.split(text) if item.strip()])
 
 
 def range_of(values: Mapping[str, str], pointer: str, names: Sequence[str] = ("from", "to")) -> dict[str, Any]:

@@ -36,10 +36,12 @@ from sprag.service.http.web.form.shaft import is_shaft
 from sprag.service.http.web.form.shaft_spec import base_of, field_of_base, values_of_base
 from sprag.service.http.web.form.tolerances import FIELDS as TOLERANT
 from sprag.service.http.web.form.tolerances import field_of_tolerance, tolerance_values, tolerances_of
+from sprag.service.languages import _
 from sprag.service.spec.axes.sweep import SWEPT
 from sprag.service.spec.derive import formulas_of, with_values
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
 from sprag.service.spec.plan import refine
+from sprag.service.spec.printed import could_be_several
 from sprag.service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
 from sprag.service.spec.together import with_last_unit
 from sprag.service.spec.units import QuantityError, parse_quantity
@@ -191,7 +193,11 @@ def _clutch(values: Mapping[str, str], pointer: str, faults: Faults) -> dict[str
     if values.get(f"{pointer}/kind", "law") != "data":
         coefficients = values.get(f"{pointer}/coefficients", "")
         # Blanks also separate numbers, where there is no unit among them.
-        if re.fullmatch(r"(?:[-+0-9.eE\s]|,[0-9])+", coefficients):
+        if could_be_several(coefficients):
+            faults[f"{pointer}/coefficients"] = [
+                _("could be one coefficient or several; allowed: semicolons between coefficients, or no blanks")
+            ]
+        elif re.fullmatch(r"(?:[-+0-9.eE\s]|,[0-9])+", coefficients):
             coefficients = "; ".join(coefficients.split())
         return {
             # Each coefficient has a unit of its own: that of the last one holds for no other.

@@ -11,7 +11,7 @@ from sprag.service.http.web.form.shaft import part_of
 from sprag.service.languages import N_, _
 from sprag.service.results.quantities import read_units
 from sprag.service.results.wording import words
-from sprag.service.spec.numbers import parse_number
+from sprag.service.spec.numbers import in_language, parse_number
 from sprag.service.spec.units import QuantityError, has_unit, parse_quantity, split_quantity
 from sprag.worker.models.parameters import parameter_of
 
@@ -129,6 +129,7 @@ def _factors(study: Study, path: str) -> tuple[tuple[float, float], bool]:
 
 def value_of(text: str, unit: str, otherwise: float) -> float:
     """The number (SI) of a text with or without a unit, even where the machine is invalid with it."""
+    text = in_language(text)
     try:
         found = parse_quantity(text, unit) if split_quantity(text)[1] else parse_number(text.strip())
     except QuantityError:
