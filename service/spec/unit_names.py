@@ -110,8 +110,11 @@ def resolved(name: str) -> tuple[Fraction, str] | None:
         if len(prefix) > 1 and name.startswith(prefix) and name.removeprefix(prefix) in _WORDS:
             return factor, name.removeprefix(prefix)
     one = name.removesuffix("s")
-    word = one.islower() and len(one) >= _WORD_LENGTH
-    return resolved(one) if one != name and (word or one in _WITH_PLURAL) and not one.endswith("s") else None
+    if one == name or one.endswith("s") or not (one.islower() or one in _WITH_PLURAL):
+        return None
+    found = resolved(one)
+    word = found is not None and len(one) >= _WORD_LENGTH and (one in names or found[1] in _WORDS)
+    return found if word or one in _WITH_PLURAL else None
 
 
 def refusal(name: str) -> str:
