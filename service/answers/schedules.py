@@ -19,13 +19,19 @@ class RunOutcome(TypedDict):
             "deleted; without one: waiting (about to be submitted), refused, skipped, missed"
         ),
     ]
-    trouble: Annotated[bool, Doc("it did not end as planned, some cases failed, or due times before it were not run")]
+    trouble: Annotated[
+        bool,
+        Doc("it did not end as planned, some cases failed or are unsettled, or due times before it were not run"),
+    ]
     sentence: str
     cases: int
     done: Annotated[int, Doc("cases that have an ending")]
     ok: int
-    endings: Annotated[dict[str, int], Doc("cases by ending other than ok, once the run is over")]
-    flags: Annotated[dict[str, int], Doc("cases by flag, once the run is over")]
+    endings: Annotated[
+        dict[str, int] | None,
+        Doc("cases by ending other than ok; null until the run is over and they have been counted"),
+    ]
+    flags: Annotated[dict[str, int] | None, Doc("cases by flag; null until the run is over and they have been counted")]
     coverage: Annotated[str | None, Doc("complete part of a study that is run coarse to fine, once the run is over")]
     ended_at: Moment | None
     seconds: Annotated[float | None, Doc("from the first chunk of the study to its end, in s")]

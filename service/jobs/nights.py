@@ -11,6 +11,7 @@ from sprag.service.answers.schedules import Night, NightRun, RunOutcome, SentRep
 from sprag.service.delivery import origin_of
 from sprag.service.jobs.reports.watchdog import late_json, late_runs
 from sprag.service.json_text import timestamp
+from sprag.service.schedules.outcomes import TROUBLE_FLAGS
 from sprag.service.schedules.times import local_time
 from sprag.service.storage.errors import StudyNotFoundError
 from sprag.worker import models
@@ -28,8 +29,8 @@ MOST_RUNS: Final = 1000
 
 
 def whole_outcome(store: Store, outcome: Outcome) -> Outcome:
-    """The outcome of a run that is over, with the endings, flags and coverage of its study; raises StoreError."""
-    if outcome.study is None:
+    """The outcome of a run, with the endings, flags and coverage of its study where it is over; raises StoreError."""
+    if outcome.study is None or not outcome.result.final or outcome.flags is not None:
         return outcome
     try:
         _, progress = store.look(outcome.study)
@@ -39,7 +40,11 @@ def whole_outcome(store: Store, outcome: Outcome) -> Outcome:
     return replace(
         outcome,
         endings={name: count for name, count in progress.endings.items() if name != "ok"},
-        flags={name: count for name, count in kinds.flags.items() if name not in models.REGIME_SENTENCES},
+        flags={
+            name: count
+            for name, count in kinds.flags.items()
+            if name in TROUBLE_FLAGS or name not in models.REGIME_SENTENCES
+        },
         coverage=None if progress.covered is None else str(progress.covered),
     )
 
@@ -65,6 +70,8 @@ def night(store: Store, hours: float = HOURS) -> Night:
     until = store.clock.now()
     since = until - timedelta(hours=hours)
     found, sent = store.runs_between(since, until, MOST_RUNS), store.reports_between(since, until)
+    # Those that ended a moment ago, or were changed since, have not been counted yet.
+    found = [replace(run, outcome=whole_outcome(store, run.outcome)) for run in found]
     runs = [
         filled(
             NightRun,

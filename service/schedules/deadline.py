@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Final
-from zoneinfo import ZoneInfo
 
 from sprag.service.faults import Code
-from sprag.service.schedules.times import TimingError, read_time_of_day
+from sprag.service.schedules.times import TimingError, next_time_of_day, read_time_of_day
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity
 from sprag.worker.limits import MAX_FINISH_DAYS
 from sprag.worker.models import WarningText
@@ -115,19 +114,14 @@ def check_run_finish(text: str) -> str:
 def run_finish_at(text: str, zone: str, begin: datetime) -> datetime:
     """The deadline (UTC) of a run that begins at ``begin``: the next such time of day in ``zone``, or after a duration.
 
-    A time of day that a change of the clocks skips is read with the offset before it; one that occurs twice means the
-    first.
+    A time of day that a change of the clocks skips is the end of the gap, and one that occurs twice means the first, as
+    for due times.
     """
     try:
         clock = read_time_of_day(text)
     except TimingError:
         return begin + timedelta(seconds=duration_seconds(text))
-    local = begin.astimezone(ZoneInfo(zone))
-    for day in range(3):
-        due = datetime.combine(local.date() + timedelta(days=day), clock, ZoneInfo(zone)).astimezone(UTC)
-        if (due - begin).total_seconds() >= _LEAST_SECONDS:
-            return due
-    raise AssertionError("a time of day comes every day")
+    return next_time_of_day(clock, zone, begin + timedelta(seconds=_LEAST_SECONDS))
 
 
 def finish_warnings(study: Study, seconds: float, left: float) -> tuple[str, ...]:
@@ -135,10 +129,11 @@ def finish_warnings(study: Study, seconds: float, left: float) -> tuple[str, ...
     if seconds <= left:
         return ()
     if study.plan is not None:
-        return (
+        text = (
             f"All its rounds may need about {_hours(seconds)}, and {_hours(left)} are left until its deadline: what is "
-            "done by then is kept, with its error.",
+            "done by then is kept, with its error."
         )
+        return (WarningText(text, "late"),)
     done = int(study.cases * left / seconds)
     text = (
         f"By estimate it will not be finished by then: it needs about {_hours(seconds)} and {_hours(left)} are left, "

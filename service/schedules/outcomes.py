@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from enum import StrEnum
 from typing import Any, Final
@@ -49,6 +49,10 @@ _SENTENCES: Final = {
 }
 
 
+#: Flags of cases that end ok and still have no result to rely on.
+TROUBLE_FLAGS: Final = ("unsettled",)
+
+
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """What became of a due time.
@@ -57,7 +61,8 @@ class Outcome:
     ----------
     study, name : id and name of its study; None and "" where there is none
     cases, done, ok : numbers of its cases, of those with an ending, and of those that ended ok
-    endings, flags : numbers of cases by ending other than ok, and by flag; known when the run is over
+    endings, flags : numbers of cases by ending other than ok, and by flag; None until the run is over and they have
+        been counted
     coverage : the complete part of a study that is run coarse to fine; known when the run is over
     reason : why it is held, failed, or has no study
     missed : due times just before that were not run
@@ -71,8 +76,8 @@ class Outcome:
     cases: int = 0
     done: int = 0
     ok: int = 0
-    endings: dict[str, int] = field(default_factory=dict)
-    flags: dict[str, int] = field(default_factory=dict)
+    endings: dict[str, int] | None = None
+    flags: dict[str, int] | None = None
     coverage: str | None = None
     reason: str | None = None
     missed: int = 0
@@ -81,9 +86,16 @@ class Outcome:
 
     @property
     def trouble(self) -> bool:
-        """Whether somebody should look: the run did not end as planned, some cases failed, or due times were missed."""
+        """Whether somebody should look: the run did not end as planned, some cases failed or have a flag of
+        `TROUBLE_FLAGS`, or due times were missed.
+        """
         planned = self.result in {Result.FINISHED, Result.DEADLINE} or not self.result.final
-        return not planned or self.ok < self.done or self.missed > 0
+        return not planned or self.ok < self.done or self.missed > 0 or self.unsettled > 0
+
+    @property
+    def unsettled(self) -> int:
+        """Cases with a flag of `TROUBLE_FLAGS`, as far as they have been counted."""
+        return sum((self.flags or {}).get(name, 0) for name in TROUBLE_FLAGS)
 
     @property
     def sentence(self) -> str:
@@ -93,11 +105,20 @@ class Outcome:
         first = gettext(_SENTENCES[self.result])
         if self.study is None or self.result is Result.FAILED:
             first += f": {said(self.reason)}" if self.reason else ""
-        elif self.result is Result.FINISHED and self.ok == self.cases:
+        elif self.result is Result.FINISHED and self.ok == self.cases and not self.unsettled:
             first += ": " + gettext("all {cases} cases ended ok", **shown)
         else:
             first += ": " + gettext("{done} of {cases} cases are done, and {ok} of them ended ok", **shown)
         parts = [first]
+        if self.unsettled:
+            parts.append(
+                ngettext(
+                    "The motion of {count} case is unsettled",
+                    "The motions of {count} cases are unsettled",
+                    self.unsettled,
+                    count=grouped(self.unsettled),
+                )
+            )
         if self.result is Result.HELD and self.reason:
             parts.append(gettext("It is held: {reason}", reason=said(self.reason)))
         if self.coverage and self.result is not Result.FINISHED:

@@ -157,13 +157,20 @@ class Window:
         """Whether the window is open at any time from ``begin`` on and before ``end`` (UTC)."""
         if self.open_at(begin):
             return True
-        zone = ZoneInfo(self.zone)
-        today = begin.astimezone(zone).date()
-        openings = (datetime.combine(today + timedelta(days=day), self.begin, zone).astimezone(UTC) for day in range(3))
-        return next(opening for opening in openings if opening >= begin) < end
+        return next_time_of_day(self.begin, self.zone, begin) < end
 
     def __str__(self) -> str:
         return recorded.WINDOW.format(begin=f"{self.begin:%H:%M}", end=f"{self.end:%H:%M}", zone=self.zone)
+
+
+def next_time_of_day(clock: time, zone: str, moment: datetime) -> datetime:
+    """The first moment (UTC) from ``moment`` on at which the wall clock shows a time of day, as for due times: at the
+    end of the gap where a change of the clocks skips it, and at its first occurrence where there are two.
+    """
+    daily = Timing(f"{clock.minute} {clock.hour} * * *", None, zone)
+    due = daily.next_after(moment.astimezone(UTC) - timedelta(microseconds=1))
+    assert due is not None, "a time of day comes every day"
+    return due
 
 
 def read_time_of_day(text: str) -> time:

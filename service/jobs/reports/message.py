@@ -73,8 +73,9 @@ def facts(content: dict[str, Any]) -> Iterator[Fact]:
         yield Fact(_("Ended"), wall_clock(datetime.fromisoformat(outcome["ended_at"]), content["zone"]))
     if outcome["coverage"] is not None:
         yield Fact(_("Coverage"), said(outcome["coverage"]))
-    yield from (Fact(_("Ended {name}", name=_words(name)), _cases(count)) for name, count in outcome["endings"].items())
-    yield from (Fact(_("Flag {name}", name=_words(name)), _cases(count)) for name, count in outcome["flags"].items())
+    endings, flags = outcome["endings"] or {}, outcome["flags"] or {}
+    yield from (Fact(_("Ended {name}", name=_words(name)), _cases(count)) for name, count in endings.items())
+    yield from (Fact(_("Flag {name}", name=_words(name)), _cases(count)) for name, count in flags.items())
 
 
 def _words(code: str) -> str:

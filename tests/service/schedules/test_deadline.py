@@ -13,14 +13,23 @@ import pytest
 from sprag.service.answers import studies
 from sprag.service.jobs.scheduler import Scheduler
 from sprag.service.results.curves import Curve, Line, Map
-from sprag.service.schedules.deadline import FinishError, check_run_finish, finish_at, run_finish_at
+from sprag.service.schedules.deadline import (
+    FinishError,
+    check_run_finish,
+    finish_at,
+    finish_warnings,
+    run_finish_at,
+)
 from sprag.service.schedules.fields import read_fields
+from sprag.service.schedules.times import Timing, Window, read_time_of_day
+from sprag.service.spec.document import parse_spec
 from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import POLL_SECONDS, Dispatcher
 from sprag.worker.executors.inline import InlineExecutor
 from sprag.worker.models import study_results
 from sprag.worker.states import StudyState
 from tests.faults import refused
+from tests.service import refined_study
 from tests.service.shapes import fits
 from tests.service.timed_spec import SPEC
 from tests.worker import fakes
@@ -338,3 +347,38 @@ def test_each_run_of_a_schedule_gets_its_deadline(service: Service, clock: fakes
     assert refused.status_code == 422
     assert refused.json()["errors"][0]["pointer"] == "/finish_by"
     assert read_fields({**given, "finish_by": "8 h"}, clock.now()).finish_by == "8 h"
+
+
+@pytest.mark.parametrize(
+    ("zone", "text", "begin", "due"),
+    [
+        ("Europe/Berlin", "02:30", "2026-03-29T00:00+01:00", "2026-03-29T01:00+00:00"),
+        ("Europe/Berlin", "02:00", "2026-03-28T23:00+01:00", "2026-03-29T01:00+00:00"),
+        ("Europe/Berlin", "03:00", "2026-03-28T23:00+01:00", "2026-03-29T01:00+00:00"),
+        ("America/New_York", "02:59", "2026-03-08T01:00-05:00", "2026-03-08T07:00+00:00"),
+        ("Australia/Lord_Howe", "02:15", "2026-10-04T00:00+10:30", "2026-10-03T15:30+00:00"),
+        # It has passed in the first of two equal hours.
+        ("Europe/Berlin", "02:30", "2026-10-25T02:10+01:00", "2026-10-26T01:30+00:00"),
+        ("Europe/Berlin", "02:30", "2026-10-25T00:10+02:00", "2026-10-25T00:30+00:00"),
+    ],
+)
+def test_a_deadline_in_a_skipped_hour_is_where_due_times_and_windows_are(
+    zone: str, text: str, begin: str, due: str
+) -> None:
+    """At the end of the gap; the instants are worked out by hand from the rules of the zones."""
+    moment, expected = datetime.fromisoformat(begin), datetime.fromisoformat(due)
+    assert run_finish_at(text, zone, moment) == expected
+    hour, minute = text.split(":")
+    assert Timing(f"{int(minute)} {int(hour)} * * *", None, zone).next_after(moment.astimezone(UTC)) == expected
+    opening = Window(read_time_of_day(text), read_time_of_day("05:00"), zone)
+    second = timedelta(seconds=1)
+    assert opening.opens_between(moment, expected + second)
+    assert not opening.opens_between(moment, expected)
+
+
+def test_the_warning_of_rounds_has_the_code_of_other_late_studies() -> None:
+    study = parse_spec(refined_study.SPEC).study
+    assert study.plan is not None
+    (warning,) = finish_warnings(study, 7200.0, 3600.0)
+    assert getattr(warning, "code", None) == "late"
+    assert "All its rounds" in warning

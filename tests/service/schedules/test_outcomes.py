@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from sprag.service import languages
 from sprag.service.jobs.scheduler import Scheduler
 from sprag.service.schedules.fields import read_fields
 from sprag.service.schedules.outcomes import Outcome, Result
 from sprag.worker.models import WINDUP_OUT_OF_DATA
+from tests.service.conftest import made_up
 from tests.service.schedules.conftest import NEW_YEAR
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
     from sprag.service.storage.store import Store
+    from sprag.worker.models import ChunkResult
+    from sprag.worker.study import Study
     from tests.service.conftest import Service
     from tests.service.schedules.conftest import Clock
 
@@ -52,6 +57,53 @@ def test_a_finished_study_has_its_failures_and_flags(service: Service, clock: Cl
         == f"Finished: {outcome.cases} of {outcome.cases} cases are done, and {outcome.ok} of them ended ok."
     )
     assert (shown["endings"], shown["flags"], shown["trouble"]) == (outcome.endings, outcome.flags, True)
+
+
+def test_cases_that_ended_ok_and_are_unsettled_need_attention(
+    service: Service, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A night of nothing else is not "all ended ok", in answers, reports and the exit code of the command."""
+    schedule, study = due_at_one(service, clock)
+
+    def unsettled(study: Study) -> ChunkResult:
+        made = made_up(study)
+        return replace(
+            made, endings=["ok"] * study.cases, flags=["unsettled", *["irregular,unsettled"] * (study.cases - 1)]
+        )
+
+    monkeypatch.setattr("tests.service.conftest.made_up", unsettled)
+    cases = service.store.get_study(study).cases
+    service.fill(study)
+    Scheduler(service.store).look()
+    outcome = last(service.store, schedule)
+    assert (outcome.result, outcome.ok, outcome.flags) == (Result.FINISHED, cases, {"unsettled": cases})
+    assert outcome.trouble
+    assert "all" not in outcome.sentence
+    assert outcome.sentence.endswith(f"The motions of {cases} cases are unsettled.")
+    assert service.get("/night")["trouble"] == 1
+    with languages.language("uk"):
+        assert "не усталені" in outcome.sentence
+    assert not Outcome(Result.FINISHED, "st_1", "", 9, 9, 9, {}, {"jumped": 3}).trouble
+
+
+def test_flags_are_unknown_until_they_are_counted(service: Service, clock: Clock) -> None:
+    """Between the end of a study and the next look of the scheduler, and after a study was changed."""
+    schedule, study = due_at_one(service, clock)
+    assert last(service.store, schedule).flags is None
+    made = service.fill(study)
+    outcome = last(service.store, schedule)
+    assert (outcome.result, outcome.endings, outcome.flags) == (Result.FINISHED, None, None)
+    shown = service.get(f"/schedules/{schedule}")["last_run"]["outcome"]
+    assert (shown["endings"], shown["flags"]) == (None, None)
+    assert service.http.get("/night").status_code == 200
+    (run,) = service.get("/night")["runs"]
+    counted = {WINDUP_OUT_OF_DATA: made.flags.count(WINDUP_OUT_OF_DATA)}
+    assert run["outcome"]["flags"] == counted, "the night counts them at once"
+    Scheduler(service.store).look()
+    assert last(service.store, schedule).flags == counted
+    service.store.retry_study(study)
+    service.fill(study)
+    assert service.get("/night")["runs"][0]["outcome"]["flags"] is not None
 
 
 def test_the_outcome_is_kept_when_the_study_is_deleted(service: Service, clock: Clock) -> None:
