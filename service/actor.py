@@ -70,6 +70,19 @@ class Actor:
     token: str | None = None
     request: str | None = None
 
+    @property
+    def share(self) -> str:
+        """Whose requests these are: see `share_of`."""
+        return share_of(self.user, self.token)
+
+
+def share_of(user: str | None, token: str | None) -> str:
+    """Who sends requests, with whatever token: a user, or a token without a user by its id; "" where nobody logs in.
+
+    What each sender has a share or a name space of its own of is counted under this name.
+    """
+    return token or "" if user is None else f"user {user}"
+
 
 _ACTING: ContextVar[Actor | None] = ContextVar("acting", default=None)
 

@@ -126,6 +126,7 @@ Kind = Literal[
     "not-allowed",
     "not-found",
     "not-owner",
+    "precondition-failed",
     "queue-full",
     "quota-exceeded",
     "range-not-satisfiable",

@@ -14,7 +14,7 @@ chunk that contains it.
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, assert_never
@@ -35,16 +35,19 @@ FAULT_CRASHES = 3
 
 @dataclass(frozen=True, slots=True)
 class Offered:
-    """A study may run; ``chunks`` are its unfinished ones. Studies of higher ``priority`` run first.
+    """A study may run; ``chunks`` are its unfinished ones.
 
-    For an active study, this only ends a pause and updates the priority. ``proven``: an earlier round of the study has
-    results.
+    Studies of higher ``rank`` run first; at the same rank the owners take turns, and of the studies of one ``owner``
+    those of higher ``priority`` run first. For an active study, this only ends a pause and updates rank and priority.
+    ``proven``: an earlier round of the study has results.
     """
 
     study: int
     chunks: Sequence[Chunk] = ()
     priority: int = 0
     proven: bool = False
+    rank: int = 0
+    owner: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +180,8 @@ class _Open:
 
     waiting: deque[Chunk]
     priority: int = 0
+    rank: int = 0
+    owner: str | None = None
     running: dict[int, Chunk] = field(default_factory=dict)
     held: bool = False
     cancelled: bool = False
@@ -219,6 +224,8 @@ class Dispatch:
         self._next_ticket = 1
         #: Studies that have caused a restart.
         self._renewed: set[int] = set()
+        #: By owner: ticket of the latest chunk that was started.
+        self._turns: dict[str | None, int] = {}
 
     @property
     def in_flight(self) -> int:
@@ -257,7 +264,7 @@ class Dispatch:
         if known is None:
             known = self._open[event.study] = _Open(deque(event.chunks), proven=event.proven)
         known.held = False
-        known.priority = event.priority
+        known.priority, known.rank, known.owner = event.priority, event.rank, event.owner
         return self._settled(event.study, known)
 
     def _paused(self, event: Paused) -> list[Instruction]:
@@ -369,22 +376,29 @@ class Dispatch:
     def _fill(self) -> list[Instruction]:
         """Start waiting chunks while there is capacity.
 
-        Order: highest priority, then fewest chunks of the study in flight, then oldest study.
+        Order: highest rank; then the owner with the fewest chunks in flight, and of several the one whose latest chunk
+        was started first, so that owners have equal shares however many studies they have; then, among the studies of
+        this owner, highest priority, fewest chunks of the study in flight, oldest study.
         """
         found: list[Instruction] = []
         while len(self._study_of) < self.capacity:
+            at_work = Counter[str | None]()
+            for known in self._open.values():
+                at_work[known.owner] += len(known.running)
             ready = [
-                (-known.priority, len(known.running), number)
+                (-known.rank, at_work[known.owner], self._turns.get(known.owner, 0), -known.priority,
+                 len(known.running), number)
                 for number, known in self._open.items()
                 if known.waiting and not known.held
-            ]
+            ]  # fmt: skip
             if not ready:
                 break
-            number = min(ready)[2]
+            number = min(ready)[-1]
             known = self._open[number]
             ticket, self._next_ticket = self._next_ticket, self._next_ticket + 1
             chunk = known.waiting.popleft()
             known.running[ticket] = chunk
             self._study_of[ticket] = number
+            self._turns[known.owner] = ticket
             found.append(Run(ticket, chunk))
         return found

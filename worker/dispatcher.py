@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, assert_never
 
 from sprag.worker import dispatch
@@ -190,12 +191,12 @@ class Dispatcher:
                 self._time_is_over(study)
             elif study.number in self._machine.studies:
                 self._opening.tell_shortage(study.number, self._executor)
-                self._handle(dispatch.Offered(study.number, priority=study.priority))
+                self._handle(offered(study))
             elif self._opening.may_open(study, self._machine.studies) and self._has_kernel(study):
                 chunks = self._store.open_chunks(study.number)
                 self._say("The study %s starts: %d cases in %d chunks to be run.", study.number,
                     sum(chunk.count for chunk in chunks), len(chunks))  # fmt: skip
-                self._handle(dispatch.Offered(study.number, chunks, study.priority, study.proven))
+                self._handle(offered(study, chunks))
 
     def _part_with(self, study: ActiveStudy) -> None:
         """A study is paused, or another dispatcher is to have it: it is free when its chunks in flight have ended."""
@@ -324,8 +325,9 @@ class Dispatcher:
                 return
             if appended is not None:
                 self._studies[number] = appended.study
-                priority = self._opening.priorities.get(number, 0)
-                self._handle(dispatch.Offered(number, appended.chunks, priority, proven=True))
+                polled = self._opening.polled.get(number)
+                again = dispatch.Offered(number) if polled is None else offered(polled)
+                self._handle(replace(again, chunks=appended.chunks, proven=True))
                 return
         ended = self._store.settle(self._epoch, number)
         self._say("The study %s is %s.", number, ended.value)
@@ -357,3 +359,8 @@ class Dispatcher:
                 raise AssertionError("only the end of a chunk stores rows")
             case _:
                 assert_never(instruction)
+
+
+def offered(study: ActiveStudy, chunks: Sequence[Chunk] = ()) -> dispatch.Offered:
+    """A study, as it was polled, for the state machine."""
+    return dispatch.Offered(study.number, chunks, study.priority, study.proven, study.rank, study.owner)

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from sprag.worker.sharing import Peer
     from sprag.worker.study import Study
 
-#: Number of studies active at the same time; the others wait in order of submission.
+#: Number of studies active at the same time; the others wait in order of submission. Each owner may have one, however
+#: many others have.
 OPEN_STUDIES = 8
 #: Seconds that a study waits for its kernel before this is reported; cached kernels load sooner.
 NOTE_SECONDS = 3.0
@@ -26,7 +27,8 @@ class Opening:
 
     def __init__(self, store: Store, clock: Clock, only: int | None) -> None:
         self.epoch = 0
-        self.priorities: dict[int, int] = {}
+        #: Every study as it was polled last.
+        self.polled: dict[int, ActiveStudy] = {}
         self._store = store
         self._clock = clock
         self._only = only
@@ -44,7 +46,7 @@ class Opening:
     def studies(self) -> list[ActiveStudy]:
         """The unfinished studies that belong to this dispatcher or to none."""
         found = self._store.active_studies()
-        self.priorities.update((study.number, study.priority) for study in found)
+        self.polled = {study.number: study for study in found}
         return [study for study in found if study.dispatcher in {None, self.epoch}]
 
     def chosen(self, study: ActiveStudy) -> bool:
@@ -71,14 +73,11 @@ class Opening:
     def may_open(self, study: ActiveStudy, active: Collection[int]) -> bool:
         """Whether a study may become active, and belongs to this dispatcher.
 
-        Those that wait for kernels or have a lower priority than it do not count among the ``active`` ones.
+        Those that wait for kernels or come after it do not count among the ``active`` ones.
         """
         if study.number in self._compiling:
             return True
-        if not all(
-            sum(self.priorities.get(number, 0) >= study.priority for number in group) < OPEN_STUDIES
-            for group in (active, self._compiling)
-        ):
+        if not all(self._has_place(study, group) for group in (active, self._compiling)):
             return False
         if self.is_ours(study):
             return True
@@ -88,6 +87,12 @@ class Opening:
             return False
         self._own += 1
         return True
+
+    def _has_place(self, study: ActiveStudy, group: Collection[int]) -> bool:
+        """Whether a study can join those of a group that do not come after it."""
+        others = [self.polled[number] for number in group if number in self.polled]
+        mine = sum(other.owner == study.owner and _order(other) >= _order(study) for other in others)
+        return not mine or mine + sum(o.owner != study.owner and o.rank >= study.rank for o in others) < OPEN_STUDIES
 
     def loaded(self, number: int, study: Study, executor: Executor) -> bool:
         """Whether the kernel of a study is loaded; if not, this is reported after a while. Raises KernelError."""
@@ -132,3 +137,8 @@ class Opening:
     def unnoted(self, number: int) -> None:
         """Another reason was recorded on a study."""
         self._notes.pop(number, None)
+
+
+def _order(study: ActiveStudy) -> tuple[int, int]:
+    """By which studies of one owner go first, the largest first."""
+    return study.rank, study.priority

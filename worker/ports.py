@@ -81,10 +81,11 @@ class Finished:
 class ActiveStudy:
     """An unfinished study, as polled by the dispatcher.
 
-    Higher ``priority`` runs first. ``waits_for_room`` marks a paused study that resumes when there is room, ``goes_on``
-    one that resumes by itself for any reason. No chunk starts after ``finish_by``. ``proven``: an earlier round of the
-    study has results, which shows that the engine works. ``dispatcher`` is the epoch of the dispatcher to which it
-    belongs, None for none; ``fingerprint`` that of its rows, "" where it has none, or rows of several.
+    Higher ``rank`` runs first; at the same rank each ``owner`` (None: nobody) has turns, and among the studies of one
+    owner higher ``priority`` runs first. ``waits_for_room`` marks a paused study that resumes when there is room,
+    ``goes_on`` one that resumes by itself for any reason. No chunk starts after ``finish_by``. ``proven``: an earlier
+    round of the study has results, which shows that the engine works. ``dispatcher`` is the epoch of the dispatcher to
+    which it belongs, None for none; ``fingerprint`` that of its rows, "" where it has none, or rows of several.
     """
 
     number: int
@@ -97,6 +98,8 @@ class ActiveStudy:
     proven: bool = False
     dispatcher: int | None = None
     fingerprint: str = ""
+    rank: int = 0
+    owner: str | None = None
 
 
 class StoreError(SpragError):

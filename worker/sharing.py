@@ -38,12 +38,12 @@ def takes(study: ActiveStudy, fingerprint: str, studies: int, peers: Sequence[Pe
 
 
 def gives(own: Iterable[ActiveStudy], peers: Sequence[Peer], *, stuck: bool = False) -> int | None:
-    """Number of the study that a dispatcher gives away: its latest of the lowest priority; None for none.
+    """Number of the study that a dispatcher gives away: its latest of the lowest rank and priority; None for none.
 
     A study with rows goes to dispatchers of their fingerprint only. ``stuck``: whether it can run nothing at present,
     and therefore gives all of them away, one after the other.
     """
-    mine = sorted(own, key=lambda study: (study.priority, -study.number))
+    mine = sorted(own, key=lambda study: (study.rank, study.priority, -study.number))
     for study in mine:
         able = (peer for peer in peers if not study.fingerprint or peer.fingerprint == study.fingerprint)
         if any(stuck or peer.studies + 2 <= len(mine) for peer in able):

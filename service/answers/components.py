@@ -18,6 +18,7 @@ class ComponentEntry(TypedDict):
     note: str
     fields: Annotated[dict[str, str], Doc("quantities as they were written, by field")]
     changed_at: Moment
+    etag: Annotated[str, Doc("edition of its note and fields, for `If-Match`")]
     owner: Annotated[str | None, Doc("the user who added it; null: nobody, so every designer may change it")]
 
 

@@ -20,6 +20,7 @@ class SavedViewEntry(TypedDict):
     address: Annotated[str, Doc("address of the page with the choices")]
     place: Annotated[int | None, Doc("position among the figures of the study's report; null: it is not in it")]
     changed_at: Moment
+    etag: Annotated[str, Doc("edition of its name, choices and place, for `If-Match`")]
     owner: Annotated[str | None, Doc("the user who saved it; null where nobody did: then every designer may change it")]
 
 

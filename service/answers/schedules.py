@@ -76,6 +76,7 @@ class ScheduleSummary(TypedDict):
     next_due_local: Annotated[str | None, Doc("the same on the wall clock of `zone`, with its offset")]
     last_run: ScheduleRun | None
     owner: Annotated[str | None, Doc("user to whom it and its studies belong; null: no owner")]
+    etag: Annotated[str, Doc("edition of its fields, for `If-Match`")]
     links: dict[str, str]
 
 

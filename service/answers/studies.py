@@ -109,6 +109,7 @@ class _Study(TypedDict):
     tags: Annotated[list[str], Doc("its tags, in the order in which they came")]
     archived_at: Annotated[Moment | None, Doc("since when it is kept out of the usual list")]
     purge_at: Annotated[Moment | None, Doc("until when it can be restored, if it is deleted")]
+    etag: Annotated[str, Doc("edition of name, notes, tags and archive, for `If-Match`")]
     links: Annotated[dict[str, str], Doc("URLs of the study's resources")]
 
 

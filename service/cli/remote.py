@@ -227,7 +227,7 @@ def prioritize(
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Change the priority of a study: among waiting studies the highest runs first."""
+    """Change the priority of a study: among the waiting studies of one user the highest runs first."""
     act_on(study_id, "prioritize", server, token, as_json, [("priority", str(priority))])
 
 

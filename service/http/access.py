@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 from starlette.concurrency import run_in_threadpool
 
-from sprag.service.actor import Actor, Door, Role
+from sprag.service.actor import Actor, Door, Role, share_of
 from sprag.service.faults import shown
 from sprag.service.http.attempts import Attempts
 from sprag.service.http.problems import ApiError
@@ -106,7 +106,7 @@ class Grant:
     @property
     def share(self) -> str:
         """Whose share of the service's work a request takes: a user's, with whatever token."""
-        return self.id if self.user is None else f"user {self.user}"
+        return share_of(self.user, self.id)
 
 
 #: The grant of everybody where no token is needed.

@@ -292,7 +292,7 @@ def create_app(
         used_computer,
         used_checker,
         checks.Library(used_store),
-        check_shares=Shares(max(settings.check_processes - 1, 1), MAX_CHECKS_EACH),
+        check_shares=Shares(max(settings.check_processes - 1, 1), MAX_CHECKS_EACH, MAX_CHECKS),
     )
     queues = (Queue("checks", context.check_shares), Queue("computations", context.compute_shares))
     metrics = Metrics(used_store, OperationCollector(settings, used_store, queues))
@@ -364,8 +364,9 @@ def _computer(settings: Settings) -> ProcessComputer:
 
 def _checker(settings: Settings) -> ProcessComputer:
     limits = Limits(
-        settings.check_timeout, settings.check_memory * 2**20, MAX_CHECKS, "too-costly", "SPRAG_CHECK_TIMEOUT"
-    )
+        settings.check_timeout, settings.check_memory * 2**20, MAX_CHECKS, "too-costly", "SPRAG_CHECK_TIMEOUT",
+        "unavailable",
+    )  # fmt: skip
     return ProcessComputer(limits, settings.check_processes, checks.prepare)
 
 

@@ -56,6 +56,9 @@ class Limits:
         Most simultaneous computations; further ones are refused immediately.
     problem : str
         Kind of the problem reported to the client.
+    died : str
+        Kind of the problem where the process died twice by itself: of the case where that runs the engine. Where it was
+        killed by somebody else, such as a system short of memory, it is always ``unavailable``.
     setting : str
         Name of the setting of the time limit, if any.
     leave_seconds : float
@@ -68,6 +71,7 @@ class Limits:
     waiting: int = MAX_WAITING
     problem: Kind = "timed-out"
     setting: str = ""
+    died: Kind = "not-computed"
     leave_seconds: float = 2.0
 
 
@@ -120,19 +124,30 @@ class ProcessComputer:
                 raise fault
 
     async def run(self, function: Callable[[*Args], R], *args: *Args) -> R:
-        """The function's value. Function, arguments and value must be picklable."""
+        """The function's value. Function, arguments and value must be picklable.
+
+        Where its process dies, it is run once more: the process may have been killed for no fault of the function.
+        """
         wall = WALL_TIMES * self._limits.seconds
         with self._turn(wall):
-            job = self._schedule(wall, within_processor_time, self._limits.seconds, function, *args)
-            future = asyncio.wrap_future(job.future)
             try:
-                return await asyncio.shield(future)
-            except asyncio.CancelledError:
-                task = asyncio.current_task()
-                if task is not None and not task.cancelling():  # cancelled by `close`, not by the client
-                    raise JobStoppedError from None
-                await self._leave(job, future)
-                raise
+                return await self._run(wall, function, *args)
+            except ProcessDiedError as error:
+                if _too_long(error):
+                    raise
+                return await self._run(wall, function, *args)
+
+    async def _run(self, wall: float, function: Callable[[*Args], R], *args: *Args) -> R:
+        job = self._schedule(wall, within_processor_time, self._limits.seconds, function, *args)
+        future = asyncio.wrap_future(job.future)
+        try:
+            return await asyncio.shield(future)
+        except asyncio.CancelledError:
+            task = asyncio.current_task()
+            if task is not None and not task.cancelling():  # cancelled by `close`, not by the client
+                raise JobStoppedError from None
+            await self._leave(job, future)
+            raise
 
     async def _leave(self, job: Job[R], future: asyncio.Future[R]) -> None:
         """End a job that nobody waits for; its process is killed only if the job continues for long."""
@@ -147,12 +162,18 @@ class ProcessComputer:
     async def load(self, shape: models.KernelShape) -> None:
         """Load a kernel. Its compilation continues when the request is cancelled, so that the next one finds it."""
         with self._turn(LOAD_SECONDS):
-            loading = self._loads.get(shape)
-            if loading is None or (loading.future.done() and loading.future.exception() is not None):
-                loading = self._loads[shape] = self._schedule(LOAD_SECONDS, self._load, shape)
-            future = asyncio.wrap_future(loading.future)
-            future.add_done_callback(_retrieve)  # nobody else retrieves the result for a cancelled request
-            await asyncio.shield(future)
+            try:
+                await self._loaded(shape)
+            except ProcessDiedError:
+                await self._loaded(shape)
+
+    async def _loaded(self, shape: models.KernelShape) -> None:
+        loading = self._loads.get(shape)
+        if loading is None or (loading.future.done() and loading.future.exception() is not None):
+            loading = self._loads[shape] = self._schedule(LOAD_SECONDS, self._load, shape)
+        future = asyncio.wrap_future(loading.future)
+        future.add_done_callback(_retrieve)  # nobody else retrieves the result for a cancelled request
+        await asyncio.shield(future)
 
     @contextmanager
     def _turn(self, timeout: float) -> Iterator[None]:
@@ -170,10 +191,14 @@ class ProcessComputer:
             detail = f"The computation needs more than the {self._limits.memory // 2**20} MiB of memory it may use."
             raise ApiError(self._limits.problem, detail) from error
         except ProcessDiedError as error:
-            if error.exitcode == -signal.SIGPROF:
+            if _too_long(error):
                 detail = f"The computation did not end within {self._limits.seconds:g} s of processor time{named}."
                 raise ApiError(self._limits.problem, detail) from error
-            raise ApiError("not-computed", "The process that ran the computation died.") from error
+            killed = error.exitcode in (-signal.SIGKILL, -signal.SIGTERM)
+            kind: Kind = "unavailable" if killed else self._limits.died
+            how = "was killed" if killed else "died"
+            detail = f"The process that ran the computation {how}, and when it was run once more, too."
+            raise ApiError(kind, detail, headers=_LATER if kind == "unavailable" else None) from error
         except ProcessStartError as error:
             raise ApiError("unavailable", "The process for computations cannot be started.", headers=_LATER) from error
         except JobStoppedError as error:
@@ -201,6 +226,11 @@ class ProcessComputer:
             pool, self._pool, self._closed = self._pool, None, True
         if pool is not None:
             pool.close()
+
+
+def _too_long(error: ProcessDiedError) -> bool:
+    """Whether the process was ended by its limit of processor time (`within_processor_time`)."""
+    return error.exitcode == -signal.SIGPROF
 
 
 def _retrieve(future: asyncio.Future[None]) -> None:

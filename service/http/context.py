@@ -18,7 +18,15 @@ from sprag.service.jobs.checks import Library
 from sprag.service.results.unaffected import Unaffected
 from sprag.service.settings import Settings
 from sprag.service.storage.store import Store
-from sprag.worker.limits import MAX_CASES, MAX_CHECKS_EACH, MAX_COMPUTATIONS_EACH, MAX_STARTS, MAX_STREAMS
+from sprag.worker.limits import (
+    MAX_CASES,
+    MAX_CHECKS,
+    MAX_CHECKS_EACH,
+    MAX_COMPUTATIONS,
+    MAX_COMPUTATIONS_EACH,
+    MAX_STARTS,
+    MAX_STREAMS,
+)
 
 if TYPE_CHECKING:
     from sprag.worker.study import Study
@@ -54,8 +62,8 @@ class Context:
     ready: Event = field(default_factory=Event)
     streams: Semaphore = field(default_factory=lambda: Semaphore(MAX_STREAMS))
     unaffected: Unaffected = field(default_factory=Unaffected)
-    compute_shares: Shares = field(default_factory=lambda: Shares(1, MAX_COMPUTATIONS_EACH))
-    check_shares: Shares = field(default_factory=lambda: Shares(1, MAX_CHECKS_EACH))
+    compute_shares: Shares = field(default_factory=lambda: Shares(1, MAX_COMPUTATIONS_EACH, MAX_COMPUTATIONS))
+    check_shares: Shares = field(default_factory=lambda: Shares(1, MAX_CHECKS_EACH, MAX_CHECKS))
     files: KeptFiles = field(default_factory=KeptFiles)
 
     def cut(self) -> None:

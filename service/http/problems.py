@@ -57,6 +57,12 @@ PROBLEM_TYPES: dict[Kind, ProblemType] = _catalogue(
     ),
     _P("not-acceptable", 406, "No acceptable format", "`detail` names the available media types."),
     _P("wrong-state", 409, "The state of the study does not allow this", "Check the state of the study first."),
+    _P(
+        "precondition-failed",
+        412,
+        "It was changed after you read it",
+        "Read it again, and send the change with the new entity tag in If-Match.",
+    ),
     _P("not-computed", 409, "The case cannot be computed", "Running it ends the process that computes it."),
     _P("body-too-large", 413, "The request body is too large", "A study is a small document: give axes as ranges."),
     _P(

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
-from fastapi import Request
+from fastapi import Header, Request
 from fastapi.dependencies.models import Dependant
+from werkzeug.http import parse_etags
 
 from sprag.service.faults import ParameterFault, shown
 from sprag.service.http.problems import ApiError
@@ -48,6 +49,31 @@ async def read_body(request: Request) -> Body:
             headers={"Accept": ", ".join(_FORMATS)},
         )
     return Body(await request.body(), form)
+
+
+#: Header by which a change or deletion is meant for what the client has read, and for nothing else.
+IfMatch = Annotated[
+    str | None,
+    Header(
+        alias="If-Match",
+        max_length=1000,
+        description="`etag` of what was read, or the header ETag of its answer: where it was changed since, nothing is "
+        "done; `*`: whatever it is by now",
+        examples=["*"],
+    ),
+]
+
+
+def editions(if_match: str | None) -> frozenset[str] | None:
+    """The editions that the header If-Match names; None where any will do.
+
+    A tag of an answer about the whole object continues after the edition with a point. Compressed answers have the weak
+    form of their tag, which counts as well.
+    """
+    tags = None if if_match is None else parse_etags(if_match)
+    if tags is None or tags.star_tag:
+        return None
+    return frozenset(tag.partition(".")[0] for tag in tags.as_set(include_weak=True))
 
 
 @contextmanager

@@ -54,6 +54,11 @@ def entity_tag(*parts: object) -> str:
     return '"' + hashlib.sha256(text.encode("utf-8", "backslashreplace")).hexdigest()[:32] + '"'
 
 
+def edition_tag(edition: str, *parts: object) -> str:
+    """The tag of an answer about the whole object of an ``edition`` that people edit (`requests.editions`)."""
+    return f'"{edition}.{entity_tag(*parts)[1:]}'
+
+
 def not_modified(request: Request, tag: str) -> Response | None:
     """The answer 304 when the client already has the version of ``tag`` (If-None-Match), otherwise None."""
     known = ",".join(request.headers.getlist("if-none-match"))

@@ -23,12 +23,14 @@ class _Share:
 class Shares:
     """Limits each owner to ``at_work`` simultaneous requests, and to ``each`` including waiting ones.
 
-    For one event loop. Nothing is stored for an owner without requests.
+    Of the ``pool`` of all owners together the last quarter is for owners that have nothing of it yet. For one event
+    loop. Nothing is stored for an owner without requests.
     """
 
-    def __init__(self, at_work: int, each: int) -> None:
+    def __init__(self, at_work: int, each: int, pool: int) -> None:
         self._at_work = at_work
         self._each = each
+        self._for_all = max(pool - pool // 4, 1)
         self._owners: dict[str, _Share] = {}
 
     @property
@@ -45,6 +47,9 @@ class Shares:
         share = self._owners.setdefault(owner, _Share(min(at_most or self._at_work, self._at_work)))
         if share.taken >= self._each:
             detail = f"{self._each} requests of this user or token are in progress, the most at one time."
+            raise ApiError("too-many-requests", detail, headers={"Retry-After": "5"})
+        if share.taken and self.requests >= self._for_all:
+            detail = "What is left is for other users, because many requests are in progress."
             raise ApiError("too-many-requests", detail, headers={"Retry-After": "5"})
         share.taken += 1
         try:

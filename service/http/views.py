@@ -11,6 +11,7 @@ from sprag.service.answers.catalogue import Preset
 from sprag.service.answers.studies import FullProgress, Origin, StudyDetail, StudySummary
 from sprag.service.faults import warned
 from sprag.service.http.prefix import here
+from sprag.service.http.respond import edition_tag
 from sprag.service.presets import ABOUT, preset_text
 from sprag.service.results.fronts import goal_units
 from sprag.service.results.rounds import rounds_json
@@ -52,6 +53,12 @@ def summary(record: StudyRecord) -> StudySummary:
         progress={"total": record.cases, "done": record.done, "ok": record.ok},
         links=study_links(record.id),
     )
+
+
+def study_tag(record: StudyRecord) -> str:
+    """Entity tag of a study: a weak one while it runs, because its time left changes with no change of the study."""
+    tag = edition_tag(record.etag, record.id, record.revision)
+    return tag if record.state.terminal else f"W/{tag}"
 
 
 def progress_json(progress: Progress, units: Sequence[str] = ()) -> FullProgress:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 from sprag.service.results.chosen_figures import require_figure
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from sprag.service.spec.saved_views import View, ViewChange
     from sprag.service.storage.saved_views import SavedView
     from sprag.service.storage.store import Store
@@ -20,11 +22,11 @@ def save_view(store: Store, view: View) -> SavedView:
     return store.save_view(view)
 
 
-def change_view(store: Store, view_id: str, change: ViewChange) -> SavedView:
+def change_view(store: Store, view_id: str, change: ViewChange, read: Collection[str] | None = None) -> SavedView:
     """Change a view; raises as the store does, and SelectionError for a figure that the study does not have."""
     old = store.saved_view(view_id).view
     in_report = change.place is not None or (old.in_report if change.in_report is None else change.in_report)
     if in_report and old.study is not None and not (old.in_report and change.query is None):
         query = old.query if change.query is None else change.query
         require_figure(store.study(old.study), replace(old, query=query))
-    return store.change_view(view_id, change)
+    return store.change_view(view_id, change, read)

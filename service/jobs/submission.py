@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from sprag.service.faults import FaultError
 from sprag.service.jobs.preview import estimated_bytes, estimated_seconds
-from sprag.service.languages import grouped, recorded
+from sprag.service.languages import recorded
 from sprag.service.schedules.deadline import finish_warnings
 from sprag.service.storage.room import RESERVE_BYTES
 from sprag.service.storage.study_row import study_row
@@ -110,8 +110,6 @@ def take_in(
     known = store.study_of_key(idempotency_key, made.body_hash) if idempotency_key else None
     if known is not None:
         return known
-    if store.waiting_studies() >= MAX_WAITING_STUDIES:
-        raise FaultError("queue-full", recorded.MANY_STUDIES.format(count=grouped(MAX_WAITING_STUDIES)))
     _require_room(store, made.bytes)
     return store.insert_study(
         made.row,
@@ -121,6 +119,7 @@ def take_in(
         fresh=made.fresh,
         finish_by=made.finish_by,
         run=run,
+        queue=MAX_WAITING_STUDIES,
     )
 
 

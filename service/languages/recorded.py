@@ -34,6 +34,10 @@ NOTICED_LATE: Final = N_("No worker was running when it was due, and this was no
 NOT_MADE_UP: Final = N_("missed due times are not made up for")
 GRACE: Final = N_("its misfire grace is {grace}")
 MANY_STUDIES: Final = N_("{count} studies have not ended yet.")
+SHARE_OF_QUEUE: Final = N_(
+    "{mine} of your studies have not ended yet, and {free} more can wait, which are for others: nobody has more than "
+    "is left."
+)
 NO_ROOM_FOR_RESULTS: Final = N_("The results would take about {size}; the database has room for {room} more.")
 SILENT: Final = N_(
     "the worker (process {process}) has not responded since {since}; the study continues when a worker is at work"
@@ -91,7 +95,7 @@ _OF_ERRORS: Final = (
 _ALL: Final = (
     OUTSIDE_WINDOW, WINDOW, NO_ROOM, DISK, LARGEST_FILE, EARLIER, PAUSED, DELETED, NOT_IN_TIME, TRIED_AGAIN,
     NOTICED_LATE, NOT_MADE_UP, GRACE, NOTHING_RAN, NOT_TAKEN, NOT_TAKEN_SILENT, NOT_SUBMITTED, NO_WORKER, WAITS_SILENT,
-    WAITS_STALLED, WAITS, MANY_STUDIES, NO_ROOM_FOR_RESULTS, SILENT, LATE_PART, LATE,
+    WAITS_STALLED, WAITS, MANY_STUDIES, SHARE_OF_QUEUE, NO_ROOM_FOR_RESULTS, SILENT, LATE_PART, LATE,
     ROUNDS_DONE, NO_ROUND, TOKEN_EXPIRED, TOKEN_REVOKED, TOKEN_OF_REMOVED_USER,
     *_OF_WORKERS, *_OF_ERRORS,
 )  # fmt: skip

@@ -120,6 +120,16 @@ def require_own(kind: str, identity: str, owner: str | None) -> None:
         raise NotOwnerError(f"the {kind} {identity} belongs to {owner}")
 
 
+def by_sender(column: sa.ColumnElement[str]) -> sa.ColumnElement[bool]:
+    """Condition: an idempotency key was sent by the present actor.
+
+    A token without a user also has the keys of nobody: those of a service that needed no token yet, and of tokens
+    without a user before revision 0033.
+    """
+    actor = acting()
+    return column.in_([actor.share] if actor.user is not None else sorted({actor.share, ""}))
+
+
 class Audit(Part):
     """The audit log of a database."""
 

@@ -13,12 +13,14 @@ from sprag.service.actor import acting
 from sprag.service.spec.components import Component
 from sprag.service.storage.audit import note, require_own
 from sprag.service.storage.component_tables import COMPONENTS
+from sprag.service.storage.editions import edition_of, require_edition
 from sprag.service.storage.errors import ComponentNotFoundError, TooManyComponentsError
 from sprag.service.storage.part import Part, moment
+from sprag.service.storage.pools import pool_of
 from sprag.worker.limits import MAX_COMPONENTS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Collection, Iterable
     from datetime import datetime
 
 _C = COMPONENTS.c
@@ -32,6 +34,11 @@ class ComponentRecord:
     component: Component
     changed_at: datetime
     owner: str | None
+
+    @property
+    def etag(self) -> str:
+        """The edition of its note and its fields."""
+        return edition_of(self.component.note, dict(self.component.fields))
 
 
 class Components(Part):
@@ -50,9 +57,11 @@ class Components(Part):
         Raises NotOwnerError for one of another user, and TooManyComponentsError.
         """
         with self.session.write() as connection:
+            before = pool_of(connection, COMPONENTS, sa.true(), MAX_COMPONENTS)
             made = [self._put(connection, one) for one in given]
-            if (connection.execute(sa.select(sa.func.count()).select_from(COMPONENTS)).scalar() or 0) > MAX_COMPONENTS:
-                raise TooManyComponentsError(f"there would be more than {MAX_COMPONENTS:,} components; remove some")
+            more = pool_of(connection, COMPONENTS, sa.true(), MAX_COMPONENTS).taken - before.taken
+            if more and not before.takes(more):
+                raise TooManyComponentsError(before.refusal("components"))
         return tuple(made)
 
     def _put(self, connection: sa.Connection, one: Component) -> ComponentRecord:
@@ -74,13 +83,17 @@ class Components(Part):
         note(connection, self._now(), action, row.id, kind=one.kind, name=one.name, fields=dict(one.fields))
         return _record(row)
 
-    def remove_component(self, component_id: str) -> None:
-        """Remove a component; studies that took it keep its values. Raises ComponentNotFoundError, NotOwnerError."""
+    def remove_component(self, component_id: str, read: Collection[str] | None = None) -> None:
+        """Remove a component; studies that took it keep its values. Raises ComponentNotFoundError, NotOwnerError.
+
+        ``read``: the editions (`ComponentRecord.etag`) that are meant; ChangedMeanwhileError for any other.
+        """
         with self.session.write() as connection:
             row = connection.execute(sa.select(COMPONENTS).where(_C.id == component_id)).one_or_none()
             if row is None:
                 raise ComponentNotFoundError(component_id)
             require_own("component", row.id, row.owner)
+            require_edition("component", row.id, _record(row).etag, read)
             connection.execute(sa.delete(COMPONENTS).where(_C.id == component_id))
             note(connection, self._now(), "component.remove", row.id, kind=row.kind, name=row.name)
 

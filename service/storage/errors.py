@@ -4,6 +4,7 @@ from sprag.worker.ports import StoreError, StoreFullError
 
 __all__ = [
     "CREATED_BY",
+    "ChangedMeanwhileError",
     "ComponentNotFoundError",
     "DatabaseBusyError",
     "DatabaseError",
@@ -172,6 +173,12 @@ class NotOwnerError(StoreError):
     """The object belongs to another user."""
 
     code = "not-owner"
+
+
+class ChangedMeanwhileError(StoreError):
+    """The object was changed after the edition that a change or deletion is meant for was read."""
+
+    code = "precondition-failed"
 
 
 class StudyBusyError(StoreError):

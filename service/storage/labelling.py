@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Any
 from sprag.service.faults import Fault, FaultError
 from sprag.service.spec.labels import folded
 from sprag.service.storage.audit import note, require_own
+from sprag.service.storage.editions import require_edition
 from sprag.service.storage.listing import Listing
 from sprag.service.storage.searching import search_text
 from sprag.service.storage.tables import STUDIES
 from sprag.worker.limits import MAX_TAGS
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from sprag.service.spec.labels import StudyChange
     from sprag.service.storage.records import StudyRecord
 
@@ -20,15 +23,17 @@ if TYPE_CHECKING:
 class Labelling(Listing):
     """What people write about studies."""
 
-    def change_study(self, study_id: str, change: StudyChange) -> StudyRecord:
+    def change_study(self, study_id: str, change: StudyChange, read: Collection[str] | None = None) -> StudyRecord:
         """Change what people write about a study; raises StudyNotFoundError.
 
-        FaultError where it would have more than `MAX_TAGS` tags.
+        FaultError where it would have more than `MAX_TAGS` tags. ``read``: the editions (`StudyRecord.etag`) that the
+        change is meant for; ChangedMeanwhileError for any other.
         """
         c = STUDIES.c
         with self.session.write() as connection:
             row = self._row(connection, study_id, c.number, c.owner, c.name, c.notes, c.tags, c.archived_at)
             require_own("study", study_id, row.owner)
+            require_edition("study", study_id, self._study_record(connection, study_id).etag, read)
             name = row.name if change.name is None else change.name
             notes = row.notes if change.notes is None else change.notes
             tags = _tags(tuple(row.tags.split("\n")[1:-1]), change)

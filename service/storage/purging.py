@@ -9,14 +9,17 @@ from typing import TYPE_CHECKING, Final
 import sqlalchemy as sa
 
 from sprag.service.storage.audit import note, require_own
+from sprag.service.storage.editions import require_edition
 from sprag.service.storage.errors import DatabaseFullError, StudyBusyError, StudyNotFoundError
 from sprag.service.storage.part import micros_of
+from sprag.service.storage.records import record_of
 from sprag.service.storage.reserve import makes_room
 from sprag.service.storage.tables import (
     CHUNKS,
     ENDINGS,
     HELD_AT_DEADLINE,
     IDEMPOTENCY_KEYS,
+    RECORD_COLUMNS,
     ROUNDS,
     STUDIES,
     further_table,
@@ -27,7 +30,7 @@ from sprag.service.storage.view_tables import SAVED_VIEWS
 from sprag.worker.states import TERMINAL, StudyState
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
     from datetime import datetime
     from threading import Event
 
@@ -46,20 +49,25 @@ class Purging(Users):
     restorable = timedelta(0)
 
     @makes_room
-    def delete_study(self, study_id: str, *, at_once: bool = False) -> None:
+    def delete_study(self, study_id: str, *, at_once: bool = False, read: Collection[str] | None = None) -> None:
         """Delete a study that has ended or is held at its deadline.
 
         Raises StudyNotFoundError, or StudyBusyError for any other study.
 
         The study is invisible when this returns, and can be restored for the time `restorable`, unless it is to be
-        deleted ``at_once``; `Purging.purge_steps` removes its rows later.
+        deleted ``at_once``; `Purging.purge_steps` removes its rows later. ``read``: the editions (`StudyRecord.etag`)
+        that are meant; ChangedMeanwhileError for any other.
         """
-        now = self._now()
+        now, c = self._now(), STUDIES.c
         purge_at = 0 if at_once else now + self.restorable // timedelta(microseconds=1)
+        # One that can be restored takes room as well, until it is deleted for good.
+        there = c.deleted_at.is_(None) | (sa.literal(at_once) & (c.purge_at > now))
         with self.session.write() as connection:
-            c = STUDIES.c
-            row = self._row(connection, study_id, c.number, c.state, c.waits_for, c.owner, c.name)
+            row = connection.execute(sa.select(*RECORD_COLUMNS).where(c.id == study_id, there)).one_or_none()
+            if row is None:
+                raise StudyNotFoundError(study_id)
             require_own("study", study_id, row.owner)
+            require_edition("study", study_id, record_of(row).etag, read)
             state = StudyState(row.state)
             if not state.terminal and row.waits_for != HELD_AT_DEADLINE:
                 raise StudyBusyError(f"the study {study_id} is {state.value}: cancel it before it is deleted")
@@ -71,14 +79,11 @@ class Purging(Users):
             self.deleted.set()
 
     def restore_study(self, study_id: str) -> None:
-        """Undo the deletion of a study; raises StudyNotFoundError when its rows are being removed.
-
-        FaultError where its results exceed the quota of the present user.
-        """
+        """Undo the deletion of a study; raises StudyNotFoundError when its rows are being removed."""
         now, c = self._now(), STUDIES.c
         with self.session.write() as connection:
             found = connection.execute(
-                sa.select(c.number, c.owner, c.name, c.estimated_bytes).where(
+                sa.select(c.number, c.owner, c.name).where(
                     c.id == study_id, c.deleted_at.is_not(None), c.purge_at > now
                 )
             ).one_or_none()
@@ -86,7 +91,6 @@ class Purging(Users):
                 self._row(connection, study_id, c.number)  # one that is not deleted stays as it is
                 return
             require_own("study", study_id, found.owner)
-            self._require_quota(connection, 0, found.estimated_bytes or 0)
             self._change(connection, found.number, deleted_at=None, purge_at=None)
             note(connection, now, "study.restore", study_id, name=found.name)
 

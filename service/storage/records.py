@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sprag.service.storage.editions import edition_of
 from sprag.service.storage.part import moment, optional_moment
 from sprag.service.storage.tables import COARSE_TO_FINE, HELD_AT_DEADLINE
 from sprag.service.storage.warning_texts import read_warnings
@@ -69,6 +70,11 @@ class StudyRecord:
     archived_at: datetime | None
     purge_at: datetime | None
     owner: str | None
+
+    @property
+    def etag(self) -> str:
+        """The edition of what people write about it."""
+        return edition_of(self.name, self.notes, self.tags, self.archived_at)
 
     @property
     def over(self) -> bool:

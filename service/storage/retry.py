@@ -16,8 +16,10 @@ from sprag.service.storage.order import Orders
 from sprag.service.storage.records import StudyRecord, record_of
 from sprag.service.storage.reuse import endings_of
 from sprag.service.storage.tables import CHUNKS, ENDINGS, RECORD_COLUMNS, STUDIES, results_table
+from sprag.service.storage.users import require_queue
 from sprag.worker import models
 from sprag.worker.chunking import MAX_CHUNKS
+from sprag.worker.limits import MAX_WAITING_STUDIES
 from sprag.worker.states import ChunkState, StudyEvent, StudyState, follow
 from sprag.worker.sweeps import LineOrder
 
@@ -43,6 +45,8 @@ class _Done:
     claimed_at: int
     finished_at: int
     detail: str | None
+    host: str | None
+    fingerprint: str | None
 
 
 class Retries(Orders):
@@ -52,8 +56,8 @@ class Retries(Orders):
         """Run the cases of an ended study again that did not end ok, or that have one of ``endings``.
 
         All other rows are kept; of a sweep those of lines without such a case. Raises StudyNotFoundError,
-        TransitionError when the study has not ended or was cancelled, and NothingToRetryError when there is no such
-        case.
+        TransitionError when the study has not ended or was cancelled, NothingToRetryError when there is no such case,
+        and FaultError when too many studies wait.
         """
         c = STUDIES.c
         while True:
@@ -77,6 +81,7 @@ class Retries(Orders):
                 now = self._row(connection, study_id, c.revision)
                 if now.revision != row.revision:  # it was run again or deleted in the meantime
                     continue
+                require_queue(connection, MAX_WAITING_STUDIES)
                 _give_back(connection, row, runs, counts, cases)
                 self._move(connection, row.number, StudyEvent.RETRY)
                 self._lift_deadline(connection, row.number)
@@ -162,7 +167,7 @@ def _give_back(
 def _cut(connection: sa.Connection, number: int, runs: Sequence[Run]) -> None:
     c = CHUNKS.c
     chunks = connection.execute(
-        sa.select(c["first"], c["count"], c.claimed_at, c.finished_at, c.detail)
+        sa.select(c["first"], c["count"], c.claimed_at, c.finished_at, c.detail, c.host, c.fingerprint)
         .where(c.study == number)
         .order_by(c["first"])
     ).all()
@@ -188,18 +193,21 @@ def _cut(connection: sa.Connection, number: int, runs: Sequence[Run]) -> None:
 def _pieces(number: int, chunk: _Done, inside: Sequence[Run]) -> list[dict[str, Any]]:
     """A finished chunk as waiting pieces (``inside``) and the finished pieces between them.
 
-    The finished pieces share its time in proportion to their cases, so the reported speed stays correct.
+    The finished pieces share its time in proportion to their cases, so the reported speed stays correct; where its rows
+    come from is where theirs do.
     """
     waiting = {first for first, _ in inside}
     borders = sorted({chunk.first, chunk.first + chunk.count, *(border for part in inside for border in part)})
     pace = (chunk.finished_at - chunk.claimed_at) / chunk.count
+    nothing = dict.fromkeys(("claimed_at", "finished_at", "detail", "host", "fingerprint"))
     pieces = []
     for first, end in pairwise(borders):
         piece: dict[str, Any] = {"study": number, "first": first, "count": end - first, "failures": 0}
         if first in waiting:
-            piece |= {"state": ChunkState.WAITING, "claimed_at": None, "finished_at": None, "detail": None}
+            piece |= {"state": ChunkState.WAITING, **nothing}
         else:
             begin, finish = (chunk.claimed_at + round(pace * (border - chunk.first)) for border in (first, end))
-            piece |= {"state": ChunkState.DONE, "claimed_at": begin, "finished_at": finish, "detail": chunk.detail}
+            piece |= {"state": ChunkState.DONE, "claimed_at": begin, "finished_at": finish}
+            piece |= {name: getattr(chunk, name) for name in ("detail", "host", "fingerprint")}
         pieces.append(piece)
     return pieces

@@ -12,13 +12,16 @@ from sprag.service.actor import acting
 from sprag.service.faults import Fault, FaultError
 from sprag.service.spec.saved_views import View
 from sprag.service.storage.audit import note, require_own
+from sprag.service.storage.editions import edition_of, require_edition
 from sprag.service.storage.errors import TooManyViewsError, ViewNotFoundError
 from sprag.service.storage.part import Part, moment
+from sprag.service.storage.pools import pool_of
 from sprag.service.storage.tables import STUDIES
 from sprag.service.storage.view_tables import SAVED_VIEWS
 from sprag.worker.limits import MAX_REPORT_FIGURES, MAX_VIEWS
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
     from datetime import datetime
 
     from sprag.service.spec.saved_views import ViewChange
@@ -45,6 +48,11 @@ class SavedView:
     place: int | None
     changed_at: datetime
     owner: str | None
+
+    @property
+    def etag(self) -> str:
+        """The edition of its name, its choices and its place."""
+        return edition_of(self.view.name, self.view.query, self.place)
 
 
 class SavedViews(Part):
@@ -83,9 +91,9 @@ class SavedViews(Part):
             old = connection.execute(sa.select(_V.id, _V.owner).where(*same)).first()
             if old is None:
                 # Figures of reports have a limit for each study, and studies of schedules inherit them.
-                count = connection.execute(sa.select(sa.func.count()).where(_V.place.is_(None))).scalar_one()
-                if count >= MAX_VIEWS:
-                    raise TooManyViewsError(f"there are {MAX_VIEWS:,} saved views already; remove some")
+                pool = pool_of(connection, SAVED_VIEWS, _V.place.is_(None), MAX_VIEWS)
+                if not pool.takes():
+                    raise TooManyViewsError(pool.refusal("saved views"))
                 identity = f"vw_{secrets.token_hex(8)}"
                 own = {"id": identity, "study": study, "page": view.page, "name": view.name, "owner": acting().user}
                 connection.execute(sa.insert(SAVED_VIEWS).values(own | self._content(view.query)))
@@ -99,11 +107,15 @@ class SavedViews(Part):
             self._put_in_report(connection, row, wanted=view.in_report or row.place is not None, place=row.place)
             return _record(_found(connection, identity))
 
-    def change_view(self, view_id: str, change: ViewChange) -> SavedView:
-        """Change a view; raises as `save_view` does, and ViewNotFoundError, FaultError for a name that is taken."""
+    def change_view(self, view_id: str, change: ViewChange, read: Collection[str] | None = None) -> SavedView:
+        """Change a view; raises as `save_view` does, and ViewNotFoundError, FaultError for a name that is taken.
+
+        ``read``: the editions (`SavedView.etag`) that the change is meant for; ChangedMeanwhileError for any other.
+        """
         with self.session.write() as connection:
             row = _found(connection, view_id)
             require_own("view", view_id, row.owner)
+            require_edition("view", view_id, _record(row).etag, read)
             if change.name not in (None, row.name):
                 same = (_V.page == row.page, _V.study.is_not_distinct_from(row.study), _V.name == change.name)
                 if connection.execute(sa.select(_V.id).where(*same)).first() is not None:
@@ -120,11 +132,12 @@ class SavedViews(Part):
             self._put_in_report(connection, row, wanted=wanted, place=change.place or row.place)
             return _record(_found(connection, view_id))
 
-    def remove_view(self, view_id: str) -> None:
-        """Remove a view; raises ViewNotFoundError, NotOwnerError."""
+    def remove_view(self, view_id: str, read: Collection[str] | None = None) -> None:
+        """Remove a view; raises ViewNotFoundError, NotOwnerError; ``read`` as for `change_view`."""
         with self.session.write() as connection:
             row = _found(connection, view_id)
             require_own("view", view_id, row.owner)
+            require_edition("view", view_id, _record(row).etag, read)
             self._put_in_report(connection, row, wanted=False)
             connection.execute(sa.delete(SAVED_VIEWS).where(_V.id == view_id))
             note(connection, self._now(), "view.remove", view_id, page=row.page, name=row.name, study=row.study_id)

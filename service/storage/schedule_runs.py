@@ -12,6 +12,7 @@ import sqlalchemy as sa
 from sprag.service.languages import recorded
 from sprag.service.schedules.policies import CatchUp
 from sprag.service.storage.audit import note
+from sprag.service.storage.editions import edition_of
 from sprag.service.storage.errors import RunClosedError
 from sprag.service.storage.part import micros_of, moment
 from sprag.service.storage.run_outcomes import COLUMNS, RunOutcomes, outcome_of, runs_with_studies
@@ -70,6 +71,11 @@ class ScheduleRecord:
     created_at: datetime
     last: RunRecord | None
     owner: str | None
+
+    @property
+    def etag(self) -> str:
+        """The edition of its fields."""
+        return edition_of(self.fields.to_json(), self.fields.spec)
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,7 +28,9 @@ SCHEDULES = sa.Table(
     sa.Column("deleted_at", sa.BigInteger),
     # "06:00" on the wall clock of the zone, or a duration such as "8 h"; NULL where a run has no deadline.
     sa.Column("finish_by", sa.String(80)),
-    # From the request that created the schedule; NULL where it had no key, or the schedule is deleted.
+    # From the request that created the schedule; NULL where it had no key, or the schedule is deleted. Each sender has
+    # keys of its own (`sprag.service.actor.share_of`).
+    sa.Column("sender", sa.String(90), nullable=False, server_default=""),
     sa.Column("idempotency_key", sa.String(255)),
     sa.Column("body_hash", sa.String(64)),
     # Name of the user to whom it and its studies belong; NULL: to nobody.
@@ -44,7 +46,7 @@ SCHEDULES = sa.Table(
     sa.Column("report_email", sa.Text, nullable=False, server_default=""),
     sa.Column("report_webhook", sa.Text),
     sa.Column("report_when", sa.String(8), nullable=False, server_default="always"),
-    sa.Index("ix_schedules_idempotency_key", "idempotency_key", unique=True),
+    sa.Index("ix_schedules_sender_idempotency_key", "sender", "idempotency_key", unique=True),
     sqlite_autoincrement=True,
 )
 

@@ -9,9 +9,11 @@ import sqlalchemy as sa
 
 from sprag.service.actor import acting
 from sprag.service.languages import recorded
-from sprag.service.storage.audit import note, require_own
+from sprag.service.storage.audit import by_sender, note, require_own
+from sprag.service.storage.editions import require_edition
 from sprag.service.storage.errors import IdempotencyConflictError, ScheduleNotFoundError, TooManySchedulesError
 from sprag.service.storage.part import micros_of, moment, optional_moment
+from sprag.service.storage.pools import pool_of
 from sprag.service.storage.schedule_rows import fields_of, logged_changes, logged_fields, row_values
 from sprag.service.storage.schedule_runs import RunRecord, ScheduleRecord, ScheduleRuns, refuse_open_runs
 from sprag.service.storage.schedule_tables import SCHEDULES
@@ -19,6 +21,7 @@ from sprag.service.storage.windows import Windows
 from sprag.worker.limits import MAX_SCHEDULES
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
     from datetime import datetime
 
     from sprag.service.schedules.fields import ScheduleFields
@@ -38,32 +41,32 @@ class Schedules(ScheduleRuns, Windows):
         """Store a new schedule; raises TooManySchedulesError.
 
         A key that was used before with the same ``body_hash`` returns the schedule of that request; with another hash
-        it raises IdempotencyConflictError.
+        it raises IdempotencyConflictError. Keys of other senders do not count.
         """
         schedule_id = f"sc_{secrets.token_hex(8)}"
-        asked = {"idempotency_key": idempotency_key, "body_hash": body_hash} if idempotency_key is not None else {}
         with self.session.write() as connection:
             if idempotency_key is not None:
                 earlier = self._schedule_of_key(connection, idempotency_key, body_hash)
                 if earlier is not None:
                     return earlier
-            alive = sa.select(sa.func.count()).select_from(SCHEDULES).where(_S.deleted_at.is_(None))
-            if connection.execute(alive).scalar_one() >= MAX_SCHEDULES:
-                raise TooManySchedulesError(f"there are {MAX_SCHEDULES} schedules already; delete one first")
+            pool = pool_of(connection, SCHEDULES, _S.deleted_at.is_(None), MAX_SCHEDULES)
+            if not pool.takes():
+                raise TooManySchedulesError(pool.refusal("schedules"))
             own = {"id": schedule_id, "created_at": self._now(), "owner": acting().user}
-            connection.execute(
-                sa.insert(SCHEDULES).values(**own, **asked, **row_values(fields, self.clock.now(), new=True))
-            )
+            if idempotency_key is not None:
+                own |= {"sender": acting().share, "idempotency_key": idempotency_key, "body_hash": body_hash}
+            connection.execute(sa.insert(SCHEDULES).values(**own, **row_values(fields, self.clock.now(), new=True)))
             note(connection, self._now(), "schedule.create", schedule_id, **logged_fields(fields))
             return self._schedule(connection, schedule_id)
 
     def schedule_of_key(self, idempotency_key: str, body_hash: str) -> ScheduleRecord | None:
-        """The schedule that was sent with that key; raises IdempotencyConflictError when its body was another."""
+        """The schedule that the present sender created with that key; IdempotencyConflictError for another body."""
         with self.session.read() as connection:
             return self._schedule_of_key(connection, idempotency_key, body_hash)
 
     def _schedule_of_key(self, connection: sa.Connection, key: str, body_hash: str) -> ScheduleRecord | None:
-        row = connection.execute(sa.select(SCHEDULES).where(_S.idempotency_key == key)).one_or_none()
+        mine = sa.select(SCHEDULES).where(_S.idempotency_key == key, by_sender(_S.sender)).order_by(_S.sender.desc())
+        row = connection.execute(mine).first()
         if row is None:
             return None
         if row.body_hash != body_hash:
@@ -87,15 +90,19 @@ class Schedules(ScheduleRuns, Windows):
             number = self._schedule_row(connection, schedule_id).number
             return self._runs(connection, number, SHOWN_RUNS)
 
-    def change_schedule(self, schedule_id: str, fields: ScheduleFields) -> ScheduleRecord:
+    def change_schedule(
+        self, schedule_id: str, fields: ScheduleFields, read: Collection[str] | None = None
+    ) -> ScheduleRecord:
         """Replace the fields of the schedule by ``fields``; missed due times are forgotten.
 
-        Where the schedule is paused, due times without a study are refused.
+        Where the schedule is paused, due times without a study are refused. ``read``: the editions
+        (`ScheduleRecord.etag`) that the change is meant for; ChangedMeanwhileError for any other.
         """
         with self.session.write() as connection:
             row = self._schedule_row(connection, schedule_id)
             number, old = row.number, fields_of(row)
             require_own("schedule", schedule_id, row.owner)
+            require_edition("schedule", schedule_id, self._record(connection, row).etag, read)
             values = row_values(fields, self.clock.now(), new=fields.timing != old.timing)
             connection.execute(sa.update(SCHEDULES).where(_S.number == number).values(values))
             changes = logged_changes(old, fields)
@@ -105,14 +112,15 @@ class Schedules(ScheduleRuns, Windows):
                 refuse_open_runs(connection, number, schedule_id, self._now(), recorded.PAUSED)
             return self._schedule(connection, schedule_id)
 
-    def delete_schedule(self, schedule_id: str) -> None:
+    def delete_schedule(self, schedule_id: str, read: Collection[str] | None = None) -> None:
         """Delete the schedule; its studies are kept, with their window, and due times without a study are refused.
 
-        Raises ScheduleNotFoundError.
+        Raises ScheduleNotFoundError; ``read`` as for `change_schedule`.
         """
         with self.session.write() as connection:
             row = self._schedule_row(connection, schedule_id)
             require_own("schedule", schedule_id, row.owner)
+            require_edition("schedule", schedule_id, self._record(connection, row).etag, read)
             note(connection, self._now(), "schedule.delete", schedule_id, name=row.name, owner=row.owner)
             refuse_open_runs(connection, row.number, schedule_id, self._now(), recorded.DELETED)
             connection.execute(

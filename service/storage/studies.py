@@ -15,7 +15,7 @@ from cachetools import LRUCache
 
 from sprag.service.actor import acting
 from sprag.service.languages import recorded
-from sprag.service.storage.audit import note, require_own
+from sprag.service.storage.audit import by_sender, note, require_own
 from sprag.service.storage.dispatchers import Dispatchers
 from sprag.service.storage.errors import (
     IdempotencyConflictError,
@@ -30,6 +30,7 @@ from sprag.service.storage.part import (
     moment,
     optional_moment,
 )
+from sprag.service.storage.pools import rank_of
 from sprag.service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
 from sprag.service.storage.records import Progress, RoundProgress, StudyRecord, record_of
 from sprag.service.storage.reserve import makes_room
@@ -46,13 +47,13 @@ from sprag.service.storage.tables import (
     RECORD_COLUMNS,
     STUDIES,
 )
-from sprag.service.storage.users import Users
+from sprag.service.storage.users import WAITING_STUDY, Users, require_queue
 from sprag.service.storage.windows import lift_window
 from sprag.worker import models
 from sprag.worker.chunking import Chunking, spans
 from sprag.worker.limits import MAX_AXIS_VALUES
 from sprag.worker.ports import Chunk
-from sprag.worker.states import TERMINAL, ChunkState, StudyEvent, StudyState
+from sprag.worker.states import ChunkState, StudyEvent, StudyState
 from sprag.worker.study import Study
 
 if TYPE_CHECKING:
@@ -99,8 +100,9 @@ class Studies(Users, Orders, Dispatchers):
         """Accept a study: the study and its chunks in one transaction.
 
         ``spec`` is the user's own, kept verbatim. A key that was used before with the same ``body_hash`` returns the
-        study of that request; with another hash it raises IdempotencyConflictError. A ``fresh`` study reuses no rows of
-        others. A study with a deadline ``finish_by`` is run coarse to fine and held at that time.
+        study of that request; with another hash it raises IdempotencyConflictError. Keys of other senders do not count.
+        A ``fresh`` study reuses no rows of others. A study with a deadline ``finish_by`` is run coarse to fine and held
+        at that time.
         """
         return self.insert_study(
             study_row(spec, study, self.chunking, warnings),
@@ -121,10 +123,12 @@ class Studies(Users, Orders, Dispatchers):
         fresh: bool = False,
         finish_by: datetime | None = None,
         run: OpenRun | None = None,
+        queue: int | None = None,
     ) -> StudyRecord:
         """Accept the study of a `study_row`; otherwise as `create_study`.
 
-        It is that of ``run``, the due time of a schedule: RunClosedError where this has an outcome by now.
+        It is that of ``run``, the due time of a schedule: RunClosedError where this has an outcome by now. FaultError
+        where there are as many waiting studies as the ``queue`` takes, or the sender's share of it is used up.
         """
         values = {
             **row,
@@ -147,7 +151,10 @@ class Studies(Users, Orders, Dispatchers):
                 earlier = _study_of_key(connection, idempotency_key, body_hash)
                 if earlier is not None:
                     return earlier
-            self._require_quota(connection, row["most_cases"] or row["cases"], row.get("estimated_bytes") or 0)
+            require_queue(connection, queue)
+            size = (row.get("estimated_bytes") or 0) + sum(len(row[name]) for name in ("spec", "study", "warnings"))
+            self._require_quota(connection, row["most_cases"] or row["cases"], size)
+            values["rank"] = rank_of(connection, priority)
             number = connection.execute(sa.insert(STUDIES).values(values).returning(STUDIES.c.number)).scalar_one()
             if row["most_cases"] is not None:
                 add_round(connection, number, 0, row["cases"], {}, values["created_at"])
@@ -155,7 +162,11 @@ class Studies(Users, Orders, Dispatchers):
             if idempotency_key is not None:
                 connection.execute(
                     sa.insert(IDEMPOTENCY_KEYS).values(
-                        key=idempotency_key, body_hash=body_hash, study=number, created_at=values["created_at"]
+                        sender=acting().share,
+                        key=idempotency_key,
+                        body_hash=body_hash,
+                        study=number,
+                        created_at=values["created_at"],
                     )
                 )
             if run is not None:
@@ -222,12 +233,8 @@ class Studies(Users, Orders, Dispatchers):
 
     def waiting_studies(self) -> int:
         """Number of studies that have not ended, except those held at their deadline."""
-        c = STUDIES.c
-        query = sa.select(sa.func.count()).where(
-            c.state.not_in([state.value for state in TERMINAL]), c.waits_for.is_distinct_from(HELD_AT_DEADLINE)
-        )
         with self.session.read() as connection:
-            return connection.execute(query).scalar_one()
+            return connection.execute(sa.select(sa.func.count()).where(WAITING_STUDY)).scalar_one()
 
     def progress(self, study_id: str) -> Progress:
         """Progress of the study; raises StudyNotFoundError."""
@@ -304,7 +311,7 @@ class Studies(Users, Orders, Dispatchers):
             return self._noted(connection, study_id, row, f"study.{event.value}")
 
     def prioritize_study(self, study_id: str, priority: int) -> StudyRecord:
-        """Change the priority of the study: among waiting studies the highest runs first.
+        """Change the priority of the study: among waiting studies of its owner the highest runs first.
 
         Raises StudyNotFoundError, and StudyEndedError where the study has ended.
         """
@@ -314,7 +321,9 @@ class Studies(Users, Orders, Dispatchers):
             number, state = row.number, StudyState(row.state)
             if state.terminal:
                 raise StudyEndedError(f"the study {study_id} is {state.value}: its priority no longer matters")
-            self._change(connection, number, STUDIES.c.priority != priority, priority=priority)
+            rank = rank_of(connection, priority)
+            other = (STUDIES.c.priority != priority) | (STUDIES.c.rank != rank)
+            self._change(connection, number, other, priority=priority, rank=rank)
             announce(connection)
             return self._noted(connection, study_id, row, "study.prioritize", priority=priority)
 
@@ -328,7 +337,7 @@ class Studies(Users, Orders, Dispatchers):
         return record
 
     def study_of_key(self, idempotency_key: str, body_hash: str) -> StudyRecord | None:
-        """The study that was submitted with that key; raises IdempotencyConflictError when its body was another."""
+        """The study that the present sender submitted with that key; IdempotencyConflictError for another body."""
         with self.session.read() as connection:
             return _study_of_key(connection, idempotency_key, body_hash)
 
@@ -341,8 +350,9 @@ def _study_of_key(connection: sa.Connection, key: str, body_hash: str) -> StudyR
     row = connection.execute(
         sa.select(IDEMPOTENCY_KEYS.c.body_hash, *RECORD_COLUMNS)
         .join_from(IDEMPOTENCY_KEYS, STUDIES)
-        .where(IDEMPOTENCY_KEYS.c.key == key)
-    ).one_or_none()
+        .where(IDEMPOTENCY_KEYS.c.key == key, by_sender(IDEMPOTENCY_KEYS.c.sender))
+        .order_by(IDEMPOTENCY_KEYS.c.sender.desc())
+    ).first()
     if row is None:
         return None
     if row.body_hash != body_hash:

@@ -9,7 +9,7 @@ from sprag.worker import models
 from sprag.worker.states import ChunkState
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0032"
+HEAD_REVISION = "0034"
 
 METADATA = sa.MetaData(
     naming_convention={
@@ -46,8 +46,10 @@ STUDIES = sa.Table(
     sa.Column("finished_at", sa.BigInteger),
     # Set when a study is deleted; after `purge_at` its rows are removed in short transactions, and this row last.
     sa.Column("deleted_at", sa.BigInteger),
-    # The study with the higher priority runs first.
+    # Among the studies of one owner, the one with the higher priority runs first.
     sa.Column("priority", sa.Integer, nullable=False, server_default="0"),
+    # The part of its priority that counts against studies of other owners (`Users._rank`).
+    sa.Column("rank", sa.Integer, nullable=False, server_default="0"),
     # What a paused study waits for (`WAITS_FOR_ROOM` and below); NULL where the user or a fault paused it.
     sa.Column("waits_for", sa.String(12)),
     # Equal for studies that may share cases (`sprag.worker.reuse`).
@@ -101,6 +103,7 @@ COARSE_TO_FINE, LINE_BY_LINE = 1, 2
 #: Long texts, and what only the storage needs.
 _BESIDE = frozenset(
     {"spec", "study", "search", "deleted_at", "kin_hash", "fresh", "fingerprint", "estimated_bytes", "dispatcher"}
+    | {"rank"}
 )
 #: The columns of a `StudyRecord`.
 RECORD_COLUMNS = tuple(column for column in STUDIES.c if column.name not in _BESIDE)
@@ -155,6 +158,8 @@ ENDINGS = sa.Table(
 IDEMPOTENCY_KEYS = sa.Table(
     "idempotency_keys",
     METADATA,
+    # Who sent it (`sprag.service.actor.share_of`): each has keys of its own; "" for nobody.
+    sa.Column("sender", sa.String(90), primary_key=True, server_default=""),
     sa.Column("key", sa.String(255), primary_key=True),
     sa.Column("body_hash", sa.String(64), nullable=False),
     sa.Column("study", sa.Integer, sa.ForeignKey("studies.number"), nullable=False, index=True),

@@ -12,10 +12,12 @@ import sqlalchemy as sa
 
 from sprag.service.actor import Role, acting
 from sprag.service.faults import FaultError
+from sprag.service.languages import grouped, recorded
 from sprag.service.storage.audit import note
 from sprag.service.storage.component_tables import COMPONENTS
 from sprag.service.storage.errors import UserExistsError, UserNotFoundError
 from sprag.service.storage.part import Part, moment, optional_moment
+from sprag.service.storage.pools import pool_of
 from sprag.service.storage.schedule_tables import SCHEDULES
 from sprag.service.storage.tables import HELD_AT_DEADLINE, STUDIES
 from sprag.service.storage.user_tables import USERS
@@ -28,6 +30,10 @@ if TYPE_CHECKING:
     from sprag.service.settings import Settings
 
 _U = USERS.c
+#: Condition: a study has not ended, and is not held at its deadline.
+WAITING_STUDY = STUDIES.c.state.not_in([state.value for state in TERMINAL]) & STUDIES.c.waits_for.is_distinct_from(
+    HELD_AT_DEADLINE
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,8 +167,19 @@ class Users(Part):
             raise FaultError(
                 "quota-exceeded",
                 f"The results would take about {_mib(size)} MiB, and {user} has used {_mib(used.bytes)} of "
-                f"{_mib(quota.bytes)} MiB: delete studies first.",
+                f"{_mib(quota.bytes)} MiB: delete studies for good first; deleted ones that can be restored count too.",
             )
+
+
+def require_queue(connection: sa.Connection, most: int | None) -> None:
+    """Raise FaultError where ``most`` studies wait already, or as many of the present sender's as are its share."""
+    pool = None if most is None else pool_of(connection, STUDIES, WAITING_STUDY, most)
+    if pool is None or pool.takes():
+        return
+    if not pool.free:
+        raise FaultError("queue-full", recorded.MANY_STUDIES.format(count=grouped(pool.taken)))
+    shares = {"mine": grouped(pool.mine), "free": grouped(pool.free)}
+    raise FaultError("queue-full", recorded.SHARE_OF_QUEUE.format(**shares))
 
 
 def require_user(connection: sa.Connection, name: str, *, removed: bool = False) -> None:
@@ -173,14 +190,22 @@ def require_user(connection: sa.Connection, name: str, *, removed: bool = False)
 
 
 def _usage(connection: sa.Connection, name: str) -> Usage:
+    """What counts against the quota: cases that wait, and what lies on the disk, of deleted studies too.
+
+    A study has its rows, all of them or, once it has ended, those that it got; and the texts that describe it.
+    """
     c = STUDIES.c
-    going = c.state.not_in([state.value for state in TERMINAL]) & c.waits_for.is_distinct_from(HELD_AT_DEADLINE)
-    waiting = sa.func.coalesce(c.most_cases, c.cases) - c.done
+    most = sa.func.coalesce(c.most_cases, c.cases)
+    ended = c.state.in_([state.value for state in TERMINAL])
+    whole = sa.func.coalesce(c.estimated_bytes, 0)
+    rows = sa.case((ended & (most > 0), whole * c.done / sa.func.nullif(most, 0)), else_=whole)
+    texts = sum((sa.func.length(column) for column in (c.spec, c.study, c.warnings)), start=sa.literal(0))
+    waits = WAITING_STUDY & c.deleted_at.is_(None)
     row = connection.execute(
         sa.select(
-            sa.func.coalesce(sa.func.sum(sa.case((going, waiting), else_=0)), 0).label("cases"),
-            sa.func.coalesce(sa.func.sum(c.estimated_bytes), 0).label("bytes"),
-        ).where(c.owner == name, c.deleted_at.is_(None))
+            sa.func.coalesce(sa.func.sum(sa.case((waits, most - c.done), else_=0)), 0).label("cases"),
+            sa.func.coalesce(sa.func.sum(rows + texts), 0).label("bytes"),
+        ).where(c.owner == name)
     ).one()
     return Usage(int(row.cases), int(row.bytes))
 

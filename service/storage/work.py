@@ -39,10 +39,10 @@ _C = STUDIES.c
 _ACTIVE = (
     sa.select(
         _C.number, _C.id, _C.state, _C.priority, _C.waits_for, _C.finish_by, _C.most_cases, _C.ok, _C.dispatcher,
-        _C.fingerprint,
+        _C.fingerprint, _C.rank, _C.owner,
     )
     .where(_C.state.not_in(_TERMINAL), _C.waits_for.is_distinct_from(HELD_AT_DEADLINE))
-    .order_by(_C.priority.desc(), _C.number)
+    .order_by(_C.rank.desc(), _C.priority.desc(), _C.number)
 )  # fmt: skip
 
 
@@ -50,7 +50,7 @@ class Work(Storing):
     """Claims and results."""
 
     def active_studies(self) -> list[ActiveStudy]:
-        """Studies that have not ended, by priority and then in order of submission.
+        """Studies that have not ended, by rank, by priority, and then in order of submission.
 
         Studies held at their deadline are left out.
         """
@@ -68,6 +68,8 @@ class Work(Storing):
                 row.most_cases is not None and row.ok > 0,
                 row.dispatcher,
                 row.fingerprint or "",
+                row.rank,
+                row.owner,
             )
             for row in rows
         ]

@@ -16,7 +16,7 @@ from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
 from sprag.worker.models import ChunkResult
-from sprag.worker.ports import Chunk
+from sprag.worker.ports import Chunk, Finished
 from sprag.worker.states import StudyState, TransitionError
 from tests import postgres
 from tests.worker import fakes
@@ -139,3 +139,27 @@ def test_nothing_to_run_again_is_said(store: Store) -> None:
     with pytest.raises(NothingToRetryError, match="ended as crashed or timed_out"):
         store.retry_study(failed.id, ["timed_out", "crashed"])
     assert store.retry_study(failed.id, ["diverged"]).state is StudyState.QUEUED
+
+
+def test_what_is_kept_keeps_where_it_comes_from(store: Store) -> None:
+    """Every tenth case of a study fails; those that are not run again stay attributed to their host."""
+    record = store.create_study({}, fakes.study(100))
+    epoch = store.take_over("test")
+    for chunk in store.open_chunks(record.number):
+        store.claim(epoch, [chunk])
+        result = fakes.result(chunk.first, chunk.count)
+        result.endings[3] = "chatter"
+        assert store.exchange(epoch, [Finished(chunk, result, None, f"host {chunk.first % 20}")])[0]
+    store.settle(epoch, record.number)
+    (before,) = {(origin.host, origin.fingerprint) for origin in store.origins(record.id) if origin.host == "host 0"}
+    store.retry_study(record.id)
+    origins = {(origin.host, origin.fingerprint): origin.cases for origin in store.origins(record.id)}
+    assert origins == {before: 45, ("host 10", before[1]): 45}
+    assert before[1]
+    epoch = store.take_over("again")
+    for chunk in store.open_chunks(record.number):
+        store.claim(epoch, [chunk])
+        assert store.exchange(epoch, [Finished(chunk, fakes.result(chunk.first, chunk.count), None, "other")])[0]
+    store.settle(epoch, record.number)
+    origins = {(origin.host, origin.fingerprint): origin.cases for origin in store.origins(record.id)}
+    assert origins == {before: 45, ("host 10", before[1]): 45, ("other", before[1]): 10}

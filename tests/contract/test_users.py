@@ -5,19 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
 from datetime import timedelta
 from typing import Any
 
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.actor import Actor, Door, Role, act_as, acting
+from sprag.service.actor import Actor, Door, Role, act_as, acting, of_machine
 from sprag.service.faults import FaultError
 from sprag.service.spec.components import Component
 from sprag.service.spec.saved_views import View
 from sprag.service.storage import purging
 from sprag.service.storage.audit import AuditFilter
-from sprag.service.storage.errors import NotOwnerError, UserExistsError, UserNotFoundError
+from sprag.service.storage.errors import IdempotencyConflictError, NotOwnerError, UserExistsError, UserNotFoundError
 from sprag.service.storage.scopes import TokenScope
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import STUDIES
@@ -55,6 +56,37 @@ def test_users_are_added_changed_removed_and_restored(store: Store) -> None:
     assert [row[1] for row in actions(store)] == [
         "user.add", "user.change", "user.change", "user.remove", "user.restore",
     ]  # fmt: skip
+
+
+def test_everybody_has_idempotency_keys_of_their_own(store: Store) -> None:
+    """The key of somebody else with the same body is a key that nobody has sent."""
+    for name in ("dora", "emil"):
+        store.add_user(name, Role.DESIGNER)
+    tokens = [Actor(Door.API, name, "192.0.2.1", token=name) for name in ("tk_1", "tk_2")]
+    senders = [of_machine(Door.PROGRAM), user("dora"), user("emil"), *tokens]
+    made = []
+    for sender in senders[1:]:  # nobody last: a token without a user has the keys of nobody
+        with act_as(sender):
+            made.append(create(store, idempotency_key="k", body_hash="a").id)
+    with act_as(senders[0]):
+        made.insert(0, create(store, idempotency_key="k", body_hash="a").id)
+    assert len(set(made)) == len(senders)
+    for sender, study_id in zip(senders, made, strict=True):
+        with act_as(sender):
+            known = store.study_of_key("k", "a")
+            assert known is not None
+            assert known.id == study_id
+            assert create(store, idempotency_key="k", body_hash="a").id == study_id
+            with pytest.raises(IdempotencyConflictError):
+                store.study_of_key("k", "b")
+    with act_as(replace(user("dora"), token="tk_3")):  # whatever token
+        assert create(store, idempotency_key="k", body_hash="a").id == made[1]
+    with act_as(senders[0]):
+        kept = create(store, idempotency_key="before", body_hash="a").id
+    with act_as(tokens[0]):
+        assert create(store, idempotency_key="before", body_hash="a").id == kept
+    with act_as(user("dora")):
+        assert store.study_of_key("before", "a") is None
 
 
 def test_what_users_make_is_theirs_and_is_handed_over(store: Store) -> None:
@@ -123,7 +155,7 @@ def test_a_change_that_fails_leaves_no_row_and_a_row_that_fails_no_change(
 
 def test_quotas_count_what_waits_and_what_is_stored(store: Store) -> None:
     store.add_user("dora", Role.DESIGNER, Quota(cases=50))
-    store.default_quota = Quota(cases=10, bytes=1000)
+    store.default_quota = Quota(cases=10)
     with act_as(user("dora")):
         first = create(store, 30)
         with pytest.raises(FaultError) as refused:
@@ -135,14 +167,24 @@ def test_quotas_count_what_waits_and_what_is_stored(store: Store) -> None:
         create(store, 30)
     with store.session.write() as connection:
         connection.execute(sa.update(STUDIES).where(STUDIES.c.id == first.id).values(estimated_bytes=900))
-    assert (store.usage("dora").cases, store.usage("dora").bytes) == (50, 900)
+        written = sa.func.length(STUDIES.c.spec) + sa.func.length(STUDIES.c.study) + sa.func.length(STUDIES.c.warnings)
+        texts = connection.execute(sa.select(sa.func.sum(written)).where(STUDIES.c.owner == "dora")).scalar_one()
+    assert (store.usage("dora").cases, store.usage("dora").bytes) == (50, 900 + texts)
+    store.default_quota = Quota(cases=10, bytes=1000 + texts)
     store.change_user("dora", quota=Quota(cases=0))
     row = {"name": "", "spec": "{}"}
     with act_as(user("dora")), pytest.raises(FaultError, match=r"about 20,480 MiB, and dora has used 0\.0 of 0\.0 MiB"):
         store.insert_study({**_row(store), **row, "estimated_bytes": 20 * 2**30})
     with act_as(user("dora")), pytest.raises(FaultError, match="MiB"):
         store.insert_study({**_row(store), **row, "estimated_bytes": 101})
+    store.restorable = timedelta(days=1)
     store.delete_study(first.id)
+    with act_as(user("dora")), pytest.raises(FaultError, match="MiB"):  # it lies on the disk as before
+        store.insert_study({**_row(store), **row, "estimated_bytes": 101})
+    store.delete_study(first.id, at_once=True)
+    with act_as(user("dora")), pytest.raises(FaultError, match="MiB"):
+        store.insert_study({**_row(store), **row, "estimated_bytes": 101})
+    store.purge()
     with act_as(user("dora")):
         store.insert_study({**_row(store), **row, "estimated_bytes": 1000})
     create(store, 1000)  # of nobody

@@ -17,6 +17,7 @@ from alembic.migration import MigrationContext
 from numpy.typing import NDArray
 
 import sprag.migrations as migrations
+from sprag.service.actor import Actor, Door, act_as
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage import maintenance
 from sprag.service.storage.errors import DatabaseError, SchemaError
@@ -34,7 +35,7 @@ from tests.worker import fakes
 
 FROZEN = sorted(FOLDER.glob("*.sql"))
 #: Revisions that nobody's database ever had, because those after them were published with them.
-UNPUBLISHED = {f"{number:04}" for number in range(21, 31)}
+UNPUBLISHED = {f"{number:04}" for number in range(21, 31)} | {"0033"}
 #: What made-up studies have since the databases were frozen.
 _LATER = {"clutch.coefficients.2", "clutch.coefficients.3"}
 
@@ -156,6 +157,30 @@ def test_the_number_of_pendulums_became_the_variant(file: Path, url: str) -> Non
     upgrade(url)
     with Store.open(url) as store:
         assert [study.variant for study in store.list_studies().studies] == ["", "3", "1"]
+
+
+def test_a_key_goes_to_the_owner_of_its_study_or_schedule(file: Path, url: str) -> None:
+    thaw(FOLDER / "0031.sql", file)
+    connection = sqlite_driver().connect(file)
+    connection.execute("UPDATE studies SET owner = 'dora' WHERE name = 'running'")
+    connection.execute(
+        "INSERT INTO idempotency_keys SELECT 'hers', 'hash', number, 0 FROM studies WHERE name = 'running'"
+    )
+    connection.execute(
+        "INSERT INTO schedules (id, name, spec, cron, zone, priority, fresh, enabled, created_at, idempotency_key, "
+        "body_hash, owner) VALUES ('sc_1', 'nightly', '{}', '@daily', 'UTC', 0, 0, 0, 0, 'nights', 'hash', 'dora')"
+    )
+    connection.commit()
+    connection.close()
+    upgrade(url)
+    with Store.open(url) as store:
+        assert store.study_of_key("hers", "hash") is None
+        assert store.schedule_of_key("nights", "hash") is None
+        assert store.study_of_key("key", "hash") is not None
+        with act_as(Actor(Door.API, "dora", "", "dora", everything=False)):
+            hers, nights = store.study_of_key("hers", "hash"), store.schedule_of_key("nights", "hash")
+            assert (hers and hers.name, nights and nights.id) == ("running", "sc_1")
+            assert store.study_of_key("key", "hash") is None
 
 
 @pytest.mark.parametrize(

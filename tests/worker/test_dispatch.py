@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter, deque
 from random import Random
 
 import pytest
@@ -241,6 +242,41 @@ def test_studies_share_the_capacity_the_oldest_first() -> None:
     for _ in range(40):
         world.finish(min(world.flying))
         assert sorted(chunk.study for chunk in world.flying.values()) == [1, 1, 2, 2]
+
+
+@pytest.mark.parametrize("capacity", [1, 2, 3, 6])
+def test_owners_have_equal_shares_however_many_studies_they_have(capacity: int) -> None:
+    """Of one rank; priorities count among the studies of one owner, a rank against everybody."""
+    machine, started, flying = Dispatch(capacity), Counter[int](), deque[int]()
+
+    def follow(instructions: list[Instruction]) -> None:
+        for instruction in instructions:
+            if isinstance(instruction, Run):
+                started[instruction.chunk.study] += 1
+                flying.append(instruction.ticket)
+
+    def offer(study: int, owner: str | None, priority: int = 0, rank: int = 0) -> None:
+        chunks = [Chunk(study, first, 1) for first in range(100)]
+        follow(machine.handle(Offered(study, chunks, priority, rank=rank, owner=owner)))
+
+    for study in range(8):
+        offer(study, "dora", priority=100 if study == 7 else 0)
+    offer(10, "emil")
+    offer(11, None)
+    offer(12, "emil", priority=-1)
+    started.clear()
+    for _ in range(90):
+        follow(machine.handle(Ended(flying.popleft(), Fate.DONE)))
+    assert abs(started[7] - 30) <= 1
+    assert abs(started[10] - 30) <= 1
+    assert abs(started[11] - 30) <= 1
+    assert set(started) == {7, 10, 11}
+    offer(20, "finn", rank=1)
+    offer(21, "gina", rank=-1)
+    started.clear()
+    for _ in range(60):
+        follow(machine.handle(Ended(flying.popleft(), Fate.DONE)))
+    assert set(started) == {20}
 
 
 def test_a_crashing_chunk_is_run_again_whole_before_it_is_split() -> None:

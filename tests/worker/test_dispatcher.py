@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sprag.service.actor import Actor, Door, Role, act_as
 from sprag.service.storage.part import SystemClock
 from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.store import Store
@@ -146,6 +147,27 @@ def test_the_highest_priority_goes_first_however_many_wait(store: Store) -> None
     assert None not in finished.values()
     order = sorted(finished, key=lambda study: finished[study])  # type: ignore[arg-type,return-value]
     assert order[:2] == [ended[0], low[-1].id]
+
+
+def test_a_user_with_many_studies_holds_up_nobody(store: Store) -> None:
+    """The only study of the last to come is taken up, however many long ones of others are active and wait."""
+    for name in ("dora", "emil"):
+        store.add_user(name, Role.DESIGNER)
+
+    def of(name: str, cases: int) -> StudyRecord:
+        with act_as(Actor(Door.API, name, "", name, everything=False)):
+            return store.create_study({}, fakes.study(cases), priority=100 if name == "dora" else 0)
+
+    many = [of("dora", 400) for _ in range(OPEN_STUDIES + 2)]
+    few = of("emil", 12)
+    clock = fakes.HandClock()
+
+    def turn() -> bool:
+        clock.seconds += POLL_SECONDS
+        return store.get_study(few.id).state.terminal
+
+    Dispatcher(store, Prompt(fakes.run), clock).run(turn)
+    assert not any(store.get_study(record.id).state.terminal for record in many)
 
 
 def test_cancelling_keeps_what_is_done(store: Store) -> None:

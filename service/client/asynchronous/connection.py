@@ -79,27 +79,44 @@ class AsyncConnection:
         await self._http.aclose()
 
     async def request(
-        self, method: str, path: str, *, key: str | None = None, once: bool = False, **arguments: Any
+        self,
+        method: str,
+        path: str,
+        *,
+        key: str | None = None,
+        etag: str | None = None,
+        once: bool = False,
+        **arguments: Any,
     ) -> dict[str, Any]:
         """The JSON object that the service answers under its API.
 
-        ``key`` is an idempotency key, "" for a new one; ``once`` never repeats the request.
+        ``key`` is an idempotency key, "" for a new one; ``once`` never repeats the request. With ``etag`` the request
+        is meant for that edition only.
         """
-        return document(self.server, await self._send(method, path, key=key, once=once, **arguments))
+        return document(self.server, await self._send(method, path, key=key, etag=etag, once=once, **arguments))
 
-    async def delete(self, path: str, query: Query = ()) -> None:
-        """Delete a resource of the API."""
-        response = await self._send("DELETE", path, params=list(query))
+    async def delete(self, path: str, query: Query = (), *, etag: str | None = None) -> None:
+        """Delete a resource of the API; with ``etag``, only that edition of it."""
+        response = await self._send("DELETE", path, etag=etag, params=list(query))
         if response.is_error:
             raise refusal(response)
 
     async def _send(
-        self, method: str, path: str, *, key: str | None = None, once: bool = False, **arguments: Any
+        self,
+        method: str,
+        path: str,
+        *,
+        key: str | None = None,
+        etag: str | None = None,
+        once: bool = False,
+        **arguments: Any,
     ) -> httpx.Response:
         if "json" in arguments:
             arguments["json"] = plain_body(arguments["json"])
         if key is not None:
             arguments["headers"] = {"Idempotency-Key": key or uuid.uuid4().hex}
+        if etag is not None:
+            arguments["headers"] = {"If-Match": f'"{etag}"'}
         retries = Retries(method, path, key is not None, self._seconds(once))
         while True:
             try:

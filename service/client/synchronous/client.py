@@ -176,9 +176,9 @@ class Client(Connection):
         found = self.request("POST", "/components", json=body)
         return cast("list[ComponentEntry]", found["components"])
 
-    def delete_component(self, component_id: str) -> None:
-        """Remove a component; studies that took it keep its values."""
-        self.delete(component_path(component_id))
+    def delete_component(self, component_id: str, *, etag: str | None = None) -> None:
+        """Remove a component; studies that took it keep its values. ``etag``: only that edition of it."""
+        self.delete(component_path(component_id), etag=etag)
 
     def schedules(self) -> list[ScheduleSummary]:
         """Every schedule with its last and its next run, newest first."""
@@ -226,22 +226,28 @@ class Client(Connection):
         body = {"page": page, "name": name, "query": query, "study": study, "in_report": in_report}
         return cast("SavedViewEntry", self.request("POST", "/views", json=body))
 
-    def change_view(self, view_id: str, **fields: Any) -> SavedViewEntry:
-        """Change some fields of a view: ``name``, ``query``, ``in_report``, or ``place`` in the report."""
-        return cast("SavedViewEntry", self.request("PATCH", view_path(view_id), json=fields))
+    def change_view(self, view_id: str, *, etag: str | None = None, **fields: Any) -> SavedViewEntry:
+        """Change some fields of a view: ``name``, ``query``, ``in_report``, or ``place`` in the report.
 
-    def delete_view(self, view_id: str) -> None:
-        """Delete a saved view."""
-        self.delete(view_path(view_id))
+        With the ``etag`` of the view that was read, it is refused (status 412) where somebody changed it since.
+        """
+        return cast("SavedViewEntry", self.request("PATCH", view_path(view_id), etag=etag, json=fields))
 
-    def change_schedule(self, schedule_id: str, **fields: Any) -> ScheduleDetail:
-        """Change some fields of a schedule, such as ``enabled=False``; the others are kept."""
+    def delete_view(self, view_id: str, *, etag: str | None = None) -> None:
+        """Delete a saved view; ``etag`` as for `change_view`."""
+        self.delete(view_path(view_id), etag=etag)
+
+    def change_schedule(self, schedule_id: str, *, etag: str | None = None, **fields: Any) -> ScheduleDetail:
+        """Change some fields of a schedule, such as ``enabled=False``; the others are kept.
+
+        With the ``etag`` of the schedule that was read, it is refused (status 412) where somebody changed it since.
+        """
         path = schedule_path(schedule_of(self, schedule_id))
-        return cast("ScheduleDetail", self.request("PATCH", path, json=fields))
+        return cast("ScheduleDetail", self.request("PATCH", path, etag=etag, json=fields))
 
-    def delete_schedule(self, schedule_id: str) -> None:
-        """Delete a schedule; its studies are kept."""
-        self.delete(schedule_path(schedule_of(self, schedule_id)))
+    def delete_schedule(self, schedule_id: str, *, etag: str | None = None) -> None:
+        """Delete a schedule; its studies are kept. ``etag`` as for `change_schedule`."""
+        self.delete(schedule_path(schedule_of(self, schedule_id)), etag=etag)
 
     def me(self) -> Me:
         """Who asks: user, token, role and quotas."""

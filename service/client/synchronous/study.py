@@ -125,7 +125,7 @@ class Study(StudyAnswers, StudyTables, StudyCases, Shown):
         return self._act("retry", [("ending", name) for name in endings])
 
     def prioritize(self, priority: int) -> StudySummary:
-        """Change the priority of the study: among waiting studies the highest runs first."""
+        """Change the priority of the study: among the waiting ones of one user the highest runs first."""
         return self._act("prioritize", [("priority", str(priority))])
 
     def change(
@@ -137,23 +137,26 @@ class Study(StudyAnswers, StudyTables, StudyCases, Shown):
         add_tags: Sequence[str] = (),
         remove_tags: Sequence[str] = (),
         archived: bool | None = None,
+        etag: str | None = None,
     ) -> StudySummary:
         """Change its name, notes or tags, or archive it; what is None is kept.
 
-        ``tags`` replaces all tags; ``add_tags`` and ``remove_tags`` change those that it has.
+        ``tags`` replaces all tags; ``add_tags`` and ``remove_tags`` change those that it has. With the ``etag`` of the
+        answer that the change is based on, it is refused (status 412) where somebody changed the study since.
         """
         fields = {"name": name, "notes": notes, "archived": archived, "tags": None if tags is None else list(tags)}
         body = {field: value for field, value in fields.items() if value is not None}
         more = {"add_tags": list(add_tags), "remove_tags": list(remove_tags)}
         body |= {field: value for field, value in more.items() if value}
-        return cast("StudySummary", self._client.request("PATCH", self._path, json=body))
+        return cast("StudySummary", self._client.request("PATCH", self._path, etag=etag, json=body))
 
-    def delete(self, *, at_once: bool = False) -> None:
+    def delete(self, *, at_once: bool = False, etag: str | None = None) -> None:
         """Delete the study, which must have ended or be held at its deadline, with all its results.
 
-        It can be restored for some days, unless it is deleted ``at_once``, which makes room on the disk.
+        It can be restored for some days, unless it is deleted ``at_once``, which makes room on the disk. ``etag`` as
+        for `change`.
         """
-        self._client.delete(self._path, [("at_once", "true")] if at_once else ())
+        self._client.delete(self._path, [("at_once", "true")] if at_once else (), etag=etag)
 
     def restore(self) -> StudySummary:
         """Undo the deletion of the study."""

@@ -12,7 +12,7 @@ from sprag.service.answers import components as m
 from sprag.service.answers import filled
 from sprag.service.http.api.document import body, files, format_query, problems
 from sprag.service.http.context import ID_PATTERN, Ctx
-from sprag.service.http.requests import Body, as_body_problems, read_body
+from sprag.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
 from sprag.service.http.respond import choose_format, json_response
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
@@ -80,14 +80,15 @@ async def put_components(context: Ctx, work: Attended, received: Annotated[Body,
     "/components/{component_id}",
     status_code=204,
     response_class=Response,
-    responses=problems("component-not-found", "invalid-parameter", "not-owner"),
+    responses=problems("component-not-found", "invalid-parameter", "not-owner", "precondition-failed"),
 )
 def delete_component(
     context: Ctx,
     component_id: Annotated[
         str, Path(description="id of the component", pattern=ID_PATTERN, examples=["cp_0123456789abcdef"])
     ],
+    if_match: IfMatch = None,
 ) -> Response:
     """Remove a component; studies that took it keep its values."""
-    context.store.remove_component(component_id)
+    context.store.remove_component(component_id, editions(if_match))
     return Response(status_code=204)

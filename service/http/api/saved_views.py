@@ -12,7 +12,7 @@ from sprag.service.answers import filled
 from sprag.service.answers import saved_views as m
 from sprag.service.http.api.document import body, problems
 from sprag.service.http.context import ID_PATTERN, Ctx
-from sprag.service.http.requests import Body, as_body_problems, read_body
+from sprag.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
 from sprag.service.http.respond import json_response
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
@@ -70,17 +70,21 @@ async def save_view(context: Ctx, work: Attended, received: Annotated[Body, Depe
 @router.patch(
     "/views/{view_id}",
     response_model=m.SavedViewEntry,
-    responses=problems(*_PROBLEMS, "view-not-found"),
+    responses=problems(*_PROBLEMS, "view-not-found", "precondition-failed"),
     openapi_extra=body({"first figure of the report": {"place": 1}}, {"$ref": "#/components/schemas/SavedViewChange"}),
 )
 async def change_view(
-    context: Ctx, work: Attended, view_id: ViewId, received: Annotated[Body, Depends(read_body)]
+    context: Ctx,
+    work: Attended,
+    view_id: ViewId,
+    received: Annotated[Body, Depends(read_body)],
+    if_match: IfMatch = None,
 ) -> Response:
     """Change the name or the choices of a view, and whether and where it is in the report of its study."""
     page = (await run_in_threadpool(context.store.saved_view, view_id)).view.page
     with as_body_problems():
         wanted = await work.check(checks.saved_view_change, received.content, received.format, page)
-        saved = await run_in_threadpool(change, context.store, view_id, wanted)
+        saved = await run_in_threadpool(change, context.store, view_id, wanted, editions(if_match))
     return json_response(entry(saved))
 
 
@@ -88,9 +92,9 @@ async def change_view(
     "/views/{view_id}",
     status_code=204,
     response_class=Response,
-    responses=problems("view-not-found", "invalid-parameter", "not-owner"),
+    responses=problems("view-not-found", "invalid-parameter", "not-owner", "precondition-failed"),
 )
-def delete_view(context: Ctx, view_id: ViewId) -> Response:
+def delete_view(context: Ctx, view_id: ViewId, if_match: IfMatch = None) -> Response:
     """Delete a saved view."""
-    context.store.remove_view(view_id)
+    context.store.remove_view(view_id, editions(if_match))
     return Response(status_code=204)

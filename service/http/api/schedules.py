@@ -13,8 +13,8 @@ from sprag.service.answers import schedules as m
 from sprag.service.http.api import examples
 from sprag.service.http.api.document import body, key_header, located, problems
 from sprag.service.http.context import ID_PATTERN, Context, Ctx, StudyIdConvertor
-from sprag.service.http.requests import Body, as_body_problems, read_body
-from sprag.service.http.respond import json_response
+from sprag.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
+from sprag.service.http.respond import edition_tag, json_response, tagged
 from sprag.service.http.routers import api_router
 from sprag.service.http.schedule_views import detail, schedule_address, summary
 from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
@@ -26,12 +26,16 @@ from sprag.service.schedules.policies import GRACE_ALLOWED
 from sprag.service.schedules.report_to import LONGEST_WEBHOOK, MOST_RECIPIENTS, require_deliverable
 from sprag.service.schedules.times import ALIASES
 from sprag.service.spec.described import schemas
+from sprag.service.storage.editions import require_edition
+from sprag.service.storage.errors import ChangedMeanwhileError
 from sprag.service.storage.schedule_runs import ScheduleRecord
 from sprag.worker.limits import MAX_NAME_LENGTH
 
 router = api_router("schedules")
 
 _PROBLEMS: Final = ("invalid-parameter", "invalid-body", "body-too-large", "unsupported-media-type")
+#: Attempts to change a schedule that somebody else changes at the same time.
+_ATTEMPTS: Final = 5
 _TIME_OF_DAY: Final = {"type": "string", "pattern": "^([01]?[0-9]|2[0-3]):[0-5][0-9]$"}
 _FIELDS: Final[dict[str, Any]] = {
     "name": {
@@ -153,6 +157,16 @@ async def create_schedule(
     return await run_in_threadpool(keep, await _fields(context, work, received, None), idempotency_key, body_hash)
 
 
+def _answer(context: Context, record: ScheduleRecord) -> Response:
+    content = detail(record, context.store.schedule_runs(record.id))
+    return tagged(json_response(content), _tag(record))
+
+
+def _tag(record: ScheduleRecord) -> str:
+    """Entity tag of a schedule: weak, because its runs change with no change of its fields."""
+    return f"W/{edition_tag(record.etag)}"
+
+
 def _made(context: Context, record: ScheduleRecord) -> Response:
     content = detail(record, context.store.schedule_runs(record.id))
     return json_response(content, 201, {"Location": schedule_address(record.id)})
@@ -192,36 +206,44 @@ def get_night(
 )
 def get_schedule(context: Ctx, schedule_id: ScheduleId) -> Response:
     """A schedule with its spec and its latest runs."""
-    return json_response(detail(context.store.get_schedule(schedule_id), context.store.schedule_runs(schedule_id)))
+    return _answer(context, context.store.get_schedule(schedule_id))
 
 
 @router.patch(
     "/schedules/{schedule_id:schedule}",
     response_model=m.ScheduleDetail,
-    responses=problems(*_PROBLEMS, *CHECK_PROBLEMS, "schedule-not-found"),
+    responses=problems(*_PROBLEMS, *CHECK_PROBLEMS, "schedule-not-found", "precondition-failed"),
     openapi_extra=body(
         {"paused": {"paused_until": "2027-01-07T00:00"}}, {"$ref": "#/components/schemas/ScheduleChange"}
     ),
 )
-async def change_schedule(context: Ctx, work: Attended, schedule_id: ScheduleId, received: Fields) -> Response:
+async def change_schedule(
+    context: Ctx, work: Attended, schedule_id: ScheduleId, received: Fields, if_match: IfMatch = None
+) -> Response:
     """Change some fields of a schedule; the others are kept. Due times missed before the change are dropped."""
-    record = await run_in_threadpool(context.store.get_schedule, schedule_id)
-    fields = await _fields(context, work, received, record.fields)
-
-    def change() -> m.ScheduleDetail:
-        changed = context.store.change_schedule(schedule_id, fields)
-        return detail(changed, context.store.schedule_runs(schedule_id))
-
-    return json_response(await run_in_threadpool(change))
+    store, wanted = context.store, editions(if_match)
+    for left in reversed(range(_ATTEMPTS)):
+        record = await run_in_threadpool(store.get_schedule, schedule_id)
+        require_edition("schedule", schedule_id, record.etag, wanted)
+        fields = await _fields(context, work, received, record.fields)
+        try:
+            # The fields that are kept are those that were read.
+            changed = await run_in_threadpool(store.change_schedule, schedule_id, fields, (record.etag,))
+        except ChangedMeanwhileError:
+            if not left:
+                raise
+        else:
+            break
+    return await run_in_threadpool(_answer, context, changed)
 
 
 @router.delete(
     "/schedules/{schedule_id:schedule}",
     status_code=204,
     response_class=Response,
-    responses=problems("invalid-parameter", "schedule-not-found"),
+    responses=problems("invalid-parameter", "schedule-not-found", "precondition-failed"),
 )
-def delete_schedule(context: Ctx, schedule_id: ScheduleId) -> Response:
+def delete_schedule(context: Ctx, schedule_id: ScheduleId, if_match: IfMatch = None) -> Response:
     """Delete a schedule. Its studies are kept."""
-    context.store.delete_schedule(schedule_id)
+    context.store.delete_schedule(schedule_id, editions(if_match))
     return Response(status_code=204)

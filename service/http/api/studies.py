@@ -19,7 +19,7 @@ from sprag.service.http.api.document import body, key_header, located, one_of, p
 from sprag.service.http.api.document import not_modified as documented_304
 from sprag.service.http.context import Context, Ctx, StudyId
 from sprag.service.http.requests import Body, read_body
-from sprag.service.http.respond import JSON, entity_tag, json_response, not_modified, tagged
+from sprag.service.http.respond import JSON, json_response, not_modified, tagged
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import checks
@@ -56,7 +56,8 @@ Priority = Annotated[
     Query(
         ge=-MAX_PRIORITY,
         le=MAX_PRIORITY,
-        description="waiting studies with the highest priority run first",
+        description="of the waiting studies of one owner, those with the highest priority run first; where there are "
+        "users, only priorities below 0, and those that administrators give, count against studies of others",
         examples=[10],
     ),
 ]
@@ -144,7 +145,7 @@ async def preview_study(context: Ctx, work: Attended, received: SpecBody, finish
 def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
     """A study: its state, progress, time left and spec."""
     record, progress = context.store.look(study_id)
-    tag = entity_tag(record.id, record.revision)
+    tag = views.study_tag(record)
     if record.state.terminal and (unchanged := not_modified(request, tag)):
         return unchanged
     study = context.store.study(study_id)
@@ -157,9 +158,7 @@ def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
         context.store.origins(study_id),
     )
     unaffected = warned((*record.warnings, *context.unaffected.of(context.store, record)))
-    response = json_response({**data, **unaffected})
-    # While it runs, the time left changes with no change of the study.
-    return tagged(response, tag) if record.state.terminal else response
+    return tagged(json_response({**data, **unaffected}), tag)
 
 
 @router.get(
@@ -200,7 +199,7 @@ _verb("resume", "Resume a study that is held; a past deadline or a closed window
     "/studies/{study_id:study}:retry",
     status_code=202,
     response_model=m.StudySummary,
-    responses=problems("invalid-parameter", "study-not-found", "wrong-state"),
+    responses=problems("invalid-parameter", "study-not-found", "wrong-state", "queue-full"),
 )
 def retry_study(
     context: Ctx,

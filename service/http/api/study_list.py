@@ -14,8 +14,8 @@ from sprag.service.http import views
 from sprag.service.http.api.document import body, next_page, problems
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.listing import PageToken, Sort, WantedStudies
-from sprag.service.http.requests import Body, as_body_problems, read_body
-from sprag.service.http.respond import json_response, page_response
+from sprag.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
+from sprag.service.http.respond import json_response, page_response, tagged
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import checks
@@ -49,6 +49,7 @@ def list_studies(
         "unsupported-media-type",
         *CHECK_PROBLEMS,
         "study-not-found",
+        "precondition-failed",
     ),
     openapi_extra=body(
         {
@@ -59,7 +60,11 @@ def list_studies(
     ),
 )
 async def change_study(
-    context: Ctx, work: Attended, study_id: StudyId, received: Annotated[Body, Depends(read_body)]
+    context: Ctx,
+    work: Attended,
+    study_id: StudyId,
+    received: Annotated[Body, Depends(read_body)],
+    if_match: IfMatch = None,
 ) -> Response:
     """Change what people write about a study: name, notes, tags, and whether it is archived.
 
@@ -68,19 +73,20 @@ async def change_study(
     """
     with as_body_problems():
         change = await work.check(checks.study_change, received.content, received.format)
-        record = await run_in_threadpool(context.store.change_study, study_id, change)
-    return json_response(views.summary(record))
+        record = await run_in_threadpool(context.store.change_study, study_id, change, editions(if_match))
+    return tagged(json_response(views.summary(record)), views.study_tag(record))
 
 
 @router.delete(
     "/studies/{study_id:study}",
     status_code=204,
     response_class=Response,
-    responses=problems("invalid-parameter", "study-not-found", "wrong-state"),
+    responses=problems("invalid-parameter", "study-not-found", "wrong-state", "precondition-failed"),
 )
 def delete_study(
     context: Ctx,
     study_id: StudyId,
+    if_match: IfMatch = None,
     at_once: Annotated[
         bool, Query(description="remove its results now, to make room on the disk; it cannot be restored")
     ] = False,
@@ -89,14 +95,14 @@ def delete_study(
 
     It can be restored for `SPRAG_RESTORE_DAYS`, unless `at_once` is true.
     """
-    context.store.delete_study(study_id, at_once=at_once)
+    context.store.delete_study(study_id, at_once=at_once, read=editions(if_match))
     return Response(status_code=204)
 
 
 @router.post(
     "/studies/{study_id:study}:restore",
     response_model=m.StudySummary,
-    responses=problems("invalid-parameter", "study-not-found", "quota-exceeded"),
+    responses=problems("invalid-parameter", "study-not-found"),
 )
 def restore_study(context: Ctx, study_id: StudyId) -> Response:
     """Undo the deletion of a study, with all its results, until `purge_at`."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from datetime import datetime
 from typing import Annotated, Any, Final
 from zoneinfo import ZoneInfo
@@ -18,7 +19,7 @@ from sprag.service.http.routers import page_router
 from sprag.service.http.schedule_views import summary
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form.entries import Values
-from sprag.service.http.web.form.values import Form
+from sprag.service.http.web.form.values import Form, changed_meanwhile
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended, Work
 from sprag.service.jobs import checks
@@ -29,7 +30,7 @@ from sprag.service.schedules.fields import ScheduleFields, change_fields
 from sprag.service.schedules.report_to import require_deliverable
 from sprag.service.spec.document import accepted
 from sprag.service.spec.report import SpecError
-from sprag.service.storage.errors import StudyNotFoundError, TooManySchedulesError
+from sprag.service.storage.errors import ChangedMeanwhileError, StudyNotFoundError, TooManySchedulesError
 from sprag.service.zones import zones
 from sprag.worker.limits import MAX_PRIORITY
 
@@ -98,7 +99,7 @@ async def keep_schedule(context: Ctx, work: Attended, values: Form) -> Response:
 def edit_schedule(context: Ctx, schedule_id: str) -> Response:
     """The form with the fields of a schedule."""
     record = context.store.get_schedule(schedule_id)
-    return _form(context, _values_of(record.fields), {}, schedule_id)
+    return _form(context, {**_values_of(record.fields), "etag": record.etag}, {}, schedule_id)
 
 
 @router.post("/schedules/{schedule_id:schedule}")
@@ -113,12 +114,21 @@ def act(context: Ctx, schedule_id: str, verb: str) -> Response:
     if verb == "delete":
         context.store.delete_schedule(schedule_id)
     elif verb in _CHANGES:
-        record = context.store.get_schedule(schedule_id)
-        fields = change_fields(record.fields, _CHANGES[verb], context.store.clock.now())
-        context.store.change_schedule(schedule_id, fields)
+        _change(context, schedule_id, _CHANGES[verb])
     else:
         raise ApiError("not-found", "Unknown action.")
     return RedirectResponse("/schedules", status_code=303)
+
+
+def _change(context: Context, schedule_id: str, changes: Mapping[str, object]) -> None:
+    """Change some fields; the others stay as they are by then."""
+    store, saved = context.store, False
+    while not saved:
+        record = store.get_schedule(schedule_id)
+        fields = change_fields(record.fields, changes, store.clock.now())
+        with suppress(ChangedMeanwhileError):
+            store.change_schedule(schedule_id, fields, (record.etag,))
+            saved = True
 
 
 async def _save(context: Context, work: Work, values: Values, schedule_id: str | None) -> Response:
@@ -132,7 +142,8 @@ async def _save(context: Context, work: Work, values: Values, schedule_id: str |
         if schedule_id is None:
             await run_in_threadpool(context.store.create_schedule, fields)
         else:
-            await run_in_threadpool(context.store.change_schedule, schedule_id, fields)
+            read = (values["etag"],) if "etag" in values else None
+            await run_in_threadpool(context.store.change_schedule, schedule_id, fields, read)
     except SpecError as error:
         for fault in error.faults:
             first = fault.where.split("/")[1] if fault.where else ""
@@ -140,6 +151,11 @@ async def _save(context: Context, work: Work, values: Values, schedule_id: str |
             faults.setdefault(_FIELD_OF.get(first, first), []).append(sentence)
     except (StudyNotFoundError, TooManySchedulesError) as error:
         faults["source"] = [str(error)]
+    except ChangedMeanwhileError:
+        # What was typed stays in the form; saved once more, it replaces what somebody else saved.
+        values = {**values, "etag": (await run_in_threadpool(context.store.get_schedule, schedule_id or "")).etag}
+        faults[""] = [changed_meanwhile()]
+        return await run_in_threadpool(_form, context, values, faults, schedule_id, status=412)
     if faults:
         return await run_in_threadpool(_form, context, values, faults, schedule_id, status=422)
     return RedirectResponse("/schedules", status_code=303)

@@ -19,6 +19,7 @@ from sprag.service.http.problems import ApiError
 from sprag.service.http.reading import CHOICE, address_pairs, file_pairs
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.form.check import fits_of, has_measured_clutch
+from sprag.service.http.web.form.values import changed_meanwhile
 from sprag.service.http.web.held import fixed_choices
 from sprag.service.http.web.saved_views import report_figures, saved_here, view_actions
 from sprag.service.http.web.study_answers import AnswersView, answers_view
@@ -119,15 +120,25 @@ async def study_page(context: Ctx, work: Attended, study_id: StudyId) -> Respons
 
 
 async def shown_study(
-    context: Context, work: Work, study_id: str, further: Values | None = None, wrong: Faults | None = None
+    context: Context,
+    work: Work,
+    study_id: str,
+    further: Values | None = None,
+    wrong: Faults | None = None,
+    labels: Values | None = None,
 ) -> Response:
-    """The page of a study; ``further`` is what its form for an extension has, with what is ``wrong`` there by field."""
+    """The page of a study; ``further`` is what its form for an extension has, with what is ``wrong`` there by field.
+
+    ``labels`` is what its form for name, notes and tags has, where somebody else changed them after it was shown.
+    """
     spec = await run_in_threadpool(context.store.spec, study_id)
     fits = await work.check(fits_of, spec) if has_measured_clutch(spec) else {}
     usual, many = await run_in_threadpool(_usual_curves, context, study_id)
     asked = (context.library, study_id, work.request.query_params.multi_items(), usual, CHOICE.get())
     view = await (work.check(answers_view, *asked) if many else run_in_threadpool(answers_view, *asked))
-    extension = {"further": further or {}, "wrong": wrong or {}}
+    extension = {"further": further or {}, "wrong": wrong or {}, "labels": labels or {}}
+    if labels:
+        extension["changed_meanwhile"] = changed_meanwhile()
     return await run_in_threadpool(_study_page, context, study_id, fits, view, usual, extension)
 
 
@@ -153,7 +164,7 @@ def _study_page(
     kinds = context.store.kinds(study_id)
     return page(
         "study.html",
-        status=422 if view.faults or extension["wrong"] else 200,
+        status=412 if extension["labels"] else 422 if view.faults or extension["wrong"] else 200,
         **frame,
         **extension,
         origins=context.store.origins(study_id),

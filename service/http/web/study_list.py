@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
 from fastapi import Request
+from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import QueryParams
 from starlette.responses import RedirectResponse, Response
 
@@ -20,12 +21,14 @@ from sprag.service.http.routers import page_router
 from sprag.service.http.views import preset_of
 from sprag.service.http.web import saved_views
 from sprag.service.http.web.form.values import Form, RepeatedForm
+from sprag.service.http.web.study import shown_study
 from sprag.service.http.web.templates import page
+from sprag.service.http.work import Attended
 from sprag.service.languages import N_
 from sprag.service.presets import preset_names
 from sprag.service.spec.labels import StudyChange, read_change, tags_of
 from sprag.service.spec.report import SpecError
-from sprag.service.storage.errors import StoreError
+from sprag.service.storage.errors import ChangedMeanwhileError, StoreError
 from sprag.service.storage.listing import StudyFilter
 from sprag.service.storage.records import StudyPage
 from sprag.worker import models
@@ -177,14 +180,17 @@ def _changed(chosen: Iterable[str], act: Callable[[str], Any]) -> list[tuple[str
 
 
 @router.post("/studies/{study_id:study}/labels")
-def change_labels(context: Ctx, study_id: StudyId, values: Form) -> Response:
-    """The form for name, notes and tags on the page of a study."""
+async def change_labels(context: Ctx, work: Attended, study_id: StudyId, values: Form) -> Response:
+    """The form for name, notes and tags on the page of a study; where somebody else changed them, the page again."""
     data: dict[str, Any] = {name: values[name] for name in ("name", "notes") if name in values}
     if "tags" in values:
         data["tags"] = tags_of(values["tags"])
     data["archived"] = "archived" in values
+    read = (values["etag"],) if "etag" in values else None
     try:
-        context.store.change_study(study_id, read_change(data))
+        await run_in_threadpool(context.store.change_study, study_id, read_change(data), read)
+    except ChangedMeanwhileError:
+        return await shown_study(context, work, study_id, labels=values)
     except SpecError as error:
         detail = "; ".join(f"{fault.message} (allowed: {fault.allowed})" for fault in error.faults)
         raise ApiError("invalid-body", detail, error.faults) from error

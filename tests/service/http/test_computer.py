@@ -6,6 +6,7 @@ import asyncio
 import gc
 import math
 import os
+import signal
 import time
 from collections.abc import Iterator
 from functools import partial
@@ -23,6 +24,8 @@ from tests.worker import fakes
 
 if TYPE_CHECKING:
     from anyio.from_thread import BlockingPortal
+
+    from sprag.service.faults import Kind
 
 
 @pytest.fixture
@@ -45,6 +48,39 @@ def test_it_computes_elsewhere_and_survives_crashes(computer: ProcessComputer, p
     with pytest.raises(ValueError, match=r"math domain|nonnegative"):
         portal.call(computer.run, math.sqrt, -1.0)
     assert portal.call(computer.run, math.sqrt, 4.0) == 2.0
+
+
+def test_what_is_killed_is_run_once_more(tmp_path: Path, portal: BlockingPortal) -> None:
+    """A process may be killed for no fault of what it computes."""
+    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES, died="unavailable"))
+    try:
+        for number in (signal.SIGKILL, signal.SIGSEGV):
+            trace = tmp_path / number.name
+            assert portal.call(computer.run, fakes.die_at_first, str(trace), number) == "alive"
+            assert trace.exists()
+    finally:
+        computer.close()
+
+
+@pytest.mark.parametrize(
+    ("died", "number", "kind"),
+    [
+        ("unavailable", signal.SIGKILL, "unavailable"),
+        ("unavailable", signal.SIGSEGV, "unavailable"),
+        ("not-computed", signal.SIGKILL, "unavailable"),
+        ("not-computed", signal.SIGSEGV, "not-computed"),
+    ],
+)
+def test_what_dies_twice_is_told(portal: BlockingPortal, died: Kind, number: int, kind: str) -> None:
+    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES, died=died))
+    try:
+        with pytest.raises(ApiError) as refused:
+            portal.call(computer.run, signal.raise_signal, number)
+        assert refused.value.code == kind
+        assert ("Retry-After" in refused.value.headers) == (kind == "unavailable")
+        assert portal.call(computer.run, math.sqrt, 4.0) == 2.0
+    finally:
+        computer.close()
 
 
 SHAPE = models.KernelShape("vibration-drive", (1, 2, 1e-9))
@@ -135,7 +171,7 @@ def test_a_kernel_that_fails_is_told_and_tried_again(portal: BlockingPortal) -> 
         for _ in range(2):
             with pytest.raises(ApiError) as died:
                 portal.call(computer.load, SHAPE)
-            assert died.value.code == "not-computed"
+            assert died.value.code == "unavailable"  # killed, both times
     finally:
         computer.close()
 

@@ -10,7 +10,7 @@ from typing import Any
 import httpx
 import pytest
 
-from sprag.service.client import Client
+from sprag.service.client import Client, RefusedError
 from sprag.service.settings import Settings
 from tests.service.conftest import API, PortalTransport, Service
 from tests.service.http.people import OWN, Office
@@ -97,6 +97,13 @@ def test_the_client_does_the_same(service: Service, three: dict[str, str]) -> No
         assert study.change(name="faster", tags=["a"], archived=True)["tags"] == ["a"]
         assert [found["name"] for found in client.studies(archived=True, tag="a", sort="name")] == ["faster"]
         assert study.change(remove_tags=["a"], archived=False)["tags"] == []
+        read = study.detail()["etag"]
+        assert study.change(notes="first", etag=read)["notes"] == "first"
+        with pytest.raises(RefusedError) as refused:
+            study.change(notes="second", etag=read)
+        assert refused.value.status == 412
+        with pytest.raises(RefusedError):
+            study.delete(etag=read)
         study.delete()
         assert [found["id"] for found in client.studies(deleted=True)] == [study.id]
         assert study.restore()["name"] == "faster"

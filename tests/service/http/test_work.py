@@ -139,7 +139,7 @@ def test_what_ends_soon_after_its_client_left_costs_no_process(portal: BlockingP
 
 def test_each_has_a_share_and_no_more(portal: BlockingPortal) -> None:
     async def take() -> None:
-        shares, order = Shares(1, 2), []
+        shares, order = Shares(1, 2, 8), []
         held, go_on = anyio.Event(), anyio.Event()
 
         async def have(owner: str, name: str) -> None:

@@ -9,6 +9,7 @@ from fastapi import Depends, Request
 
 from sprag.service.http.problems import ApiError
 from sprag.service.http.web.form.entries import Values
+from sprag.service.languages import _
 
 Pairs = list[tuple[str, str]]
 _FORM_TYPE: Final = "application/x-www-form-urlencoded"
@@ -30,6 +31,14 @@ async def read_pairs(request: Request) -> Pairs:
 async def read_form(request: Request) -> Values:
     """Read the fields; the last value of a repeated name counts. Raises ApiError."""
     return dict(await read_pairs(request))
+
+
+def changed_meanwhile() -> str:
+    """What a form says whose object somebody else changed after the form was shown."""
+    return _(
+        "Somebody changed this after the form was shown, so nothing was saved. Look at the present values in another "
+        "window; saved once more, what stands here replaces them."
+    )
 
 
 RepeatedForm = Annotated[Pairs, Depends(read_pairs)]

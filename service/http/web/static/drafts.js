@@ -4,7 +4,7 @@
 
 sprag.drafts = (() => {
   const PREFIX = "sprag.draft:", SENT = "sprag.sent", DAYS = 30, WAIT = 300;
-  const OWN = ["key", "history", "edited"]; // fields that nobody types into
+  const OWN = ["key", "history", "edited", "etag"]; // fields that nobody types into
   let name = `${PREFIX}${location.pathname}${location.search}`, timer = null;
 
   const fieldsOf = (form) => [...new FormData(form)].filter(([, value]) => typeof value === "string");
@@ -57,7 +57,8 @@ for (const form of document.querySelectorAll("form[data-draft]")) {
   const fill = (fields) => {
     const left = [...fields];
     for (const field of form.elements) {
-      if (!field.name || field.type === "hidden") continue;
+      // With the edition on which the draft is based, so that it replaces no later one unseen.
+      if (!field.name || (field.type === "hidden" && field.name !== "etag")) continue;
       const ticked = ["checkbox", "radio"].includes(field.type);
       const at = left.findIndex(([name, value]) => name === field.name && (!ticked || value === field.value));
       if (ticked) field.checked = at >= 0;
