@@ -7,11 +7,14 @@ faulty processor or memory, or of a damaged cache.
 from __future__ import annotations
 
 import hashlib
+from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
 from sprag.worker import fingerprint, models
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from sprag.worker.models import ChunkResult, ChunkTask, KernelShape
 
 #: The answers of the kernels that have answered in this process.
@@ -47,9 +50,18 @@ def require_answers(shape: KernelShape) -> str:
     if shape in _ANSWERS:
         return _ANSWERS[shape]
     answers, under = answers_of(shape), fingerprint.digest()
-    noted = models.noted_answers(shape).split()
+    noted = _noted(models.mark_of(shape))
     if noted[:1] == [under] and noted[1:] != [answers]:
         raise OtherAnswersError(f"known answers of its kernel: {answers} instead of {' '.join(noted[1:])}")
     if not noted or noted[0] != under:
-        models.note_answers(shape, f"{under} {answers}")
+        with suppress(OSError):
+            models.mark_of(shape).write_text(f"{under} {answers}", encoding="ascii")
     return _ANSWERS.setdefault(shape, answers)
+
+
+def _noted(mark: Path) -> list[str]:
+    """Fingerprint and answers in the file beside a kernel; nothing where there are none."""
+    try:
+        return mark.read_text(encoding="ascii").split()
+    except (OSError, UnicodeDecodeError):
+        return []

@@ -147,10 +147,9 @@ __all__ = [
     "kernel_source",
     "lanes_per_case",
     "load",
+    "mark_of",
     "model_names",
     "model_of",
-    "note_answers",
-    "noted_answers",
     "numbered_by",
     "parameter_catalogue",
     "parameters_of",
@@ -354,29 +353,16 @@ def load(shape: KernelShape) -> None:
     """Compile the kernel of that shape into the on-disk cache, or load it from there."""
     model_of(shape.model).load(shape)
     with suppress(OSError):
-        _mark(shape).touch()
+        mark_of(shape).touch()
 
 
 def is_compiled(shape: KernelShape) -> bool:
     """Whether `load` has put the kernel of that shape into the on-disk cache, on this machine and for this engine."""
-    return _mark(shape).exists()
+    return mark_of(shape).exists()
 
 
-def noted_answers(shape: KernelShape) -> str:
-    """What `note_answers` wrote beside the kernel of that shape; "" where there is nothing."""
-    try:
-        return _mark(shape).read_text(encoding="ascii")
-    except (OSError, UnicodeDecodeError):
-        return ""
-
-
-def note_answers(shape: KernelShape, answers: str) -> None:
-    """Keep the known answers of a kernel beside it in the cache, as long as it is there."""
-    with suppress(OSError):
-        _mark(shape).write_text(answers, encoding="ascii")
-
-
-def _mark(shape: KernelShape) -> Path:
+def mark_of(shape: KernelShape) -> Path:
+    """The file beside the kernel of that shape in the cache that is there once it is compiled."""
     # Machines that share a home folder may need different code.
     return cache_folder() / f"{'-'.join(map(str, (shape.model, *shape.key, platform.node())))}.ready"
 

@@ -69,15 +69,15 @@ def test_a_kernel_that_is_compiled_anew_has_answers_of_its_own(answers: list[byt
     """Where the kernels are thrown away, and under another fingerprint, the first process says what is right."""
     known_answers.load(shape())
     another_process()
-    models._mark(shape()).unlink()
+    models.mark_of(shape()).unlink()
     answers[:] = [b"compiled anew"]
     assert run_chunk().fate is Fate.DONE
     another_process()
-    models.note_answers(shape(), "of-another-fingerprint 0123456789abcdef")
+    models.mark_of(shape()).write_text("of-another-fingerprint 0123456789abcdef")
     assert run_chunk().fate is Fate.DONE
-    assert models.noted_answers(shape()).split()[0] == fingerprint.digest()
+    assert models.mark_of(shape()).read_text().split()[0] == fingerprint.digest()
     another_process()
-    models._mark(shape()).write_bytes(b"")  # as earlier versions left it
+    models.mark_of(shape()).write_bytes(b"")  # as earlier versions left it
     assert run_chunk().fate is Fate.DONE
 
 
