@@ -18,6 +18,7 @@ from sprag.service.spec.derive import check_derived, layout, read_machine
 from sprag.service.spec.draws.tolerances import read_tolerances, warn_of_invalid_drives, with_drives
 from sprag.service.spec.fields import TOLERANCE_FIELDS, read_object
 from sprag.service.spec.machine.registry import part_of
+from sprag.service.spec.numbers import has_doubtful_point, with_decimal
 from sprag.service.spec.plan.outline import Outline, chooses, first_round, read_outline
 from sprag.service.spec.report import Report, SpecError, did_you_mean
 from sprag.service.spec.starts import read_starts
@@ -128,9 +129,10 @@ def parse_spec(data: object) -> ParsedSpec:
 
 
 def accepted(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """A spec that was accepted before, bare numbers beside quantities of another scale with their SI unit.
+    """A spec that was accepted before, without what is asked about now.
 
-    Earlier versions read them as SI without a question, so that is what they are.
+    Earlier versions read bare numbers beside quantities of another scale as SI, and points that could separate
+    thousands as decimal points, so that is what they are: their unit and a further decimal are written.
     """
     settled: dict[str, Any] = dict(spec)
     while unclear := _unclear(settled):
@@ -141,19 +143,30 @@ def accepted(spec: Mapping[str, Any]) -> dict[str, Any]:
             for key in parents:
                 place = place[int(key)] if isinstance(place, list) else place[key]
             index: Any = int(last) if isinstance(place, list) else last
-            place[index] = f"{place[index]!r} {fault.unit}"
+            if fault.code == AMBIGUOUS_UNIT:
+                place[index] = f"{place[index]!r} {fault.unit}"
+            else:
+                place[index] = with_decimal(place[index], str(fault.value))
     return settled
 
 
 def _unclear(spec: Mapping[str, Any]) -> list[Fault]:
-    """The faults of bare numbers beside quantities of another scale."""
-    if not _mixed(spec):
+    """The faults of bare numbers beside quantities of another scale, and of points that could separate thousands."""
+    if not _mixed(spec) and not _grouped(spec):
         return []
     try:
         parse_spec(spec)
     except SpecError as error:
-        return [fault for fault in error.faults if fault.code == AMBIGUOUS_UNIT]
+        return [fault for fault in error.faults if fault.code in {AMBIGUOUS_UNIT, "ambiguous-point"}]
     return []
+
+
+def _grouped(data: object) -> bool:
+    """Whether a text has a point that could separate thousands."""
+    if isinstance(data, str):
+        return has_doubtful_point(data)
+    items = data.values() if isinstance(data, Mapping) else data if isinstance(data, list) else ()
+    return any(map(_grouped, items))
 
 
 def _mixed(data: object) -> bool:

@@ -7,10 +7,9 @@ decimal. In a list or a table the numbers settle together what their commas and 
 
 from __future__ import annotations
 
-import itertools
 import re
 from collections.abc import Iterable, Sequence
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from sprag.service.languages import decimal
 from sprag.service.spec.printed import keyboard
@@ -20,6 +19,7 @@ _NUMBER: Final = re.compile(r"\s*[+\-\u2212]?([.,]?[0-9][0-9.,]*)([eE][+\-\u2212
 #: Two whole numbers and a comma, with or without a unit behind: also one number with a decimal comma.
 _PAIR: Final = re.compile(r"\s*[+\-\u2212]?[0-9]+,[0-9]+(?![0-9.,;])[^,;]*")
 _THOUSANDS: Final = 3
+_DOUBTFUL: Final = re.compile(r"(?<![0-9.,])[1-9][0-9]{0,2}\.[0-9]{3}(?![0-9.,])")
 #: Digits in groups of three, and the sign between them.
 _GROUPS: Final = re.compile(r"[1-9][0-9]{0,2}(?:\.[0-9]{3})+|[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 
@@ -36,6 +36,9 @@ class _Marks(NamedTuple):
     decimal: str = ""
     groups: str = ""
     either: str = ""
+
+
+_NONE: Final = _Marks()
 
 
 class Settled(NamedTuple):
@@ -103,6 +106,8 @@ def settle(texts: Sequence[str], *, decimal: bool = False) -> Settled:
     is proved: then commas before three digits are decimal where ``decimal`` says so (semicolons between columns are
     written where commas are decimal) and no number has a point, and points are decimal, in doubt.
     """
+    if not any("," in text for text in texts) and any(_marks(text).decimal for text in texts if "." in text):
+        return Settled(list(texts), None)  # decimal points alone
     marks = [_marks(text) for text in texts]
     proved = _proved(marks)
     if proved:
@@ -123,16 +128,22 @@ def settled(texts: Sequence[str], *, decimal: bool = False) -> list[str]:
     return settle(texts, decimal=decimal).texts
 
 
-def settle_rows(
-    rows: Iterable[Sequence[str]], *, decimal: bool = False
-) -> tuple[list[list[str]], tuple[int, int] | None]:
-    """The rows of one table, as `settle` does it for all its cells together, and row and column of a point in doubt."""
-    given = [list(row) for row in rows]
-    texts, doubt = settle([cell for row in given for cell in row], decimal=decimal)
-    cells = iter(texts)
-    places = ((place, column) for place, row in enumerate(given) for column in range(len(row)))
-    doubtful = None if doubt is None else next(itertools.islice(places, doubt, None))
-    return [[next(cells) for _ in row] for row in given], doubtful
+def settled_items(items: Sequence[Any]) -> list[Any]:
+    """The items of a list in a spec, their texts as `settled` has them."""
+    texts = iter(settled([item for item in items if isinstance(item, str)]))
+    return [next(texts) if isinstance(item, str) else item for item in items]
+
+
+def has_doubtful_point(text: str) -> bool:
+    """Whether a text, such as that of a table, has a number whose point could separate thousands."""
+    return _DOUBTFUL.search(text) is not None
+
+
+def with_decimal(text: str, cell: str) -> str:
+    """``text`` with a further decimal in each number ``cell``, which makes its point a decimal one."""
+    return re.sub(
+        rf"(?<![0-9.,]){re.escape(cell)}(?![0-9.,])", lambda found: _NUMBER.sub(r"\g<0>0", found[0], count=1), text
+    )
 
 
 def question(text: str) -> str:
@@ -154,13 +165,13 @@ def _readings(text: str) -> tuple[str, str]:
 
 
 def _marks(text: str) -> _Marks:
-    found = _NUMBER.match(text)
+    found = _NUMBER.match(text) if "." in text or "," in text else None
     if found is None:
-        return _Marks()
+        return _NONE
     digits, exponent = found.groups()
     last = max(digits.rfind("."), digits.rfind(","))
     if last < 0:
-        return _Marks()
+        return _NONE
     sign, whole, rest = digits[last], digits[:last], digits[last + 1 :]
     if not whole.isdecimal() and whole:
         if _GROUPS.fullmatch(digits):

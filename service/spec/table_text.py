@@ -14,7 +14,7 @@ import itertools
 import re
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from sprag.service.spec.numbers import settle_rows, settled
+from sprag.service.spec.numbers import settle, settled
 from sprag.service.spec.units import QuantityError, measure
 
 if TYPE_CHECKING:
@@ -180,22 +180,31 @@ def settled_table(table: Split, texts: Collection[int] = ()) -> tuple[list[CsvRo
 
     A cell may have several numbers, such as the coefficients of a clutch.
     """
-    pieces = [[[] if i in texts else _BETWEEN.split(own) for i, own in enumerate(row.cells)] for row in table.rows]
-    numbers = ([part for cell in row for part in cell] for row in pieces)
-    below, place = settle_rows(numbers, decimal=table.separator == ";")
+    pieces = [[] if i in texts else _pieces(cell) for row in table.rows for i, cell in enumerate(row.cells)]
+    lines = [row.line for row in table.rows for _ in row.cells]
+    numbers = [part for cell in pieces for part in cell]
+    made, place = settle(numbers, decimal=table.separator == ";")
+    doubt = None
+    if place is not None:
+        line = next(itertools.islice((n for n, cell in zip(lines, pieces, strict=True) for _ in cell), place, None))
+        doubt = Doubt(line, numbers[place], table.separator == "," and not table.quoted)
+    if made == numbers:
+        return list(table.rows), doubt
+    parts, cells = iter(made), iter(pieces)
     rows = []
-    for row, cells, parts in zip(table.rows, pieces, map(iter, below), strict=True):
-        taken = [list(itertools.islice(parts, len(cell))) for cell in cells]
-        made = [_joined(*own) for own in zip(row.cells, cells, taken, strict=True)]
-        rows.append(CsvRow(row.line, made))
-    if place is None:
-        return rows, None
-    number, column = place
-    text = [part for cell in pieces[number] for part in cell][column]
-    likely = table.separator == "," and not table.quoted
-    return rows, Doubt(table.rows[number].line, text, likely)
+    for row in table.rows:
+        own = list(itertools.islice(cells, len(row.cells)))
+        taken = [[*itertools.islice(parts, len(cell))] for cell in own]
+        rows.append(CsvRow(row.line, [_joined(*one) for one in zip(row.cells, own, taken, strict=True)]))
+    return rows, doubt
+
+
+def _pieces(cell: str) -> list[str]:
+    return _BETWEEN.split(cell) if any(sign in cell for sign in " ;\t\n") else [cell]
 
 
 def _joined(text: str, pieces: list[str], made: list[str]) -> str:
     """A cell with its numbers as the table settles them; several that say so themselves stay as they are written."""
-    return text if len(pieces) != 1 and settled(pieces) == made else "".join(made)
+    if len(made) == 1:
+        return made[0]
+    return text if settled(pieces) == made else "".join(made)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag.service.spec.fields import read_exact, read_number, read_whole
+from sprag.service.spec.numbers import settled_items
 from sprag.service.spec.report import Report, join
 from sprag.service.spec.together import refuse_mixed
 from sprag.service.spec.units import QuantityError, parse_exact, to_float
@@ -62,6 +63,7 @@ def plan_values(report: Report, pointer: str, data: object, parameter: Parameter
     plain = _plain_numbers(data)
     if plain is not None and in_range(plain, parameter).all():
         return Plan(pointer, plain.size, lambda: plain, listed=True)
+    data = settled_items(data)
     if _mixed(report, pointer, data, parameter):
         return None
     numbers = [read_number(report, join(pointer, index), value, parameter) for index, value in enumerate(data)]

@@ -11,6 +11,7 @@ import numpy as np
 
 from sprag.service.spec.described import FIT, Listed
 from sprag.service.spec.fields import missing, placed, read_number, read_object
+from sprag.service.spec.numbers import settled_items
 from sprag.service.spec.report import Report, join, quantity_text
 from sprag.service.spec.together import refuse_mixed
 from sprag.worker import models
@@ -113,6 +114,7 @@ def _given(report: Report, pointer: str, data: Mapping[str, Any], prefix: str) -
     items = COEFFICIENTS.read(report, where, data.get("coefficients"))
     if items is None:
         return None
+    items = settled_items(items)
     own = [placed(CLUTCH_COEFFICIENT, f"{prefix}coefficients.{k}") for k in range(len(items))]
     if refuse_mixed(report, [(join(where, k), item) for k, item in enumerate(items)], [entry.unit for entry in own]):
         return None

@@ -12,11 +12,12 @@ from sprag.service.faults import Fault
 from sprag.service.http.web.form.columns import COLUMNS, take_columns
 from sprag.service.http.web.form.fields import Choice
 from sprag.service.spec.components import list_text, read_components
-from sprag.service.spec.document import parse_spec
+from sprag.service.spec.document import accepted, parse_spec
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
 from sprag.service.spec.report import SpecError
 from sprag.service.spec.units import parse_quantity
 from tests.service.spec.machine.test_shaft import changed
+from tests.service.spec_sample import changed as drive_changed
 from tests.service.spec_sample import parsed
 from tests.service.spec_sample import problems as drive_problems
 
@@ -127,6 +128,29 @@ def test_pasted_columns_are_settled() -> None:
     assert (values["/axes/0/values"], values["/axes/1/values"]) == ("20000 N*mm; 25000 N*mm", "0.5; 1")
     values = {COLUMNS: "shaft.load\tshaft.inertia\nN*mm\tkg*m^2\n20.000\t5\n25.000\t1\n"}
     assert "20 or 20000" in take_columns(values, choices)[COLUMNS][0]
+
+
+def test_a_list_of_texts_is_settled() -> None:
+    values = {"/axes": [{"path": "shaft.load", "values": ["20.000 N*mm", "120,5 N*mm"]}], "/exclude": []}
+    assert parsed(values).study.columns(range(2))["shaft.load"].tolist() == pytest.approx([20.0, 0.1205])
+    values["/axes"][0]["values"] = ["20.000 N*mm", "120.5 N*mm"]
+    assert parsed(values).study.columns(range(2))["shaft.load"].tolist() == pytest.approx([0.020, 0.1205])
+
+
+@pytest.mark.parametrize("rows", ["20.000;1500\n25.000;1600\n", "20.000;0.25\n25.000;1600,5\n30.000;2,5\n"])
+def test_what_was_accepted_before_keeps_its_meaning(rows: str) -> None:
+    points = POINTS.replace("shaft.load [N*mm]", "gravity [mm/s^2]") + rows
+    spec = drive_changed({"/axes": [{"points": points}], "/exclude": []})
+    with pytest.raises(SpecError):
+        parse_spec(spec)
+    study = parse_spec(accepted(spec)).study
+    assert study.columns(range(study.cases))["gravity"].tolist() == pytest.approx([0.020, 0.025, 0.030][: study.cases])
+    table = [["0 deg", "1.000 N*m"], ["30.5 deg", "0,5 N*m"], ["300 deg", "2.500 N*m"]]
+    operation = {"quantity": "torque", "table": table}
+    machine = accepted(changed({"/base/operation": operation, "/base/drive/inertia": 1e6, "/axes": []}))
+    structure = parse_spec(machine).study.structure
+    assert structure is not None
+    assert [row[1] for row in structure["operation"]["table"]["rows"]] == [1.0, 0.5, 2.5]
 
 
 ROWS = [[0.0, 100.0], [pytest.approx(0.5 * math.pi), 300.0], [pytest.approx(math.radians(355.5)), 100.0]]
