@@ -58,7 +58,14 @@ class Design(TypedDict):
         Doc("what goals and limits are about, at each operating point; null where missing"),
     ]
     feasible: Annotated[bool, Doc("whether it is within every limit")]
-    failed: Annotated[bool, Doc("whether one of its cases has failed, or a goal is missing")]
+    failed: Annotated[bool, Doc("whether one of its cases has failed or had not settled, or a goal is missing")]
+    regimes: Annotated[
+        list[str | None] | None,
+        Doc(
+            "regime of the nominal drive at each operating point, null for a failed case; null for runs of a given time"
+        ),
+    ]
+    flags: Annotated[list[str], Doc("flags of all its cases, each once")]
     violation: Annotated[Number, Doc("sum of the relative violations of limits; 0 if feasible, null if failed")]
     miss: Annotated[Number, Doc("largest relative distance from the value of an equality; null where missing")]
     exact: Annotated[bool, Doc("whether it is feasible with its equalities met to 1e-6; without equalities, feasible")]

@@ -42,7 +42,7 @@ class AnswerFacts(TypedDict):
     error: Annotated[float | None, Doc("of a refined curve, relative to its range")]
     regime: str | None
     flags: list[str]
-    why: Annotated[str | None, Doc("why there is no value: no-case, outside, not-joined or no-result")]
+    why: Annotated[str | None, Doc("why there is no value: no-case, outside, not-joined, no-result or unsettled")]
 
 
 class AnswerValue(AnswerFacts):

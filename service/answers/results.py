@@ -139,6 +139,7 @@ class Curve(TypedDict):
     cases: list[int]
     y: dict[str, list[Number]]
     endings: list[str]
+    flags: Annotated[list[list[str]], Doc("flags of each case; a case that had not settled is a missing value")]
     regime: NotRequired[Annotated[list[str | None], Doc("regime of each case of a settled study; null: none")]]
     order: NotRequired[
         Annotated[
@@ -208,6 +209,7 @@ class MapData(TypedDict):
     endings: Annotated[
         list[list[str]], Doc("of a refined map: interpolated; jump, where it must not be interpolated; pending")
     ]
+    flags: NotRequired[Annotated[list[list[list[str]]], Doc("flags of each case; not of a refined map")]]
     regime: NotRequired[Annotated[list[list[str | None]], Doc("regime of each case of a settled study; null: none")]]
     order: NotRequired[
         Annotated[

@@ -76,10 +76,11 @@ def _show(found: dict[str, Any]) -> None:
             *design["variables"].values(),
             *chain.from_iterable(design["results"][name] for name in limited),
             *(design[name] for name in ("feasible", "exact", "rank")),
+            ", ".join(dict.fromkeys([*filter(None, design["regimes"] or ()), *design["flags"]])),
         )
         for design in found["designs"]
     ]
-    columns += [(_("feasible"), False), (_("exact"), False), (_("rank"), True)]
+    columns += [(_("feasible"), False), (_("exact"), False), (_("rank"), True), (_("motion"), False)]
     show_table(", ".join(parts), columns, rows)
 
 

@@ -13,6 +13,7 @@ from sprag.service.jobs.reading import reading_of
 from sprag.service.json_text import numbers, to_bytes
 from sprag.service.results import exports
 from sprag.service.results.calibration import calibration_csv, calibration_json
+from sprag.service.results.curves import flag_names
 from sprag.service.results.directions import in_words
 from sprag.service.results.figures.calibration import calibration_figure
 from sprag.service.results.figures.front import front_figure, history_figure
@@ -72,6 +73,7 @@ def curves_csv(library: Library, study_id: str, query: CurveQuery, choice: Choic
             **dict(kinds),
             **_jumped(curve),
             **_not_joined(curve, [info.name for info in curves.selection.results]),
+            "flags": [" ".join(names) for names in flag_names(curve.flags or [""] * points)],
             "ending": curve.endings,
         }
         for name, part in parts.items():

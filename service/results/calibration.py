@@ -109,7 +109,7 @@ def calibration_of(study: Study, rounds: list[RoundRecord], fetch: Fetch) -> Cal
         endings = [ending or WorkerEnding.CANCELLED for ending in columns.endings]
         if WorkerEnding.CANCELLED in endings:
             break
-        ok = np.array([ending == models.OK for ending in endings])
+        ok = models.usable(study.model, columns.endings, columns.flags)
         planner.tell(Rows(study.points(record.cases), ok, columns.values))
     refits = planner.state.refits
     converged = 0 if refits is None else int(np.count_nonzero(refits.converged))

@@ -35,9 +35,9 @@ from sprag.service.results.selection import (
 )
 from sprag.service.results.sweeps import jumps_of_line, swept_along
 from sprag.service.spec.catalogue import unit_of
+from sprag.worker import models
 from sprag.worker.codes import PENDING
 from sprag.worker.limits import MAX_CURVE_VALUES
-from sprag.worker.models import regime_info
 from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
@@ -85,8 +85,10 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
     made = tuple(lines)
     units = {path: unit_of(study, path) for path in (query.x, *made[0].by, *made[0].at)}
     names = {path: axis_name(study, path) for path in (query.x, *made[0].by)}
-    held, regime = held_texts(study, made[0].at), regime_info(infos)
-    return Selection(query.x, units, names, held, x_values, results, made, regime, plan, swept_along(study, query.x))
+    held, regime = held_texts(study, made[0].at), models.regime_info(infos)
+    return Selection(
+        study.model, query.x, units, names, held, x_values, results, made, regime, plan, swept_along(study, query.x)
+    )
 
 
 def draw(selection: Selection, fetch: Fetch) -> Curves:
@@ -98,9 +100,10 @@ def draw(selection: Selection, fetch: Fetch) -> Curves:
     columns = fetch(np.concatenate([line.cases for line in selection.lines]), needed)
     endings = [ending or PENDING for ending in columns.endings]
     regimes, orders = kinds_of(columns.values, selection.regime)
+    usable = models.usable(selection.model, columns.endings, columns.flags)
     refined: list[Refined] | None = None
     if selection.plan is not None:
-        refined = refined_curves(selection.plan, selection.lines, ~not_run(endings), columns)
+        refined = refined_curves(selection.model, selection.plan, selection.lines, ~not_run(endings), columns)
     curves, start = [], 0
     for place, line in enumerate(selection.lines):
         part = slice(start, start + line.cases.size)
@@ -110,7 +113,7 @@ def draw(selection: Selection, fetch: Fetch) -> Curves:
         if selection.swept and regimes and orders:
             jumps = jumps_of_line(line, columns.flags[part], regimes[part], orders[part])
         kinds = regimes and regimes[part], orders and orders[part]
-        curves.append(Curve(line, y, endings[part], *kinds, own, jumps, columns.flags[part] or None))
+        curves.append(Curve(line, y, endings[part], *kinds, own, jumps, columns.flags[part] or None, usable[part]))
         start = part.stop
     return Curves(selection, tuple(curves))
 
@@ -137,7 +140,7 @@ def draw_map(
     x_values, lines = _grid_lines(study, x_axis, {y: y_axis}, fixed, 1, way_out="give")
     rows = list(lines)
     cases = np.stack([row.cases for row in rows])
-    regime = regime_info(infos)
+    regime = models.regime_info(infos)
     columns = fetch(cases.reshape(-1), _with_kinds([z], regime))
     endings = [ending or PENDING for ending in columns.endings]
     regimes, orders = kinds_of(columns.values, regime)
@@ -159,6 +162,7 @@ def draw_map(
         [endings[start : start + width] for start in starts],
         None if regimes is None else [regimes[start : start + width] for start in starts],
         None if orders is None else [orders[start : start + width] for start in starts],
+        flags=[columns.flags[start : start + width] for start in starts] if columns.flags else None,
     )
 
 

@@ -62,9 +62,11 @@ class Selection:
 
     For display: ``names`` of the drawn paths with those tied to them, and ``held``, the fixed ones with their values,
     including constant ones of the operating point. ``regime`` is the result that gives the kind of motion, where the
-    study has one; ``plan`` is that of curves that were refined over x; ``swept``: x is the axis of a sweep.
+    study has one; ``plan`` is that of curves that were refined over x; ``swept``: x is the axis of a sweep. ``model``
+    is named as in specs.
     """
 
+    model: str
     x: str
     units: dict[str, str]
     names: dict[str, str]
@@ -83,7 +85,8 @@ class Curve:
 
     Of a settled study also with their regimes, and the excitation periods after which their motions repeat;
     of a refined curve what its planner says of it, of a sweep its jumps. ``flags`` are those of each case, joined by
-    commas, where they are known.
+    commas, where they are known, and ``usable`` says which results count (`sprag.worker.models.usable`): no line goes
+    through others, and no answer is read from them.
     """
 
     line: Line
@@ -94,6 +97,11 @@ class Curve:
     refined: Refined | None = None
     jumps: list[Jump] | None = None
     flags: list[str] | None = None
+    usable: NDArray[np.bool_] | None = None
+
+    def known(self, name: str) -> NDArray[np.float64]:
+        """A result of each case; NaN where there is none that counts."""
+        return self.y[name] if self.usable is None else np.where(self.usable, self.y[name], np.nan)
 
     def run(self) -> NDArray[np.intp]:
         """Indices of the cases that were run, ascending, which a picture joins; of a coarser study, its own points."""
@@ -108,6 +116,7 @@ class Curve:
             "cases": self.line.cases.tolist(),
             "y": {info.name: numbers(self.y[info.name], info.kind == "count") for info in results},
             "endings": self.endings,
+            "flags": flag_names(self.flags or [""] * len(self.endings)),
         }
         if self.regimes is not None and self.orders is not None:
             data = {**data, "regime": self.regimes, "order": self.orders}
@@ -164,6 +173,7 @@ class Map:
     regimes: list[list[str | None]] | None = None
     orders: list[list[int | None]] | None = None
     refined: RefinedMap | None = None
+    flags: list[list[str]] | None = None
     title: str = ""
 
     def to_json(self) -> MapData:
@@ -201,6 +211,8 @@ class Map:
             "cases": self.cases.tolist(),
             "endings": self.endings,
         }
+        if self.flags is not None:
+            data = {**data, "flags": [flag_names(row) for row in self.flags]}
         if self.regimes is None or self.orders is None:
             return data
         return {**data, "regime": self.regimes, "order": self.orders}
@@ -223,6 +235,7 @@ class Map:
             endings=[[self.endings[row][column] for column in columns] for row in rows],
             regimes=self.regimes and [[self.regimes[row][column] for column in columns] for row in rows],
             orders=self.orders and [[self.orders[row][column] for column in columns] for row in rows],
+            flags=self.flags and [[self.flags[row][column] for column in columns] for row in rows],
         )
 
 
@@ -239,6 +252,11 @@ def _complete(missing: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.
             columns[column], in_columns[column] = False, 0
             in_rows -= missing[:, column] & rows
     return np.flatnonzero(rows), np.flatnonzero(columns)
+
+
+def flag_names(flags: Sequence[str]) -> list[list[str]]:
+    """The flags of each case, which are joined by commas, as lists."""
+    return [[name for name in text.split(",") if name] for text in flags]
 
 
 def not_run(endings: Sequence[str] | Sequence[Sequence[str]]) -> NDArray[np.bool_]:

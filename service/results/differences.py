@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sprag.service.results import exports
+from sprag.service.results.curves import flag_names
 from sprag.service.results.directions import in_words
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def _key(by: Mapping[str, float]) -> tuple[tuple[str, str], ...]:
 def _less(curve: Curve, base: Curve | None) -> Curve:
     nothing = np.full(len(curve.line.x), np.nan)
     x = np.asarray(curve.line.x)
-    y = {name: nothing if base is None else own - _at(base, name, x) for name, own in curve.y.items()}
+    y = {name: nothing if base is None else curve.known(name) - _at(base, name, x) for name in curve.y}
     # What is said of the curve itself is not said of its difference.
     return replace(curve, y=y, regimes=None, orders=None, refined=None, jumps=None)
 
@@ -55,7 +56,7 @@ def _less(curve: Curve, base: Curve | None) -> Curve:
 def _at(base: Curve, name: str, x: NDArray[np.float64]) -> NDArray[np.float64]:
     """A result of the reference at places ``x``, array of the same shape."""
     order = np.argsort(np.asarray(base.line.x), kind="stable")
-    known, values = np.asarray(base.line.x)[order], base.y[name][order]
+    known, values = np.asarray(base.line.x)[order], base.known(name)[order]
     # Places that differ by rounding only are the same.
     near = np.clip(np.searchsorted(known, x), 1, max(len(known) - 1, 1)) if len(known) > 1 else np.ones(len(x), int)
     left, right = near - 1, np.minimum(near, len(known) - 1)
@@ -83,6 +84,8 @@ def compared_csv(drawn: Sequence[tuple[str, Curves]], reading: Reading) -> bytes
                 "case": curve.line.cases.tolist(),
                 chosen.x: list(curve.line.x),
                 **{info.name: curve.y[info.name].tolist() for info in chosen.results},
+                **({} if curve.regimes is None else {"regime": curve.regimes}),
+                "flags": [" ".join(names) for names in flag_names(curve.flags or [""] * points)],
                 "ending": curve.endings,
             }
             rows = len(columns["study"])

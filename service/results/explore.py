@@ -12,6 +12,7 @@ import numpy as np
 from sprag.service.answers.explore import Exploration, ExploredCase, Histogram
 from sprag.service.results import exports
 from sprag.service.results.directions import case_values
+from sprag.service.results.regimes import kind_columns
 from sprag.service.results.selection import listed, locate_axes, own_paths, refuse_mixed_texts, refused, value_of
 from sprag.service.spec.catalogue import result_of, unit_of
 from sprag.service.spec.report import did_you_mean
@@ -180,7 +181,11 @@ def explore(study: Study, plan: Plan, rows: RowColumns) -> Explored:
     """The cases that a checked question selects, of a study whose finished cases have these ``rows``."""
     known = len(rows.cases)
     parameters = study.columns(rows.cases) if known else {}
-    every = {**rows.values, **parameters}
+    counts = models.usable(study.model, [ending for ending, _ in rows.kinds], [flags for _, flags in rows.kinds])
+    missing = ~counts[rows.kind] if known else np.empty(0, dtype=np.bool_)
+    kinds = kind_columns(plan.regime)
+    results = {n: v if n in kinds or not known else np.where(missing, np.nan, v) for n, v in rows.values.items()}
+    every = {**results, **parameters}
     empty = np.empty(0)
     selected = np.ones(known, dtype=np.bool_)
     for one in plan.ranges:

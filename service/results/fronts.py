@@ -12,6 +12,7 @@ from sprag.service.answers.goals import Design, DesignGoal, DesignLimit, DesignV
 from sprag.service.faults import Fault, FaultError
 from sprag.service.json_text import numbers
 from sprag.service.results import exports
+from sprag.service.results.regimes import kind_columns
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 from sprag.worker.models import WorkerEnding
@@ -61,6 +62,10 @@ class Designs:
         Which of ``rounds`` each design belongs to.
     pending : int
         Designs that are still to be run, or never were.
+    regimes : list of lists or None
+        Of each design those at its operating points, of the nominal drive; None for a search of runs of a given time.
+    flags : list of lists of str
+        Of each design those of all its cases, each once.
     """
 
     study: Study
@@ -74,6 +79,8 @@ class Designs:
     rounds: list[RoundRecord]
     round: NDArray[np.int64]
     pending: int
+    regimes: list[list[str | None]] | None
+    flags: list[list[str]]
 
     @property
     def counts(self) -> dict[str, int]:
@@ -123,13 +130,17 @@ def designs_of(study: Study, rounds: list[RoundRecord], fetch: Fetch, *, exact: 
     plan = goal_of(study)
     each, drives = plan.cases_each, 1 + plan.drives
     whole = range(study.cases - study.cases % each)
-    columns = fetch(np.arange(whole.stop, dtype=np.int64), list(plan.results))
+    infos = models.study_results(study)
+    regime = models.regime_info(infos)
+    names = models.with_half_widths([*plan.results, *kind_columns(regime)[:1]], (info.name for info in infos))
+    columns = fetch(np.arange(whole.stop, dtype=np.int64), names)
     endings = np.array([ending or WorkerEnding.CANCELLED for ending in columns.endings], dtype=object)
     ended = (endings != WorkerEnding.CANCELLED).reshape(-1, each).all(axis=1)
     known = ended & ~_for_derivatives(rounds, len(ended), each)
     kept = np.repeat(known, each)
     values = {name: column[kept] for name, column in columns.values.items()}
-    rows = Rows(study.points(whole)[kept], endings[kept] == models.OK, values)
+    rows = Rows(study.points(whole)[kept], models.usable(study.model, columns.endings, columns.flags)[kept], values)
+    flags = np.array(columns.flags or [""] * whole.stop, dtype=object)[kept].reshape(-1, each).tolist()
     found = front(plan, rows, equality=MET if exact else None)
     numbers_ = np.flatnonzero(known)
     found.cases[:] = numbers_[:, None] * each + np.arange(0, each, drives)
@@ -147,7 +158,15 @@ def designs_of(study: Study, rounds: list[RoundRecord], fetch: Fetch, *, exact: 
         rounds=rounds,
         round=np.searchsorted([record.cases.start for record in rounds], found.cases[:, 0], side="right") - 1,
         pending=int(np.count_nonzero(~ended)),
+        regimes=None if regime is None else _regimes(regime, values[regime.name].reshape(-1, each)[:, ::drives]),
+        flags=[list(dict.fromkeys(name for text in own for name in text.split(",") if name)) for own in flags],
     )
+
+
+def _regimes(regime: ResultInfo, codes: NDArray[np.float64]) -> list[list[str | None]]:
+    """Names of regimes, None for a case without, from their codes."""
+    cells = [[regime.cell(code) for code in own] for own in codes.tolist()]
+    return [[None if cell is None else str(cell) for cell in own] for own in cells]
 
 
 def _for_derivatives(rounds: Sequence[RoundRecord], designs: int, each: int) -> NDArray[np.bool_]:
@@ -235,6 +254,8 @@ def design_json(found: Designs, position: int) -> Design:
         },
         "feasible": bool(ranked.feasible[position]),
         "failed": bool(ranked.failed[position]),
+        "regimes": None if found.regimes is None else found.regimes[position],
+        "flags": found.flags[position],
         "violation": _finite(ranked.violation[position]),
         "miss": _finite(ranked.miss[position]),
         "exact": bool(found.exact[position]),
@@ -263,10 +284,13 @@ def front_csv(found: Designs, limit: int = DESIGNS) -> bytes:
     header = ["design", "case", *columns, *(one.paths[0] for one in plan.vary)]
     header += [f"{plan.over}.{goal.name}" for goal in plan.best if len(points) > 1]
     header += [name if len(points) == 1 else f"{name}.{number}" for name in found.values for number in points]
+    own = found.regimes is not None and not any(item.result == "regime" for item in plan.items)
+    header += ["regime" if len(points) == 1 else f"regime.{number}" for number in points if own] + ["flags"]
     rows: list[list[Any]] = []
     for position in found.order[:limit].tolist():
         design = cast("dict[str, Any]", design_json(found, position))
         row = [design["design"], design["cases"][0], *(design[name] for name in columns), *design["variables"].values()]
         row += design["goals"].values() if len(points) > 1 else ()
-        rows.append([*row, *chain.from_iterable(design["results"].values())])
+        row += chain.from_iterable(design["results"].values())
+        rows.append([*row, *(design["regimes"] if own else ()), " ".join(design["flags"])])
     return exports.table_csv(header, zip(*rows, strict=True) if rows else [[] for _ in header])

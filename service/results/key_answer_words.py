@@ -38,6 +38,8 @@ def _missing(found: AnswerFacts, x_unit: str) -> Phrase:
     why = found["why"] or "no-result"
     if why == "not-joined":
         return Phrase("not interpolated: the motion changes between {places}", places=_between(found, x_unit))
+    if why == "unsettled":
+        return Phrase("not settled there: a missing value") if found["cases"] else Phrase("no case had settled")
     if why == "no-result":
         return Phrase("no case has this result")
     if found["x"] is None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from sprag.service.results.defaults import drawn_results, main_query, main_resul
 from sprag.service.results.joined import joined_points
 from sprag.service.results.phrases import Name, Phrase
 from sprag.service.results.refined import curve_plan
+from sprag.service.results.regimes import kind_columns
 from sprag.service.results.selection import refused, require_axis, value_of
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
@@ -32,13 +33,12 @@ if TYPE_CHECKING:
 
     from sprag.service.results.curves import CurveQuery, Curves, Fetch
     from sprag.service.storage.records import CaseColumns
-    from sprag.worker.models import Presentation, ResultInfo
+    from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
 
-#: Why there is no value: no case there, beyond the ends of the axis, between points that no line joins, no result.
-Why = Literal["no-case", "outside", "not-joined", "no-result"]
-#: Ending of the names of half widths of the intervals of means of irregular motion.
-_HALF: Final = ".half_width"
+#: Why there is no value: no case there, beyond the ends of the axis, between points that no line joins, no result, or
+#: only results of motions that had not settled.
+Why = Literal["no-case", "outside", "not-joined", "no-result", "unsettled"]
 #: Results of all cases by their names, in order of the cases.
 Whole = Callable[[Sequence[str]], "CaseColumns"]
 
@@ -181,8 +181,8 @@ def find_answers(
     SelectionError
         As `select` does; and where ``point`` is given although there is no axis for it.
     """
-    shown, answers, by_name = models.presentation_of(study), answers_of_model(study, infos), {i.name: i for i in infos}
-    overall = () if whole is None else tuple(_overall(study, shown, answers, by_name, whole))
+    answers, by_name = answers_of_model(study, infos), {info.name: info for info in infos}
+    overall = () if whole is None else tuple(_overall(study, answers, by_name, whole))
     if query is None:
         if point:
             raise refused("point", "not-used", "the cases of this study lie on no curves", point, allowed="no point")
@@ -190,11 +190,10 @@ def find_answers(
         return StudyAnswers(None, None, "1", curves, () if study.cases == 1 else overall, None)
     x = read_point(study, query, point)
     names = dict.fromkeys([*query.y, *(one.result for one in answers)])
-    names |= dict.fromkeys(name + _HALF for name in tuple(names) if name + _HALF in by_name)
-    drawn = draw(select(study, infos, replace(query, y=tuple(names))), fetch)
+    drawn = draw(select(study, infos, replace(query, y=tuple(models.with_half_widths(names, by_name)))), fetch)
     found = []
     for curve in drawn.curves:
-        reader = _Reader(curve, shown, query.x, x)
+        reader = _Reader(curve, query.x, x)
         main = (Answer(name, name, name, "here") for name in query.y)
         found.append(
             CurveAnswers(
@@ -223,47 +222,55 @@ def _single(
     main = [Answer(name, name, name, "here") for name in main_results(study, infos)]
     here = [one for one in answers if one.kind == "here"]
     names = dict.fromkeys(one.result for one in (*main, *here))
-    columns = fetch(np.zeros(1, dtype=np.int64), list(names))
+    columns = fetch(np.zeros(1, dtype=np.int64), models.with_half_widths(names, by_name))
     line = Line({}, {}, (0.0,), np.zeros(1, dtype=np.int64))
-    flags = columns.flags[0].split(",") if columns.flags and columns.flags[0] else []
+    usable = models.usable(study.model, columns.endings, columns.flags)
 
     def one(answer: Answer) -> Found:
         info, value = by_name[answer.result], float(columns.values[answer.result][0])
-        known = math.isfinite(value)
-        why: Why | None = None if known else "no-result"
-        return Found(answer, info, info.unit, value if known else None, why, case=0, cases=1, flags=tuple(flags))
+        known = math.isfinite(value) and bool(usable[0])
+        width = columns.values.get(models.half_width(info.name), np.array([np.nan]))[0]
+        return Found(
+            answer, info, info.unit, value if known else None, None if known else _why(np.array([value])),
+            case=0, cases=1,
+            flags=_split(columns.flags, [0]),
+            half_width=float(width) if known and np.isfinite(width) else None,
+        )  # fmt: skip
 
     return CurveAnswers(line, tuple(map(one, here)), tuple(map(one, main)))
 
 
-def _overall(
-    study: Study, shown: Presentation, answers: Sequence[Answer], by_name: dict[str, ResultInfo], whole: Whole
-) -> Iterator[Found]:
+def _overall(study: Study, answers: Sequence[Answer], by_name: dict[str, ResultInfo], whole: Whole) -> Iterator[Found]:
     """The extremes among all cases of a study; none of one that chooses its own cases, or has one."""
     extremes = [one for one in answers if one.kind in ("largest", "smallest")]
     if not extremes or study.cases == 1 or study.plan is not None:
         return
-    columns = whole(list(dict.fromkeys(one.result for one in extremes)))
+    regime = models.regime_info(tuple(by_name.values()))
+    names = [*(one.result for one in extremes), *kind_columns(regime)[:1]]
+    columns = whole(models.with_half_widths(names, by_name))
+    settled = ~models.unsettled(study.model, columns.flags) if columns.flags else True
     for answer in extremes:
         info, values = by_name[answer.result], columns.values[answer.result]
-        kept = _preferred(values, columns.flags, shown)
+        kept = np.flatnonzero(np.isfinite(values) & settled)
         if not kept.size:
-            yield Found(answer, info, info.unit, why="no-result")
+            yield Found(answer, info, info.unit, why=_why(values))
             continue
         place = int(kept[_best(values[kept], answer)])
-        flags, case = _split(columns.flags, [place]), int(columns.cases[place])
-        yield Found(answer, info, info.unit, float(values[place]), case=case, cases=kept.size, flags=flags)
+        width = columns.values.get(models.half_width(info.name), np.full(values.size, np.nan))[place]
+        kind = None if regime is None else regime.cell(float(columns.values[regime.name][place]))
+        yield Found(
+            answer, info, info.unit, float(values[place]),
+            case=int(columns.cases[place]),
+            cases=kept.size,
+            regime=None if kind is None else str(kind),
+            flags=_split(columns.flags, [place]),
+            half_width=float(width) if np.isfinite(width) else None,
+        )  # fmt: skip
 
 
-def _preferred(values: NDArray[np.float64], flags: Sequence[str], shown: Presentation) -> NDArray[np.int64]:
-    """Places with a value, without those whose flags make them doubtful unless there are no others."""
-    known = np.isfinite(values)
-    doubtful = set(shown.doubtful)
-    if doubtful and flags:
-        kinds = {text: bool(doubtful & set(text.split(","))) for text in set(flags)}
-        sound = known & ~np.array([kinds[text] for text in flags], dtype=np.bool_)
-        known = sound if sound.any() else known
-    return np.flatnonzero(known).astype(np.int64)
+def _why(values: NDArray[np.float64]) -> Why:
+    """Why none of these results counts."""
+    return "unsettled" if np.isfinite(values).any() else "no-result"
 
 
 def _best(values: NDArray[np.float64], answer: Answer) -> int:
@@ -278,8 +285,8 @@ def _split(flags: Sequence[str], places: Sequence[int]) -> tuple[str, ...]:
 class _Reader:
     """Reads answers off one curve."""
 
-    def __init__(self, curve: Curve, shown: Presentation, path: str, point: float | None) -> None:
-        self._curve, self._shown, self._path, self._point = curve, shown, path, point
+    def __init__(self, curve: Curve, path: str, point: float | None) -> None:
+        self._curve, self._path, self._point = curve, path, point
         self._x = np.asarray(curve.line.x, dtype=np.float64)
         self._flags = curve.flags or []
 
@@ -314,7 +321,7 @@ class _Reader:
         return replace(found, **more)  # type: ignore[arg-type]
 
     def _half_width(self, info: ResultInfo, places: Sequence[int]) -> float | None:
-        widths = self._curve.y.get(info.name + _HALF)
+        widths = self._curve.y.get(models.half_width(info.name))
         known = [] if widths is None else [float(widths[place]) for place in places if np.isfinite(widths[place])]
         return max(known, default=None)
 
@@ -325,10 +332,10 @@ class _Reader:
         return self._at(answer, info, 0.0)
 
     def _extreme(self, answer: Answer, info: ResultInfo) -> Found:
-        values = self._curve.y[info.name]
-        kept = _preferred(values, self._flags, self._shown)
+        values = self._curve.known(info.name)
+        kept = np.flatnonzero(np.isfinite(values))
         if not kept.size:
-            return Found(answer, info, info.unit, why="no-result")
+            return Found(answer, info, info.unit, why=_why(self._curve.y[info.name]))
         place = int(kept[_best(values[kept], answer)])
         around = np.unique(self._x[np.isfinite(values)]) if np.all(np.diff(self._x) > 0.0) else self._x[[place]]
         own = int(np.searchsorted(around, self._x[place]))
@@ -339,12 +346,12 @@ class _Reader:
 
     def _until_zero(self, answer: Answer, info: ResultInfo) -> Found:
         """The last x with a value above 0, and the next one with a case at 0."""
-        values = self._curve.y[info.name]
+        values = self._curve.known(info.name)
         moving = np.flatnonzero(np.nan_to_num(values) > 0.0)
         at_rest = np.flatnonzero(values == 0.0)
         count = int(np.isfinite(values).sum())
         if not moving.size:
-            why: Why = "outside" if at_rest.size else "no-result"
+            why: Why = "outside" if at_rest.size else _why(self._curve.y[info.name])
             return Found(answer, info, info.unit, why=why, cases=count)
         last = int(moving[np.argmax(self._x[moving])])
         after = at_rest[self._x[at_rest] > self._x[last]]
@@ -361,13 +368,20 @@ class _Reader:
         nothing = Found(answer, info, info.unit, x=point)
         if point is None or not self._x.size:
             return replace(nothing, why="no-case")
-        run, values = self._curve.run(), self._curve.y[info.name]
+        run, values = self._curve.run(), self._curve.known(info.name)
         scale = max(float(np.max(np.abs(self._x))), abs(point))
         exact = [place for place in run.tolist() if abs(self._x[place] - point) <= SAME_VALUE * scale]
         if exact:
             place = exact[0]
             if not np.isfinite(values[place]):
-                return replace(nothing, why="no-result", case=int(self._curve.line.cases[place]))
+                kinds = self._curve.regimes
+                return replace(
+                    nothing,
+                    why=_why(self._curve.y[info.name][[place]]),
+                    case=int(self._curve.line.cases[place]),
+                    regime=None if kinds is None else kinds[place],
+                    flags=_split(self._flags, [place]),
+                )
             return self._of(answer, info, [place], float(values[place]), cases=1)
         x = self._x[run]
         known = x[np.isfinite(values[run])]

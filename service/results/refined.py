@@ -50,7 +50,7 @@ def families(plan: RefinePlan) -> list[str]:
 
 
 def refined_curves(
-    plan: RefinePlan, lines: Sequence[Line], run: NDArray[np.bool_], columns: CaseColumns
+    model: str, plan: RefinePlan, lines: Sequence[Line], run: NDArray[np.bool_], columns: CaseColumns
 ) -> list[Refined]:
     """What the planner says of each line, which is one combination of the fixed axes.
 
@@ -60,7 +60,7 @@ def refined_curves(
     points = [_points(plan, line) for line in lines]
     rows = Rows(
         np.concatenate(points)[run],
-        (np.array(columns.endings, dtype=object) == models.OK)[run],
+        models.usable(model, columns.endings, columns.flags)[run],
         {name: columns.values[name][run] for name in plan.needed},
     )
     every = describe(plan, rows)

@@ -170,7 +170,7 @@ def _described(
     columns = fetch(cases, plan.needed)
     endings = [ending or PENDING for ending in columns.endings]
     run = ~not_run(endings)
-    ok = np.array(endings, dtype=object) == models.OK
+    ok = models.usable(study.model, columns.endings, columns.flags)
     values = {name: columns.values[name][run] for name in plan.needed}
     points = every[cases]
     number = int(plan.places(points[:1])[0][0])

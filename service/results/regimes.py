@@ -72,19 +72,24 @@ MARKED: Final = tuple(name for name in MARKS if name != "periodic")
 DOUBTFUL: Final = ("irregular", UNSETTLED)
 
 
-def stretches(regimes: Sequence[str | None] | None, points: int) -> list[NDArray[np.int64]]:
-    """Indices of the points that a line joins: neighbours of one regime, or coasting and periodic; no unsettled point.
+def stretches(
+    regimes: Sequence[str | None] | None, points: int, usable: NDArray[np.bool_] | None = None
+) -> list[NDArray[np.int64]]:
+    """Indices of the points that a line joins: neighbours of one regime, or coasting and periodic.
 
-    A point without a regime (it has no result) belongs to no stretch, unless the study has no regimes at all.
+    A point without a regime (it has no result) belongs to no stretch, unless the study has no regimes at all. A point
+    whose result does not count (``usable``) is a stretch of its own.
     """
-    if regimes is None:
+    counts = np.ones(points, dtype=np.bool_) if usable is None else usable
+    if regimes is None and counts.all():
         return [np.arange(points, dtype=np.int64)]
     found: list[list[int]] = []
-    for place, regime in enumerate(regimes):
-        if regime is None:
+    for place in range(points):
+        regime, before = (None, None) if regimes is None else (regimes[place], regimes[place - 1])
+        if regimes is not None and regime is None:
             continue
-        before = regimes[place - 1] if place else None
-        if found and regime != UNSETTLED and (regime == before or {regime, before} == _CONTINUOUS):
+        both = bool(counts[place] and counts[place - 1])
+        if found and both and (regime == before or {regime, before} == _CONTINUOUS):
             found[-1].append(place)
         else:
             found.append([place])

@@ -22,7 +22,7 @@ from sprag.service.faults import Fault
 from sprag.service.json_text import numbers
 from sprag.service.results.curves import Fetch
 from sprag.service.results.phrases import Phrase, plural
-from sprag.service.results.regimes import UNSETTLED, counted, kind_columns, kinds_of, left_out
+from sprag.service.results.regimes import counted, kind_columns, kinds_of, left_out
 from sprag.service.results.selection import SelectionError, axis_name, numeric_results, refused
 from sprag.service.results.sensitivity_design import (
     factorial_table,
@@ -133,7 +133,8 @@ def sensitivity(study: Study, spec: Mapping[str, Any], names: Sequence[str], fet
     columns = fetch(np.arange(study.cases, dtype=np.int64), list(dict.fromkeys([*names, *kinds])))
     regimes, _ = kinds_of(columns.values, regime)
     sample = _design(study, spec)
-    return [_of_result(study, varying, info, columns.values[info.name], regimes, sample) for info in results]
+    usable = models.usable(study.model, columns.endings, columns.flags)
+    return [_of_result(study, varying, info, columns.values[info.name], usable, regimes, sample) for info in results]
 
 
 def _design(study: Study, spec: Mapping[str, Any]) -> Mapping[str, Any] | None:
@@ -149,15 +150,15 @@ def _design(study: Study, spec: Mapping[str, Any]) -> Mapping[str, Any] | None:
     return sample if cases == study.cases else None
 
 
-def _settled_only(y: Numbers, regimes: list[str | None] | None, notes: list[str]) -> Numbers:
+def _settled_only(y: Numbers, usable: NDArray[np.bool_], regimes: list[str | None] | None, notes: list[str]) -> Numbers:
     """The result without unsettled cases; remarks about regimes are added to ``notes``."""
-    if regimes is None:
-        return y
-    names = np.array([name or "" for name in regimes])
-    unsettled = (names == UNSETTLED) & np.isfinite(y)
+    unsettled = ~usable & np.isfinite(y)
     if unsettled.any():
         notes.append(left_out(int(unsettled.sum())))
     y = np.where(unsettled, np.nan, y)
+    if regimes is None:
+        return y
+    names = np.array([name or "" for name in regimes])
     counts = Counter(names[np.isfinite(y)].tolist())
     if len(counts) > 1:
         text = counted(dict(counts.most_common()))
@@ -175,11 +176,12 @@ def _of_result(
     varying: list[Axis],
     info: ResultInfo,
     y: Numbers,
+    usable: NDArray[np.bool_],
     regimes: list[str | None] | None,
     sample: Mapping[str, Any] | None,
 ) -> Sensitivity:
     kinds: list[str] = []
-    y = _settled_only(y, regimes, kinds)
+    y = _settled_only(y, usable, regimes, kinds)
     known = np.isfinite(y)
     cases, missing = int(known.sum()), int((~known).sum())
     values = y[known]

@@ -47,8 +47,9 @@ class Rounds(Studies, Cases, Work):
         """The rows of one round."""
         with self.session.read() as connection:
             study_id = connection.execute(sa.select(STUDIES.c.id).where(STUDIES.c.number == number)).scalar_one()
-        columns = self.rows_for_cases(study_id, np.arange(cases.start, cases.stop), results)
-        ok = np.array([ending == models.OK for ending in columns.endings], dtype=np.bool_)
+        names = models.with_half_widths(results, (info.name for info in models.study_results(study)))
+        columns = self.rows_for_cases(study_id, np.arange(cases.start, cases.stop), names)
+        ok = models.usable(study.model, columns.endings, columns.flags)
         return Rows(study.points(cases), ok, columns.values)
 
     def append_round(

@@ -60,6 +60,7 @@ from sprag.worker.models.settled import (
     settled_study,
 )
 from sprag.worker.models.tasks import chunk_task, run_chunk, run_task
+from sprag.worker.models.usable import half_width, unsettled, usable, with_half_widths
 from sprag.worker.models.vibration_drive import (
     NOT_SETTLED,
     WINDUP_OUT_OF_DATA,
@@ -140,6 +141,7 @@ __all__ = [
     "extent",
     "fit_clutch",
     "flags_of",
+    "half_width",
     "has_clutches",
     "has_strobes",
     "is_compiled",
@@ -173,9 +175,12 @@ __all__ = [
     "source_hash",
     "study_results",
     "unregister",
+    "unsettled",
+    "usable",
     "variant_of",
     "variants",
     "warm_up",
+    "with_half_widths",
 ]
 
 VIBRATION_DRIVE = vibration_drive.MODEL

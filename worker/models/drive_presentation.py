@@ -60,7 +60,6 @@ PRESENTATION: Final = Presentation(
         Answer("best_efficiency", "Best efficiency", "efficiency", "largest"),
         Answer("stall_torque", "Stall torque", "shaft.speed.mean", "until_zero", along="shaft.load"),
     ),
-    doubtful=("not_settled", "unsettled"),
     columns=("regime", "shaft.speed.mean", "shaft.irregularity", "torque.mean", "power.useful.mean", "efficiency"),
     operating_point=_POINT,
     checks=("balance", "run", "reset", "regime"),

@@ -48,6 +48,11 @@ class Model(Protocol):
         return {}
 
     @property
+    def unsettled(self) -> frozenset[str]:
+        """The flags of cases whose results are missing values, because their motion had not settled."""
+        return frozenset()
+
+    @property
     def presentation(self) -> Presentation:
         """Presentation of the model to users."""
         return Presentation()

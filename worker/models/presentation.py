@@ -87,7 +87,6 @@ class Presentation:
     drawn : results of the main curve
     main : the main results of a machine; ``heading`` is their common title
     answers : what a page says first; where there are none, the largest and smallest values of the drawn results
-    doubtful : flags of cases whose results are not those of steady running: other cases are preferred as answers
     columns : results that the table of cases shows first
     operating_point : paths of parameters that every picture must state
     checks : first parts of the names of results that describe the computation rather than the machine
@@ -112,7 +111,6 @@ class Presentation:
     main: tuple[str, ...] = ()
     heading: str = "Main results"
     answers: tuple[Answer, ...] = ()
-    doubtful: tuple[str, ...] = ()
     columns: tuple[str, ...] = ()
     operating_point: tuple[str, ...] = ()
     checks: tuple[str, ...] = ()

@@ -196,6 +196,7 @@ class VibrationDrive(Model):
     name = MODEL
     endings = frozenset({Ending.ACCURACY_NOT_REACHED, Ending.CHATTER, Ending.STEP_BUDGET, Ending.DIVERGED})
     flags = FLAG_SENTENCES
+    unsettled = frozenset({NOT_SETTLED, Regime.UNSETTLED.name.lower()})
     presentation = PRESENTATION
 
     def parameters(self) -> tuple[Parameter, ...]:

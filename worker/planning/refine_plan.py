@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.worker.models.usable import half_width
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
@@ -22,7 +24,6 @@ REFINE: Final = "refine"
 #: Results of settled studies that tell regimes apart, and how a motion settles.
 REGIME, ORDER = "regime", "regime.order"
 MULTIPLIER, SETTLED_AFTER = "regime.multiplier", "regime.settled_after"
-_HALF_WIDTH: Final = ".half_width"
 _MAX_FINEST: Final = 65_536
 #: Numbers that a planner holds at most: results at every point of the finest grids.
 _MAX_NUMBERS: Final = 8_000_000
@@ -166,7 +167,7 @@ class RefinePlan:
     def needed(self) -> tuple[str, ...]:
         """Every result that the planner must be told."""
         own = (REGIME, ORDER, MULTIPLIER, SETTLED_AFTER) if self.regime else ()
-        widths = (name + _HALF_WIDTH for name in self.half_widths)
+        widths = (half_width(name) for name in self.half_widths)
         return tuple(dict.fromkeys((*self.results, *own, *widths)))
 
     @property
@@ -218,12 +219,7 @@ class RefinePlan:
 def half_widths_of(results: Iterable[str], names: Iterable[str]) -> tuple[str, ...]:
     """Those of the results for which there also is a result "NAME.half_width" among all ``names`` of a study."""
     every = set(names)
-    return tuple(name for name in results if name + _HALF_WIDTH in every)
-
-
-def half_width(name: str) -> str:
-    """Name of the half width of a result."""
-    return name + _HALF_WIDTH
+    return tuple(name for name in results if half_width(name) in every)
 
 
 def _power(number: int) -> bool:

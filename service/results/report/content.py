@@ -183,10 +183,8 @@ def make_report(
 ) -> Report:
     """The report of a study in its current state; reads all its rows once. ``spec`` is the user's own."""
     infos = models.study_results(study)
-    doubtful = models.presentation_of(study).doubtful
-    left_out = sum(kinds.flags.get(name, 0) for name in doubtful)
-    left_out = left_out if left_out < record.done else 0
-    every = ranges(infos, blocks, doubtful if left_out else ())
+    left_out = sum(count for name, count in kinds.flags.items() if models.unsettled(study.model, [name])[0])
+    every = ranges(study.model, infos, blocks)
     found = _answers_of(study, infos, chosen, point, fetch)
     drawn = None if found is None or figures else found.drawn
     already = frozenset(() if drawn is None else (info.name for info in drawn.selection.results))
@@ -296,10 +294,10 @@ def _shortened(text: str) -> str:
     )
 
 
-def ranges(infos: Sequence[ResultInfo], blocks: Iterable[RowBlock], doubtful: Sequence[str] = ()) -> tuple[Range, ...]:
+def ranges(model: str, infos: Sequence[ResultInfo], blocks: Iterable[RowBlock]) -> tuple[Range, ...]:
     """Least, mean and largest of every result over the rows, with the first case that has the extreme.
 
-    Rows with a flag of ``doubtful`` are left out, as answers leave them out.
+    Rows whose motion had not settled are left out.
     """
     columns = [index for index, info in enumerate(infos) if info.kind != "category"]
     every = np.arange(len(columns))
@@ -308,8 +306,7 @@ def ranges(infos: Sequence[ResultInfo], blocks: Iterable[RowBlock], doubtful: Se
     value = {np.less: np.full(every.size, np.inf), np.greater: np.full(every.size, -np.inf)}
     case = {better: np.zeros(every.size, dtype=np.int64) for better in value}
     for block in blocks:
-        sound = [not set(doubtful).intersection(flags.split(",")) for flags in block.flags]
-        values = np.where(np.array(sound, dtype=np.bool_)[:, None], block.values[:, columns], np.nan)
+        values = np.where(~models.unsettled(model, block.flags)[:, None], block.values[:, columns], np.nan)
         there = ~np.isnan(values)
         known += there.sum(axis=0)
         total += np.where(there, values, 0.0).sum(axis=0)

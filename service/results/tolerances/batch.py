@@ -11,11 +11,11 @@ import numpy as np
 from sprag.service.results.curve_cases import select
 from sprag.service.results.curves import CurveQuery, Fetch, Line, not_run
 from sprag.service.results.defaults import main_query
-from sprag.service.results.regimes import UNSETTLED, kind_columns
+from sprag.service.results.regimes import kind_columns
 from sprag.service.results.selection import axis_name, held_texts, locate_axes, refused
 from sprag.service.spec.catalogue import unit_of
+from sprag.worker import models
 from sprag.worker.codes import PENDING
-from sprag.worker.models import regime_info
 from sprag.worker.spread import DRIVE
 
 if TYPE_CHECKING:
@@ -146,8 +146,7 @@ def _single(study: Study, at: Sequence[tuple[str, str]]) -> Line:
 def read(places: Places, line: Line, names: Sequence[str], fetch: Fetch) -> Iterator[Rows]:
     """The rows of a line, some places at a time, so that memory does not grow with the number of places."""
     drives = places.study.drives + 1
-    regime = regime_info(places.infos)
-    needed = list(dict.fromkeys([*names, *(kind_columns(regime)[:1])]))
+    regime, needed = models.regime_info(places.infos), list(dict.fromkeys(names))
     at_once = max(BLOCK_CASES // drives, 1)
     for first in range(0, line.cases.size, at_once):
         part = slice(first, min(first + at_once, line.cases.size))
@@ -159,10 +158,10 @@ def read(places: Places, line: Line, names: Sequence[str], fetch: Fetch) -> Iter
         values = {name: np.full(cases.shape, np.nan) for name in needed}
         for name, column in columns.values.items():
             values[name][present] = column
-        if regime is not None:
-            unsettled = values[regime.name] == regime.categories.index(UNSETTLED)
-            for name in set(names) - {*kind_columns(regime)}:
-                values[name][unsettled] = np.nan
+        missing = np.zeros(cases.shape, dtype=np.bool_)
+        missing[present] = ~models.usable(places.study.model, columns.endings, columns.flags)
+        for name in set(names) - {*kind_columns(regime)}:
+            values[name][missing] = np.nan
         yield Rows(part, cases, {name: values[name] for name in names}, ~not_run(endings.tolist()))
 
 

@@ -15,6 +15,7 @@ from sprag.service.spec.catalogue import result_of
 from sprag.service.spec.numbers import in_language
 from sprag.service.spec.units import QuantityError, parse_quantity, plain_signs, split_quantity, to_float
 from sprag.worker import models
+from sprag.worker.models.usable import against
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -62,13 +63,15 @@ class Condition:
     of_nominal: bool
     text: Phrase
 
-    def margins(self, values: Numbers, nominal: Numbers) -> Numbers:
+    def margins(self, values: Numbers, nominal: Numbers, widths: Numbers | None = None) -> Numbers:
         """How far results are within the limit, relative to it: negative outside, -inf without a result.
 
-        ``values`` has the shape (places, drives), ``nominal`` (places,). Equalities have 0 and -1.
+        ``values`` has the shape (places, drives), ``nominal`` (places,). Equalities have 0 and -1. ``widths`` are half
+        widths of means of irregular motion, which count against the limit; NaN for none.
         """
         limit = np.broadcast_to(self.limit * nominal if self.of_nominal else np.float64(self.limit), nominal.shape)
         bound = limit[:, None]
+        values = against(self.kind, bound, values, widths)
         if self.kind == "is":
             found = np.where(values == bound, 0.0, -1.0)
         else:

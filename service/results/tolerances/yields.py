@@ -13,6 +13,7 @@ from sprag.service.results.tolerances.batch import Asked, Places, Rows, places_o
 from sprag.service.results.tolerances.causes import Causes, variance_causes
 from sprag.service.results.tolerances.conditions import Condition, read_conditions
 from sprag.service.results.tolerances.quantiles import Proportion, proportion
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -86,20 +87,22 @@ def yields(
 def _line(places: Places, line: Line, conditions: tuple[Condition, ...], worst: int, fetch: Fetch) -> YieldLine:
     count, drives = line.cases.size, places.study.drives
     names = list(dict.fromkeys(condition.info.name for condition in conditions))
+    fetched = models.with_half_widths(names, (info.name for info in places.infos))
     reached, run, failed, pending = (np.zeros(count, dtype=np.int64) for _ in range(4))
     nominal = np.zeros(count, dtype=np.bool_)
     whole = _Whole(drives, names)
-    for rows in read(places, line, names, fetch):
+    for rows in read(places, line, fetched, fetch):
         margins = np.full(rows.cases.shape, np.inf)
         for condition in conditions:
             values = rows.values[condition.info.name]
-            margins = np.minimum(margins, condition.margins(values, values[:, 0]))
+            widths = rows.values.get(models.half_width(condition.info.name))
+            margins = np.minimum(margins, condition.margins(values, values[:, 0], widths))
         own, done = margins[:, 1:], rows.done[:, 1:]
         nominal[rows.at] = margins[:, 0] >= 0.0
         reached[rows.at] = ((own >= 0.0) & done).sum(axis=1)
         run[rows.at] = done.sum(axis=1)
         pending[rows.at] = (~done & (rows.cases[:, 1:] >= 0)).sum(axis=1)
-        known = np.all([np.isfinite(values[:, 1:]) for values in rows.values.values()], axis=0)
+        known = np.all([np.isfinite(rows.values[name][:, 1:]) for name in names], axis=0)
         failed[rows.at] = (done & ~known).sum(axis=1)
         whole.take(rows, own, done)
     every = whole.done

@@ -28,8 +28,9 @@ ORDERS = [1.0, 2.0, 1.0, np.nan, 4.0, np.nan, np.nan, np.nan]
 REGIMES = ["coasting", "periodic", "periodic", "irregular", "periodic", "unsettled", "unsettled", None]
 
 
-def joined(regimes: list[str | None] | None, points: int = 8) -> list[list[int]]:
-    return [stretch.tolist() for stretch in stretches(regimes, points)]
+def joined(regimes: list[str | None] | None, points: int = 0) -> list[list[int]]:
+    usable = np.array([name != "unsettled" for name in regimes or [""] * points])
+    return [stretch.tolist() for stretch in stretches(regimes, len(usable), usable)]
 
 
 def test_a_line_joins_neighbours_of_one_regime_and_no_unsettled_point() -> None:
@@ -37,8 +38,10 @@ def test_a_line_joins_neighbours_of_one_regime_and_no_unsettled_point() -> None:
     assert joined(["held", "coasting", "periodic", "held"]) == [[0], [1, 2], [3]]
     assert joined(["irregular"] * 3) == [[0, 1, 2]]
     assert joined(["periodic", None, "periodic"]) == [[0], [2]]
-    assert joined(None) == [list(range(8))]
+    assert joined(None, 8) == [list(range(8))]
     assert joined([]) == []
+    counts = np.array([True, False, True, True])
+    assert [part.tolist() for part in stretches(None, 4, counts)] == [[0], [1], [2, 3]]
 
 
 def test_regimes_are_told_in_one_order_and_counted_in_words() -> None:
@@ -67,7 +70,8 @@ def fetched(cases: np.ndarray[tuple[int], np.dtype[np.int64]], names: list[str])
         columns["regime.order"] = np.array([ORDERS[case % 8] for case in cases.tolist()])
     for column in columns.values():
         column[[name is None for name in places]] = np.nan
-    return CaseColumns(cases, ["ok" if name else "chatter" for name in places], columns)
+    flags = [name if name in ("irregular", "unsettled") else "" for name in places]
+    return CaseColumns(cases, ["ok" if name else "chatter" for name in places], columns, flags)
 
 
 def drawn() -> Curves:
@@ -84,7 +88,7 @@ def test_a_figure_breaks_lines_and_marks_regimes() -> None:
         "periodic": [None], "coasting": [0], "irregular": [3], "unsettled": [5, 6],
     }  # fmt: skip
     assert figure["layout"]["showlegend"]
-    plain = (replace(curve, regimes=None, orders=None) for curve in drawn().curves)
+    plain = (replace(curve, regimes=None, orders=None, usable=None) for curve in drawn().curves)
     transient = replace(drawn(), curves=tuple(plain))
     (line,) = plotly_figure(curves_figure([("", transient)]))["data"]
     assert line["customdata"] == list(range(8))

@@ -1,8 +1,8 @@
 """What a result is worth over the drives of a design: that of the nominal drive, a quantile, or the yield.
 
 Drive 0 is nominal, the others are drawn; all designs have the same draws (common random numbers), so that designs are
-compared with each other and not with chance. A drive that failed counts as one that does not reach anything: its value
-is the worst one.
+compared with each other and not with chance. A drive without a usable result counts as one that reaches nothing: its
+value is the worst one.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from sprag.worker.models.usable import against, half_width
 
 if TYPE_CHECKING:
     from sprag.worker.planning.goals.plan import Goal, GoalPlan, Limit
@@ -41,15 +43,16 @@ class Table:
         if plan.drives:
             self.failed |= ~np.all(np.any(self.ok[:, :, 1:], axis=2), axis=1)
 
-    def values(self, item: Goal | Limit) -> Floats:
+    def values(self, item: Goal | Limit, limit: Limit | None = None) -> Floats:
         """What a goal or a limit is about, shape (designs, points); NaN where it is missing.
 
-        A yield, which concerns all operating points together, is the same at each of them.
+        A yield, which concerns all operating points together, is the same at each of them. With ``limit``, means of
+        irregular motion are moved by their half widths to where it is hardest to meet.
         """
         if item.conditions:
             share = np.asarray(self._held(item.conditions).sum(axis=1) / self._plan.drives)
             return np.repeat(share[:, None], self._shape[1], axis=1)
-        results = self._results(item.result)
+        results = self._results(item.result, limit)
         if item.quantile is None:
             nominal: Floats = results[:, :, 0]
             return nominal
@@ -61,14 +64,16 @@ class Table:
         value[~np.isfinite(value)] = np.nan
         return value
 
-    def _results(self, name: str) -> Floats:
-        values = self._rows.values[name]
-        return np.where(np.isfinite(values), values, np.nan).reshape(self._shape)
+    def _results(self, name: str, limit: Limit | None = None) -> Floats:
+        values = np.where(self._rows.ok & np.isfinite(self._rows.values[name]), self._rows.values[name], np.nan)
+        if limit is not None:
+            values = against(limit.kind, limit.value, values, self._rows.values.get(half_width(name)))
+        return values.reshape(self._shape)
 
     def _held(self, conditions: tuple[Limit, ...]) -> Floats:
         """1 for each drawn drive that meets every condition at every operating point, shape (designs, drives)."""
         held: Flags = np.all(self.ok[:, :, 1:], axis=1)
         for condition in conditions:
-            values = self._results(condition.result)[:, :, 1:]
+            values = self._results(condition.result, condition)[:, :, 1:]
             held = held & np.all(condition.holds(values), axis=1)
         return np.asarray(held, dtype=np.float64)

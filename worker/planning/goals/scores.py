@@ -70,12 +70,13 @@ def joined(first: Scores, second: Scores) -> Scores:
 def outputs_of(plan: GoalPlan, rows: Rows) -> Floats:
     """What designs are judged by, shape (designs, limits x points + goals + 1).
 
-    The columns are what each limit is about at each operating point, the goals taken over the operating points, and 1
-    where a case has failed (of drawn drives: all of them), otherwise 0. Values that are missing or not finite are NaN.
+    The columns are what each limit is about at each operating point, with half widths counted against it, the goals
+    taken over the operating points, and 1 where a case has failed or had not settled (of drawn drives: all of them),
+    otherwise 0. Values that are missing or not finite are NaN.
     """
     table = Table(plan, rows)
     goals = [_over_points(plan.over, table.values(goal), goal.max) for goal in plan.best]
-    columns = [table.values(limit) for limit in plan.subject_to]
+    columns = [table.values(limit, limit) for limit in plan.subject_to]
     columns += [one[:, None] for one in (*goals, table.failed.astype(np.float64))]
     return np.hstack(columns)
 

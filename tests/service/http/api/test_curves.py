@@ -306,7 +306,7 @@ def test_curves_have_a_tag_that_changes_with_the_rows_and_the_program(
         ("svg", "image/svg+xml", b"<?xml"),
         ("png", "image/png", b"\x89PNG"),
         ("pdf", "application/pdf", b"%PDF"),
-        ("csv", "text/csv", b"excitation.frequency,case,shaft.load,torque.max,ending\n16.0,0,0.02,"),
+        ("csv", "text/csv", b"excitation.frequency,case,shaft.load,torque.max,flags,ending\n16.0,0,0.02,"),
     ],
 )
 def test_curves_come_as_pictures_and_tables(

@@ -42,7 +42,7 @@ def test_ranges_are_those_of_the_rows(service: Service) -> None:
     study_id = service.submit()
     rows = service.fill(study_id)
     infos = models.study_results(service.store.study(study_id))
-    found = ranges(infos, service.store.iter_rows(study_id, block=2))
+    found = ranges("vibration-drive", infos, service.store.iter_rows(study_id, block=2))
     for index, row in enumerate(found):
         column = rows.values[:, index]
         assert row.known == int(np.isfinite(column).sum())
@@ -178,9 +178,9 @@ def test_doubtful_cases_are_in_no_range(service: Service) -> None:
     study_id = service.submit()
     rows = service.fill(study_id)
     infos = models.study_results(service.store.study(study_id))
-    blocks = [replace(block, flags=["unsettled,jumped", *block.flags[1:]])
-              for block in service.store.iter_rows(study_id, block=rows.values.shape[0])]  # fmt: skip
-    every, sound = ranges(infos, blocks), ranges(infos, blocks, ("unsettled",))
+    blocks = list(service.store.iter_rows(study_id, block=rows.values.shape[0]))
+    marked = [replace(block, flags=["unsettled,jumped", *block.flags[1:]]) for block in blocks]
+    every, sound = (ranges("vibration-drive", infos, own) for own in (blocks, marked))
     assert [row.known - kept.known for row, kept in zip(every, sound, strict=True)] == [
         int(np.isfinite(rows.values[0, infos.index(row.info)])) for row in every
     ]
