@@ -77,6 +77,20 @@ def _tnk(x: Floats) -> Values:
     }
 
 
+def _osy(x: Floats) -> Values:
+    a, b, c, d, e, f = x.T
+    return {
+        "f1": -(25.0 * (a - 2.0) ** 2 + (b - 2.0) ** 2 + (c - 1.0) ** 2 + (d - 4.0) ** 2 + (e - 1.0) ** 2),
+        "f2": (x**2).sum(axis=1),
+        "c1": a + b,
+        "c2": a + b,
+        "c3": b - a,
+        "c4": a - 3.0 * b,
+        "c5": (c - 3.0) ** 2 + d,
+        "c6": (e - 3.0) ** 2 + f,
+    }
+
+
 CASES = (
     Case("ZDT1", (0.0,) * 30, (1.0,) * 30, (), _zdt(0.5), (1.1, 1.1)),
     Case("ZDT2", (0.0,) * 30, (1.0,) * 30, (), _zdt(2.0), (1.1, 1.1)),
@@ -95,6 +109,21 @@ CASES = (
         (Limit("c1", "at_least", 0.0), Limit("c2", "at_most", 0.5)),
         _tnk,
         (1.2, 1.2),
+    ),
+    Case(
+        "OSY",
+        (0.0, 0.0, 1.0, 0.0, 1.0, 0.0),
+        (10.0, 10.0, 5.0, 6.0, 5.0, 10.0),
+        (
+            Limit("c1", "at_least", 2.0),
+            Limit("c2", "at_most", 6.0),
+            Limit("c3", "at_most", 2.0),
+            Limit("c4", "at_most", 2.0),
+            Limit("c5", "at_most", 4.0),
+            Limit("c6", "at_least", 4.0),
+        ),
+        _osy,
+        (0.0, 386.0),
     ),
 )
 

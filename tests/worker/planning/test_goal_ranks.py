@@ -50,7 +50,15 @@ def test_without_goals_all_are_in_one_front() -> None:
 def test_designs_within_limits_come_first_then_less_violation_then_failed() -> None:
     goals = np.array([[1.0, 2.0], [2.0, 3.0], [0.0, 0.0], [0.0, 0.0], [np.nan, np.nan], [2.0, 1.0], [0.0, 0.0]])
     violation = np.array([0.0, 0.0, 0.5, 0.1, np.inf, 0.0, 0.5])
-    assert ranks(Scores(goals, violation, np.empty((len(goals), 0)))).tolist() == [0, 1, 3, 2, 4, 0, 3]
+    assert ranks(Scores(goals, violation, np.empty((len(goals), 0)), np.zeros(len(goals)))).tolist() == [
+        0,
+        1,
+        3,
+        2,
+        4,
+        0,
+        3,
+    ]
 
 
 def _front(plan: GoalPlan, values: dict[str, list[float]], ok: list[bool] | None = None) -> dict[str, list[object]]:

@@ -74,11 +74,11 @@ class _Rates:
 class Cma:
     """The distribution so far, and how the next generation follows from it."""
 
-    def __init__(self, space: Space, population: int, generations: int, seed: int) -> None:
+    def __init__(self, space: Space, population: int, seed: int) -> None:
         self._space, self._population, self._seed = space, population, seed
         self._rates = _Rates(space.dimensions, population)
         self._quantile = normal_quantile(min(0.25, 1.0 / (space.dimensions * population)))
-        self._tolerance = Tolerance(generations)
+        self._tolerance = Tolerance()
         self._generation = 0
         self._best: tuple[Floats, Scores] | None = None
         self._start(np.full(space.dimensions, 0.5))

@@ -47,9 +47,9 @@ class _Survivors:
 class Nsga2:
     """The survivors so far, and how the next generation follows from them."""
 
-    def __init__(self, space: Space, population: int, generations: int, seed: int) -> None:
+    def __init__(self, space: Space, population: int, seed: int) -> None:
         self._space, self._population, self._seed = space, population, seed
-        self._tolerance = Tolerance(generations)
+        self._tolerance = Tolerance()
         #: The best by the limits as they are, and the parents of the next generation, by violations tolerated now.
         self._best: _Survivors | None = None
         self._parents: _Survivors | None = None

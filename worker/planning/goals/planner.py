@@ -54,9 +54,9 @@ class GoalPlanner:
         self._space = Space(plan)
         self._search: Search
         if len(plan.best) == 1:
-            self._search = Cma(self._space, plan.population, plan.generations, plan.seed)
+            self._search = Cma(self._space, plan.population, plan.seed)
         else:
-            self._search = Nsga2(self._space, plan.population, plan.generations, plan.seed)
+            self._search = Nsga2(self._space, plan.population, plan.seed)
         self._known: dict[bytes, Floats] = {}
         self._record = Record(plan)
         self._generation = self._idle = self._rounds = self._cases = 0

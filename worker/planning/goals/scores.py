@@ -34,11 +34,14 @@ class Scores:
         0 where every limit holds; inf where a case has failed or, with every limit held, a goal is missing.
     outputs : array, shape (designs, outputs)
         What they were judged by, as of ``outputs_of``.
+    equalities : array, shape (designs,)
+        The part of the violation that is of equalities of real numbers.
     """
 
     goals: Floats
     violation: Floats
     outputs: Floats
+    equalities: Floats
 
     @property
     def feasible(self) -> Flags:
@@ -52,7 +55,8 @@ class Scores:
         return np.isinf(self.violation)
 
     def __getitem__(self, which: NDArray[np.int64] | Flags | slice) -> Scores:
-        return Scores(self.goals[which], np.asarray(self.violation[which]), self.outputs[which])
+        violation, equalities = (np.asarray(one[which]) for one in (self.violation, self.equalities))
+        return Scores(self.goals[which], violation, self.outputs[which], equalities)
 
     def __len__(self) -> int:
         return len(self.violation)
@@ -64,6 +68,7 @@ def joined(first: Scores, second: Scores) -> Scores:
         np.concatenate([first.goals, second.goals]),
         np.concatenate([first.violation, second.violation]),
         np.concatenate([first.outputs, second.outputs]),
+        np.concatenate([first.equalities, second.equalities]),
     )
 
 
@@ -108,13 +113,15 @@ def judge(plan: GoalPlan, outputs: Floats, *, equality: float | None = None) -> 
     points = len(plan.at)
     first = points * len(plan.subject_to)
     goals = outputs[:, first:-1] * signs(plan) + 0.0
-    violation = np.zeros(len(outputs))
+    violation, equalities = np.zeros(len(outputs)), np.zeros(len(outputs))
     for i, limit in enumerate(plan.subject_to):
         within = limit.within if equality is None or not limit.polished else equality * limit.scale
-        violation += _violation(limit, within, outputs[:, points * i : points * (i + 1)])
+        excess = _violation(limit, within, outputs[:, points * i : points * (i + 1)])
+        violation += excess
+        equalities += excess if limit.polished else 0.0
     missing = np.isnan(goals).any(axis=1) & (violation == 0.0)
     violation[missing | (outputs[:, -1] != 0.0)] = np.inf
-    return Scores(goals, violation, outputs)
+    return Scores(goals, violation, outputs, equalities)
 
 
 def _violation(limit: Limit, within: float, values: Floats) -> Floats:
