@@ -51,6 +51,10 @@ class Report:
             shown = _as_written(value, _at(self._source, pointer))
             self.faults.append(Fault(pointer, code, message, shorten(shown), allowed, unit))
 
+    def written(self, pointer: str) -> object:
+        """What the user wrote at a JSON Pointer; None where there is nothing."""
+        return _at(self._source, pointer)
+
     def adopt(self, other: Report) -> None:
         """Record the faults of another report, without its warnings."""
         self.found += other.found

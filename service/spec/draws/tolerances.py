@@ -24,6 +24,7 @@ from sprag.service.spec.draws.distributions import Distribution
 from sprag.service.spec.draws.unit import correlated, unit_sample
 from sprag.service.spec.fields import TOLERANCE_FIELDS, read_object
 from sprag.service.spec.report import Report, join
+from sprag.service.spec.together import AMBIGUOUS_UNIT, question
 from sprag.worker.derived import blocks, involved
 from sprag.worker.limits import MAX_AXIS_VALUES, MAX_CASES, MAX_TOLERANCES
 from sprag.worker.models.parameters import in_range, parameter_of
@@ -218,6 +219,17 @@ def _measured(
     return [_Drawn(pointer, Tolerance(name, paths, "value", about), Distribution("values", values=tuple(values)))]
 
 
+def _mixed(report: Report, where: str, plus_minus: object, nominal: list[_Nominal]) -> bool:
+    """Whether a bare distance stands beside a nominal value in a unit of another scale; it is recorded as a fault."""
+    written = [report.written("/base/" + one.parameter.path.replace(".", "/")) for one in nominal]
+    texts = [value for value in written if isinstance(value, str)]
+    asked = question([plus_minus, *texts], nominal[0].parameter.unit) if not isinstance(plus_minus, str) else None
+    if asked is not None and asked.place == 0:
+        unit = nominal[0].parameter.unit
+        report.fault(where, AMBIGUOUS_UNIT, asked.message, plus_minus, allowed=asked.allowed, unit=unit)
+    return asked is not None and asked.place == 0
+
+
 def _around(
     report: Report,
     pointer: str,
@@ -228,6 +240,8 @@ def _around(
     nominal: list[_Nominal],
 ) -> list[_Drawn]:
     """A tolerance around the nominal values."""
+    if _mixed(report, join(pointer, "plus_minus"), found.get("plus_minus"), nominal):
+        return []
     units = list(dict.fromkeys(one.parameter.unit for one in nominal))
     read = read_plus_minus(report, pointer, found, nominal[0].parameter)
     if read is None:

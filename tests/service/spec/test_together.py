@@ -116,6 +116,7 @@ ENDS = {"from": 100, "to": "1000 N*mm"}
         ({"/exclude": [{LOAD: {"is": [1, "20 N*mm"]}}]}, f"/exclude/0/{LOAD}/is/0"),
         ({"/exclude": [{LOAD: {"above": 1, "below": "2000 N*mm"}}]}, f"/exclude/0/{LOAD}/above"),
         ({"/tolerances": [{"path": LOAD, "values": [0.1, "20 N*mm"]}], "/axes": []}, "/tolerances/0/values/0"),
+        ({"/tolerances": [{"path": "pendulums.0.arm", "plus_minus": 0.2}]}, "/tolerances/0/plus_minus"),
         ({"/run/window": [40, "60 periods"]}, "/run/window/0"),
         ({"/base/clutch": {"data": [[0, 0], ["1 deg", 5], [0.04, "8 N*m"]], "accuracy": 1}}, "/base/clutch/data/2/0"),
         ({"/base/clutch": {"coefficients": [25, 400, "30 N*mm/rad^2"]}}, "/base/clutch/coefficients/0"),
