@@ -9,6 +9,7 @@ from sprag.engine.vibration_drive import orbits
 from sprag.engine.vibration_drive.cases import with_lengths
 from sprag.engine.vibration_drive.characteristics import characteristics, combined
 from sprag.engine.vibration_drive.integration import integrate
+from sprag.engine.vibration_drive.layout import OUT_STEPS
 from sprag.engine.vibration_drive.newton import disturbed
 from sprag.engine.vibration_drive.regimes import Regime, means
 from sprag.engine.vibration_drive.results import result_infos
@@ -76,7 +77,9 @@ class Batches:
         matrix = with_lengths(
             search.matrix[active], starts[:, BEGIN], np.full(len(active), float(ROUND)), windowed=False
         )
-        other = integrate(search.kernel, matrix, search.run, starts=self.beside[active], strobes=ROUND).strobes
+        done = integrate(search.kernel, matrix, search.run, starts=self.beside[active], strobes=ROUND)
+        other = done.strobes
+        search.pay(active, done.sums[:, OUT_STEPS])
         search.spent[active] += ROUND
         base = np.ascontiguousarray(search.history[active, -ROUND:])
         grown, over = np.zeros(len(active)), np.zeros(len(active), dtype=np.int64)

@@ -131,7 +131,7 @@ def _longest_stretch(times: Floats, angle: Floats, speed: Floats, acceleration: 
 def limit_of(search: Search, case: int, point: Floats, order: int) -> float:
     """Speed in the limit of a vanishing load of a case whose contact-free orbit is known; NaN where it is held."""
     begin = float(point[BEGIN])
-    matrix = with_lengths(search.matrix[case : case + 1], np.array([begin]), np.array([float(order)]), windowed=False)
+    matrix = with_lengths(search.whole(np.array([case])), np.array([begin]), np.array([float(order)]), windowed=False)
     places = begin + np.linspace(0.0, order, _SAMPLES * order + 1)
     done = integrate(search.kernel, matrix, search.settings.fine, starts=point[None, :], times=places)
     times = places[: done.recorded] * search.matrix[case, Column.PERIOD]

@@ -71,6 +71,9 @@ _SAME = 1e-7
 #: whole periods later are too.
 MOVED = 0.375
 
+#: Step budgets of a run that the runs of a search may take together.
+RUNS = 2.0
+
 _OK = ENDINGS.index(Ending.OK)
 _FREE, _HELD = float(Clutch.FREE), float(Shaft.HELD)
 
@@ -101,7 +104,9 @@ class Orbits:
 class Search:
     """The current state of the cases of a batch.
 
-    ``steady_shaft`` leaves the shaft's speed out of the orbits: nothing changes it where no clutch transmits.
+    A search has a multiple of the step budget of a run as long as it: the budgets in ``matrix`` are what is left, and
+    every run for the search, disturbed ones too, takes from them. ``steady_shaft`` leaves the shaft's speed out of the
+    orbits: nothing changes it where no clutch transmits.
     """
 
     kernel: Kernel
@@ -124,9 +129,14 @@ class Search:
     wait: Floats = field(init=False)
     #: Total periods computed for each case, including disturbed runs.
     spent: Floats = field(init=False)
+    #: Steps that a search may take.
+    budget: Floats = field(init=False)
 
     def __post_init__(self) -> None:
         cases, n = len(self.matrix), self.kernel.LAYOUT.n
+        self.matrix = self.matrix.copy()
+        self.budget = RUNS * self.matrix[:, Column.MOST_STEPS]
+        self.matrix[:, Column.MOST_STEPS] = self.budget
         self.starts = from_rest(cases, n) if self.given is None else self.given.copy()
         self.history = np.zeros((cases, 3 * max(self.settings.max_period, WINDOW) + 1, width(n)))
         self.periods = np.zeros(cases, dtype=np.int64)
@@ -144,6 +154,18 @@ class Search:
     def run(self) -> Run:
         """Accuracy and budgets."""
         return self.settings.run
+
+    def whole(self, cases: Ints) -> Floats:
+        """The matrix of cases with the whole budget, for what is computed of a motion that was found."""
+        matrix = self.matrix[cases]
+        matrix[:, Column.MOST_STEPS] = self.budget[cases]
+        return matrix
+
+    def pay(self, cases: Ints, steps: Floats) -> None:
+        """Take steps from the budgets; cases may stand in it several times."""
+        np.subtract.at(self.matrix, (cases, int(Column.MOST_STEPS)), steps)
+        left = self.matrix[:, Column.MOST_STEPS]
+        np.maximum(left, 0.0, out=left)
 
     def units(self, active: Ints) -> Floats:
         """Scales of the strobes' columns."""
@@ -179,6 +201,7 @@ class Search:
         self.periods[active] += periods
         self.spent[active] += periods
         self.steps[active] += done.sums[:, OUT_STEPS]
+        self.pay(active, done.sums[:, OUT_STEPS])
         self.events[active] += done.sums[:, OUT_EVENTS]
         orbits.keep_strobes(self.history, active, self.count, done.strobes)
         self.count = min(self.count + periods, self.history.shape[1])
@@ -280,6 +303,7 @@ class Search:
             self.matrix[cases[of_row]], points[of_row, BEGIN], orders[of_row].astype(float), windowed=windowed
         )
         done = integrate(self.kernel, matrix, run, starts=rows[:count], strobes=int(orders.max()))
+        self.pay(cases[of_row], done.sums[:, OUT_STEPS])
         return of_row, first, done
 
     def _tied(self, cases: Ints, points: Floats, orders: Ints, sums: Floats) -> Flags:
@@ -296,7 +320,7 @@ class Search:
     def over_one_turn(self, found: Orbits) -> Floats:
         """Characteristics of orbits over one turn of each, shape (orbits, results)."""
         cases = found.cases
-        matrix = with_lengths(self.matrix[cases], found.points[:, BEGIN], found.orders.astype(float), windowed=True)
+        matrix = with_lengths(self.whole(cases), found.points[:, BEGIN], found.orders.astype(float), windowed=True)
         sums = integrate(self.kernel, matrix, self.settings.fine, starts=found.points).sums
         self.spent[cases] += found.orders
         self.steps[cases] += sums[:, OUT_STEPS]

@@ -17,7 +17,7 @@ from sprag.engine.vibration_drive.no_load import limit_of
 from sprag.engine.vibration_drive.orbits import distances, settling_periods
 from sprag.engine.vibration_drive.regimes import Regime, means, settled_infos
 from sprag.engine.vibration_drive.results import STEADY_SHAFT, result_infos
-from sprag.engine.vibration_drive.search import ROUND, Orbits, Search, joined, transient_rounds
+from sprag.engine.vibration_drive.search import ROUND, RUNS, Orbits, Search, joined, transient_rounds
 from sprag.engine.vibration_drive.strobes import ANGLE, FRACTION, PENDULUM_WIDTH, SHAFT_SPEED, SHAFT_WIDTH, SPEED, width
 
 Floats = NDArray[np.float64]
@@ -248,6 +248,7 @@ def _unloaded(module: Kernel, search: Search, cases: Ints, results: _Results) ->
         return
     results.put(cases, "shaft.speed.from_rest", _speed_from_rest(search, cases))
     free = search.matrix[cases].copy()
+    free[:, Column.MOST_STEPS] = search.budget[cases] / RUNS
     free[:, Column.SPEED] = _OUT_OF_REACH
     apart = Search(module, free, search.settings, steady_shaft=True)
     own = _Results(len(cases), module.LAYOUT.n, apart.starts.shape[1])
