@@ -163,8 +163,8 @@ class Search:
 
     def pay(self, cases: Ints, steps: Floats) -> None:
         """Take steps from the budgets; cases may stand in it several times."""
-        np.subtract.at(self.matrix, (cases, int(Column.MOST_STEPS)), steps)
         left = self.matrix[:, Column.MOST_STEPS]
+        np.subtract.at(left, cases, steps)
         np.maximum(left, 0.0, out=left)
 
     def units(self, active: Ints) -> Floats:
