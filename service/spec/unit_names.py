@@ -56,7 +56,7 @@ DEFINITIONS: Final = (
 
 #: Prefixes that a symbol has. Others, such as those of Mm, Grad and mt, are more often something else.
 _PREFIXED: Final = {
-    **dict.fromkeys(("N", "J", "W", "Pa", "Hz", "Nm"), "nuµmcdkMG"),
+    **dict.fromkeys(("N", "J", "W", "Pa", "Hz", "rps", "Nm"), "nuµmcdkMG"),
     **dict.fromkeys(("m", "s", "rad"), "nuµmcdk"),
     **dict.fromkeys(("Nms", "Wh", "Ws"), "uµmkM"),
     **dict.fromkeys(("Ncm", "Nmm", "Ncms", "Nmms"), "mk"),
