@@ -17,6 +17,10 @@ __all__ = ["counted", "duration", "number", "percent", "symbol", "typed_text", "
 _RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 #: A name of a unit; words of a sentence around it have none in the catalogues.
 _UNIT: Final = re.compile(r"[A-Za-z]+\d?")
+#: English words that name units too. In a sentence they are units after a number and before no other word than these.
+_WORDS: Final = frozenset({"in"})
+_AFTER_NUMBER: Final = re.compile(r"\d\s?\Z")
+_BEFORE_WORD: Final = re.compile(r"\s+(?!(?:to|and|or|or less|or more)\b)[^\W\d_]")
 #: A number of a text, and its unit.
 _QUANTITY: Final = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)(\s?)([A-Za-z][A-Za-z\d*/^-]*)?")
 #: Significant digits of numbers on pages; files and the API have all digits.
@@ -63,16 +67,33 @@ def unit_text(unit: str | None) -> str:
         return ""
     named = str(unit)
     if current() != ENGLISH:
-        named = _UNIT.sub(lambda found: pgettext("unit", found[0]), pgettext("unit", named))
+        named = _UNIT.sub(_unit_name, pgettext("unit", named))
     raised = re.sub(r"\^(-?\d+)", lambda found: found[1].translate(_RAISED), named)
     return raised.replace("*", "·")
+
+
+def _unit_name(found: re.Match[str]) -> str:
+    """A unit of a text in the reader's language; an English word that also names a unit only where it is one."""
+    text, name = found.string, found[0]
+    if name in _WORDS and " " in text and not _AFTER_NUMBER.search(text, 0, found.start()):
+        return name
+    if name in _WORDS and _BEFORE_WORD.match(text, found.end()):
+        return name
+    return pgettext("unit", name)
 
 
 def typed_text(text: str) -> str:
     """A quantity, or several, as somebody types them: ``0.3 deg`` as ``0,3 град``; words around them stay."""
     if current() == ENGLISH:
         return text
-    return _QUANTITY.sub(lambda found: f"{decimal(found[1])}{found[2]}{unit_text(found[3] or '')}", text)
+    return _QUANTITY.sub(_typed, text)
+
+
+def _typed(found: re.Match[str]) -> str:
+    """A quantity of a text."""
+    number_, blank, unit = found[1], found[2], found[3] or ""
+    word = unit in _WORDS and _BEFORE_WORD.match(found.string, found.end())
+    return f"{decimal(number_)}{blank}{unit if word else unit_text(unit)}"
 
 
 def symbol(text: str) -> Markup:

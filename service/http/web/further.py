@@ -64,8 +64,9 @@ async def extend(context: Ctx, work: Attended, study_id: StudyId, values: Form) 
 
 
 @router.get("/studies/{study_id:study}/extend")
+@router.get("/studies/{study_id:study}/labels")
 def extension_form(request: Request, study_id: StudyId) -> Response:
-    """The page of the study, from the address that a refused extension has."""
+    """The page of the study, from the address that a refused extension or a refused name has."""
     query = request.url.query
     return RedirectResponse(f"/studies/{study_id}{f'?{query}' if query else ''}", status_code=303)
 

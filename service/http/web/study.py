@@ -126,18 +126,20 @@ async def shown_study(
     further: Values | None = None,
     wrong: Faults | None = None,
     labels: Values | None = None,
+    untaken: Faults | None = None,
 ) -> Response:
     """The page of a study; ``further`` is what its form for an extension has, with what is ``wrong`` there by field.
 
-    ``labels`` is what its form for name, notes and tags has, where somebody else changed them after it was shown.
+    ``labels`` is what its form for name, notes and tags has, where somebody else changed them after it was shown, or
+    with what is ``untaken`` of it.
     """
     spec = await run_in_threadpool(context.store.spec, study_id)
     fits = await work.check(fits_of, spec) if has_measured_clutch(spec) else {}
     usual, many = await run_in_threadpool(_usual_curves, context, study_id)
     asked = (context.library, study_id, work.request.query_params.multi_items(), usual, CHOICE.get())
     view = await (work.check(answers_view, *asked) if many else run_in_threadpool(answers_view, *asked))
-    extension = {"further": further or {}, "wrong": wrong or {}, "labels": labels or {}}
-    if labels:
+    extension = {"further": further or {}, "wrong": wrong or {}, "labels": labels or {}, "untaken": untaken or {}}
+    if labels and not untaken:
         extension["changed_meanwhile"] = changed_meanwhile()
     return await run_in_threadpool(_study_page, context, study_id, fits, view, usual, extension)
 
@@ -164,7 +166,7 @@ def _study_page(
     kinds = context.store.kinds(study_id)
     return page(
         "study.html",
-        status=412 if extension["labels"] else 422 if view.faults or extension["wrong"] else 200,
+        status=_status(view, extension),
         **frame,
         **extension,
         origins=context.store.origins(study_id),
@@ -194,6 +196,13 @@ def _study_page(
         to_run_longer=(*DOUBTFUL, models.NOT_SETTLED),
         narrowed=_narrowed(context, study, study_id) if models.JUMPED in kinds.flags else 0,
     )
+
+
+def _status(view: AnswersView, extension: Mapping[str, Any]) -> int:
+    """The status of the page: whether one of its forms is refused, or its labels were changed meanwhile."""
+    if extension["untaken"] or view.faults or extension["wrong"]:
+        return 422
+    return 412 if extension["labels"] else 200
 
 
 def _narrowed(context: Context, study: Study, study_id: str) -> int:
@@ -373,8 +382,8 @@ def regime_maps(study: Study, study_id: str) -> list[tuple[str, str]]:
     """Text and URL of each map of how many motions cases have; none of cases with one start."""
     if not has_starts(study.run):
         return []
-    shown = (("number of motions", "regime.count"), ("share of the rarest motion", "regime.share.least"))
-    addresses = [(text, _map_address(study, study_id, name)) for text, name in shown]
+    shown = ((N_("number of motions"), "regime.count"), (N_("share of the rarest motion"), "regime.share.least"))
+    addresses = [(_(text), _map_address(study, study_id, name)) for text, name in shown]
     return [(text, address) for text, address in addresses if address is not None]
 
 

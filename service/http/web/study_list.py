@@ -16,10 +16,11 @@ from sprag.service.faults import FaultError, choice_of
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx, StudyId
 from sprag.service.http.listing import wanted_studies
-from sprag.service.http.problems import ApiError
 from sprag.service.http.routers import page_router
 from sprag.service.http.views import preset_of
 from sprag.service.http.web import saved_views
+from sprag.service.http.web.form.check import message
+from sprag.service.http.web.form.entries import Faults
 from sprag.service.http.web.form.values import Form, RepeatedForm
 from sprag.service.http.web.study import shown_study
 from sprag.service.http.web.templates import page
@@ -181,7 +182,7 @@ def _changed(chosen: Iterable[str], act: Callable[[str], Any]) -> list[tuple[str
 
 @router.post("/studies/{study_id:study}/labels")
 async def change_labels(context: Ctx, work: Attended, study_id: StudyId, values: Form) -> Response:
-    """The form for name, notes and tags on the page of a study; where somebody else changed them, the page again."""
+    """The form for name, notes and tags on the page of a study; where it is refused, the page with what was typed."""
     data: dict[str, Any] = {name: values[name] for name in ("name", "notes") if name in values}
     if "tags" in values:
         data["tags"] = tags_of(values["tags"])
@@ -192,6 +193,8 @@ async def change_labels(context: Ctx, work: Attended, study_id: StudyId, values:
     except ChangedMeanwhileError:
         return await shown_study(context, work, study_id, labels=values)
     except SpecError as error:
-        detail = "; ".join(f"{fault.message} (allowed: {fault.allowed})" for fault in error.faults)
-        raise ApiError("invalid-body", detail, error.faults) from error
+        untaken = Faults()
+        for fault in error.faults:
+            untaken.setdefault((fault.where or "").strip("/").partition("/")[0], []).append(message(fault))
+        return await shown_study(context, work, study_id, labels=values, untaken=untaken)
     return RedirectResponse(f"/studies/{study_id}", status_code=303)

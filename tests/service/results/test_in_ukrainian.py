@@ -24,7 +24,7 @@ from sprag.service.results.phrases import Amount, Phrase, joined, part_label, pl
 from sprag.service.results.pictures.curves import draw_figure
 from sprag.service.results.reading import CODES, Reading
 from sprag.service.results.tolerances.conditions import read_conditions
-from sprag.service.results.wording import unit_text
+from sprag.service.results.wording import typed_text, unit_text
 from sprag.worker.models import ResultInfo, WarningText
 from sprag.worker.models.branches import BranchContact, SpecialPoint
 
@@ -167,3 +167,19 @@ def test_another_process_gets_the_language_of_the_task() -> None:
         given = languages.current()
     assert speak(given, titled, "held") == "Утримується"
     assert languages.current() == languages.ENGLISH
+
+
+def test_the_word_in_is_no_inch() -> None:
+    """Of what is allowed, and of placeholders: a unit stands after a number and before no word."""
+    with languages.language("uk"):
+        for words in (
+            "1 to 200 printable characters in one line",
+            "at most 3 in a row",
+            "a number in Hz, in all cases",
+        ):
+            assert "\u0434\u044e\u0439\u043c" not in unit_text(allowed_text(words))
+            assert "\u0434\u044e\u0439\u043c" not in typed_text(words)
+        assert unit_text("in") == "\u0434\u044e\u0439\u043c"
+        assert unit_text(allowed_text("0.1 to 4 in")).endswith("4 \u0434\u044e\u0439\u043c")
+        assert unit_text("> 2 in").endswith("\u0434\u044e\u0439\u043c")
+        assert typed_text("2 in; 3 in") == "2 \u0434\u044e\u0439\u043c; 3 \u0434\u044e\u0439\u043c"
