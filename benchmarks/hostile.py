@@ -1,7 +1,8 @@
 """Effect of hostile clients on a service: the longest wait for /livez, memory, and the shutdown time.
 
 Run as ``python -m benchmarks.hostile [--clients N]``. Each bomb is within every limit of a spec; all are sent at once
-by clients that leave after five seconds, or wait for their answers, to a service with its default settings.
+by clients that leave after five seconds, or wait for their answers, to a service with its default settings. With
+``--readers`` the attacks are those of `benchmarks.hostile_readers`, each by one reader.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from typing import Any
 import psutil
 
 from benchmarks.faults.harness import PATIENCE, Service, until
+from benchmarks.hostile_readers import measure
 from sprag.service.presets import preset_text
 
 _LEAVE = 5.0
@@ -206,7 +208,15 @@ def main() -> None:
     """Throw every bomb, then end a service under fire."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--clients", type=int, default=40)
-    clients = parser.parse_args().clients
+    parser.add_argument("--readers", action="store_true", help="the attacks of readers instead")
+    parser.add_argument("--only", default="", help="attacks of readers whose names begin so")
+    parser.add_argument("--cases", type=int, default=100_000, help="cases of the study that readers export")
+    parser.add_argument("--seconds", type=float, default=30.0, help="time after which readers leave")
+    options = parser.parse_args()
+    if options.readers:
+        measure(options.cases, options.seconds, options.only)
+        return
+    clients = options.clients
     for name, (made, patience) in BOMBS.items():
         with running() as service:
             watch, answers, seconds = throw(service, made, patience, clients)

@@ -112,7 +112,21 @@ def limits() -> Iterator[Row]:
     together = f"{limit.MAX_COMPUTATIONS_EACH}, {limit.MAX_COMPUTATIONS}"
     yield "instantaneous values asked for by one token, by all together", together
     yield "memory for the instantaneous values of a case", f"{limit.COMPUTATION_BYTES / 2**30:g} GiB"
+    yield (
+        "files of rows that are written or wait, of one token, of all together",
+        f"{limit.MAX_FILES_EACH}, {limit.MAX_FILES}",
+    )
+    yield (
+        "processor time, memory for a file of rows",
+        f"{limit.FILE_SECONDS / 3600:g} h, {limit.FILE_BYTES / 2**30:g} GiB",
+    )
+    yield (
+        "time in which a client takes a piece of the rows that are sent while they are read",
+        f"{limit.PIECE_SECONDS:g} s",
+    )
+    yield "time in which a change gets a thread, and then the write lock", f"{limit.LOCK_SECONDS:g} s each"
     yield "connections", f"{limit.MAX_CONNECTIONS}"
+    yield "requests in progress of one token, where tokens are needed", f"{limit.MAX_REQUESTS_EACH}"
     yield "head, body of a request", f"{limit.HEAD_SECONDS:g} s, {limit.BODY_SECONDS:g} s"
     yield "time in which a client takes something of an answer", f"{limit.WRITE_SECONDS:g} s"
 

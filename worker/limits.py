@@ -108,6 +108,21 @@ HEAD_SECONDS: Final = 20.0
 BODY_SECONDS: Final = 60.0
 #: Seconds within which a client must read part of its answer.
 WRITE_SECONDS: Final = 60.0
+#: Complete requests of one token or user in progress, where tokens are needed: half of the connections.
+MAX_REQUESTS_EACH: Final = 400
+#: Threads of requests that change something, and seconds for which such a request waits for one, and then for the write
+#: lock of the database.
+WRITING_THREADS: Final = 16
+LOCK_SECONDS: Final = 30.0
+#: Processes that write files of rows; files of one token, and of all tokens together, that are written or wait.
+FILE_PROCESSES: Final = 2
+MAX_FILES_EACH: Final = 32
+MAX_FILES: Final = 64
+#: Seconds within which a client must take one of the pieces in which rows are sent while they are read.
+PIECE_SECONDS: Final = 600.0
+#: Seconds of processor time, and bytes of memory, within which a file of rows must be written.
+FILE_SECONDS: Final = 7200.0
+FILE_BYTES: Final = 4 * 1024**3
 #: Number of schedules.
 MAX_SCHEDULES: Final = 1_000
 

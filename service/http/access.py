@@ -7,6 +7,7 @@ database and across restarts, until the token is revoked, the browser logs out, 
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import hmac
 import secrets
@@ -17,12 +18,11 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Final, Protocol
 
-from starlette.concurrency import run_in_threadpool
-
 from sprag.service.actor import Actor, Door, Role, share_of
 from sprag.service.faults import shown
 from sprag.service.http.attempts import Attempts
 from sprag.service.http.problems import ApiError
+from sprag.service.http.threads import Threads, in_thread
 from sprag.service.languages import N_
 from sprag.service.languages.recorded import TOKEN_EXPIRED, TOKEN_OF_REMOVED_USER, TOKEN_REVOKED
 from sprag.service.logs import REQUEST_ID
@@ -141,13 +141,27 @@ class Access:
         self._uses: dict[str, int] = {}
         self._any = False
         self._read_at: float | None = None
+        self._reading: asyncio.Future[None] | None = None
 
     async def refresh(self) -> None:
         """Read the tokens again when the cache is stale; raises StoreError."""
         now = time.monotonic()
         if self._store is None or (self._read_at is not None and now - self._read_at < BELIEVED_SECONDS):
             return
-        records, users, found = await run_in_threadpool(_read, self._store)
+        if self._reading is None or self._reading.get_loop() is not asyncio.get_running_loop():
+            self._reading = asyncio.ensure_future(self._read_again(self._store))
+            self._reading.add_done_callback(self._has_read)
+        await asyncio.shield(self._reading)
+
+    def _has_read(self, reading: asyncio.Future[None]) -> None:
+        self._reading = None
+        if not reading.cancelled():
+            reading.exception()  # the requests that wait for it raise it
+
+    async def _read_again(self, store: TokenStore) -> None:
+        """Read the tokens, in a thread that nothing else has: every request waits for it."""
+        now = time.monotonic()
+        records, users, found = await in_thread(_read, store, threads=Threads.TOKENS)
         self._key = found.key or self._key
         now_seconds = time.time()
         self._logged_out = {
@@ -269,7 +283,7 @@ class Access:
     async def log_in(self, grant: Grant) -> str:
         """The value of the session cookie for ``grant``; raises StoreError."""
         if self._key is None and self._store is not None:
-            self._key = await run_in_threadpool(self._store.create_session_key)
+            self._key = await in_thread(self._store.create_session_key)
         identity = f"{grant.id}.{int(time.time()) + SESSION_SECONDS}"
         return f"{identity}.{self._sealed(identity)}"
 
@@ -281,7 +295,7 @@ class Access:
         end = int(identity.partition(".")[2])
         self._logged_out[seal] = end  # effective here immediately, even if storing it for other hosts fails
         if self._store is not None:
-            await run_in_threadpool(self._store.end_session, seal, end)
+            await in_thread(self._store.end_session, seal, end)
 
     def _sealed(self, identity: str) -> str:
         message = identity.encode("utf-8", "replace")

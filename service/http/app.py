@@ -92,7 +92,7 @@ from sprag.service.http.web import workers as worker_pages
 from sprag.service.http.web.form import page as form
 from sprag.service.http.web.laboratory import drive as drive_laboratory
 from sprag.service.http.web.laboratory import pages as laboratory
-from sprag.service.jobs import checks
+from sprag.service.jobs import checks, row_files
 from sprag.service.jobs.housekeeping import Housekeeping
 from sprag.service.jobs.reports.reporter import Reporter
 from sprag.service.jobs.reports.watchdog import Watchdog, late_runs
@@ -106,7 +106,16 @@ from sprag.service.storage.readiness import Readiness
 from sprag.service.storage.store import Store
 from sprag.service.storage.users import quota_of
 from sprag.worker.chunking import Chunking
-from sprag.worker.limits import COMPUTATION_BYTES, MAX_CHECKS, MAX_CHECKS_EACH, MAX_COMPUTATIONS
+from sprag.worker.limits import (
+    COMPUTATION_BYTES,
+    FILE_BYTES,
+    FILE_PROCESSES,
+    FILE_SECONDS,
+    MAX_CHECKS,
+    MAX_CHECKS_EACH,
+    MAX_COMPUTATIONS,
+    MAX_FILES,
+)
 from sprag.worker.pool.child_pool import JobStoppedError
 from sprag.worker.pool.child_process import ProcessDiedError, ProcessStartError
 from sprag.worker.ports import StoreError
@@ -236,12 +245,13 @@ def create_app(
     store: Store | None = None,
     computer: Computes | None = None,
     checker: Computes | None = None,
+    writer: Computes | None = None,
 ) -> FastAPI:
     """The application for ``settings`` (by default from the environment).
 
-    A given store, computer or checker stays open when the application ends. Raises UnsafeSettingsError for an address
-    that others can reach without a token and for a URL prefix that is a path of the service itself, and DatabaseError
-    when the database cannot be used.
+    A given store, computer, checker or writer stays open when the application ends; a given checker is the writer too
+    where none is given. Raises UnsafeSettingsError for an address that others can reach without a token and for a URL
+    prefix that is a path of the service itself, and DatabaseError when the database cannot be used.
     """
     settings = settings or Settings()
     _require_free(settings.url_prefix)
@@ -257,6 +267,7 @@ def create_app(
     used_store.restorable = timedelta(days=settings.restore_days)
     access = Access(settings, used_store)
     used_computer, used_checker = computer or _computer(settings), checker or _checker(settings)
+    used_writer = writer or checker or _writer()
 
     @asynccontextmanager
     async def lifespan(running: FastAPI) -> AsyncIterator[None]:
@@ -283,6 +294,8 @@ def create_app(
             used_computer.close()
         if checker is None:
             used_checker.close()
+        if writer is None and checker is None:
+            used_writer.close()
         if own_store:
             used_store.close()
 
@@ -291,10 +304,15 @@ def create_app(
         used_store,
         used_computer,
         used_checker,
+        used_writer,
         checks.Library(used_store),
         check_shares=Shares(max(settings.check_processes - 1, 1), MAX_CHECKS_EACH, MAX_CHECKS),
     )
-    queues = (Queue("checks", context.check_shares), Queue("computations", context.compute_shares))
+    queues = (
+        Queue("checks", context.check_shares),
+        Queue("computations", context.compute_shares),
+        Queue("files", context.file_shares),
+    )
     metrics = Metrics(used_store, OperationCollector(settings, used_store, queues))
     app = Application(
         settings,
@@ -368,6 +386,11 @@ def _checker(settings: Settings) -> ProcessComputer:
         "unavailable",
     )  # fmt: skip
     return ProcessComputer(limits, settings.check_processes, checks.prepare)
+
+
+def _writer() -> ProcessComputer:
+    limits = Limits(FILE_SECONDS, FILE_BYTES, MAX_FILES, "too-costly")
+    return ProcessComputer(limits, FILE_PROCESSES, row_files.prepare)
 
 
 def chunking(settings: Settings) -> Chunking:

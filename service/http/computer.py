@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 import signal
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncGenerator, Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Protocol, TypeVar, TypeVarTuple
@@ -14,9 +14,9 @@ from typing import Protocol, TypeVar, TypeVarTuple
 from sprag.service.faults import Kind
 from sprag.service.http.problems import ApiError
 from sprag.worker import models
-from sprag.worker.limits import LOAD_SECONDS, WALL_TIMES
+from sprag.worker.limits import LOAD_SECONDS, PIECE_SECONDS, WALL_TIMES
 from sprag.worker.pool.child_pool import ChildPool, Job, JobStoppedError
-from sprag.worker.pool.child_process import ProcessDiedError, ProcessStartError
+from sprag.worker.pool.child_process import ProcessDiedError, ProcessStartError, send_piece
 from sprag.worker.pool.processes import limit_memory, single_threaded_children, within_processor_time
 
 Args = TypeVarTuple("Args")
@@ -33,6 +33,9 @@ class Computes(Protocol):
 
     async def run(self, function: Callable[[*Args], R], *args: *Args) -> R:
         """The function's value; ApiError when it takes too long or its process dies."""
+
+    def stream(self, function: Callable[[*Args], Iterator[bytes]], *args: *Args) -> AsyncGenerator[bytes]:
+        """The pieces that the function yields, as they come; ends when it is closed. Raises as `run` does."""
 
     async def load(self, shape: models.KernelShape) -> None:
         """Load a kernel, however long its compilation takes; ApiError when that fails."""
@@ -149,6 +152,26 @@ class ProcessComputer:
             await self._leave(job, future)
             raise
 
+    async def stream(self, function: Callable[[*Args], Iterator[bytes]], *args: *Args) -> AsyncGenerator[bytes]:
+        """The pieces that the function yields. It waits while they are not taken, and ends with this generator."""
+        wall = WALL_TIMES * self._limits.seconds
+        pieces = _Pieces(asyncio.get_running_loop())
+        with self._turn(wall):
+            with self._lock:
+                job = self._started().stream(
+                    wall, pieces.receive, within_processor_time, self._limits.seconds, _send_all, function, args
+                )
+            job.future.add_done_callback(pieces.end)
+            try:
+                while (piece := await pieces.next()) is not None:
+                    yield piece
+                if job.future.cancelled():
+                    raise JobStoppedError
+                job.future.result()
+            finally:
+                pieces.leave()
+                job.stop()
+
     async def _leave(self, job: Job[R], future: asyncio.Future[R]) -> None:
         """End a job that nobody waits for; its process is killed only if the job continues for long."""
         if job.future.cancel():
@@ -231,6 +254,54 @@ class ProcessComputer:
 def _too_long(error: ProcessDiedError) -> bool:
     """Whether the process was ended by its limit of processor time (`within_processor_time`)."""
     return error.exitcode == -signal.SIGPROF
+
+
+def _send_all(function: Callable[..., Iterator[bytes]], args: tuple[object, ...]) -> None:
+    """In the other process: send what the function yields."""
+    for piece in function(*args):
+        send_piece(piece)
+
+
+class _Pieces:
+    """Pieces on their way from a thread of the pool to the event loop: at most `_AHEAD` of them."""
+
+    _AHEAD = 2
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._loop = loop
+        self._queue: asyncio.Queue[bytes | None] = asyncio.Queue()
+        self._room = threading.Semaphore(self._AHEAD)
+        self._left = False
+
+    def receive(self, piece: bytes) -> None:
+        """Take a piece once there is room for it. In a thread of the pool.
+
+        JobStoppedError when nobody wants any more, TimeoutError when the client reads too slowly.
+        """
+        if not self._room.acquire(timeout=PIECE_SECONDS):
+            raise TimeoutError
+        if self._left:
+            raise JobStoppedError
+        self._put(piece)
+
+    def end(self, _: object) -> None:
+        """The last piece has been received."""
+        self._put(None)
+
+    def _put(self, piece: bytes | None) -> None:
+        with suppress(RuntimeError):  # the loop has ended, and nobody waits
+            self._loop.call_soon_threadsafe(self._queue.put_nowait, piece)
+
+    async def next(self) -> bytes | None:
+        """The next piece; None after the last one."""
+        piece = await self._queue.get()
+        self._room.release()
+        return piece
+
+    def leave(self) -> None:
+        """Want no more."""
+        self._left = True
+        self._room.release()
 
 
 def _retrieve(future: asyncio.Future[None]) -> None:

@@ -12,6 +12,7 @@ from starlette.convertors import Convertor, register_url_convertor
 
 from sprag.service.http.computer import Computes
 from sprag.service.http.kept_files import KeptFiles
+from sprag.service.http.looks import Looks
 from sprag.service.http.problems import ApiError
 from sprag.service.http.shares import Shares
 from sprag.service.jobs.checks import Library
@@ -24,6 +25,8 @@ from sprag.worker.limits import (
     MAX_CHECKS_EACH,
     MAX_COMPUTATIONS,
     MAX_COMPUTATIONS_EACH,
+    MAX_FILES,
+    MAX_FILES_EACH,
     MAX_STARTS,
     MAX_STREAMS,
 )
@@ -48,15 +51,17 @@ class Context:
 
     ``ending`` is set when the service begins to shut down.
     ``checker`` runs the functions that read, expand, fit or draw user input, and ``library`` gives them the store.
-    Requests use it and the computer through `sprag.service.http.work`, which enforces the share of each token.
-    ``unaffected`` finds parameters without effect; ``streams`` are the places for event streams. ``ready`` is set when
-    the checker accepts work.
+    ``writer`` writes files of rows. Requests use all three through `sprag.service.http.work`, which enforces the share
+    of each token.
+    ``unaffected`` finds parameters without effect; ``streams`` are the places for event streams, and ``looks`` what
+    these look at. ``ready`` is set when the checker accepts work.
     """
 
     settings: Settings
     store: Store
     computer: Computes
     checker: Computes
+    writer: Computes
     library: Library
     ending: Event = field(default_factory=Event)
     ready: Event = field(default_factory=Event)
@@ -64,6 +69,8 @@ class Context:
     unaffected: Unaffected = field(default_factory=Unaffected)
     compute_shares: Shares = field(default_factory=lambda: Shares(1, MAX_COMPUTATIONS_EACH, MAX_COMPUTATIONS))
     check_shares: Shares = field(default_factory=lambda: Shares(1, MAX_CHECKS_EACH, MAX_CHECKS))
+    file_shares: Shares = field(default_factory=lambda: Shares(1, MAX_FILES_EACH, MAX_FILES))
+    looks: Looks = field(default_factory=Looks)
     files: KeptFiles = field(default_factory=KeptFiles)
 
     def cut(self) -> None:
@@ -71,7 +78,7 @@ class Context:
         processes.
         """
         self.store.session.refuse_writes()
-        for computer in (self.checker, self.computer):
+        for computer in (self.checker, self.computer, self.writer):
             computer.close()
 
 

@@ -8,13 +8,13 @@ from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from fastapi import Query
-from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response
 
 from sprag.service import languages
 from sprag.service.formats import MEDIA_TYPES, Format
 from sprag.service.http.respond import entity_tag, not_modified, tagged
+from sprag.service.http.threads import in_thread
 from sprag.service.http.work import Work
 from sprag.service.jobs import answers
 from sprag.service.results.defaults import drawn_numbers
@@ -103,7 +103,7 @@ async def unless_known(work: Work, look: Callable[[], tuple[str, Callable[[], Re
         unchanged = not_modified(work.request, tag)
         return tag, unchanged or make(), unchanged is not None
 
-    tag, made, unchanged = await run_in_threadpool(answer)
+    tag, made, unchanged = await in_thread(answer)
     response = await made.response(work) if isinstance(made, Drawing) else made
     return response if unchanged else tagged(response, tag)
 

@@ -2,6 +2,9 @@
 
 import logging
 import re
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Final
 
 import anyio
@@ -15,18 +18,21 @@ from sprag.service.faults import ParameterFault, shown
 from sprag.service.http.access import ASKING, OPEN, Access, Grant, token_in
 from sprag.service.http.problems import ApiError, problem_response
 from sprag.service.http.roles import LOOKING
+from sprag.service.http.threads import CHANGING
 from sprag.service.http.web.problem_page import problem_page
 from sprag.service.http.web.way_in import LOGIN_PATH, way_in
 from sprag.service.logs import note_caller
 from sprag.service.settings import Settings
 from sprag.service.storage.errors import StoreError
-from sprag.worker.limits import BODY_SECONDS, MAX_BODY_BYTES
+from sprag.worker.limits import BODY_SECONDS, MAX_BODY_BYTES, MAX_REQUESTS_EACH
 
 _LOG = logging.getLogger("sprag.service")
 
+#: Whether the process answers.
+LIVE_PATH: Final = "/livez"
 #: Paths that need no token: health checks, the login, and what its page has on it.
 OPEN_PATHS: Final = frozenset(
-    {"/livez", "/readyz", LOGIN_PATH, "/language", "/static/sprag.css", "/static/sprag.svg"}
+    {LIVE_PATH, "/readyz", LOGIN_PATH, "/language", "/static/sprag.css", "/static/sprag.svg"}
     | {"/static/link.js", "/static/keys.js"}
 )
 SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
@@ -69,6 +75,8 @@ class Guard:
         self._app = app
         self._hosts = settings.host_names
         self._access = access or Access(settings)
+        #: Requests in progress of each token or user.
+        self._requests: Counter[str] = Counter()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "lifespan":
@@ -88,11 +96,33 @@ class Guard:
             # HEAD is allowed wherever GET is; the server then sends no body.
             scope = {**scope, "method": "GET", "sprag.head": True}
         asking = ASKING.set(scope["sprag.grant"])
+        changing = CHANGING.set(scope["method"] not in SAFE_METHODS and scope["path"] not in LOOKING)
         try:
-            with act_as(self._note(scope)):
+            with act_as(self._note(scope)), self._counted(scope["sprag.grant"]):
                 await self._app(scope, _limited(receive), _with_headers(send))
+        except _TooManyError as error:
+            await problem_response(error)(scope, receive, _with_headers(send))
         finally:
+            CHANGING.reset(changing)
             ASKING.reset(asking)
+
+    @contextmanager
+    def _counted(self, grant: Grant | None) -> Iterator[None]:
+        """Count a request of its token or user; _TooManyError where it would have more than its part of connections."""
+        if grant is None or grant is OPEN:
+            yield
+            return
+        owner = grant.share
+        if self._requests[owner] >= MAX_REQUESTS_EACH:
+            detail = f"{MAX_REQUESTS_EACH} requests of this user or token are in progress, the most at one time."
+            raise _TooManyError("too-many-requests", detail)
+        self._requests[owner] += 1
+        try:
+            yield
+        finally:
+            self._requests[owner] -= 1
+            if not self._requests[owner]:
+                del self._requests[owner]
 
     def _note(self, scope: Scope) -> Actor:
         """Who acts in the request, for the log too."""
@@ -135,6 +165,8 @@ class Guard:
 
     async def _grant(self, scope: Scope, headers: Headers) -> Grant | None:
         """The grant of the request; ApiError where a token or a role is missing."""
+        if scope["path"] == LIVE_PATH:
+            return None  # whether the process answers is no matter for a database
         opened, safe = scope["path"] in OPEN_PATHS, scope["method"] in SAFE_METHODS
         try:
             await self._access.refresh()
@@ -174,6 +206,10 @@ class Guard:
             scope["sprag.grant"] = grant  # the login page shows who is logged in
             raise ApiError("read-only", f"{grant.label} {grant.reading}.")
         return grant
+
+
+class _TooManyError(ApiError):
+    """One token or user has too many requests in progress."""
 
 
 def body_too_large() -> ApiError:

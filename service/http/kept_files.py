@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import errno
 import os
 import re
@@ -9,16 +10,17 @@ import shutil
 import tempfile
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from starlette.concurrency import iterate_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 
 from sprag.service.http.problems import ApiError
+from sprag.service.http.threads import iterated
 from sprag.service.stale_files import mark, sweep
 
 #: All kept files together have at most this size; a larger one is kept alone until the next.
@@ -31,9 +33,12 @@ _RANGE: Final = re.compile(r"bytes=(?:([0-9]{1,18})-([0-9]{1,18})?|-([0-9]{1,18}
 
 @dataclass
 class _Entry:
-    lock: threading.Lock = field(default_factory=threading.Lock)
+    """A file, or who is about to write it: ``attempts`` of those who wait for their turn or ``writer``, who has it."""
+
     path: Path | None = None
     size: int = 0
+    writer: str | None = None
+    attempts: dict[str, asyncio.Future[None]] = field(default_factory=dict)
 
 
 class KeptFiles:
@@ -46,35 +51,70 @@ class KeptFiles:
         self._folder: Path | None = None
         self._descriptor = -1
 
-    def opened(self, tag: str, pieces: Callable[[], Iterable[bytes]]) -> BinaryIO:
-        """The file of a tag, open for reading; written from ``pieces`` where it is not kept.
+    async def opened(
+        self,
+        tag: str,
+        owner: str,
+        turn: Callable[[], AbstractAsyncContextManager[None]],
+        write: Callable[[str], Awaitable[None]],
+    ) -> BinaryIO:
+        """The file of a tag, open for reading; where it is not kept, ``write`` makes it in a ``turn`` of the ``owner``.
 
-        An open file stays readable when it is removed. Two requests for one file write it once.
+        An open file stays readable when it is removed. One of several requests for a file writes it, and the others
+        wait for it, or for its failure; where its client leaves, another one goes on.
         """
+        entry = self._entries.setdefault(tag, _Entry())
+        while entry.path is None:
+            attempt = entry.attempts.get(entry.writer or owner)
+            if attempt is not None:
+                await asyncio.shield(attempt)
+            else:
+                await self._attempt(entry, owner, turn, write)
         with self._lock:
-            entry = self._entries.setdefault(tag, _Entry())
+            self._entries[tag] = entry
             self._entries.move_to_end(tag)
-        with entry.lock:
-            if entry.path is None:
-                self._write(tag, entry, pieces())
-            assert entry.path is not None
-            file = entry.path.open("rb")
+        file = entry.path.open("rb")
         self._trim(tag)
         return file
 
-    def _write(self, tag: str, entry: _Entry, pieces: Iterable[bytes]) -> None:
-        handle, name = tempfile.mkstemp(dir=self._place())
+    async def _attempt(
+        self,
+        entry: _Entry,
+        owner: str,
+        turn: Callable[[], AbstractAsyncContextManager[None]],
+        write: Callable[[str], Awaitable[None]],
+    ) -> None:
+        """Wait for a turn, and write the file unless somebody else has done it or is doing it by then."""
+        attempt = entry.attempts[owner] = asyncio.get_running_loop().create_future()
         try:
-            with os.fdopen(handle, "wb") as file:
-                for piece in pieces:
-                    file.write(piece)
-                entry.size = file.tell()
-        except BaseException:
-            os.unlink(name)
-            with self._lock:
-                self._entries.pop(tag, None)
+            async with turn():
+                if entry.path is None and entry.writer is None:
+                    entry.writer = owner
+                    try:
+                        await self._write(entry, write)
+                    finally:
+                        entry.writer = None
+        except Exception as error:
+            attempt.set_exception(error)
+            attempt.exception()  # there may be nobody else to whom it matters
             raise
-        entry.path = Path(name)
+        finally:
+            del entry.attempts[owner]
+            for waiting in (attempt, *(entry.attempts.values() if entry.path is not None else ())):
+                if not waiting.done():
+                    waiting.set_result(None)
+
+    async def _write(self, entry: _Entry, write: Callable[[str], Awaitable[None]]) -> None:
+        handle, name = tempfile.mkstemp(dir=self._place())
+        os.close(handle)
+        path = Path(name)
+        try:
+            await write(name)
+            entry.size = path.stat().st_size
+        except BaseException:
+            path.unlink(missing_ok=True)
+            raise
+        entry.path = path
 
     def _place(self) -> Path:
         with self._lock:
@@ -126,8 +166,7 @@ def file_response(request: Request, file: BinaryIO, tag: str, media_type: str, h
     if request.scope.get("sprag.head"):
         file.close()
         return Response(status_code=status, media_type=media_type, headers=sent)
-    body = iterate_in_threadpool(_read(file, first, end))
-    return StreamingResponse(body, status, media_type=media_type, headers=sent)
+    return StreamingResponse(iterated(_read(file, first, end)), status, media_type=media_type, headers=sent)
 
 
 def asks_for_part(request: Request) -> bool:

@@ -6,9 +6,8 @@ import asyncio
 import logging
 from typing import TYPE_CHECKING, Final
 
-from starlette.concurrency import run_in_threadpool
-
 from sprag.service.http.problems import ApiError
+from sprag.service.http.threads import in_thread
 from sprag.service.jobs import explore
 from sprag.worker.pool.child_pool import JobStoppedError
 from sprag.worker.ports import StoreError
@@ -37,7 +36,7 @@ async def keep_reading_ahead(context: Context) -> None:
 
 async def read_ahead(context: Context, tried: set[str]) -> None:
     """Read the columns of every study that waits for it, each once: where that fails, the first question reads them."""
-    for study_id in await run_in_threadpool(context.library.columns.waiting):
+    for study_id in await in_thread(context.library.columns.waiting):
         if study_id not in tried:
             tried.add(study_id)
             try:

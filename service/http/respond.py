@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import AsyncGenerator, AsyncIterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import urlencode
 
-from starlette.concurrency import iterate_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
+from starlette.types import Receive, Scope, Send
 from werkzeug.datastructures import MIMEAccept
 from werkzeug.http import parse_accept_header, parse_etags
 
@@ -75,15 +74,39 @@ def tagged(response: Response, tag: str) -> Response:
     return response
 
 
-def streamed(pieces: Iterable[bytes], media_type: str, filename: str) -> StreamingResponse:
-    """A file sent piece by piece; the pieces are made in a thread, so that the service stays responsive.
+async def streamed(pieces: AsyncGenerator[bytes], media_type: str, filename: str) -> Response:
+    """A file sent piece by piece, as they come; ``pieces`` is closed when its client leaves.
 
-    The first piece is made here, so that earlier errors still become problem documents.
+    The first piece is waited for here, so that earlier errors still become problem documents. A later error breaks the
+    connection, so that no client takes a part for the whole.
     """
+    first = await anext(pieces, b"")
     headers = {"Content-Disposition": f'attachment; filename="{filename}"', "Vary": "Accept"}
-    rest = iter(pieces)
-    whole = itertools.chain([next(rest, b"")], rest)
-    return StreamingResponse(iterate_in_threadpool(whole), media_type=media_type, headers=headers)
+    return _Streamed(first, pieces, media_type, headers)
+
+
+class _Streamed(StreamingResponse):
+    """The answer, which closes its pieces however it ends."""
+
+    def __init__(self, first: bytes, rest: AsyncGenerator[bytes], media_type: str, headers: dict[str, str]) -> None:
+        async def pieces() -> AsyncIterator[bytes]:
+            yield first
+            async for piece in rest:
+                yield piece
+
+        super().__init__(pieces(), media_type=media_type, headers=headers)
+        self._rest = rest
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send it; to who asks for the head only, nothing of it."""
+        try:
+            if scope.get("sprag.head"):
+                await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
+                await send({"type": "http.response.body", "body": b""})
+            else:
+                await super().__call__(scope, receive, send)
+        finally:
+            await self._rest.aclose()
 
 
 def choose_format(request: Request, wanted: str | None, media_types: Mapping[Form, str]) -> Form:

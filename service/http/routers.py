@@ -13,6 +13,7 @@ from fastapi import APIRouter, Depends
 from sprag.service.http.reading import page_choice
 from sprag.service.http.requests import strict_query
 from sprag.service.http.roles import require_role
+from sprag.service.http.threads import ThreadedRoute
 from sprag.service.http.views import API_PREFIX
 
 if TYPE_CHECKING:
@@ -25,13 +26,18 @@ def api_router(tag: str | None = None, path: str = "", *, prefix: str = API_PREF
         prefix=prefix + path,
         tags=[tag] if tag else None,
         dependencies=[Depends(require_role), Depends(strict_query)],
+        route_class=ThreadedRoute,
         generate_unique_id_function=_operation_id,
     )
 
 
 def page_router() -> APIRouter:
     """A router of pages: they have the reader's units and names, and are not in the OpenAPI document."""
-    return APIRouter(include_in_schema=False, dependencies=[Depends(require_role), Depends(page_choice)])
+    return APIRouter(
+        include_in_schema=False,
+        dependencies=[Depends(require_role), Depends(page_choice)],
+        route_class=ThreadedRoute,
+    )
 
 
 def _operation_id(route: APIRoute) -> str:

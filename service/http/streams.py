@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import AsyncIterator, Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import AsyncIterator, Callable, Hashable
+from typing import TYPE_CHECKING, Final
 
-import anyio
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
 
 from sprag.service.http.problems import ApiError
@@ -20,6 +17,7 @@ if TYPE_CHECKING:
     from starlette.types import Receive, Scope, Send
 
     from sprag.service.http.context import Context
+    from sprag.service.http.looks import Seen
 
 MEDIA_TYPE: Final = "text/event-stream"
 #: Seconds between two looks at a study, and at a list, which costs more.
@@ -31,27 +29,18 @@ _SILENCE_SECONDS: Final = 15.0
 _RETRY: Final = 2000
 
 
-@dataclass(frozen=True, slots=True)
-class Seen:
-    """A look: ``mark`` differs after every change and is the id of the event; nothing follows the ``last`` one."""
-
-    mark: str
-    data: Any
-    last: bool = False
-
-
 async def event_stream(
-    context: Context, look: Callable[[], Seen], received: str | None, seconds: float | None = None
+    context: Context, key: Hashable, look: Callable[[], Seen], received: str | None, seconds: float | None = None
 ) -> Response:
-    """The stream of ``look``, which runs in a thread, to a client that has ``received`` the event of that mark.
+    """The stream of what has that key, to a client that has ``received`` the event of that mark.
 
-    Raises ApiError where too many streams are open.
+    All streams of a key share one ``look``, which runs in a thread. Raises ApiError where too many streams are open.
     """
     if context.streams.locked():
         detail = f"{MAX_STREAMS} streams of events are open already."
         raise ApiError("unavailable", detail, headers={"Retry-After": "10"})
     await context.streams.acquire()
-    return _Stream(context, _events(context, look, received, LOOK_SECONDS if seconds is None else seconds))
+    return _Stream(context, _events(context, key, look, received, LOOK_SECONDS if seconds is None else seconds))
 
 
 class _Stream(StreamingResponse):
@@ -70,22 +59,24 @@ class _Stream(StreamingResponse):
 
 
 async def _events(
-    context: Context, look: Callable[[], Seen], received: str | None, seconds: float
+    context: Context, key: Hashable, look: Callable[[], Seen], received: str | None, seconds: float
 ) -> AsyncIterator[bytes]:
     yield b"retry: %d\n\n" % _RETRY
     spoke = time.monotonic()
-    while not context.ending.is_set():
-        try:
-            seen = await run_in_threadpool(look)
-        except StoreError:
-            return  # deleted, or a database problem, which a reconnecting client learns
-        if seen.mark != received:
-            received, spoke = seen.mark, time.monotonic()
-            kind = b"end" if seen.last else b"progress"
-            yield b"id: %s\nevent: %s\ndata: %s\n\n" % (seen.mark.encode(), kind, to_bytes(seen.data))
-        if seen.last:
-            return
-        if time.monotonic() - spoke > _SILENCE_SECONDS:
-            spoke = time.monotonic()
-            yield b":\n\n"
-        await anyio.sleep(seconds)
+    async with context.looks.following(key, look, seconds) as followed:
+        following = followed.latest
+        while not context.ending.is_set():
+            try:
+                seen = await following()
+            except StoreError:
+                return  # deleted, or a database problem, which a reconnecting client learns
+            following = followed.next
+            if seen.mark != received:
+                received, spoke = seen.mark, time.monotonic()
+                kind = b"end" if seen.last else b"progress"
+                yield b"id: %s\nevent: %s\ndata: %s\n\n" % (seen.mark.encode(), kind, to_bytes(seen.data))
+            if seen.last:
+                return
+            if time.monotonic() - spoke > _SILENCE_SECONDS:
+                spoke = time.monotonic()
+                yield b":\n\n"

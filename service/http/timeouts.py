@@ -27,11 +27,34 @@ class TimeoutProtocol(H11Protocol):
         super().__init__(*arguments, **options)
         self._head: asyncio.TimerHandle | None = None
         self._write: asyncio.TimerHandle | None = None
+        self._since = 0.0
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """A client connects; wait for its request."""
         super().connection_made(transport)
+        self._since = self.loop.time()
         self._await_head()
+        self._make_room()
+
+    def _make_room(self) -> None:
+        """Close the connection that has waited longest for a whole request, where all places are taken."""
+        if self.limit_concurrency is None or len(self.connections) < self.limit_concurrency:
+            return
+        others = (other for other in self.connections if isinstance(other, TimeoutProtocol) and other is not self)
+        oldest = min((other for other in others if other.waiting), key=lambda other: other.since, default=None)
+        if oldest is not None:
+            self.connections.discard(oldest)  # now, and not when it is told that it is closed
+            oldest.transport.abort()
+
+    @property
+    def since(self) -> float:
+        """When the connection began to wait for its current request, by the clock of the loop."""
+        return self._since
+
+    @property
+    def waiting(self) -> bool:
+        """Whether no request is there, or only a part of one."""
+        return not self._busy() or bool(self.cycle.more_body)
 
     def data_received(self, data: bytes) -> None:
         """Part of a request arrives."""
@@ -44,6 +67,7 @@ class TimeoutProtocol(H11Protocol):
     def on_response_complete(self) -> None:
         """An answer is complete; the timeout applies to the head of a request that follows it."""
         super().on_response_complete()
+        self._since = self.loop.time()
         if self._busy():
             self._head = _stopped(self._head)
 

@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import aclosing
 from typing import TYPE_CHECKING, Annotated, Final, TypeVar, TypeVarTuple, cast
 
 from fastapi import Depends, Request
-from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
 from sprag.service import languages
 from sprag.service.http.access import OPEN
 from sprag.service.http.context import study_with
+from sprag.service.http.respond import streamed
+from sprag.service.http.threads import in_thread
 from sprag.service.languages.elsewhere import speak
 from sprag.service.results.start_states import check_start
 from sprag.service.spec.machine.shaft_check import NotCompiledError
 from sprag.worker import models
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine
-    from typing import Any
+    from collections.abc import AsyncGenerator, Callable, Coroutine, Iterator
+    from typing import Any, BinaryIO
+
+    from starlette.responses import Response
 
     from sprag.service.http.access import Grant
     from sprag.service.http.computer import Computes
@@ -65,6 +69,31 @@ class Work:
         context = self.context
         return await self._attended(self._in_turn(context.compute_shares, context.computer, 0, function, *args))
 
+    async def kept_file(self, tag: str, function: Callable[[*Args, str], None], *args: *Args) -> BinaryIO:
+        """The kept file of a tag, open for reading, which a process writes first where it is not there.
+
+        ``function(*args, path)`` writes it. Raises OSError where there is no place for files.
+        """
+        context, owner = self.context, self._grant.share
+
+        async def write(path: str) -> None:
+            await context.writer.run(function, *args, path)
+
+        return await self._attended(context.files.opened(tag, owner, lambda: context.file_shares.take(owner), write))
+
+    async def rows(
+        self, media_type: str, name: str, function: Callable[[*Args], Iterator[bytes]], *args: *Args
+    ) -> Response:
+        """The answer with the pieces that a function yields in a process, which ends with the client."""
+        context, owner = self.context, self._grant.share
+
+        async def pieces() -> AsyncGenerator[bytes]:
+            async with context.file_shares.take(owner), aclosing(context.writer.stream(function, *args)) as made:
+                async for piece in made:
+                    yield piece
+
+        return await self._attended(streamed(pieces(), media_type, name))
+
     async def run_case(self, function: Callable[[Study, *Args], R], study: Study, *args: *Args) -> R:
         """The value of a function that runs a case of ``study``, once its kernel is ready."""
         await self.load(models.shape_of(study))
@@ -83,7 +112,7 @@ class Work:
             check_start(study, start)
             return study, look(study)
 
-        return await run_in_threadpool(find)
+        return await in_thread(find)
 
     async def load(self, shape: KernelShape) -> None:
         """Load a kernel, compiling it if necessary; the compilation continues when the client disconnects."""

@@ -30,7 +30,9 @@ if TYPE_CHECKING:
 BUSY_SECONDS = 30.0
 POOL_CONNECTIONS = 8
 
+#: Options of a connection: the statement that begins a transaction, and the seconds that a file waits for its lock.
 _BEGIN = "sprag_begin"
+_WAIT = "sprag_wait"
 
 
 def _without_password(url: str) -> str:
@@ -148,6 +150,7 @@ class Session:
         # Threads of one process queue here: SQLite waits by sleeping for increasing times, which is unfair to early
         # waiters.
         began = perf_counter()
+        until = began + BUSY_SECONDS  # for the turn here and the lock together
         self.require_same_file()
         with self._turn:
             if not self._turn.wait_for(lambda: self._refusing or not self._writing, BUSY_SECONDS):
@@ -156,7 +159,8 @@ class Session:
                 raise EndingError("the service is shutting down; nothing was written")
             self._writing = True
         try:
-            with self._transaction(self._writer, "write", began) as connection:
+            writer = self._writer.execution_options(**{_WAIT: max(until - perf_counter(), 0.0)})
+            with self._transaction(writer, "write", began) as connection:
                 yield connection
         finally:
             with self._turn:
@@ -232,5 +236,8 @@ def _postgres() -> ModuleType:
 def _begin(connection: sa.Connection) -> None:
     # The driver never begins a transaction by itself (isolation_level None). A read transaction cannot become a write
     # transaction once another process has written in between, so writers take the lock when they begin.
-    if statement := connection.get_execution_options().get(_BEGIN):
+    options = connection.get_execution_options()
+    if statement := options.get(_BEGIN):
+        if _WAIT in options and connection.dialect.name == "sqlite":
+            connection.exec_driver_sql(f"PRAGMA busy_timeout = {int(options[_WAIT] * 1000)}")
         connection.exec_driver_sql(statement)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncGenerator, Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -60,6 +60,12 @@ class InThread:
         self.calls.append(call)
         return function(*args, **kwargs) if self.answer is None else self.answer(*call[1:], **kwargs)
 
+    async def stream(self, function: Any, *args: Any) -> AsyncGenerator[bytes]:
+        """The pieces that the function yields."""
+        self.calls.append((function, *args))
+        for piece in function(*args):
+            yield piece
+
     async def load(self, shape: KernelShape) -> None:
         """Note the kernel: functions load what they need."""
         self.loads.append(shape)
@@ -77,6 +83,7 @@ class Service:
     store: Store
     computer: InThread
     checker: InThread = field(default_factory=InThread)
+    writer: InThread = field(default_factory=InThread)
 
     def submit(self, spec: Any = None, **headers: str) -> str:
         """Submit a study; its id."""
@@ -163,9 +170,9 @@ def service(settings: Settings, connect: Callable[..., httpx.Client]) -> Iterato
     """A service with an empty database."""
     computer = InThread()
     with Store.open(settings.database_url, chunking=chunking(settings)) as store:
-        checker = InThread()
-        app = create_app(settings, store=store, computer=computer, checker=checker)
-        yield Service(app, connect(app), store, computer, checker)
+        checker, writer = InThread(), InThread()
+        app = create_app(settings, store=store, computer=computer, checker=checker, writer=writer)
+        yield Service(app, connect(app), store, computer, checker, writer)
 
 
 @pytest.fixture

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from collections.abc import Set as AbstractSet
 from contextlib import suppress
 from datetime import UTC, datetime, timedelta
@@ -291,3 +292,11 @@ def of_any_processor() -> dict[str, str]:
         "NPY_DISABLE_CPU_FEATURES": " ".join(numpy_features()),
         "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX512F",
     }
+
+
+def numbered(count: int, size: int = 1, broken: bool = False) -> Iterator[bytes]:
+    """Pieces that begin with their number, without an end where ``count`` is 0; ``broken`` fails at the end."""
+    for number in itertools.count() if count == 0 else range(count):
+        yield b"%d " % number + b"." * size
+    if broken:
+        raise ValueError("broken")

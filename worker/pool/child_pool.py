@@ -90,26 +90,54 @@ class ChildPool:
 
     def schedule(self, timeout: float, function: Callable[[*Args], R], *args: *Args) -> Job[R]:
         """Run a function in the next free process, for at most ``timeout`` s; returns at once."""
+        return self._submitted(timeout, function, args, None)
+
+    def stream(
+        self, timeout: float, receive: Callable[[bytes], None], function: Callable[[*Args], R], *args: *Args
+    ) -> Job[R]:
+        """The same for a function that uses `send_piece`: ``receive`` takes the pieces in a thread of the pool."""
+        return self._submitted(timeout, function, args, receive)
+
+    def _submitted(
+        self,
+        timeout: float,
+        function: Callable[..., R],
+        args: tuple[object, ...],
+        receive: Callable[[bytes], None] | None,
+    ) -> Job[R]:
         job: Job[R] = Job()
-        job.future = self._threads.submit(self._run, job, timeout, function, args)
+        job.future = self._threads.submit(self._run, job, timeout, function, args, receive)
         return job
 
-    def _run(self, job: Job[R], timeout: float, function: Callable[..., R], args: tuple[object, ...]) -> R:
+    def _run(
+        self,
+        job: Job[R],
+        timeout: float,
+        function: Callable[..., R],
+        args: tuple[object, ...],
+        receive: Callable[[bytes], None] | None,
+    ) -> R:
         child = self._idle.get()
         try:
-            return self._run_in(child, job, timeout, function, args)
+            return self._run_in(child, job, timeout, function, args, receive)
         finally:
             with suppress(ProcessStartError):  # the next job tries again and reports the error
                 child.start()
             self._idle.put(child)
 
     def _run_in(
-        self, child: ChildProcess, job: Job[R], timeout: float, function: Callable[..., R], args: tuple[object, ...]
+        self,
+        child: ChildProcess,
+        job: Job[R],
+        timeout: float,
+        function: Callable[..., R],
+        args: tuple[object, ...],
+        receive: Callable[[bytes], None] | None,
     ) -> R:
         for last in (False, False, True):
             try:
                 job._enter(child)
-                value: R = child.run(function, args, timeout)
+                value: R = child.run(function, args, timeout, receive)
                 break
             except (ProcessDiedError, ProcessStartError) as error:
                 if job._leave() or self._closed:

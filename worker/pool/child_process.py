@@ -93,15 +93,24 @@ class ChildProcess:
                 theirs.close()
             self._process, self._pipe, self._is_ready = process, ours, False
 
-    def run(self, function: Callable[..., Any], args: tuple[Any, ...], timeout: float) -> Any:
+    def run(
+        self,
+        function: Callable[..., Any],
+        args: tuple[Any, ...],
+        timeout: float,
+        receive: Callable[[bytes], None] | None = None,
+    ) -> Any:
         """The value of ``function(*args)``, computed by the process that was started; everything must be picklable.
+
+        ``receive`` is called with each piece that the function gives to `send_piece`; until it returns, which takes as
+        long as it likes, the function may fill the pipe and then waits.
 
         Raises TimeoutError after ``timeout`` s, not counting time in `uncounted` (the process is then killed),
         ProcessDiedError when it died, ProcessStartError when it died before it began, or the function's exception.
         """
         pipe = self._give(pickle.dumps((function, args), protocol=pickle.HIGHEST_PROTOCOL))
         try:
-            is_value, found = _read(pipe, *self._answer_of(pipe, timeout), timeout)
+            is_value, found = _read(pipe, *self._answer_of(pipe, timeout, receive), timeout)
         except TimeoutError:
             self._bury()
             raise
@@ -114,7 +123,9 @@ class ChildProcess:
             raise found
         return found
 
-    def _answer_of(self, pipe: Connection, timeout: float) -> tuple[bytes, list[int]]:
+    def _answer_of(
+        self, pipe: Connection, timeout: float, receive: Callable[[bytes], None] | None
+    ) -> tuple[bytes, list[int]]:
         """The outcome of the function, to be `_read`; raises TimeoutError, EOFError and OSError."""
         left = timeout
         while True:
@@ -123,6 +134,11 @@ class ChildProcess:
             left = max(left - (time.monotonic() - begun), 0.0)
             if in_time:
                 said: Any = pipe.recv()
+                if isinstance(said, int):  # the size of a piece
+                    piece = _filled(pipe, said, timeout)
+                    if receive is not None:
+                        receive(bytes(piece))
+                    continue
                 if said != _LOADING:
                     answer: tuple[bytes, list[int]] = said
                     return answer
@@ -219,6 +235,15 @@ def uncounted() -> Iterator[None]:
         pipe.send(_LOADED)
 
 
+def send_piece(piece: bytes) -> None:
+    """Give a piece of a long answer to the owner before the function returns. Only inside a `ChildProcess`."""
+    pipe = _owner
+    if pipe is None:
+        raise RuntimeError("this is no process of a pool")
+    pipe.send(len(piece))
+    _write(pipe, memoryview(piece))
+
+
 def _serve(pipe: Connection, parent: int, prepare: Callable[[], None]) -> None:
     """Main loop of the process: receive a function and its arguments, send its value, until the pipe is closed."""
     global _owner  # noqa: PLW0603 - there is one in a process
@@ -264,15 +289,20 @@ def _read(pipe: Connection, answer: bytes, sizes: Iterable[int], timeout: float)
 
     Raises TimeoutError when nothing comes for ``timeout`` s, EOFError and OSError.
     """
-    arrays = [bytearray(size) for size in sizes]
-    for array in arrays:
-        left = memoryview(array)
-        while left:
-            if not wait([pipe], timeout):
-                raise TimeoutError(f"not sent within {timeout:g} s")
-            count = os.readv(pipe.fileno(), [left])
-            if not count:
-                raise EOFError
-            left = left[count:]
+    arrays = [_filled(pipe, size, timeout) for size in sizes]
     value: tuple[bool, Any] = pickle.loads(answer, buffers=arrays)  # noqa: S301 - from a process of this program
     return value
+
+
+def _filled(pipe: Connection, size: int, timeout: float) -> bytearray:
+    """So many bytes that `_write` of the other process sends; raises what `_read` raises."""
+    array = bytearray(size)
+    left = memoryview(array)
+    while left:
+        if not wait([pipe], timeout):
+            raise TimeoutError(f"not sent within {timeout:g} s")
+        count = os.readv(pipe.fileno(), [left])
+        if not count:
+            raise EOFError
+        left = left[count:]
+    return array

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated
 
 from fastapi import Query, Request
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.answers import results as m
@@ -16,6 +15,7 @@ from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, st
 from sprag.service.http.drawing import TABLE_FORMATS, table
 from sprag.service.http.respond import choose_format, json_response, page_response
 from sprag.service.http.routers import api_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.views import study_address
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs.answers import FEW
@@ -101,10 +101,10 @@ async def list_cases(
     query = ExploreQuery(tuple(where or ()), ending or "", regime or "", flag or "", sort, page_size, at=pairs(at))
     context = work.context
     asked = (context.library, study_id, query, page_token)
-    study = await run_in_threadpool(context.store.study, study_id)
+    study = await in_thread(context.store.study, study_id)
     large = study.cases > FEW and not by_number(query)
-    page = await (work.check(case_page, *asked) if large else run_in_threadpool(case_page, *asked))
-    rows = await run_in_threadpool(lambda: list(rows_json(study, page.block)))
+    page = await (work.check(case_page, *asked) if large else in_thread(case_page, *asked))
+    rows = await in_thread(lambda: list(rows_json(study, page.block)))
     return page_response(request, {"cases": rows, "units": case_units(study), "next_page_token": page.next_token})
 
 

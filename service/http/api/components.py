@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated, Any, Final, Literal
 
 from fastapi import Depends, Path, Query, Request
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.answers import components as m
@@ -15,6 +14,7 @@ from sprag.service.http.context import ID_PATTERN, Ctx
 from sprag.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
 from sprag.service.http.respond import choose_format, json_response
 from sprag.service.http.routers import api_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import checks
 from sprag.service.results.exports.components import COMPONENT_FORMATS, components_csv
@@ -72,7 +72,7 @@ async def put_components(context: Ctx, work: Attended, received: Annotated[Body,
     """Add components, all or none; those of the same kind and name are replaced. CSV is sent as `{"csv": text}`."""
     with as_body_problems():
         given = await work.check(checks.components, received.content, received.format)
-    made = await run_in_threadpool(context.store.put_components, given)
+    made = await in_thread(context.store.put_components, given)
     return json_response({"components": list(map(entry, made))})
 
 

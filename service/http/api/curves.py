@@ -13,7 +13,7 @@ from starlette.responses import Response
 
 from sprag.service import formats, languages
 from sprag.service.answers import results as m
-from sprag.service.faults import choice_of, parameter_error
+from sprag.service.faults import FaultError, choice_of, parameter_error
 from sprag.service.http.api.document import CONTENT_RANGE, files, format_query, one_of, problems
 from sprag.service.http.api.document import not_modified as documented_304
 from sprag.service.http.api.drawn_format import DrawnFormat, language_query
@@ -21,11 +21,12 @@ from sprag.service.http.context import StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture, placed, tag_of
 from sprag.service.http.kept_files import asks_for_part, file_response
 from sprag.service.http.reading import FileChoice, ReportChoice, TableUnits
-from sprag.service.http.respond import JSON, choose_format, streamed
+from sprag.service.http.respond import JSON, choose_format, not_modified, tagged
 from sprag.service.http.routers import api_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
-from sprag.service.jobs import answers
-from sprag.service.results import exports, report
+from sprag.service.jobs import answers, row_files
+from sprag.service.results import report
 from sprag.service.results.choice import held
 from sprag.service.results.chosen_figures import CONTOUR
 from sprag.service.results.curves import CurveQuery
@@ -37,6 +38,7 @@ from sprag.worker import models
 from sprag.worker.limits import MAX_STARTS
 
 if TYPE_CHECKING:
+    from sprag.service.jobs.checks import Library
     from sprag.service.results.reading import Choice
     from sprag.service.storage.records import StudyRecord
     from sprag.worker.study import Study
@@ -222,7 +224,13 @@ async def _drawn(
         **files("All finished cases, in the requested format.", formats.MEDIA_TYPES.values()),
         206: {"description": "The part of the file that `Range` asks for; of ended studies.", "headers": CONTENT_RANGE},
         **problems(
-            "invalid-parameter", "invalid-selection", "study-not-found", "not-acceptable", "range-not-satisfiable"
+            "invalid-parameter",
+            "invalid-selection",
+            "study-not-found",
+            "not-acceptable",
+            "range-not-satisfiable",
+            "storage-full",
+            *CHECK_PROBLEMS,
         ),
         **documented_304(),
     },
@@ -250,22 +258,34 @@ async def get_results(
         raise parameter_error("header", "not-used", "only CSV has it", header, "in csv")
     heads: formats.Header = choice_of("header", "names" if header is None else header, formats.HEADERS)
 
-    def make(record: StudyRecord) -> Response:
-        study = work.context.store.study(study_id)
-        source = exports.stored(work.context.store, record, study, units or SI, heads)
-        pieces = partial(exports.export, source, chosen)
-        name, media_type = f"{study_id}.{formats.SUFFIXES[chosen][0]}", formats.MEDIA_TYPES[chosen]
-        if not record.state.terminal or not (record.cases <= _AT_ONCE or asks_for_part(work.request)):
-            return streamed(pieces(), media_type, name)
-        tag = tag_of(work.request, record.id, record.revision, chosen)
-        try:
-            file = work.context.files.opened(tag, pieces)
-        except OSError as error:  # a full disk, for instance: the rows can be sent all the same
-            _LOG.warning("A file of results cannot be kept: %s", error)
-            return streamed(pieces(), media_type, name)
-        return file_response(work.request, file, tag, media_type, {**attached(name), "Vary": "Accept"})
+    def look() -> tuple[StudyRecord, str]:
+        record = work.context.store.get_study(study_id)
+        return record, tag_of(work.request, record.id, record.revision, chosen)
 
-    return await conditional(work, study_id, chosen, make)
+    record, tag = await in_thread(look)
+    asked = work.context.library, study_id, chosen, units or SI, heads
+    return not_modified(work.request, tag) or tagged(await _rows(work, record, tag, asked), tag)
+
+
+async def _rows(
+    work: Work,
+    record: StudyRecord,
+    tag: str,
+    asked: tuple[Library, str, formats.Format, str, formats.Header],
+) -> Response:
+    """All rows as a file of an ended study, which is kept and has parts, or sent while they are read."""
+    chosen = asked[2]
+    name, media_type = f"{record.id}.{formats.SUFFIXES[chosen][0]}", formats.MEDIA_TYPES[chosen]
+    if record.state.terminal and (record.cases <= _AT_ONCE or asks_for_part(work.request)):
+        try:
+            file = await work.kept_file(tag, row_files.write, *asked)
+        except (OSError, FaultError) as error:  # the rows can be sent all the same
+            if isinstance(error, FaultError) and error.code != "storage-full":
+                raise
+            _LOG.warning("A file of results cannot be kept: %s", error)
+        else:
+            return file_response(work.request, file, tag, media_type, {**attached(name), "Vary": "Accept"})
+    return await work.rows(media_type, name, row_files.pieces, *asked)
 
 
 def _particular(name: str) -> Any:

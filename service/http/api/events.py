@@ -5,14 +5,15 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import Header
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
 
 from sprag.service.http import views
 from sprag.service.http.api.document import files, problems
 from sprag.service.http.context import Ctx, StudyId
+from sprag.service.http.looks import Seen
 from sprag.service.http.routers import api_router
-from sprag.service.http.streams import MEDIA_TYPE, Seen, event_stream
+from sprag.service.http.streams import MEDIA_TYPE, event_stream
+from sprag.service.http.threads import in_thread
 
 router = api_router("studies")
 
@@ -32,7 +33,7 @@ LastEventId = Annotated[
 )
 async def get_events(context: Ctx, study_id: StudyId, last_event_id: LastEventId = None) -> Response:
     """The live progress of a study. Each event has the complete state, so a missed one does not matter."""
-    record = await run_in_threadpool(context.store.get_study, study_id)
+    record = await in_thread(context.store.get_study, study_id)
     if record.state.terminal and last_event_id == str(record.revision):
         return Response(status_code=204)
 
@@ -46,4 +47,4 @@ async def get_events(context: Ctx, study_id: StudyId, last_event_id: LastEventId
         }
         return Seen(str(found.revision), data, found.state.terminal)
 
-    return await event_stream(context, look, last_event_id)
+    return await event_stream(context, ("study", study_id), look, last_event_id)

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Final
 
 from fastapi import Query
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.answers import explore as m
@@ -19,6 +18,7 @@ from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture
 from sprag.service.http.reading import FileChoice
 from sprag.service.http.routers import api_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import checks, explore
 from sprag.service.jobs.answers import FEW
@@ -126,4 +126,4 @@ async def select_cases(
     query = ExploreQuery(tuple(where or ()), ending or "", regime or "", flag or "", sort, limit)
     given = given_options(where=where, ending=ending, regime=regime, flag=flag, sort=sort, limit=limit)
     made = await work.check(checks.selected_study, context.library, study_id, query, context.store.clock.now(), given)
-    return await run_in_threadpool(taken_in, context, made, idempotency_key, 0)
+    return await in_thread(taken_in, context, made, idempotency_key, 0)

@@ -14,6 +14,7 @@ from sprag.service.http.metrics import CONTENT_TYPE, Metrics
 from sprag.service.http.problems import ApiError
 from sprag.service.http.respond import json_response
 from sprag.service.http.routers import api_router
+from sprag.service.http.threads import Threads, in_thread
 from sprag.service.storage.readiness import Readiness
 
 router = api_router("health", prefix="")
@@ -26,8 +27,12 @@ async def livez() -> Any:
 
 
 @router.get("/readyz", response_model=Health, responses=problems("invalid-parameter", "unavailable"))
-def readyz(request: Request) -> Any:
+async def readyz(request: Request) -> Any:
     """Whether studies can be submitted, read and run: checks, database, its schema, file and write lock, the worker."""
+    return await in_thread(_ready, request, threads=Threads.HEALTH)
+
+
+def _ready(request: Request) -> Response:
     readiness, context = cast("Readiness", request.app.state.readiness), cast("Context", request.app.state.context)
     starting = () if context.ready.is_set() else ("The checking processes are starting.",)
     if found := (*starting, *readiness.problems()):
@@ -44,7 +49,8 @@ def readyz(request: Request) -> Any:
         **problems("invalid-parameter", "unauthorized", "unavailable"),
     },
 )
-def metrics(request: Request) -> Response:
+async def metrics(request: Request) -> Response:
     """Metrics for Prometheus: queue, cases, endings, requests, waits for the database."""
     found = cast("Metrics", request.app.state.metrics)
-    return Response(found.text(), headers={"Content-Type": CONTENT_TYPE})
+    text = await in_thread(found.text, threads=Threads.HEALTH)
+    return Response(text, headers={"Content-Type": CONTENT_TYPE})

@@ -15,6 +15,7 @@ from sprag.service.http.context import Ctx
 from sprag.service.http.people import Action, Actor, Since, Target, Until, quota_json, user_json
 from sprag.service.http.respond import choose_format, json_response, page_response, streamed
 from sprag.service.http.routers import api_router
+from sprag.service.http.threads import in_thread, iterated
 from sprag.service.results.exports.audit import AUDIT_FORMATS, audit_pieces, entry_json
 from sprag.service.storage.audit import audit_filter
 from sprag.service.storage.users import Quota
@@ -51,7 +52,7 @@ def list_users(context: Ctx) -> Response:
         **problems("invalid-parameter", "not-allowed", "not-acceptable"),
     },
 )
-def get_audit(
+async def get_audit(
     context: Ctx,
     request: Request,
     since: Since = None,
@@ -70,7 +71,7 @@ def get_audit(
     chosen = choose_format(request, form, AUDIT_FORMATS)
     if chosen != "json":
         pieces = audit_pieces(context.store.audit_rows(wanted), chosen)
-        return streamed(pieces, AUDIT_FORMATS[chosen], f"audit.{chosen}")
-    page = context.store.audit_log(wanted, page_size, page_token)
+        return await streamed(iterated(pieces), AUDIT_FORMATS[chosen], f"audit.{chosen}")
+    page = await in_thread(context.store.audit_log, wanted, page_size, page_token)
     entries = list(map(entry_json, page.records))
     return page_response(request, {"entries": entries, "next_page_token": page.next_token})

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated, Any, Final
 
 from fastapi import Depends, Path, Query
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.answers import filled
@@ -15,6 +14,7 @@ from sprag.service.http.context import ID_PATTERN, Ctx
 from sprag.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
 from sprag.service.http.respond import json_response
 from sprag.service.http.routers import api_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import checks
 from sprag.service.jobs.saved_views import change_view as change
@@ -63,7 +63,7 @@ async def save_view(context: Ctx, work: Attended, received: Annotated[Body, Depe
     """
     with as_body_problems():
         view = await work.check(checks.saved_view, received.content, received.format)
-        saved = await run_in_threadpool(save, context.store, view)
+        saved = await in_thread(save, context.store, view)
     return json_response(entry(saved))
 
 
@@ -81,10 +81,10 @@ async def change_view(
     if_match: IfMatch = None,
 ) -> Response:
     """Change the name or the choices of a view, and whether and where it is in the report of its study."""
-    page = (await run_in_threadpool(context.store.saved_view, view_id)).view.page
+    page = (await in_thread(context.store.saved_view, view_id)).view.page
     with as_body_problems():
         wanted = await work.check(checks.saved_view_change, received.content, received.format, page)
-        saved = await run_in_threadpool(change, context.store, view_id, wanted, editions(if_match))
+        saved = await in_thread(change, context.store, view_id, wanted, editions(if_match))
     return json_response(entry(saved))
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated, Any, Final
 
 from fastapi import Depends, Path, Query
-from starlette.concurrency import run_in_threadpool
 from starlette.convertors import register_url_convertor
 from starlette.responses import Response
 
@@ -17,6 +16,7 @@ from sprag.service.http.requests import Body, IfMatch, as_body_problems, edition
 from sprag.service.http.respond import edition_tag, json_response, tagged
 from sprag.service.http.routers import api_router
 from sprag.service.http.schedule_views import detail, schedule_address, summary
+from sprag.service.http.threads import in_thread
 from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
 from sprag.service.jobs import checks
 from sprag.service.jobs.nights import HOURS, MOST_HOURS, night
@@ -147,14 +147,14 @@ async def create_schedule(
         return _made(context, store.create_schedule(fields, idempotency_key=key, body_hash=body_hash))
 
     if idempotency_key is None:
-        return await run_in_threadpool(keep, await _fields(context, work, received, None), None, "")
+        return await in_thread(keep, await _fields(context, work, received, None), None, "")
     # Before the fields are read: a future time may have passed since the key was first sent.
     with as_body_problems():
         body_hash = await work.check(checks.body_hash, received.content, received.format)
-    known = await run_in_threadpool(store.schedule_of_key, idempotency_key, body_hash)
+    known = await in_thread(store.schedule_of_key, idempotency_key, body_hash)
     if known is not None:
-        return await run_in_threadpool(_made, context, known)
-    return await run_in_threadpool(keep, await _fields(context, work, received, None), idempotency_key, body_hash)
+        return await in_thread(_made, context, known)
+    return await in_thread(keep, await _fields(context, work, received, None), idempotency_key, body_hash)
 
 
 def _answer(context: Context, record: ScheduleRecord) -> Response:
@@ -178,7 +178,7 @@ async def _fields(context: Context, work: Work, received: Body, old: ScheduleFie
         # Whoever pauses a schedule does not wait for a process, of which a service that has just started has none yet.
         quick = old is not None and checks.only_pauses(received.content, received.format)
         asked = (context.library, received.content, received.format, now, old)
-        fields = await (run_in_threadpool if quick else work.check)(checks.schedule_body, *asked)
+        fields = await (in_thread if quick else work.check)(checks.schedule_body, *asked)
         if old is None or fields.report_to != old.report_to:
             require_deliverable(fields.report_to, context.settings.reports)
         return fields
@@ -223,18 +223,18 @@ async def change_schedule(
     """Change some fields of a schedule; the others are kept. Due times missed before the change are dropped."""
     store, wanted = context.store, editions(if_match)
     for left in reversed(range(_ATTEMPTS)):
-        record = await run_in_threadpool(store.get_schedule, schedule_id)
+        record = await in_thread(store.get_schedule, schedule_id)
         require_edition("schedule", schedule_id, record.etag, wanted)
         fields = await _fields(context, work, received, record.fields)
         try:
             # The fields that are kept are those that were read.
-            changed = await run_in_threadpool(store.change_schedule, schedule_id, fields, (record.etag,))
+            changed = await in_thread(store.change_schedule, schedule_id, fields, (record.etag,))
         except ChangedMeanwhileError:
             if not left:
                 raise
         else:
             break
-    return await run_in_threadpool(_answer, context, changed)
+    return await in_thread(_answer, context, changed)
 
 
 @router.delete(

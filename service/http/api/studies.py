@@ -7,7 +7,6 @@ from typing import Annotated
 
 from fastapi import Depends, Query, Request
 from pydantic import Field
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.answers import studies as m
@@ -21,6 +20,7 @@ from sprag.service.http.context import Context, Ctx, StudyId
 from sprag.service.http.requests import Body, read_body
 from sprag.service.http.respond import JSON, json_response, not_modified, tagged
 from sprag.service.http.routers import api_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import checks
 from sprag.service.jobs.submission import Submission, take_in
@@ -110,7 +110,7 @@ async def create_study(
     made = await work.check(
         checks.new_study, context.library, received.content, received.format, fresh, finish, now, given
     )
-    return await run_in_threadpool(taken_in, context, made, idempotency_key, priority)
+    return await in_thread(taken_in, context, made, idempotency_key, priority)
 
 
 def given_options(**options: object) -> dict[str, object]:
@@ -244,7 +244,7 @@ async def extend_study(
     made = await work.check(
         checks.extended_study, context.library, study_id, received.content, received.format, finish, now, given
     )
-    return await run_in_threadpool(taken_in, context, made, idempotency_key, priority)
+    return await in_thread(taken_in, context, made, idempotency_key, priority)
 
 
 @router.post(
@@ -285,11 +285,11 @@ async def run_longer(
     idempotency_key: ExtensionKey = None,
 ) -> Response:
     """Submit a study of the unsettled cases of a study, with more time for each."""
-    kind = await run_in_threadpool(_to_run_longer, context, study_id, regime)
+    kind = await in_thread(_to_run_longer, context, study_id, regime)
     given = given_options(regime=regime, at_most=at_most)
     now = context.store.clock.now()
     made = await work.check(checks.longer_study, context.library, study_id, kind, at_most, now, given)
-    return await run_in_threadpool(taken_in, context, made, idempotency_key, 0)
+    return await in_thread(taken_in, context, made, idempotency_key, 0)
 
 
 def _to_run_longer(context: Context, study_id: str, regime: str | None) -> str:
@@ -350,7 +350,7 @@ async def narrow_study(
     """Submit the sweep of a study once more, with smaller steps where its motion jumps."""
     now, given = context.store.clock.now(), given_options(steps=steps, at=at)
     made = await work.check(checks.narrowed_study, context.library, study_id, steps, pairs(at), now, given)
-    return await run_in_threadpool(taken_in, context, made, idempotency_key, 0)
+    return await in_thread(taken_in, context, made, idempotency_key, 0)
 
 
 @router.post(

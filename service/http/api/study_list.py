@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import Depends, Query, Request
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.answers import studies as m
@@ -17,6 +16,7 @@ from sprag.service.http.listing import PageToken, Sort, WantedStudies
 from sprag.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
 from sprag.service.http.respond import json_response, page_response, tagged
 from sprag.service.http.routers import api_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import checks
 from sprag.worker.limits import MAX_PAGE_SIZE
@@ -73,7 +73,7 @@ async def change_study(
     """
     with as_body_problems():
         change = await work.check(checks.study_change, received.content, received.format)
-        record = await run_in_threadpool(context.store.change_study, study_id, change, editions(if_match))
+        record = await in_thread(context.store.change_study, study_id, change, editions(if_match))
     return tagged(json_response(views.summary(record)), views.study_tag(record))
 
 

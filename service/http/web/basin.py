@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
 from fastapi import Request
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError, parameter_error
@@ -16,6 +15,7 @@ from sprag.service.http.drawing import unchanging
 from sprag.service.http.reading import FileChoice, read_as
 from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.web.figures.answers import basin_plot
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
@@ -74,7 +74,7 @@ async def basin(work: Attended, study_id: StudyId, case: CaseNumber, asked: Aske
     study, query = await work.case_of(study_id, case, lambda study: asked.of(study, case))
 
     async def make() -> Response:
-        reading = await run_in_threadpool(reading_of, work.context.store, study_id, choice)
+        reading = await in_thread(reading_of, work.context.store, study_id, choice)
         return json_response(await work.run_case(basin_plot, study, case, query, reading))
 
     return await unchanging(work, study_id, make)

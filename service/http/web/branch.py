@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError
@@ -13,6 +12,7 @@ from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, st
 from sprag.service.http.reading import FileChoice
 from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.web.along import Begin, End, Text, along_frame, query_of
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.templates import page
@@ -77,8 +77,8 @@ async def branch_drawn(
 
     study, (asked, result) = await work.case_of(study_id, case, look, which)
     made = await work.run_case(run_branch, *motion_of(study, case, which), asked)
-    own = await run_in_threadpool(_own_cases, work.context, study_id, study, case, asked, result)
-    reading = await run_in_threadpool(reading_of, work.context.store, study_id, choice)
+    own = await in_thread(_own_cases, work.context, study_id, study, case, asked, result)
+    reading = await in_thread(reading_of, work.context.store, study_id, choice)
     return json_response(plotly_figure(read_figure(branch_figure(made, study, asked, result, own), reading)))
 
 

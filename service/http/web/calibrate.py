@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from fastapi import Query
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.faults import Fault, FaultError
 from sprag.service.http.context import Context, Ctx
 from sprag.service.http.problems import api_error
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.web.form.entries import range_of
 from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.templates import page
@@ -47,16 +47,16 @@ def calibrate_page(context: Ctx, study: Annotated[str, Query(max_length=64)]) ->
 async def send_points(context: Ctx, work: Attended, values: Form) -> Response:
     """Submit the calibration, or show what is wrong with it."""
     study_id = values.get("study", "")
-    spec = await run_in_threadpool(context.store.spec, study_id)
+    spec = await in_thread(context.store.spec, study_id)
     content = json.dumps(calibration_spec(spec, values)).encode()
     try:
         made = await work.check(
             checks.new_study, context.library, content, "json", False, None, context.store.clock.now(), {}
         )
-        return await run_in_threadpool(_submit, context, made)
+        return await in_thread(_submit, context, made)
     except FaultError as error:
         faults = error.faults or (Fault(None, "conflict", error.detail),)
-        return await run_in_threadpool(_page, context, study_id, values, faults, api_error(error).type.status)
+        return await in_thread(_page, context, study_id, values, faults, api_error(error).type.status)
 
 
 def _submit(context: Context, made: Submission) -> Response:

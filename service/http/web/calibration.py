@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 from urllib.parse import urlencode
 
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.http import views
@@ -14,6 +13,7 @@ from sprag.service.http.drawing import Columns, Drawing, conditional
 from sprag.service.http.reading import FileChoice, file_pairs, read_as
 from sprag.service.http.respond import JSON
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.web.figures import answers as figures
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
@@ -33,7 +33,7 @@ router = page_router()
 async def calibration_page(work: Attended, study_id: StudyId) -> Response:
     """Values with their intervals, the measured points on the fitted curve, correlations, residuals."""
     found = await work.check(answers.calibration_report, work.context.library, study_id)
-    return await run_in_threadpool(_page, work.context, study_id, found)
+    return await in_thread(_page, work.context, study_id, found)
 
 
 def _page(context: Context, study_id: str, found: CalibrationReport) -> Response:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from urllib.parse import urlencode
 
 from fastapi import Query
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.faults import FaultError
@@ -15,6 +14,7 @@ from sprag.service.http.drawing import Columns, picture, unchanging
 from sprag.service.http.reading import CHOICE, FileChoice, address_pairs
 from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.web.figures.answers import SAMPLES, motion_figures, strobes_figure
 from sprag.service.http.web.form.own_machine import case_address, has_laboratory
 from sprag.service.http.web.study import study_frame
@@ -185,7 +185,7 @@ async def motion(
     study, span = await work.case_of(study_id, case, lambda study: _span(study, case, begin, end), which)
 
     async def make() -> Response:
-        reading = await run_in_threadpool(reading_of, work.context.store, study_id, choice)
+        reading = await in_thread(reading_of, work.context.store, study_id, choice)
         figures = await work.run_case(motion_figures, *motion_of(study, case, which), *span, columns, reading)
         return json_response(figures)
 
@@ -218,7 +218,7 @@ async def motion_picture(
 
     async def make() -> Response:
         made = await work.run_case(models.run_trajectory, *motion_of(study, case, which), *span, SAMPLES // 3)
-        reading = await run_in_threadpool(reading_of, work.context.store, study_id, choice)
+        reading = await in_thread(reading_of, work.context.store, study_id, choice)
         shown, title = models.presentation_of(study), f"{study.name}, case {case}"
         return await picture(draw_motion, "svg", made, shown, reading, title, (), None).response(work)
 
@@ -238,7 +238,7 @@ async def strobes(
     study, _ = await work.case_of(study_id, case, require_strobes, which)
 
     async def make() -> Response:
-        reading = await run_in_threadpool(reading_of, work.context.store, study_id, choice)
+        reading = await in_thread(reading_of, work.context.store, study_id, choice)
         return json_response(await work.run_case(strobes_figure, *motion_of(study, case, which), columns, reading))
 
     return await unchanging(work, study_id, make)

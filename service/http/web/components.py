@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import Annotated, Final
 
 from fastapi import Query
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.faults import Fault, FaultError
 from sprag.service.http.context import Context, Ctx
 from sprag.service.http.problems import api_error
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.entries import Faults, Values
 from sprag.service.http.web.form.values import Form
@@ -97,10 +97,10 @@ async def put_component(context: Ctx, work: Attended, values: Form) -> Response:
             given = await work.check(checks.components, to_bytes({"csv": values.get("csv", "")}), "json")
         else:
             given = [_component(values)]
-        await run_in_threadpool(context.store.put_components, given)
+        await in_thread(context.store.put_components, given)
     except FaultError as error:
         faults, status = _faults(error, csv=csv), api_error(error).type.status
-        return await run_in_threadpool(_page, context, values, faults, status)
+        return await in_thread(_page, context, values, faults, status)
     return RedirectResponse(f"/components?read={len(given)}" if csv else "/components", status_code=303)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from fastapi import Query
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError
@@ -14,6 +13,7 @@ from sprag.service.http.drawing import unchanging
 from sprag.service.http.reading import FileChoice
 from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.web.along import Begin, End, Text, along_frame, query_of
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.templates import page
@@ -90,7 +90,7 @@ async def diagram_drawn(
 
     async def make() -> Response:
         made = await work.run_case(run_sections, *motion_of(study, case, which), asked)
-        reading = await run_in_threadpool(reading_of, work.context.store, study_id, choice)
+        reading = await in_thread(reading_of, work.context.store, study_id, choice)
         return json_response(plotly_figure(read_figure(diagram_figure(made, study, asked, shown), reading)))
 
     return await unchanging(work, study_id, make)
@@ -114,7 +114,7 @@ async def section_drawn(
 
     async def make() -> Response:
         made = await work.run_case(run_sections, *motion_of(study, case, which), asked)
-        reading = await run_in_threadpool(reading_of, work.context.store, study_id, choice)
+        reading = await in_thread(reading_of, work.context.store, study_id, choice)
         return json_response(plotly_figure(read_figure(section_figure(made, study, asked), reading)))
 
     return await unchanging(work, study_id, make)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
 from fastapi import Request
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.http import views
@@ -16,6 +15,7 @@ from sprag.service.http.drawing import Drawing, conditional
 from sprag.service.http.reading import CHOICE, FileChoice, file_read_as, read_as
 from sprag.service.http.respond import JSON
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.web.figures import answers as figures
 from sprag.service.http.web.held import fixed_choices, with_held
 from sprag.service.http.web.results import axis_choices
@@ -54,10 +54,10 @@ _PROBABILITY: Final = re.compile(r"([\d.eE+-]+)\s*(%?)")
 @router.get("/studies/{study_id:study}/drives")
 async def drives_page(context: Ctx, work: Attended, request: Request, study_id: StudyId) -> Response:
     """Ribbons and yield of one line of places; the user chooses results, places, quantiles and conditions."""
-    study = await run_in_threadpool(context.store.study, study_id)
+    study = await in_thread(context.store.study, study_id)
     if study.spread is None or study.plan is not None:
         return RedirectResponse(f"/studies/{study_id}", status_code=303)
-    reading = await run_in_threadpool(reading_of, context.store, study_id, CHOICE.get())
+    reading = await in_thread(reading_of, context.store, study_id, CHOICE.get())
     given = with_held(request.query_params, study, reading)
     faults: tuple[Any, ...] = ()
     found: tuple[RibbonReport, YieldReport] | None = None
@@ -66,7 +66,7 @@ async def drives_page(context: Ctx, work: Attended, request: Request, study_id: 
         found = await work.check(batch_answers.both, context.library, study_id, ribbon, wanted)
     except SelectionError as error:
         faults = error.faults
-    return await run_in_threadpool(_page, context, study_id, given, found, faults)
+    return await in_thread(_page, context, study_id, given, found, faults)
 
 
 def _page(

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from urllib.parse import urlencode
 
 from fastapi import Query, Request
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.http import views
@@ -14,6 +13,7 @@ from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.drawing import Drawing, conditional, picture
 from sprag.service.http.reading import FileChoice, file_read_as, read_as
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
@@ -44,7 +44,7 @@ METHODS: Final = {
 @router.get("/studies/{study_id:study}/sensitivity")
 async def sensitivity_page(context: Ctx, work: Attended, request: Request, study_id: StudyId) -> Response:
     """The indices of every axis for the chosen results, as a picture and as tables."""
-    study = await run_in_threadpool(context.store.study, study_id)
+    study = await in_thread(context.store.study, study_id)
     if not varying_axes(study) or study.plan is not None:
         return RedirectResponse(f"/studies/{study_id}", status_code=303)
     infos = models.study_results(study)
@@ -56,7 +56,7 @@ async def sensitivity_page(context: Ctx, work: Attended, request: Request, study
         found = await work.check(sensitivities.sensitivities_shown, context.library, study_id, names)
     except SelectionError as error:
         faults = error.faults
-    return await run_in_threadpool(_page, context, study_id, names, found, faults)
+    return await in_thread(_page, context, study_id, names, found, faults)
 
 
 def _page(

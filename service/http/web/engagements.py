@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.http.context import CaseNumber, StartNumber, StudyId
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
@@ -27,7 +27,7 @@ async def engagements_page(work: Attended, study_id: StudyId, case: CaseNumber, 
     study, _ = await work.case_of(study_id, case, require_clutches, which)
     made = await work.run_case(models.run_engagements, *motion_of(study, case, which))
     own = f"/studies/{study_id}/cases/{case}"
-    frame = await run_in_threadpool(study_frame, work.context, study_id)
+    frame = await in_thread(study_frame, work.context, study_id)
     return page(
         "engagements.html",
         **frame,

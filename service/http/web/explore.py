@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 from urllib.parse import urlencode
 
-from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import QueryParams
 from starlette.responses import Response
 
@@ -17,6 +16,7 @@ from sprag.service.http.drawing import Drawing, conditional
 from sprag.service.http.reading import CHOICE, FileChoice, address_pairs, file_pairs
 from sprag.service.http.respond import JSON
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.web.figures import answers as figures
 from sprag.service.http.web.figures.linked import BELOW, GRID, HEIGHT, TOP, Linked, linked
 from sprag.service.http.web.form.check import message
@@ -159,10 +159,10 @@ def _field_names(view: ExploreView, reading: Reading) -> dict[str, str]:
 async def explore_page(work: Attended, study_id: StudyId) -> Response:
     """Cases within ranges; every choice is in the address."""
     context, given = work.context, work.request.query_params.multi_items()
-    many = await run_in_threadpool(_many, context, study_id)
+    many = await in_thread(_many, context, study_id)
     asked = (context.library, study_id, given, CHOICE.get())
-    view = await (work.check(explore_view, *asked) if many else run_in_threadpool(explore_view, *asked))
-    return await run_in_threadpool(_page, context, study_id, view, given)
+    view = await (work.check(explore_view, *asked) if many else in_thread(explore_view, *asked))
+    return await in_thread(_page, context, study_id, view, given)
 
 
 def _many(context: Context, study_id: str) -> bool:
@@ -230,7 +230,7 @@ async def new_study_of_selection(work: Attended, study_id: StudyId) -> Response:
         query = _whole(read_choice(given, study, reading_of(context.store, study_id, choice)))
         return replace(query, limit=MOST_POINTS)
 
-    query = await run_in_threadpool(asked)
+    query = await in_thread(asked)
     spec = await work.check(selection_spec, context.library, study_id, query)
     return await spec_in_form(work, spec)
 

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Final
 from urllib.parse import urlencode
 
 from fastapi import Query
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.http import views
@@ -15,6 +14,7 @@ from sprag.service.http.drawing import Columns, Drawing, conditional, picture
 from sprag.service.http.reading import FileChoice, file_pairs, file_read_as, read_as
 from sprag.service.http.respond import JSON
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.web.figures import answers as figures
 from sprag.service.http.web.front_view import FrontView, front_view
 from sprag.service.http.web.study import study_frame
@@ -42,9 +42,9 @@ async def front_page(work: Attended, study_id: StudyId, x: X = "", y: X = "", ex
     """The best designs of a search; the user chooses what is drawn over what."""
     context = work.context
     asked = (context.library, study_id, bool(exact), x or None, y or None)
-    many = await run_in_threadpool(_many, context, study_id)
-    view = await (work.check(front_view, *asked) if many else run_in_threadpool(front_view, *asked))
-    return await run_in_threadpool(_front_page, context, study_id, view, exact=bool(exact))
+    many = await in_thread(_many, context, study_id)
+    view = await (work.check(front_view, *asked) if many else in_thread(front_view, *asked))
+    return await in_thread(_front_page, context, study_id, view, exact=bool(exact))
 
 
 def _many(context: Context, study_id: str) -> bool:

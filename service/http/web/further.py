@@ -7,12 +7,12 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from fastapi import Request
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.faults import FaultError, parameter_error
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.entries import Faults, Values, list_of
 from sprag.service.http.web.form.values import Form
@@ -59,7 +59,7 @@ async def extend(context: Ctx, work: Attended, study_id: StudyId, values: Form) 
         return await shown_study(context, work, study_id, values, _wrong(values, error.faults))
     # Pressed twice, it submits one study.
     key = f"extend-{study_id}-{hashlib.sha256(content).hexdigest()[:32]}"
-    record = await run_in_threadpool(take_in, context.store, made, key)
+    record = await in_thread(take_in, context.store, made, key)
     return RedirectResponse(f"/studies/{record.id}", status_code=303)
 
 

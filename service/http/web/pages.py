@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from fastapi import Request
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 
 from sprag.service.http.problems import PROBLEM_TYPES, ApiError
 from sprag.service.http.respond import entity_tag, json_response, not_modified
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.web import apidoc
 from sprag.service.http.web.apidoc import with_token_needed
 from sprag.service.http.web.manual import PAGES, manual_page, titles
@@ -40,7 +40,7 @@ async def manual(name: str) -> Response:
     """A page of the guide or the theory."""
     if name not in PAGES:
         raise ApiError("not-found", f"Unknown page; known pages: {', '.join(PAGES)}.")
-    return await run_in_threadpool(lambda: page("manual.html", page=manual_page(name), titles=titles()))
+    return await in_thread(lambda: page("manual.html", page=manual_page(name), titles=titles()))
 
 
 @router.get("/openapi.json")
@@ -83,7 +83,7 @@ class _FileAnswer(Response):
 @router.get("/static/{name}")
 async def static(request: Request, name: str) -> Response:
     """Style sheet, icon and scripts of all pages."""
-    return await run_in_threadpool(_plotly, request) if name == PLOTLY else _FileAnswer()
+    return await in_thread(_plotly, request) if name == PLOTLY else _FileAnswer()
 
 
 def _plotly(request: Request) -> Response:

@@ -10,13 +10,13 @@ from typing import Annotated, Any, Final
 from zoneinfo import ZoneInfo
 
 from fastapi import Query
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.http.context import Context, Ctx
 from sprag.service.http.problems import ApiError
 from sprag.service.http.routers import page_router
 from sprag.service.http.schedule_views import summary
+from sprag.service.http.threads import in_thread
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form.entries import Values
 from sprag.service.http.web.form.values import Form, changed_meanwhile
@@ -135,15 +135,15 @@ async def _save(context: Context, work: Work, values: Values, schedule_id: str |
     now = context.store.clock.now()
     faults: dict[str, list[str]] = {}
     try:
-        data, old = await run_in_threadpool(_asked, context, values, schedule_id)
+        data, old = await in_thread(_asked, context, values, schedule_id)
         fields = await work.check(checks.schedule_fields, work.context.library, data, now, old)
         if old is None or fields.report_to != old.report_to:
             require_deliverable(fields.report_to, context.settings.reports)
         if schedule_id is None:
-            await run_in_threadpool(context.store.create_schedule, fields)
+            await in_thread(context.store.create_schedule, fields)
         else:
             read = (values["etag"],) if "etag" in values else None
-            await run_in_threadpool(context.store.change_schedule, schedule_id, fields, read)
+            await in_thread(context.store.change_schedule, schedule_id, fields, read)
     except SpecError as error:
         for fault in error.faults:
             first = fault.where.split("/")[1] if fault.where else ""
@@ -153,11 +153,11 @@ async def _save(context: Context, work: Work, values: Values, schedule_id: str |
         faults["source"] = [str(error)]
     except ChangedMeanwhileError:
         # What was typed stays in the form; saved once more, it replaces what somebody else saved.
-        values = {**values, "etag": (await run_in_threadpool(context.store.get_schedule, schedule_id or "")).etag}
+        values = {**values, "etag": (await in_thread(context.store.get_schedule, schedule_id or "")).etag}
         faults[""] = [changed_meanwhile()]
-        return await run_in_threadpool(_form, context, values, faults, schedule_id, status=412)
+        return await in_thread(_form, context, values, faults, schedule_id, status=412)
     if faults:
-        return await run_in_threadpool(_form, context, values, faults, schedule_id, status=422)
+        return await in_thread(_form, context, values, faults, schedule_id, status=422)
     return RedirectResponse("/schedules", status_code=303)
 
 

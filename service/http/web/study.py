@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
 import numpy as np
-from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import QueryParams
 from starlette.responses import RedirectResponse, Response
 
@@ -18,6 +17,7 @@ from sprag.service.http.context import Context, Ctx, StudyId
 from sprag.service.http.problems import ApiError
 from sprag.service.http.reading import CHOICE, address_pairs, file_pairs
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.web.form.check import fits_of, has_measured_clutch
 from sprag.service.http.web.form.values import changed_meanwhile
 from sprag.service.http.web.held import fixed_choices
@@ -133,15 +133,15 @@ async def shown_study(
     ``labels`` is what its form for name, notes and tags has, where somebody else changed them after it was shown, or
     with what is ``untaken`` of it.
     """
-    spec = await run_in_threadpool(context.store.spec, study_id)
+    spec = await in_thread(context.store.spec, study_id)
     fits = await work.check(fits_of, spec) if has_measured_clutch(spec) else {}
-    usual, many = await run_in_threadpool(_usual_curves, context, study_id)
+    usual, many = await in_thread(_usual_curves, context, study_id)
     asked = (context.library, study_id, work.request.query_params.multi_items(), usual, CHOICE.get())
-    view = await (work.check(answers_view, *asked) if many else run_in_threadpool(answers_view, *asked))
+    view = await (work.check(answers_view, *asked) if many else in_thread(answers_view, *asked))
     extension = {"further": further or {}, "wrong": wrong or {}, "labels": labels or {}, "untaken": untaken or {}}
     if labels and not untaken:
         extension["changed_meanwhile"] = changed_meanwhile()
-    return await run_in_threadpool(_study_page, context, study_id, fits, view, usual, extension)
+    return await in_thread(_study_page, context, study_id, fits, view, usual, extension)
 
 
 def _usual_curves(context: Context, study_id: str) -> tuple[CurveQuery | None, bool]:
@@ -337,24 +337,24 @@ async def run_longer(context: Ctx, work: Attended, study_id: StudyId, kind: str)
         study, kinds = context.store.study(study_id), context.store.kinds(study_id)
         return kinds.regimes if models.is_settled(study.run) else _not_settled(kinds.flags)
 
-    counts = await run_in_threadpool(find)
+    counts = await in_thread(find)
     if kind not in counts:
         raise ApiError("not-found", "No case of this study is of this kind.")
     now = context.store.clock.now()
     made = await work.check(checks.longer_study, context.library, study_id, kind, None, now, {})
     # Pressed twice, it submits one study, unless more cases of this kind have finished.
     key = f"longer-{study_id}-{kind}-{counts[kind]}"
-    record = await run_in_threadpool(take_in, context.store, made, key)
+    record = await in_thread(take_in, context.store, made, key)
     return RedirectResponse(f"/studies/{record.id}", status_code=303)
 
 
 @router.post("/studies/{study_id:study}/narrow")
 async def narrow(context: Ctx, work: Attended, study_id: StudyId) -> Response:
     """The button beside the count of jumps: submit the sweep once more, with smaller steps there."""
-    now, revision = context.store.clock.now(), (await run_in_threadpool(context.store.get_study, study_id)).revision
+    now, revision = context.store.clock.now(), (await in_thread(context.store.get_study, study_id)).revision
     made = await work.check(checks.narrowed_study, context.library, study_id, NARROW_STEPS, (), now, {})
     # Pressed twice, it submits one study.
-    record = await run_in_threadpool(take_in, context.store, made, f"narrow-{study_id}-{revision}")
+    record = await in_thread(take_in, context.store, made, f"narrow-{study_id}-{revision}")
     return RedirectResponse(f"/studies/{record.id}", status_code=303)
 
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
 from fastapi import Request
-from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import QueryParams
 from starlette.responses import RedirectResponse, Response
 
@@ -17,6 +16,7 @@ from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx, StudyId
 from sprag.service.http.listing import wanted_studies
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.views import preset_of
 from sprag.service.http.web import saved_views
 from sprag.service.http.web.form.check import message
@@ -189,7 +189,7 @@ async def change_labels(context: Ctx, work: Attended, study_id: StudyId, values:
     data["archived"] = "archived" in values
     read = (values["etag"],) if "etag" in values else None
     try:
-        await run_in_threadpool(context.store.change_study, study_id, read_change(data), read)
+        await in_thread(context.store.change_study, study_id, read_change(data), read)
     except ChangedMeanwhileError:
         return await shown_study(context, work, study_id, labels=values)
     except SpecError as error:

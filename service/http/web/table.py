@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from urllib.parse import urlencode
 
 from fastapi import Query
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError
 from sprag.service.http.context import Context, StudyId
 from sprag.service.http.reading import CHOICE
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.web.held import fixed_choices, with_held
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
@@ -49,8 +49,8 @@ async def cases_page(
 ) -> Response:
     """Cases with the selected results, sorted and filtered."""
     context = work.context
-    study = await run_in_threadpool(context.store.study, study_id)
-    reading = await run_in_threadpool(reading_of, context.store, study_id, CHOICE.get())
+    study = await in_thread(context.store.study, study_id)
+    reading = await in_thread(reading_of, context.store, study_id, CHOICE.get())
     given = with_held(work.request.query_params, study, reading)
     at = tuple(
         (path.strip(), value.strip())
@@ -64,10 +64,10 @@ async def cases_page(
     large = study.cases > FEW and not by_number(query)
     asked = (context.library, study_id, query, after or None)
     try:
-        found = await (work.check(case_page, *asked) if large else run_in_threadpool(case_page, *asked))
+        found = await (work.check(case_page, *asked) if large else in_thread(case_page, *asked))
     except FaultError as error:
         faults = error.faults
-    return await run_in_threadpool(_table, context, study_id, given, query, found, faults)
+    return await in_thread(_table, context, study_id, given, query, found, faults)
 
 
 def _table(

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from urllib.parse import urlencode
 
 from fastapi import Query
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError
@@ -14,6 +13,7 @@ from sprag.service.http.context import CaseNumber, StudyId, study_with
 from sprag.service.http.reading import FileChoice, read_as
 from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
@@ -47,7 +47,7 @@ async def transient_page(
     torque: Text = "", within: Text = "", revolutions: Text = "",
 ) -> Response:  # fmt: skip
     """The form of a transient, its results and its figure."""
-    study = await run_in_threadpool(study_with, work.context, study_id, case)
+    study = await in_thread(study_with, work.context, study_id, case)
     require_transients(study)
     given = {"load": load, "angle": angle, "torque": torque, "within": within, "revolutions": revolutions}
     faults: tuple[Any, ...] = ()
@@ -62,7 +62,7 @@ async def transient_page(
             await work.load(shape_of_transients(study))
             made = await work.run_case(run_transient, study, case, course, 2)
     own = f"/studies/{study_id}/cases/{case}/transient"
-    frame = await run_in_threadpool(study_frame, work.context, study_id)
+    frame = await in_thread(study_frame, work.context, study_id)
     return page(
         "transient.html",
         status=422 if faults else 200,
@@ -95,5 +95,5 @@ async def transient_drawn(
     study, course = await work.case_of(study_id, case, look)
     await work.load(shape_of_transients(study))
     made = await work.run_case(run_transient, study, case, course, _POINTS)
-    reading = await run_in_threadpool(reading_of, work.context.store, study_id, choice)
+    reading = await in_thread(reading_of, work.context.store, study_id, choice)
     return json_response(plotly_figure(read_figure(transient_figure(made), reading)))

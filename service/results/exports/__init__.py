@@ -11,10 +11,9 @@ from collections.abc import Iterator
 from importlib import import_module
 from typing import Final
 
-from sprag.service.faults import FaultError
 from sprag.service.formats import Format
 from sprag.service.results.exports.source import MissingRowsError, Source, StoredRows, stored
-from sprag.service.results.exports.spool import lacks_room
+from sprag.service.results.exports.spool import room_required
 from sprag.service.results.exports.text import (
     csv_pieces,
     json_pieces,
@@ -32,6 +31,7 @@ __all__ = [
     "export",
     "json_pieces",
     "read_table",
+    "room_required",
     "row_json",
     "rows_json",
     "stored",
@@ -57,12 +57,5 @@ def export(source: Source, form: Format) -> Iterator[bytes]:
     stored study are missing.
     """
     module, write = _WRITERS[form]
-    try:
+    with room_required(tempfile.gettempdir()):
         yield from getattr(import_module(f"{__name__}.{module}"), write)(source)
-    except Exception as error:
-        if not lacks_room(error):
-            raise
-        folder = tempfile.gettempdir()
-        raise FaultError(
-            "storage-full", f"The folder for temporary files, {folder}, has no room for the file."
-        ) from error

@@ -8,9 +8,11 @@ import re
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
+from sprag.service.faults import FaultError
 from sprag.service.stale_files import marked, sweep
 
 _PREFIX: Final = "sprag-export-"
@@ -54,7 +56,21 @@ def require_room(folder: Path, size: int) -> None:
         reserve.unlink()
 
 
-def lacks_room(error: BaseException) -> bool:
+@contextmanager
+def room_required(folder: str) -> Iterator[None]:
+    """Raise FaultError "storage-full" where what is written into a folder inside the context has no room."""
+    try:
+        yield
+    except FaultError:
+        raise
+    except Exception as error:
+        if not _lacks_room(error):
+            raise
+        detail = f"The folder for temporary files, {folder}, has no room for the file."
+        raise FaultError("storage-full", detail) from error
+
+
+def _lacks_room(error: BaseException) -> bool:
     """Whether a full disk, or a quota of one, is the cause of an error."""
     causes, seen = [error], set[int]()
     while causes:

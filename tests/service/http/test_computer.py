@@ -8,7 +8,8 @@ import math
 import os
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
+from contextlib import aclosing
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -183,3 +184,59 @@ def test_it_takes_only_so_many_at_once(computer: ProcessComputer, portal: Blocki
     assert refused.value.code == "unavailable"
     for task in waiting:
         task.cancel()
+
+
+async def taken(pieces: AsyncIterator[bytes], into: list[bytes]) -> None:
+    async for piece in pieces:
+        into.append(piece)
+
+
+def test_pieces_come_in_order_and_an_error_after_them(portal: BlockingPortal) -> None:
+    made = ProcessComputer(Limits(60.0, 2**30), prepare=fakes.prepare_nothing)
+
+    async def take() -> None:
+        pieces: list[bytes] = []
+        # More than the pipe holds, so that the process waits for who takes them.
+        await taken(made.stream(fakes.numbered, 20, 2**17), pieces)
+        assert [int(piece.split()[0]) for piece in pieces] == list(range(20))
+        assert {len(piece.split()[1]) for piece in pieces} == {2**17}
+        received: list[bytes] = []
+        with pytest.raises(ValueError, match="broken"):
+            await taken(made.stream(fakes.numbered, 3, 1, True), received)
+        assert len(received) == 3
+
+    try:
+        portal.call(take)
+    finally:
+        made.close()
+
+
+def test_who_leaves_ends_the_pieces_and_frees_the_process(portal: BlockingPortal) -> None:
+    made = ProcessComputer(Limits(600.0, 2**30), prepare=fakes.prepare_nothing)
+
+    async def leave() -> None:
+        process = await made.run(os.getpid)
+        async with aclosing(made.stream(fakes.numbered, 0, 2**17)) as pieces:
+            assert await anext(pieces)
+            assert await anext(pieces)
+        assert await made.run(os.getpid) != process, "it would have gone on for ever"
+
+    try:
+        portal.call(leave)
+    finally:
+        made.close()
+
+
+def test_pieces_end_with_the_service(portal: BlockingPortal) -> None:
+    made = ProcessComputer(Limits(600.0, 2**30), prepare=fakes.prepare_nothing)
+
+    async def end() -> None:
+        pieces = made.stream(fakes.numbered, 0, 2**17)
+        assert await anext(pieces)
+        closing = asyncio.ensure_future(asyncio.to_thread(made.close))
+        with pytest.raises(ApiError) as ended:
+            await taken(pieces, [])
+        assert ended.value.type.status == 503
+        await closing
+
+    portal.call(end)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import gzip
 import tempfile
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
+from anyio.from_thread import BlockingPortal
 
 from sprag.service.http.api import curves
 from sprag.service.http.kept_files import KeptFiles
@@ -107,20 +109,24 @@ def test_a_running_study_has_no_parts(service: Service) -> None:
     assert answer.content.count(b"\n") == 5
 
 
-def test_files_are_written_once_and_the_oldest_go(tmp_path: Any) -> None:
+def test_files_are_written_once_and_the_oldest_go(tmp_path: Any, portal: BlockingPortal) -> None:
     files, made = KeptFiles(most_bytes=25), list[str]()
 
-    def content(name: str) -> bytes:
-        def pieces() -> Any:
+    def opened(name: str, content: str | None = None) -> Any:
+        async def write(path: str) -> None:
             made.append(name)
-            yield name.encode() * 5
-            yield b"." * 5
+            if content is None:
+                raise ValueError("broken")
+            Path(path).write_text(content)
 
-        with files.opened(name, pieces) as file:
-            return file.read()
+        return portal.call(files.opened, name, "owner", nullcontext, write)
+
+    def content(name: str) -> bytes:
+        with opened(name, name * 5 + "." * 5) as file:
+            return bytes(file.read())
 
     assert content("a") == content("a") == b"aaaaa....."
-    held = files.opened("a", list)
+    held = opened("a")
     content("b")
     content("a")
     content("c")
@@ -130,17 +136,13 @@ def test_files_are_written_once_and_the_oldest_go(tmp_path: Any) -> None:
     assert made == ["a", "b", "c", "b"], "the one that was used longest ago was removed"
     with held:
         assert held.read() == b"aaaaa.....", "an open file stays"
-
-    def broken() -> Any:
-        yield b"x"
-        raise ValueError("broken")
-
     with pytest.raises(ValueError, match="broken"):
-        files.opened("d", broken)
+        opened("d")
     content("d")
     assert made[-1] == "d"
     assert files._folder is not None
     folder = files._folder
+    assert len(list(folder.iterdir())) == 2
     files.close()
     assert not folder.exists()
 

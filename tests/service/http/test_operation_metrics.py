@@ -131,12 +131,12 @@ def test_queues_and_requests_in_progress_are_counted(service: Service) -> None:
         seen.append({"checks": shares.requests})
         raise RuntimeError("seen")
 
-    assert family(service, "sprag_queue_requests") == {("checks",): 0, ("computations",): 0}
+    assert family(service, "sprag_queue_requests") == {("checks",): 0, ("computations",): 0, ("files",): 0}
     assert value(samples(service), "sprag_http_requests_in_progress") == 1  # the one that asks
     service.checker.answer = look
     service.http.post("/api/v1/studies:preview", json=SPEC)
     assert seen == [{"checks": 1}]
-    assert family(service, "sprag_queue_requests") == {("checks",): 0, ("computations",): 0}
+    assert family(service, "sprag_queue_requests") == {("checks",): 0, ("computations",): 0, ("files",): 0}
     assert value(samples(service), "sprag_http_requests_in_progress") == 1
 
 

@@ -6,7 +6,7 @@ import asyncio
 import socket
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import httpx
@@ -199,3 +199,19 @@ def test_the_queue_has_an_end(service: Service, monkeypatch: pytest.MonkeyPatch,
     service.fill(first)
     accept(service.store, parse_spec(spec))
     assert limits.MAX_WAITING_STUDIES >= 100
+
+
+def test_half_a_request_makes_room_for_a_whole_one(service: Service) -> None:
+    options = {**READING, "limit_concurrency": 4}
+    with serving(service.app, **options) as address, ExitStack() as opened:
+        head = b"GET /livez HTTP/1.1\r\nHost: local"
+        body = b"POST /api/v1/studies:preview HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+        half = [head, body + b"Content-Length: 100\r\n\r\n{", head, head, b""]
+        held = []
+        for sent in half:
+            connection = opened.enter_context(socket.create_connection(address))
+            connection.sendall(sent)
+            held.append(connection)
+        for _ in range(3):
+            assert httpx.get(f"http://{address[0]}:{address[1]}/livez").status_code == 200
+        assert until_closed(held[0]) == until_closed(held[1]) == b"", "those that have waited longest"

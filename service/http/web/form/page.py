@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Final
 
 from fastapi import Query, Request
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.faults import FaultError
@@ -18,6 +17,7 @@ from sprag.service.http.problems import ApiError, api_error
 from sprag.service.http.reading import CHOICE
 from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form import study_check
 from sprag.service.http.web.form.cases import kinds, methods
@@ -109,7 +109,7 @@ async def new_study(
     """The form, empty or filled in from an example or from another study, or one case of it, alone or along a
     parameter.
     """
-    spec = await run_in_threadpool(_start, context, preset, clone, case, along)
+    spec = await in_thread(_start, context, preset, clone, case, along)
     if spec is None:
         return form_page(request, _empty(mode, model), None)
     try:
@@ -121,7 +121,7 @@ async def new_study(
     if clone is not None and case is None and "/name" in values:
         values["/name"] = f"{values['/name']} (copy)"
     checked = await look_over(context, work, values)
-    return await run_in_threadpool(form_page, request, values, checked)
+    return await in_thread(form_page, request, values, checked)
 
 
 def _empty(mode: str, model: str) -> Values:
@@ -156,17 +156,17 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
     wanted = values.pop("do", "check")
     if wanted == "undo":
         undo(values)
-        return await run_in_threadpool(form_page, request, values, await look_over(context, work, values))
+        return await in_thread(form_page, request, values, await look_over(context, work, values))
     before = _as_sent(values)
     share_clutches(values)
     if wanted == "submit":
         checked, made = await work.check(study_check.form_study, context.library, values, context.store.clock.now())
-        return await run_in_threadpool(_submit, context, request, values, checked, made)
+        return await in_thread(_submit, context, request, values, checked, made)
     reshape(values, wanted)
     if wanted == "take-component":
-        take_component(values, await run_in_threadpool(context.store.components))
+        take_component(values, await in_thread(context.store.components))
     taken = wanted == "take-columns"
-    faults = await run_in_threadpool(take_columns, values, _choices(values)) if taken else {}
+    faults = await in_thread(take_columns, values, _choices(values)) if taken else {}
     remember(values, before)
     checked = await look_over(context, work, values)
     checked.faults.update(faults)
@@ -178,7 +178,7 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
             checked.faults.setdefault("", []).append(f"The laboratory cannot show this machine: {text}")
         else:
             return RedirectResponse(address, status_code=303)
-    return await run_in_threadpool(form_page, request, values, checked)
+    return await in_thread(form_page, request, values, checked)
 
 
 def _submit(context: Context, request: Request, values: Values, checked: Checked, made: Submission | None) -> Response:
@@ -212,7 +212,7 @@ async def check(context: Ctx, work: Attended, request: Request, values: Form) ->
             },
         }
 
-    return json_response(await run_in_threadpool(answer))
+    return json_response(await in_thread(answer))
 
 
 async def look_over(context: Context, work: Work, values: Mapping[str, str]) -> Checked:
@@ -315,7 +315,7 @@ async def spec_in_form(work: Work, spec: dict[str, Any]) -> Response:
         values = values_of(spec)
     except ValueError:
         values = {"/text": spec_text(spec), "format": "json"}
-    return await run_in_threadpool(form_page, work.request, values, await look_over(work.context, work, values))
+    return await in_thread(form_page, work.request, values, await look_over(work.context, work, values))
 
 
 def _choices(values: Values) -> Groups:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 from urllib.parse import urlencode
 
 from fastapi import Query
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.http.drawing import picture, table
@@ -14,6 +13,7 @@ from sprag.service.http.problems import ApiError
 from sprag.service.http.reading import CHOICE
 from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.figures.shaft import SAMPLES, irregularities, machine_case
 from sprag.service.http.web.form.own_machine import fits
@@ -150,7 +150,7 @@ async def laboratory_picture(work: Attended, form: Literal["svg", "png", "csv"])
         raise ApiError("invalid-spec", "; ".join(text for texts in chosen.faults.values() for text in texts))
     motions = [await work.run_case(_motion, each.study) for each in (chosen, *held)]
     if form == "csv":
-        return table(await run_in_threadpool(trajectory_csv, motions[0], _reading(chosen).units), "csv", "laboratory")
+        return table(await in_thread(trajectory_csv, motions[0], _reading(chosen).units), "csv", "laboratory")
     beside = [(_NAMES[index], motion) for index, motion in enumerate(motions[1:]) if motion.times.size]
     shown, reading = models.presentation_of(chosen.study), _reading(chosen)
     at = chosen.angle % chosen.degrees

@@ -12,7 +12,7 @@ from playwright.sync_api import expect
 from starlette.concurrency import run_in_threadpool
 
 from benchmarks.faults.harness import free_port
-from sprag.service.http import streams
+from sprag.service.http import looks as looking
 from tests.acceptance.processes import SECONDS, service
 from tests.service.timed_spec import SPEC
 
@@ -45,7 +45,7 @@ def test_a_stream_has_one_event_for_each_change(service: Service, monkeypatch: p
             case 4 | 5:
                 ending.set()
 
-    monkeypatch.setattr(streams.anyio, "sleep", between_looks)
+    monkeypatch.setattr(looking, "_pause", between_looks)
     marks = re.findall("^id: (.+)$", service.http.get(f"/live/{name}").text, re.MULTILINE)
     assert len(set(marks)) == len(marks) == (1 if name == "night" else 2)  # no schedule was due
     ending.clear()

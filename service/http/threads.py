@@ -1,0 +1,115 @@
+"""Threads of requests: what only reads never waits for a thread of what writes, nor for one of health or tokens."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from contextvars import ContextVar
+from enum import StrEnum
+from functools import partial, wraps
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+import anyio
+from anyio.lowlevel import RunVar
+from fastapi.routing import APIRoute
+
+from sprag.service.http.problems import ApiError
+from sprag.worker.limits import LOCK_SECONDS, WRITING_THREADS
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncGenerator, Callable, Iterable
+
+R = TypeVar("R")
+
+
+class Threads(StrEnum):
+    """What threads are for."""
+
+    READ = "read"
+    WRITE = "write"
+    HEALTH = "health"
+    TOKENS = "tokens"
+    FILES = "files"
+    STREAMS = "streams"
+
+
+#: Number of threads of each kind; those for reading are the framework's own.
+_NUMBERS: Final = {
+    Threads.WRITE: WRITING_THREADS,
+    Threads.HEALTH: 4,
+    Threads.TOKENS: 2,
+    Threads.FILES: 8,
+    Threads.STREAMS: 4,
+}
+#: Whether the current request changes something.
+CHANGING: ContextVar[bool] = ContextVar("changing", default=False)
+
+# Semaphores and limiters belong to an event loop, and tests have several.
+_PLACES: RunVar[dict[Threads, asyncio.Semaphore]] = RunVar("sprag_places")
+_UNLIMITED: RunVar[anyio.CapacityLimiter] = RunVar("sprag_threads")
+
+
+async def in_thread(function: Callable[..., R], *args: Any, threads: Threads | None = None, **options: Any) -> R:
+    """The value of a function, run in a thread of a kind; by default one for what the current request does.
+
+    Raises ApiError where a request that changes something gets no thread in time, because all of them wait for the
+    write lock of the database.
+    """
+    call = partial(function, *args, **options)
+    kind = threads or (Threads.WRITE if CHANGING.get() else Threads.READ)
+    if kind is Threads.READ:
+        return await anyio.to_thread.run_sync(call)
+    place = _places()[kind]
+    if kind is Threads.WRITE:
+        try:
+            await asyncio.wait_for(place.acquire(), LOCK_SECONDS)
+        except TimeoutError:
+            detail = "Too many changes wait for the write lock of the database; nothing was changed."
+            raise ApiError("unavailable", detail, headers={"Retry-After": "5"}) from None
+    else:
+        await place.acquire()
+    try:
+        return await anyio.to_thread.run_sync(call, limiter=_unlimited())
+    finally:
+        place.release()
+
+
+def _places() -> dict[Threads, asyncio.Semaphore]:
+    try:
+        return _PLACES.get()
+    except LookupError:
+        places = {kind: asyncio.Semaphore(number) for kind, number in _NUMBERS.items()}
+        _PLACES.set(places)
+        return places
+
+
+def _unlimited() -> anyio.CapacityLimiter:
+    """The threads of all kinds but the framework's own, whose numbers `_places` limits."""
+    try:
+        return _UNLIMITED.get()
+    except LookupError:
+        limiter = anyio.CapacityLimiter(math.inf)
+        _UNLIMITED.set(limiter)
+        return limiter
+
+
+async def iterated(pieces: Iterable[bytes], threads: Threads = Threads.FILES) -> AsyncGenerator[bytes]:
+    """The pieces, each made in a thread, which is free while the client takes them."""
+    rest = iter(pieces)
+    while (piece := await in_thread(next, rest, None, threads=threads)) is not None:
+        yield piece
+
+
+class ThreadedRoute(APIRoute):
+    """A route whose plain functions run `in_thread`."""
+
+    def __init__(self, path: str, endpoint: Callable[..., Any], **options: Any) -> None:
+        super().__init__(path, endpoint if asyncio.iscoroutinefunction(endpoint) else _threaded(endpoint), **options)
+
+
+def _threaded(endpoint: Callable[..., Any]) -> Callable[..., Any]:
+    @wraps(endpoint)
+    async def run(*args: Any, **options: Any) -> Any:
+        return await in_thread(partial(endpoint, *args, **options))
+
+    return run

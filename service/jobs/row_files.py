@@ -1,0 +1,32 @@
+"""Functions for the processes that write files of rows: into a file, or piece by piece for who waits for them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sprag.service.results.exports import export, room_required, stored
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from sprag.service.formats import Format, Header
+    from sprag.service.jobs.checks import Library
+
+
+def prepare() -> None:
+    """Prepare a process: load this module."""
+
+
+def pieces(library: Library, study_id: str, form: Format, units: str, header: Header) -> Iterator[bytes]:
+    """All rows of a study; raises StoreError, SelectionError, and FaultError "storage-full"."""
+    store = library.store
+    record, study = store.get_study(study_id), store.study(study_id)
+    return export(stored(store, record, study, units, header), form)
+
+
+def write(library: Library, study_id: str, form: Format, units: str, header: Header, path: str) -> None:
+    """Write all rows of a study into a file; raises what `pieces` raises."""
+    with room_required(str(Path(path).parent)), Path(path).open("wb") as file:
+        for piece in pieces(library, study_id, form, units, header):
+            file.write(piece)

@@ -1,0 +1,305 @@
+"""What one token does keeps no other one from the service: files, changes, tokens, health and streams wait apart."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections import Counter
+from random import Random
+from typing import TYPE_CHECKING, Any
+
+import anyio
+import httpx
+import pytest
+
+from sprag.service.formats import FORMATS
+from sprag.service.http import guard, looks
+from sprag.service.http.problems import ApiError
+from sprag.service.http.threads import ThreadedRoute
+from sprag.service.jobs import row_files
+from sprag.service.storage.scopes import TokenScope
+from sprag.worker.limits import MAX_FILES_EACH, WRITING_THREADS
+from tests.service.conftest import API, Service
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable
+
+    from anyio.from_thread import BlockingPortal
+
+EXPORTS = 45
+STREAMS = 50
+
+
+@pytest.fixture
+def tokens(service: Service) -> dict[str, str]:
+    """Secrets of two readers and a writer; the service's client is the writer."""
+    scopes = {"one": TokenScope.READ, "other": TokenScope.READ, "writer": TokenScope.WRITE}
+    secrets = {name: service.store.create_token(name, scope)[0] for name, scope in scopes.items()}
+    service.http.headers["Authorization"] = f"Bearer {secrets['writer']}"
+    return secrets
+
+
+@pytest.fixture
+def ended(service: Service, tokens: dict[str, str]) -> str:
+    """A study that has ended."""
+    study_id = service.submit()
+    service.fill(study_id)
+    return study_id
+
+
+class Held:
+    """A writer whose files wait to be allowed; what it was asked to write, in order."""
+
+    def __init__(self, service: Service) -> None:
+        self._run = service.writer.run
+        self.begun: list[tuple[Any, ...]] = []
+        self.allowed = anyio.Event()
+        service.writer.run = self.run  # type: ignore[method-assign]
+
+    async def run(self, function: Any, *args: Any) -> Any:
+        """Wait, without a thread, then run the function."""
+        self.begun.append((function, args[2]))
+        await self.allowed.wait()
+        return await self._run(function, *args)
+
+
+def ask(service: Service, path: str, token: str, method: str = "GET", **headers: str) -> Awaitable[httpx.Response]:
+    async def sent() -> httpx.Response:
+        transport = httpx.ASGITransport(service.app, raise_app_exceptions=False)
+        async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
+            return await client.request(method, path, headers={"Authorization": f"Bearer {token}", **headers})
+
+    return sent()
+
+
+def threads_taken() -> float:
+    """Threads of the framework that work or wait, which readers have."""
+    return anyio.to_thread.current_default_thread_limiter().borrowed_tokens
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    """Wait until something holds."""
+    with anyio.fail_after(600):
+        while not condition():
+            await anyio.sleep(0.001)
+
+
+def rows(study_id: str, form: str) -> str:
+    return f"{API}/studies/{study_id}/results?format={form}"
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_one_request_writes_what_many_want(
+    service: Service, ended: str, tokens: dict[str, str], portal: BlockingPortal, form: str
+) -> None:
+    curve = f"{API}/studies/{ended}/curves?rest=usual"
+
+    async def export() -> None:
+        held = Held(service)
+        order = Random(form).choices(["one", "one", "one", "writer"], k=EXPORTS)
+        asked = [asyncio.ensure_future(ask(service, rows(ended, form), tokens[name])) for name in order]
+        await until(lambda: bool(held.begun) and not threads_taken())
+        # Everybody waits for the file, and nobody for a thread.
+        for path in ("/livez", "/readyz", curve):
+            assert (await ask(service, path, tokens["other"])).status_code in (200, 503)
+        await until(lambda: not threads_taken())
+        assert held.begun == [(row_files.write, form)]
+        held.allowed.set()
+        answers = await asyncio.gather(*asked)
+        assert {answer.status_code for answer in answers} == {200}
+        assert len({answer.content for answer in answers}) == 1
+        assert held.begun == [(row_files.write, form)]
+        part = await ask(service, rows(ended, form), tokens["one"], Range="bytes=0-9")
+        assert part.content == answers[0].content[:10]
+
+    portal.call(export)
+
+
+def test_a_client_that_leaves_leaves_the_file_to_another(
+    service: Service, ended: str, tokens: dict[str, str], portal: BlockingPortal
+) -> None:
+    async def export() -> None:
+        held = Held(service)
+        first, second, third = (
+            asyncio.ensure_future(ask(service, rows(ended, "csv"), tokens[name])) for name in ("one", "one", "other")
+        )
+        await until(lambda: len(held.begun) == 1)
+        first.cancel()
+        await until(lambda: len(held.begun) == 2)
+        held.allowed.set()
+        assert (await second).content == (await third).content
+        assert len(held.begun) == 2
+
+    portal.call(export)
+
+
+def test_a_failure_is_everybodys(service: Service, ended: str, tokens: dict[str, str], portal: BlockingPortal) -> None:
+    async def export() -> None:
+        held = Held(service)
+
+        async def fail(*args: Any) -> None:
+            held.begun.append(args)
+            await held.allowed.wait()
+            raise ApiError("too-costly", "Too costly.")
+
+        service.writer.run = fail  # type: ignore[method-assign]
+        asked = [asyncio.ensure_future(ask(service, rows(ended, "xlsx"), tokens["one"])) for _ in range(5)]
+        await until(lambda: len(held.begun) == 1 and not threads_taken())
+        held.allowed.set()
+        assert {answer.status_code for answer in await asyncio.gather(*asked)} == {422}
+        assert len(held.begun) == 1
+
+    portal.call(export)
+
+
+def test_each_token_has_its_share_of_files(
+    service: Service, ended: str, tokens: dict[str, str], portal: BlockingPortal
+) -> None:
+    addresses = [f"{rows(ended, 'csv')}&header={header}&units={unit}" for header in ("names", "units")
+                 for unit in ("SI", "typed", *(f"{unit}" for unit in ("rpm", "mm", "rev", "deg")))]  # fmt: skip
+    addresses += [f"{rows(ended, form)}&units={unit}" for form in ("parquet", "arrow", "xlsx")
+                  for unit in ("SI", "typed", "rpm", "mm", "rev", "deg", "cm", "km")]  # fmt: skip
+    assert len(addresses) > MAX_FILES_EACH
+
+    async def export() -> None:
+        held = Held(service)
+        asked = [asyncio.ensure_future(ask(service, address, tokens["one"])) for address in addresses]
+        await until(lambda: sum(task.done() for task in asked) == len(addresses) - MAX_FILES_EACH)
+        refused = Counter(task.result().status_code for task in asked if task.done())
+        assert refused == {429: len(addresses) - MAX_FILES_EACH}
+        assert len(held.begun) == 1, "the others wait for their turn"
+        other = asyncio.ensure_future(ask(service, rows(ended, "jsonl"), tokens["other"]))
+        await until(lambda: len(held.begun) == 2)
+        held.allowed.set()
+        assert (await other).status_code == 200
+        answers = await asyncio.gather(*asked)
+        assert [answer.status_code for answer in answers].count(429) == refused[429]
+
+    portal.call(export)
+
+
+def test_changes_that_wait_for_the_lock_have_threads_of_their_own(
+    service: Service, ended: str, tokens: dict[str, str], portal: BlockingPortal
+) -> None:
+    study_id, locked, free = service.submit(), threading.Event(), threading.Event()
+
+    def hold() -> None:
+        with service.store.session.write():
+            locked.set()
+            assert free.wait(600)
+
+    holder = threading.Thread(target=hold)
+    holder.start()
+    assert locked.wait(600)
+
+    async def change() -> None:
+        verb = f"{API}/studies/{study_id}:cancel"
+        changes = [asyncio.ensure_future(ask(service, verb, tokens["writer"], "POST")) for _ in range(60)]
+        waiting = service.store.session._turn._waiters  # type: ignore[attr-defined]
+        await until(lambda: len(waiting) == WRITING_THREADS)
+        assert threads_taken() == 0
+        assert (await ask(service, "/livez", tokens["one"])).status_code == 200
+        assert (await ask(service, f"{API}/studies/{ended}/curves?rest=usual", tokens["one"])).status_code == 200
+        assert not any(task.done() for task in changes)
+        free.set()
+        assert {answer.status_code for answer in await asyncio.gather(*changes)} <= {200, 202, 409}
+
+    try:
+        portal.call(change)
+    finally:
+        free.set()
+        holder.join()
+    assert service.get(f"/studies/{study_id}")["state"] in ("cancelling", "cancelled")
+
+
+def test_every_route_chooses_its_thread_by_what_it_does(service: Service) -> None:
+    routes = [route for route in service.app.router.routes if getattr(route, "methods", None)]
+    assert len(routes) > 100
+    assert all(isinstance(route, ThreadedRoute) for route in routes)
+    plain = [route.path for route in routes if not asyncio.iscoroutinefunction(route.dependant.call)]  # type: ignore[attr-defined]
+    assert plain == [], "the framework would run it in a thread that readers have"
+
+
+def test_whether_the_process_answers_is_asked_of_nobody(
+    service: Service, portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError("/livez asks the database")
+
+    monkeypatch.setattr(service.store, "tokens", refuse)
+    monkeypatch.setattr(service.app.state.access, "_read_at", None)
+    assert service.http.get("/livez").status_code == 200
+    assert portal.call(threads_taken) == 0
+
+
+def test_tokens_are_read_once_for_all_who_wait(
+    service: Service, ended: str, tokens: dict[str, str], portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read, go_on, reads = service.store.tokens, threading.Event(), list[int]()
+
+    def slowly() -> Any:
+        reads.append(1)
+        assert go_on.wait(600)
+        return read()
+
+    monkeypatch.setattr(service.store, "tokens", slowly)
+    monkeypatch.setattr(service.app.state.access, "_read_at", None)
+
+    async def many() -> None:
+        asked = [asyncio.ensure_future(ask(service, f"{API}/studies/{ended}", tokens["one"])) for _ in range(60)]
+        await until(lambda: bool(reads))
+        assert threads_taken() == 0
+        go_on.set()
+        assert {answer.status_code for answer in await asyncio.gather(*asked)} == {200}
+
+    portal.call(many)
+    assert len(reads) == 1
+
+
+def test_one_look_serves_all_streams_of_a_study(
+    service: Service, tokens: dict[str, str], portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study_id, seen = service.submit(), list[str]()
+    look = service.store.look
+    monkeypatch.setattr(service.store, "look", lambda *args: seen.append(study_id) or look(*args))
+
+    async def follow() -> None:
+        go_on = anyio.Event()
+
+        async def between_looks(_: float) -> None:
+            await go_on.wait()
+
+        monkeypatch.setattr(looks, "_pause", between_looks)
+        path = f"{API}/studies/{study_id}/events"
+        opened = [asyncio.ensure_future(ask(service, path, tokens["one"])) for _ in range(STREAMS)]
+        followed = service.app.state.context.looks._followed
+        await until(lambda: [one.streams for one in followed.values()] == [STREAMS])
+        assert len(seen) == 1
+        await anyio.to_thread.run_sync(service.fill, study_id)
+        go_on.set()
+        answers = await asyncio.gather(*opened)
+        assert all("event: progress" in answer.text and "event: end" in answer.text for answer in answers)
+        assert not followed
+
+    portal.call(follow)
+    assert len(seen) < STREAMS
+
+
+def test_one_token_has_a_part_of_the_connections(
+    service: Service, ended: str, tokens: dict[str, str], portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(guard, "MAX_REQUESTS_EACH", 3)
+
+    async def many() -> None:
+        held = Held(service)
+        asked = [asyncio.ensure_future(ask(service, rows(ended, "csv"), tokens["one"])) for _ in range(3)]
+        await until(lambda: bool(held.begun))
+        refused = await ask(service, f"{API}/studies/{ended}", tokens["one"])
+        assert (refused.status_code, refused.json()["type"]) == (429, "/problems/too-many-requests")
+        assert (await ask(service, f"{API}/studies/{ended}", tokens["other"])).status_code == 200
+        assert (await ask(service, "/livez", tokens["one"])).status_code == 200
+        held.allowed.set()
+        assert {answer.status_code for answer in await asyncio.gather(*asked)} == {200}
+        assert (await ask(service, f"{API}/studies/{ended}", tokens["one"])).status_code == 200
+
+    portal.call(many)
