@@ -38,6 +38,7 @@ class Housekeeping(threading.Thread):
     def run(self) -> None:
         """Remove them at the start, after each deletion, and periodically."""
         self.purge()
+        self.add_keys()
         while not self._ending.is_set():
             deleted = self._store.deleted.wait(LOOK_SECONDS)
             self._do_also()
@@ -67,6 +68,17 @@ class Housekeeping(threading.Thread):
         except StoreError as error:
             self._failed = True
             _LOG.warning("Deleted studies will be removed later: %s", error)
+
+    def add_keys(self) -> None:
+        """Give keys of their cases to studies that have none yet, in turns with other writers."""
+        try:
+            began = time.monotonic()
+            for _ in self._store.key_steps():
+                if self._ending.wait(time.monotonic() - began):
+                    return
+                began = time.monotonic()
+        except StoreError as error:
+            _LOG.warning("Studies of before get the keys of their cases at the next start: %s", error)
 
     def _do_also(self) -> None:
         for each in self._also:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import sqlalchemy as sa
 
 from sprag.service.storage.audit import note, require_own
+from sprag.service.storage.case_keys import CaseKeys
 from sprag.service.storage.editions import require_edition
 from sprag.service.storage.errors import DatabaseFullError, StudyBusyError, StudyNotFoundError
 from sprag.service.storage.part import micros_of
@@ -40,7 +41,7 @@ PURGED_ROWS: Final = 5_000
 LEAST_PURGED_ROWS: Final = 50
 
 
-class Purging(Users):
+class Purging(Users, CaseKeys):
     """Deletion of studies, and their rows."""
 
     #: Set when a study is deleted whose rows are to be removed now (`Studies`).
@@ -129,6 +130,7 @@ class Purging(Users):
             if (further := further_table(model, variant)) is not None:
                 yield from self._emptied(further, further.c.case_number, number)
             yield from self._emptied(CHUNKS, CHUNKS.c["first"], number)
+            yield from self._remove_keys(number)
             self._remove(number)
             yield 1
 

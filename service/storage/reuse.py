@@ -11,6 +11,7 @@ import numpy as np
 import sqlalchemy as sa
 from cachetools import LRUCache
 
+from sprag.service.storage.case_keys import KEYED, any_below, newest_with
 from sprag.service.storage.cases import conditions
 from sprag.service.storage.order import Orders
 from sprag.service.storage.origins import HOSTS_BETWEEN
@@ -18,6 +19,7 @@ from sprag.service.storage.round_table import latest_round
 from sprag.service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, further_table, results_table
 from sprag.service.storage.warning_texts import read_warnings, write_warnings
 from sprag.worker import fingerprint, models
+from sprag.worker.case_keys import case_keys
 from sprag.worker.models import WarningText, WorkerEnding
 from sprag.worker.order import order_of
 from sprag.worker.ports import Known
@@ -37,6 +39,8 @@ if TYPE_CHECKING:
 #: Studies whose spans are kept in memory, about a kilobyte each; and how many are read and compared together.
 _KEPT_SPANS: Final = 20_000
 _SPANS_AT_ONCE: Final = 500
+#: Cases whose keys are looked up in the time in which one study is read and compared.
+_CASES_A_STUDY: Final = 2_000
 #: Studies whose equal cases are kept in memory.
 _KEPT: Final = 16
 _SOURCE: Final[tuple[sa.ColumnElement[Any], ...]] = (
@@ -145,13 +149,17 @@ class _Spans:
         self._of: LRUCache[int, NDArray[np.float64]] = LRUCache(_KEPT_SPANS)
         self._lock = Lock()
 
-    def candidates(self, connection: sa.Connection, wanted: Wanted, kin: str, number: int) -> list[int]:
-        """Numbers of the studies of that kin that may share a case with the wanted study, newest first."""
+    def candidates(self, connection: sa.Connection, wanted: Wanted, kin: str, number: int, *, keyed: bool) -> list[int]:
+        """Numbers of the studies of that kin that may share a case with the wanted study, newest first.
+
+        Those whose cases have keys only with ``keyed``.
+        """
         c = STUDIES.c
+        some = sa.true() if keyed else c.keyed != KEYED
         numbers = list(
             connection.execute(
                 # The index on kin contains the numbers; no study is read for this.
-                sa.select(c.number).where(c.kin_hash == kin, c.number != number).order_by(c.number.desc())
+                sa.select(c.number).where(c.kin_hash == kin, c.number != number, some).order_by(c.number.desc())
             ).scalars()
         )
         found: list[int] = []
@@ -183,46 +191,80 @@ class _Spans:
 def _find(connection: sa.Connection, spans: _Spans, study: Study, kin: str, number: int) -> _Found | None:
     """Equal cases with rows in any number of studies of the same kin; the newest study with a case counts.
 
-    Only rows computed under the fingerprint of this process count.
+    Only rows computed under the fingerprint of this process count. Studies whose cases have keys are found by them,
+    unless so many cases are wanted that it is quicker to compare the few studies there are.
     """
-    wanted, c = Wanted(study), STUDIES.c
-    found: list[tuple[Cases, int, Cases]] = []
-    left, taken = study.cases, np.empty(0, dtype=np.bool_)
-    for candidate in spans.candidates(connection, wanted, kin, number):
-        source = connection.execute(
+    search, c = _Search(connection, study), STUDIES.c
+    keyed = sa.select(sa.func.count()).where(c.kin_hash == kin, c.keyed == KEYED, c.number != number)
+    by_keys = connection.execute(keyed).scalar_one() * _CASES_A_STUDY >= study.cases
+    if by_keys:
+        search.by_keys(kin, number)
+    if search.left:
+        for candidate in spans.candidates(connection, search.wanted, kin, number, keyed=not by_keys):
+            search.look_in(candidate)
+            if not search.left:
+                break
+    return search.found()
+
+
+class _Search:
+    """The search for the cases of a study in others, one after the other."""
+
+    def __init__(self, connection: sa.Connection, study: Study) -> None:
+        self.wanted = Wanted(study)
+        self.left = study.cases
+        self._connection = connection
+        self._taken = np.zeros(study.cases, dtype=np.bool_)
+        self._parts: list[tuple[Cases, int, Cases]] = []
+
+    def by_keys(self, kin: str, number: int) -> None:
+        """Look in the studies with a case of the same key: for each key in the newest one, then in the one before."""
+        keys, key_of = np.unique(case_keys(self.wanted.study, kin), return_inverse=True)
+        below, wanted = any_below(keys.size), np.arange(keys.size)
+        while wanted.size and self.left:
+            studies = newest_with(self._connection, keys[wanted], below[wanted], number)
+            wanted, studies = wanted[studies > 0], studies[studies > 0]
+            below[wanted] = studies
+            for candidate in np.unique(studies)[::-1].tolist():
+                self.look_in(candidate)
+            done = np.zeros(keys.size, dtype=np.bool_)
+            done[key_of[self._taken]] = True
+            wanted = wanted[~done[wanted]]
+
+    def look_in(self, number: int) -> None:
+        """Take the cases that this study has, with rows that may be reused, and that no other had before."""
+        c = STUDIES.c
+        source = self._connection.execute(
             sa.select(*_SOURCE).where(
-                c.number == candidate, c.done > 0, c.deleted_at.is_(None), c.fingerprint.in_([fingerprint.digest(), ""])
+                c.number == number, c.done > 0, c.deleted_at.is_(None), c.fingerprint.in_([fingerprint.digest(), ""])
             )
         ).one_or_none()
         if source is None:
-            continue
+            return
         other = Study.from_text(source.study)
-        ours, theirs = shared_cases(wanted, other)
-        if not ours.size:
-            continue
-        if not taken.size:
-            taken = np.zeros(study.cases, dtype=np.bool_)
-        new = ~taken[ours]
+        ours, theirs = shared_cases(self.wanted, other)
+        new = ~self._taken[ours]
         ours, theirs = ours[new], theirs[new]
-        stored = _has_rows(connection, source, other, theirs)
+        stored = _has_rows(self._connection, source, other, theirs)
         ours, theirs = ours[stored], theirs[stored]
         if ours.size:
-            taken[ours] = True
-            found.append((ours, source.number, theirs))
-            left -= ours.size
-        if not left:
-            break
-    if not found:
-        return None
-    cases = np.concatenate([ours for ours, _, _ in found])
-    studies = np.concatenate([np.full(ours.size, source, dtype=np.int64) for ours, source, _ in found])
-    order = np.argsort(cases)
-    if study.sweep is not None:
-        # A line of which some cases are missing is run as a whole.
-        order = order[whole_lines(study, cases[order])]
-        if not order.size:
+            self._taken[ours] = True
+            self._parts.append((ours, source.number, theirs))
+            self.left -= ours.size
+
+    def found(self) -> _Found | None:
+        """What was taken; None for nothing."""
+        if not self._parts:
             return None
-    return _Found(cases[order], studies[order], np.concatenate([theirs for _, _, theirs in found])[order])
+        cases = np.concatenate([ours for ours, _, _ in self._parts])
+        studies = np.concatenate([np.full(ours.size, source, dtype=np.int64) for ours, source, _ in self._parts])
+        order = np.argsort(cases)
+        if self.wanted.study.sweep is not None:
+            # A line of which some cases are missing is run as a whole.
+            order = order[whole_lines(self.wanted.study, cases[order])]
+            if not order.size:
+                return None
+        return _Found(cases[order], studies[order], np.concatenate([theirs for _, _, theirs in self._parts])[order])
 
 
 def _has_rows(connection: sa.Connection, source: sa.Row[Any], study: Study, cases: Cases) -> NDArray[np.bool_]:

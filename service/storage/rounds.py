@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sqlalchemy as sa
 
+from sprag.service.storage.case_keys import KEYED, add_keys
 from sprag.service.storage.cases import Cases
 from sprag.service.storage.part import add_chunks
 from sprag.service.storage.round_table import add_round, rounds_of
@@ -14,9 +15,11 @@ from sprag.service.storage.studies import Studies
 from sprag.service.storage.tables import ROUNDS, STUDIES
 from sprag.service.storage.work import Work
 from sprag.worker import models
+from sprag.worker.case_keys import case_keys
 from sprag.worker.chunking import spans
 from sprag.worker.planning.rounds import Rows
 from sprag.worker.ports import Chunk
+from sprag.worker.reuse import taken
 from sprag.worker.states import StudyState
 
 if TYPE_CHECKING:
@@ -62,12 +65,17 @@ class Rounds(Studies, Cases, Work):
         count = study.cases - first
         sizes = list(spans(count, self.chunking.cases_of(study, count)))
         text = study.to_text()
+        added = taken(study, np.arange(first, study.cases))
         with self.session.write() as connection:
             if not self._may_change(connection, epoch, number) or not _needs_round(connection, number, first):
                 return None
             add_round(connection, number, first, count, summary, self._now())
             chunks = [Chunk(number, first + start, size) for start, size in sizes]
             add_chunks(connection, chunks)
+            mine = (STUDIES.c.number == number) & (STUDIES.c.keyed == KEYED)
+            kin = connection.execute(sa.select(STUDIES.c.kin_hash).where(mine)).scalar_one_or_none()
+            if kin is not None:
+                add_keys(connection, number, case_keys(added, kin))
             self._change(connection, number, cases=study.cases, study=text)
         self._forget_reuse(number)
         return chunks

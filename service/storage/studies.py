@@ -16,6 +16,7 @@ from cachetools import LRUCache
 from sprag.service.actor import acting
 from sprag.service.languages import recorded
 from sprag.service.storage.audit import by_sender, note, require_own
+from sprag.service.storage.case_keys import KEYED, NOT_YET, TOO_MANY, add_keys
 from sprag.service.storage.dispatchers import Dispatchers
 from sprag.service.storage.errors import (
     IdempotencyConflictError,
@@ -146,6 +147,8 @@ class Studies(Users, Orders, Dispatchers):
             "search": search_text(row["name"]),
             "created_at": self._now(),
         }
+        keys = values.pop("keys", None)
+        values["keyed"] = NOT_YET if "keys" not in row else TOO_MANY if keys is None else KEYED
         with self.session.write() as connection:
             if idempotency_key is not None:
                 earlier = _study_of_key(connection, idempotency_key, body_hash)
@@ -158,6 +161,8 @@ class Studies(Users, Orders, Dispatchers):
             number = connection.execute(sa.insert(STUDIES).values(values).returning(STUDIES.c.number)).scalar_one()
             if row["most_cases"] is not None:
                 add_round(connection, number, 0, row["cases"], {}, values["created_at"])
+            if keys is not None:
+                add_keys(connection, number, keys)
             add_chunks(connection, [Chunk(number, *span) for span in spans(row["cases"], row["chunk_cases"])])
             if idempotency_key is not None:
                 connection.execute(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+from sprag.service.storage.case_keys import keys_of
 from sprag.service.storage.tables import LINE_BY_LINE
 from sprag.service.storage.warning_texts import write_warnings
 from sprag.worker import models
@@ -21,11 +22,12 @@ if TYPE_CHECKING:
 def study_row(
     spec: Mapping[str, Any], study: Study, chunking: Chunking, warnings: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """The columns of a new study that follow from the study itself.
+    """The columns of a new study that follow from the study itself, and the ``keys`` of its cases (`keys_of`).
 
     This takes about a second for a million values, so it is computed in the processes that check studies.
     """
     planner = None if study.plan is None else planner_of(study.plan)
+    kin = kin_hash(study, models.ENGINE_VERSION)
     return {
         "name": study.name,
         "model": study.model,
@@ -37,7 +39,8 @@ def study_row(
         "spec": json.dumps(spec, allow_nan=False),
         "study": study.to_text(),
         "warnings": write_warnings(warnings),
-        "kin_hash": kin_hash(study, models.ENGINE_VERSION),
+        "kin_hash": kin,
+        "keys": keys_of(study, kin),
         "coarse": 0 if study.sweep is None else LINE_BY_LINE,
         "most_cases": None if planner is None else planner.most_cases,
         "most_rounds": None if planner is None else planner.most_rounds,

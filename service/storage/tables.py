@@ -9,7 +9,7 @@ from sprag.worker import models
 from sprag.worker.states import ChunkState
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0034"
+HEAD_REVISION = "0035"
 
 METADATA = sa.MetaData(
     naming_convention={
@@ -53,7 +53,9 @@ STUDIES = sa.Table(
     # What a paused study waits for (`WAITS_FOR_ROOM` and below); NULL where the user or a fault paused it.
     sa.Column("waits_for", sa.String(12)),
     # Equal for studies that may share cases (`sprag.worker.reuse`).
-    sa.Column("kin_hash", sa.String(64), nullable=False, server_default="", index=True),
+    sa.Column("kin_hash", sa.String(64), nullable=False, server_default=""),
+    # Whether its cases are in `CASE_KEYS` (`sprag.service.storage.case_keys`).
+    sa.Column("keyed", sa.Integer, nullable=False, server_default="0"),
     # 1: every case is run, without reuse of other studies.
     sa.Column("fresh", sa.Integer, nullable=False, server_default="0"),
     # Cases whose rows were copied from other studies.
@@ -85,6 +87,7 @@ STUDIES = sa.Table(
     sa.Column("search", sa.Text, nullable=False, server_default=""),
     # Epoch of the dispatcher to which it belongs; NULL: to none, so any of them may take it.
     sa.Column("dispatcher", sa.Integer),
+    sa.Index("ix_studies_kin_hash_keyed", "kin_hash", "keyed"),
     sqlite_autoincrement=True,
 )
 
@@ -103,7 +106,7 @@ COARSE_TO_FINE, LINE_BY_LINE = 1, 2
 #: Long texts, and what only the storage needs.
 _BESIDE = frozenset(
     {"spec", "study", "search", "deleted_at", "kin_hash", "fresh", "fingerprint", "estimated_bytes", "dispatcher"}
-    | {"rank"}
+    | {"rank", "keyed"}
 )
 #: The columns of a `StudyRecord`.
 RECORD_COLUMNS = tuple(column for column in STUDIES.c if column.name not in _BESIDE)
@@ -182,6 +185,15 @@ DISPATCHERS = sa.Table(
     sa.Column("clock_at", sa.BigInteger),
     # What it last reported of its workers, as JSON data (`sprag.worker.reports`); NULL before its first heartbeat.
     sa.Column("report", sa.Text),
+)
+
+#: Keys of cases (`sprag.worker.case_keys`) and the studies that have them, whether or not they have been run.
+CASE_KEYS = sa.Table(
+    "case_keys",
+    METADATA,
+    sa.Column("key", sa.BigInteger, primary_key=True, autoincrement=False),
+    sa.Column("study", sa.Integer, primary_key=True, autoincrement=False),
+    sqlite_with_rowid=False,
 )
 
 #: What a fingerprint says, by its digest in chunks and dispatchers; none of versions before revision 0031.

@@ -6,14 +6,17 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 import sqlalchemy as sa
 
 from sprag.service.storage import reuse
+from sprag.service.storage.case_keys import TOO_MANY, add_keys
 from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.store import Store
-from sprag.service.storage.tables import CHUNKS, STUDIES
+from sprag.service.storage.tables import CASE_KEYS, CHUNKS, STUDIES
 from sprag.worker import reuse as physics
+from sprag.worker.case_keys import case_keys
 from sprag.worker.chunking import Chunking
 from sprag.worker.states import StudyState
 from sprag.worker.study import Axis, Study
@@ -56,15 +59,24 @@ def finish(store: Store, record: StudyRecord, study: Study) -> None:
     store.settle(epoch, record.number)
 
 
-def many_more(store: Store, like: StudyRecord, studies: list[Study]) -> None:
-    """Ended studies of the same kin, written as they lie in the table, with their one chunk each."""
+def many_more(store: Store, like: StudyRecord, studies: list[Study], *, keyed: bool = False) -> None:
+    """Ended studies of the same kin, written as they lie in the table, with their one chunk each.
+
+    Unless ``keyed`` as before revision 0035, so that they must be compared themselves.
+    """
     with store.session.write() as connection:
         row = connection.execute(sa.select(STUDIES).where(STUDIES.c.number == like.number)).mappings().one()
         first = like.number + 1
         connection.execute(
             sa.insert(STUDIES),
             [
-                {**row, "number": first + index, "id": f"st_more{index}", "study": json.dumps(study.to_json())}
+                {
+                    **row,
+                    "number": first + index,
+                    "id": f"st_more{index}",
+                    "study": json.dumps(study.to_json()),
+                    "keyed": int(keyed),
+                }
                 for index, study in enumerate(studies)
             ],
         )
@@ -75,16 +87,19 @@ def many_more(store: Store, like: StudyRecord, studies: list[Study]) -> None:
                 for index in range(len(studies))
             ],
         )
+        for index, study in enumerate(studies if keyed else ()):
+            add_keys(connection, first + index, case_keys(study, row["kin_hash"]))
         if connection.dialect.name == "postgresql":
             connection.exec_driver_sql("SELECT setval('studies_number_seq', (SELECT max(number) FROM studies))")
 
 
-def test_an_old_study_is_found_behind_many_newer_ones(store: Store) -> None:
+@pytest.mark.parametrize("keyed", [False, True])
+def test_an_old_study_is_found_behind_many_newer_ones(store: Store, keyed: bool) -> None:
     old = finished(store, over_loads(0.1, 0.2, 0.3))
     # Between its loads, beside them, and at its loads with another frequency: more than are compared in one go.
     others = [over_loads(0.1 + 0.2 * (index + 0.5) / 700) for index in range(700)]
     others += [over_loads(0.2, frequency=26.0 + index) for index in range(100)]
-    many_more(store, old, others)
+    many_more(store, old, others, keyed=keyed)
     larger = over_loads(0.1, 0.2, 0.3, 0.4)
     assert store.reusable(larger) == 3
     record = finished(store, larger)
@@ -106,9 +121,89 @@ def test_studies_that_cannot_have_a_case_are_not_read_again(store: Store, monkey
     monkeypatch.setattr(reuse, "span", lambda study: read.append(1) or physics.span(study))  # type: ignore[func-returns-value]
     assert store.reusable(over_loads(0.1, 0.9)) == 1
     assert [study.axes[0].values for study in compared] == [(0.1, 0.2)]
-    assert len(read) == 301
+    assert len(read) == 300
     assert store.reusable(over_loads(0.2, 0.8)) == 1
-    assert len(read) == 301
+    assert len(read) == 300
+
+
+def test_kindred_studies_without_a_case_are_not_even_read(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many samples over the same ranges there are."""
+    random = np.random.default_rng(3)
+    samples = [over_loads(*np.sort(random.uniform(0.1, 0.2, 20)).tolist()) for _ in range(50)]
+    old = finished(store, samples[0])
+    many_more(store, old, samples[1:], keyed=True)
+    for name in ("shared_cases", "span"):
+        monkeypatch.setattr(reuse, name, lambda *_: pytest.fail("a study was read"))
+    assert store.reusable(over_loads(*np.sort(random.uniform(0.1, 0.2, 20)).tolist())) == 0
+    monkeypatch.undo()
+    compared: list[Study] = []
+
+    def counted(wanted: Any, other: Study) -> Any:
+        compared.append(other)
+        return physics.shared_cases(wanted, other)
+
+    monkeypatch.setattr(reuse, "shared_cases", counted)
+    loads = [float(samples[number].axes[0].values[3]) for number in (0, 7, 7)]
+    wanted = over_loads(*sorted({*loads, samples[7].axes[0].values[5], 0.15}))
+    assert store.reusable(wanted) == 3
+    assert len(compared) == 2
+
+
+def test_a_case_that_the_newest_studies_have_not_run_is_found_in_an_older_one(store: Store) -> None:
+    study = over_loads(0.1, 0.2, 0.3)
+    finished(store, study)
+    for _ in range(3):
+        store.create_study({}, study)
+    failed = store.create_study({}, study, fresh=True)
+    epoch = store.take_over("test")
+    (chunk,) = store.open_chunks(failed.number)
+    assert store.claim(epoch, [chunk]) == [chunk]
+    result = fakes.result(0, 3)
+    result.endings[1] = "crashed"
+    assert store.commit(epoch, chunk, result)
+    store.settle(epoch, failed.number)
+    assert store.reusable(study) == 3
+
+
+def test_studies_of_before_get_keys_and_lose_nothing(store: Store) -> None:
+    old = finished(store, over_loads(0.1, 0.2, 0.3))
+    with store.session.write() as connection:
+        connection.execute(sa.delete(CASE_KEYS))
+        connection.execute(sa.update(STUDIES).values(keyed=0))
+    wanted = over_loads(0.2, 0.3, 0.4)
+    assert store.reusable(wanted) == 2
+    assert list(store.key_steps()) == [old.number]
+    assert list(store.key_steps()) == []
+    assert store.reusable(wanted) == 2
+    with store.session.read() as connection:
+        assert len(connection.execute(sa.select(CASE_KEYS)).all()) == 3
+
+
+def test_studies_with_many_cases_have_no_keys_and_are_found(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sprag.service.storage.case_keys.MAX_KEYED", 2)
+    finished(store, over_loads(0.1, 0.2, 0.3))
+    assert store.reusable(over_loads(0.2, 0.3)) == 2
+    with store.session.read() as connection:
+        assert connection.execute(sa.select(CASE_KEYS)).all() == []
+        assert connection.execute(sa.select(STUDIES.c.keyed)).scalars().all() == [TOO_MANY]
+
+
+def test_many_wanted_cases_are_compared_with_the_few_studies_there_are(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    finished(store, over_loads(0.1, 0.2, 0.3))
+    monkeypatch.setattr(reuse, "_CASES_A_STUDY", 2)
+    monkeypatch.setattr(reuse, "newest_with", lambda *_: pytest.fail("keys were looked up"))
+    assert store.reusable(over_loads(0.2, 0.3, 0.4)) == 2
+
+
+def test_keys_go_with_their_study(store: Store) -> None:
+    one, other = finished(store, over_loads(0.1, 0.2, 0.3)), finished(store, over_loads(0.2, 0.3, 0.4))
+    store.delete_study(one.id)
+    assert store.reusable(over_loads(0.1, 0.2)) == 1
+    store.purge()
+    with store.session.read() as connection:
+        assert connection.execute(sa.select(CASE_KEYS.c.study)).scalars().all() == [other.number] * 3
 
 
 def test_memory_of_studies_is_bounded(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:

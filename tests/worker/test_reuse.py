@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sprag.worker import models
+from sprag.worker.case_keys import case_keys
 from sprag.worker.models.formulas import evaluate
 from sprag.worker.reuse import Wanted, kin_hash, shared_cases, span, taken
 from sprag.worker.study import Axis, Study
@@ -60,6 +61,22 @@ def test_the_cases_found_are_those_with_equal_parameters(new: Study, old: Study)
     ours, theirs = shared_cases(new, old)
     assert set(zip(ours.tolist(), theirs.tolist(), strict=True)) == expected
     assert ours.tolist() == sorted(ours.tolist())
+
+
+@given(studies(), studies())
+@settings(max_examples=300, deadline=None)
+def test_cases_have_equal_keys_where_their_parameters_are_equal(new: Study, old: Study) -> None:
+    ours, theirs = case_keys(new, "kin").tolist(), case_keys(old, "kin").tolist()
+    for one, key in enumerate(ours):
+        for other, other_key in enumerate(theirs):
+            assert (key == other_key) == (parameters(new, one) == parameters(old, other))
+    assert not {*ours}.intersection(case_keys(old, "another kin").tolist())
+
+
+def test_zero_has_one_key() -> None:
+    zero, negative = (replace(Study("m", "", {"a": value, "b": 1.0}, {}), name=str(value)) for value in (0.0, -0.0))
+    swapped = Study("m", "", {"a": 1.0, "b": 0.0}, {})
+    assert case_keys(zero, "kin") == case_keys(negative, "kin") != case_keys(swapped, "kin")
 
 
 @given(studies(), st.lists(studies(), min_size=1, max_size=4))

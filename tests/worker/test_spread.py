@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sprag.worker.case_keys import case_keys
 from sprag.worker.derived import distinct_values, involved
 from sprag.worker.order import order_of
 from sprag.worker.reuse import kin_hash, shared_cases, span, taken
@@ -52,6 +53,19 @@ def test_drive_0_is_nominal_and_the_others_share_their_draws_at_every_place(comb
     some = [7, 0, 10]
     for path, column in own.columns(some).items():
         np.testing.assert_array_equal(column, columns[path][some])
+
+
+@pytest.mark.parametrize("combine", ["grid", "zip"])
+def test_a_drawn_drive_has_the_key_of_its_parameters(combine: Combine) -> None:
+    """As a point of a table, and alone, it has the key that it has in its batch."""
+    own = study(derive={"a": "b + c"}, combine=combine)
+    columns = {path: column for path, column in own.columns(range(own.cases)).items() if path != DRIVE}
+    points = Study("toy", "", dict(BASE), {}, tuple(Axis((path,), column) for path, column in columns.items()), "zip")
+    keys = case_keys(own, "kin").tolist()
+    assert case_keys(points, "kin").tolist() == keys
+    assert case_keys(own, "kin", 5).tolist() == keys[5:]
+    alone = Study("toy", "", BASE | {path: float(column[6]) for path, column in columns.items()}, {})
+    assert case_keys(alone, "kin").tolist() == [keys[6]]
 
 
 def test_the_stored_text_gives_an_equal_study_also_with_many_draws() -> None:
