@@ -52,6 +52,7 @@ FLAG_MASKS: Final[dict[str, int]] = {
     "jumped": 1 << 4,
     "arbitrary_start": 1 << 5,
     "restarted": 1 << 6,
+    "history_dependent": 1 << 7,
 }
 
 

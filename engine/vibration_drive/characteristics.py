@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from sprag.engine.vibration_drive.cases import Column, PendulumColumn, pendulum_column, stop_column
 from sprag.engine.vibration_drive.layout import OUT_EVENTS, OUT_RUNUP, OUT_STEPS, OUT_SUMS, Layout
+from sprag.engine.vibration_drive.regimes import keeps_windup
 from sprag.engine.vibration_drive.results import result_infos
 
 Floats = NDArray[np.float64]
@@ -103,8 +104,8 @@ def tied_clutches(lay: Layout, matrix: Floats, sums: Floats) -> NDArray[np.bool_
     held = cases.shaft("time_rotating") == 0.0
     columns = []
     for i in range(lay.n):
-        wound = (cases.pendulum(i, "time_engaged") == cases.shaft("time_held")) & (
-            cases.pendulum(i, "engagements") == 0.0
+        wound = keeps_windup(
+            cases.pendulum(i, "time_engaged"), cases.shaft("time_held"), cases.pendulum(i, "engagements")
         )
         columns.append(held & (wound | (sums[:, OUT_EVENTS] == 0.0)))
     return np.column_stack(columns)

@@ -1,9 +1,15 @@
 """Regimes of settled motion, and the results that describe them."""
 
+from collections.abc import Mapping
 from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sprag.engine.catalogue import ResultInfo
 from sprag.engine.vibration_drive.results import result_infos
+
+Floats = NDArray[np.float64]
 
 
 class Regime(IntEnum):
@@ -79,6 +85,36 @@ def means(pendulums: int) -> tuple[int, ...]:
     names = [info.name for info in result_infos(pendulums)]
     own = [name.split(".", 2)[2] if name.startswith("pendulums.") else name for name in names]
     return tuple(place for place, name in enumerate(own) if name in _MEANS)
+
+
+def keeps_windup(engaged: Floats, held: Floats, engagements: Floats) -> NDArray[np.bool_]:
+    """Where a clutch leans on a held shaft throughout: its pendulum's angle and its windup differ by a constant.
+
+    Parameters
+    ----------
+    engaged, held : arrays, shape (cases,)
+        Time, or share of it, in which the clutch transmits torque and in which the shaft is held, over a whole turn of
+        an orbit along which the shaft never turns.
+    engagements : array, shape (cases,)
+        Engagements of the clutch in that turn.
+    """
+    return np.asarray((held > 0.0) & (engaged == held) & (engagements == 0.0))
+
+
+def depends_on_history(values: Mapping[str, Floats]) -> NDArray[np.bool_]:
+    """Which settled motions are one of a continuum, of which the run-up chooses one (docs/theory.md).
+
+    Parameters
+    ----------
+    values : mapping
+        Results of settled cases by name, each of shape (cases,).
+    """
+    prefixes = [name.removesuffix("fraction.engaged") for name in values if name.endswith(".fraction.engaged")]
+    kept = [
+        keeps_windup(values[f"{own}fraction.engaged"], values["fraction.held"], values[f"{own}engagements"])
+        for own in prefixes
+    ]
+    return np.asarray((values["regime"] == Regime.HELD) & np.any(kept, axis=0))
 
 
 def settled_infos(pendulums: int) -> tuple[ResultInfo, ...]:

@@ -24,6 +24,14 @@ REGIME_SENTENCES: Final[dict[str, str]] = {regime.name.lower(): regime.sentence 
 REGIME_FLAGS: Final[dict[str, str]] = {
     regime.name.lower(): regime.sentence for regime in (Regime.IRREGULAR, Regime.UNSETTLED)
 }
+#: Flag of a held motion with a clutch under torque that never lets go.
+HISTORY_DEPENDENT: Final = "history_dependent"
+HISTORY_FLAGS: Final[dict[str, str]] = {
+    HISTORY_DEPENDENT: (
+        "The shaft is held and a clutch leans on it all the time: the clutch keeps the windup with which it came "
+        "there, and each windup has a motion of its own. The results belong to this run-up; another start can lead to others."
+    ),
+}
 #: Flag of a case of a sweep whose motion does not continue that of the case before it.
 JUMPED: Final = "jumped"
 #: Flags of a case of a sweep that did not start from an orbit of the case before it.

@@ -1,8 +1,9 @@
 """Usable results: the one rule by which a row counts, for planners, curves, answers, yields, reports and all others.
 
 A row is usable where its case ended ok and no flag of it says that the motion had not settled (`Model.unsettled`). What
-is not usable is a missing value: it is neither interpolated nor compared with others. A usable mean of irregular motion
-has a half width ("NAME.half_width"), which counts against every limit.
+is not usable is a missing value: it is neither interpolated nor compared with others. Any other flag stands beside a
+result that counts: a held motion that depends on its run-up ("history_dependent") is a steady motion of the machine. A
+usable mean of irregular motion has a half width ("NAME.half_width"), which counts against every limit.
 """
 
 from __future__ import annotations

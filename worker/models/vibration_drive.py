@@ -18,7 +18,7 @@ from sprag.engine.vibration_drive.parameters import (
     MAX_PENDULUMS,
     PARAMETERS,
 )
-from sprag.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag.engine.vibration_drive.regimes import Regime, depends_on_history, settled_infos
 from sprag.engine.vibration_drive.results import result_infos
 from sprag.engine.vibration_drive.start_results import NUMBER, started_infos
 from sprag.worker.models.branches import Along, CaseBranch, drive_branch
@@ -35,6 +35,8 @@ from sprag.worker.models.drive_presentation import PRESENTATION
 from sprag.worker.models.model import Model
 from sprag.worker.models.sections import CaseSections, Sampling, drive_sections
 from sprag.worker.models.settled import (
+    HISTORY_DEPENDENT,
+    HISTORY_FLAGS,
     REGIME_FLAGS,
     SWEEP_FLAGS,
     followed_periods,
@@ -69,6 +71,7 @@ FLAG_SENTENCES: dict[str, str] = {
     ),
     WINDUP_OUT_OF_DATA: "A clutch was wound up beyond the measured data, where its law was extrapolated linearly.",
     **REGIME_FLAGS,
+    **HISTORY_FLAGS,
     **SWEEP_FLAGS,
 }
 #: Most cases whose frequency is evaluated for an estimate.
@@ -145,6 +148,7 @@ def _flags(
     raised = {WINDUP_OUT_OF_DATA: np.any(beyond > 0.0, axis=1)}
     if "regime" in column:
         raised |= {flag: column["regime"] == Regime[flag.upper()] for flag in REGIME_FLAGS}
+        raised[HISTORY_DEPENDENT] = depends_on_history(column)
     if not_settled is not None:
         raised = {NOT_SETTLED: not_settled, **raised}
     return [",".join(name for name, cases in raised.items() if cases[case]) for case in range(len(values))]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from sprag.engine.run import SettledRun
 from sprag.engine.vibration_drive.regimes import Regime
@@ -13,6 +14,22 @@ from sprag.engine.vibration_drive.settle import settle
 from sprag.service.spec.document import parse_spec
 from sprag.worker import models
 from tests.service.spec_sample import changed
+
+
+class _Held(NamedTuple):
+    regimes: NDArray[np.float64]
+    torque: NDArray[np.float64]
+    engaged: NDArray[np.float64]
+    flags: list[str]
+
+
+def _held(changes: dict[str, Any]) -> _Held:
+    study = parse_spec(changed({"/run": {"until": "settled"}} | changes)).study
+    done = models.run_chunk(study, 0, study.cases)
+    names = [info.name for info in models.study_results(study)]
+    columns = (names.index(name) for name in ("regime", "torque.mean", "pendulums.0.fraction.engaged"))
+    return _Held(*(done.values[:, column] for column in columns), done.flags)
+
 
 SPEC = changed({"/run": {"until": "settled"}, "/axes": [{"path": "shaft.load", "values": [0, 0.2, 0.7, 1.6]}]})
 
@@ -52,3 +69,28 @@ def test_a_settled_case_is_estimated_by_what_a_search_takes() -> None:
     # A run of a given time is followed on, too, if not as far.
     assert 1.1 < settled / timed < 2.0
     assert 3.0 < longer / settled < 8.0
+
+
+def test_a_held_motion_that_keeps_the_windup_of_its_run_up_has_a_flag() -> None:
+    """Two run-ups of one machine come to two shaken motions on a clutch that never lets go: both count, with a flag."""
+    shaken = {"/base/excitation/amplitude_x": 5e-4, "/base/excitation/amplitude_y": 5e-4, "/base/shaft/load": 5}
+    leaning = _held(shaken | {"/axes": [{"path": "pendulums.0.initial_angle", "values": [0.2, 0.25]}]})
+    np.testing.assert_array_equal(leaning.regimes, [Regime.HELD, Regime.HELD])
+    np.testing.assert_array_equal(leaning.engaged, 1.0)
+    assert leaning.flags == ["history_dependent", "history_dependent"]
+    assert abs(leaning.torque[1] - leaning.torque[0]) > 0.01 * leaning.torque[0] > 0.0
+    assert models.usable("vibration-drive", ["ok", "ok"], leaning.flags).all()
+
+
+def test_held_motions_that_every_run_up_comes_to_have_no_flag() -> None:
+    """A clutch that is never wound up, and one that is wound up and let go in each turn."""
+    shaken = {"/base/excitation/amplitude_x": 5e-4, "/base/excitation/amplitude_y": 5e-4}
+    starts = [{"path": "pendulums.0.initial_angle", "values": [0, 0.2]}]
+    free = _held(shaken | {"/base/pendulums/0/backlash": 10, "/axes": starts})
+    np.testing.assert_array_equal(free.regimes, [Regime.HELD, Regime.HELD])
+    assert free.flags == ["", ""]
+    letting_go = _held({"/base/pendulums/0/damping": 0.2, "/base/shaft/load": 5, "/axes": starts})
+    np.testing.assert_array_equal(letting_go.regimes, [Regime.HELD, Regime.HELD])
+    assert ((letting_go.engaged > 0.0) & (letting_go.engaged < 1.0)).all()
+    np.testing.assert_allclose(letting_go.torque[1], letting_go.torque[0], rtol=1e-8)
+    assert letting_go.flags == ["", ""]
