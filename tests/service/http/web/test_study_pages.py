@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from playwright.sync_api import expect
@@ -125,6 +125,11 @@ def test_a_case_is_found_and_its_motion_seen(visitor: Visitor, office: Office, e
     expect(page.get_by_role("alert")).to_contain_text("apples")
 
 
+def points_of(line: dict[str, Any]) -> list[float]:
+    """The values of a line, without the gaps beside those that have not settled."""
+    return [value for value in line["y"] if value is not None]
+
+
 def test_choices_of_curves_and_maps_are_in_the_address(visitor: Visitor, office: Office, example: str) -> None:
     page = visitor.page
     page.goto(f"/studies/{example}/curves")
@@ -139,7 +144,7 @@ def test_choices_of_curves_and_maps_are_in_the_address(visitor: Visitor, office:
     page.goto(shared)
     lines = drawn(page)
     told = office.get(f"/studies/{example}/curves", x="excitation.frequency", y="shaft.speed.mean", by="shaft.load")
-    assert [line["y"] for line in lines] == [curve["y"]["shaft.speed.mean"] for curve in told["curves"]]
+    assert [points_of(line) for line in lines] == [curve["y"]["shaft.speed.mean"] for curve in told["curves"]]
     page.get_by_role("link", name="Map").click()
     assert [line["type"] for line in drawn(page)] == ["heatmap"]
     page.get_by_label("Lines of equal value").check()
@@ -157,7 +162,7 @@ def test_two_studies_are_compared(visitor: Visitor, office: Office, example: str
     lines = drawn(page)
     assert {line["name"] for line in lines} == {"Feeder motor: speed against load", "Another load"}
     told = office.get(f"/studies/{other}/curves", x="shaft.load", y="shaft.speed.mean")
-    assert told["curves"][0]["y"]["shaft.speed.mean"] in [line["y"] for line in lines]
+    assert told["curves"][0]["y"]["shaft.speed.mean"] in [points_of(line) for line in lines]
 
 
 def test_no_page_asks_another_host(visitor: Visitor, example: str) -> None:
