@@ -179,7 +179,15 @@ def _config(token: str, examples: int, skip: Mapping[str, tuple[str, ...]]) -> d
         },
         # The document's own links only: guessed ones take the address of a verb for that of a study.
         "phases": {"stateful": {"inference": {"algorithms": []}}},
-        "checks": {"enabled": False, **{name: {"enabled": True} for name in CHECKS}},
+        "checks": {
+            "enabled": False,
+            **{name: {"enabled": True} for name in CHECKS},
+            # 412: no document can say which entity tag a request must name.
+            "positive_data_acceptance": {
+                "enabled": True,
+                "expected-statuses": ["2xx", "3xx", 401, 403, 404, 409, 412, 429, "5xx"],
+            },
+        },
         "operations": [
             {
                 "include-operation-id": list(FURTHER_RULES),
