@@ -15,6 +15,7 @@ from benchmarks.faults.clients import clients
 from benchmarks.faults.cluster import cluster
 from benchmarks.faults.disk import disk, file_limit
 from benchmarks.faults.dispatchers import dispatchers
+from benchmarks.faults.flips import flips
 from benchmarks.faults.kills import kills
 from benchmarks.faults.link import link
 from benchmarks.faults.nights import nights
@@ -70,6 +71,7 @@ def main() -> None:
         "clients", clients, "clients write and read while a study runs",
         readers=20, writers=20, seconds=120.0, cases=4_000, periods=1000.0,
     )  # fmt: skip
+    drill("flips", flips, "single bits of a database file are flipped", count=1_000, seed=1, cases=2_000)
     options = vars(parser.parse_args())
     run = options.pop("run")
     with tempfile.TemporaryDirectory(prefix="sprag-drill-") as folder:

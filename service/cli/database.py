@@ -79,6 +79,10 @@ def check(db: Database = None, as_json: JsonFlag = False) -> None:
         found = {"backend": backend, "revision": report.revision or _("none")}
         print(_("{database}: {backend}, revision {revision}", database=report.location, **found))
         print("\n".join(f"  {problem}" for problem in report.problems) or "  " + _("sound"))
+        if report.unchecked:
+            say(
+                _("{count} chunks from before revision 0036 have no digest and are not checked", count=report.unchecked)
+            )
     if report.problems:
         raise typer.Exit(ExitCode.TROUBLE)
 

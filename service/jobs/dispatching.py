@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from sprag.service import logs
 from sprag.service.delivery import Delivery
 from sprag.service.jobs.chores import Chores
-from sprag.service.jobs.housekeeping import Housekeeping
+from sprag.service.jobs.housekeeping import Housekeeping, Scrubbing
 from sprag.service.jobs.maintenance import Maintenance, MaintenancePlan
 from sprag.service.jobs.reports.reporter import Reporter
 from sprag.service.jobs.reports.watchdog import Watchdog
@@ -157,7 +157,10 @@ def run_dispatcher(
         lock = lock_of(store)
         maintenance = Maintenance(store, _possible(store, settings.maintenance, say))
         reports = [Reporter(store, settings.delivery)] if settings.delivery.wanted else []
-        chores = Chores(lock, [Scheduler(store), maintenance, Housekeeping(store, Watchdog(store).look), *reports])
+        chores = Chores(
+            lock,
+            [Scheduler(store), maintenance, Housekeeping(store, Watchdog(store).look, Scrubbing(store).look), *reports],
+        )
         try:
             if take_over:
                 if isinstance(lock, DispatcherLock):

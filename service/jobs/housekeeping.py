@@ -18,6 +18,41 @@ _LOG = logging.getLogger("sprag.housekeeping")
 
 #: Seconds between two checks while nothing is deleted.
 LOOK_SECONDS: Final = 30.0
+#: Rest after rows were looked over, in times of how long that took.
+REST_TIMES: Final = 50.0
+
+
+class Scrubbing:
+    """Looks over the rows of one ended study after the other, and has those run again that changed on the disk.
+
+    One study at a time, when `Housekeeping` asks, but resting for `REST_TIMES` as long as it took; after the last one
+    it begins anew.
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._last = 0
+        self._next = 0.0
+
+    def look(self) -> None:
+        """Look over the next one, when it is time. Raises StoreError."""
+        began = self._store.clock.monotonic()
+        if began < self._next:
+            return
+        try:
+            self._look()
+        finally:
+            now = self._store.clock.monotonic()
+            self._next = now + REST_TIMES * (now - began)
+
+    def _look(self) -> None:
+        found = self._store.ended_after(self._last)
+        self._last = 0 if found is None else found[0]
+        if found is None:
+            return
+        for damaged in self._store.run_damaged_again(found[1]):
+            text = str(damaged)
+            _LOG.error("%s%s: they are run again.", text[:1].upper(), text[1:])
 
 
 class Housekeeping(threading.Thread):

@@ -15,6 +15,7 @@ import sqlalchemy as sa
 from sprag.service.stale_files import mark, sweep
 from sprag.service.storage import component_tables, schedule_tables, sessions, tokens, user_tables  # noqa: F401 - their tables are made, too
 from sprag.service.storage.audit import note
+from sprag.service.storage.digests import Digests
 from sprag.service.storage.errors import CREATED_BY, DatabaseError, SchemaError
 from sprag.service.storage.part import SystemClock, micros_of
 from sprag.service.storage.private_files import create_private, sync_folder
@@ -163,7 +164,7 @@ def require_sound(session: Session) -> None:
 def check(session: Session) -> CheckReport:
     """Check the database: its revision, pages and references, and the library that reads it."""
     problems: list[str] = []
-    found = None
+    found, unchecked = None, 0
     try:
         found = revision(session)
         if found is None:
@@ -172,6 +173,10 @@ def check(session: Session) -> CheckReport:
             problems.append(str(other_revision(session, found)))
         if not session.on_server:
             problems += _look_over_file(session)
+        if found == HEAD_REVISION and not problems:
+            looking = Digests(session, SystemClock())
+            problems += map(str, looking.all_damaged_rows())
+            unchecked = looking.undigested()
     except DatabaseError as error:
         problems.append(str(error))
     if session.on_server:
@@ -180,7 +185,7 @@ def check(session: Session) -> CheckReport:
         backend, version = "SQLite", ".".join(map(str, sqlite_version()))
         if warning := sqlite_warning():
             problems.append(warning)
-    return CheckReport(session.location, backend, version, found, HEAD_REVISION, tuple(problems))
+    return CheckReport(session.location, backend, version, found, HEAD_REVISION, tuple(problems), unchecked)
 
 
 def _look_over_file(session: Session) -> list[str]:

@@ -309,6 +309,8 @@ class CheckReport:
     revision: str | None
     expected_revision: str
     problems: tuple[str, ...]
+    #: Finished chunks from before revision 0036, whose rows have no digest.
+    unchecked: int = 0
 
 
 def split_flags(flags: str) -> tuple[str, ...]:

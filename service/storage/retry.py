@@ -11,8 +11,8 @@ import sqlalchemy as sa
 
 from sprag.service.storage.audit import note, require_own
 from sprag.service.storage.cases import conditions
+from sprag.service.storage.digests import Digests
 from sprag.service.storage.errors import NothingToRetryError
-from sprag.service.storage.order import Orders
 from sprag.service.storage.records import StudyRecord, record_of
 from sprag.service.storage.reuse import endings_of
 from sprag.service.storage.tables import CHUNKS, ENDINGS, RECORD_COLUMNS, STUDIES, results_table
@@ -20,6 +20,7 @@ from sprag.service.storage.users import require_queue
 from sprag.worker import models
 from sprag.worker.chunking import MAX_CHUNKS
 from sprag.worker.limits import MAX_WAITING_STUDIES
+from sprag.worker.ports import Chunk
 from sprag.worker.states import ChunkState, StudyEvent, StudyState, follow
 from sprag.worker.sweeps import LineOrder
 
@@ -47,9 +48,10 @@ class _Done:
     detail: str | None
     host: str | None
     fingerprint: str | None
+    digest: int | None
 
 
-class Retries(Orders):
+class Retries(Digests):
     """Returning failed cases to waiting."""
 
     def retry_study(self, study_id: str, endings: Collection[str] | None = None) -> StudyRecord:
@@ -82,7 +84,8 @@ class Retries(Orders):
                 if now.revision != row.revision:  # it was run again or deleted in the meantime
                     continue
                 require_queue(connection, MAX_WAITING_STUDIES)
-                _give_back(connection, row, runs, counts, cases)
+                for chunk in _give_back(connection, row, runs, counts, cases):
+                    self.seal(connection, chunk)
                 self._move(connection, row.number, StudyEvent.RETRY)
                 self._lift_deadline(connection, row.number)
                 # The cases must be run, not copied from a study in which they failed in the same way.
@@ -143,16 +146,17 @@ def _few(runs: list[Run]) -> list[Run]:
 
 def _give_back(
     connection: sa.Connection, row: sa.Row[Any], runs: Sequence[Run], counts: dict[str, int], cases: Cases | None
-) -> None:
+) -> list[Chunk]:
     """Delete the rows that are run again and cut the chunks so that exactly these cases wait.
 
-    They are ``cases``, ascending, or all with the endings of ``counts``, which has their number by ending.
+    They are ``cases``, ascending, or all with the endings of ``counts``, which has their number by ending. Returns the
+    finished pieces of chunks that had a digest.
     """
     table = results_table(row.model, row.variant)
     own = [table.c.ending.in_(tuple(counts))] if cases is None else conditions(table.c.case_number, cases)
     for condition in own:
         connection.execute(sa.delete(table).where(table.c.study == row.number, condition))
-    _cut(connection, row.number, runs)
+    finished = _cut(connection, row.number, runs)
     for ending, count in counts.items():
         this = (ENDINGS.c.study == row.number) & (ENDINGS.c.ending == ending)
         connection.execute(sa.update(ENDINGS).where(this).values(cases=ENDINGS.c.cases - count))
@@ -162,16 +166,18 @@ def _give_back(
         .where(STUDIES.c.number == row.number)
         .values(done=STUDIES.c.done - sum(counts.values()), ok=STUDIES.c.ok - counts.get(models.OK, 0))
     )
+    return finished
 
 
-def _cut(connection: sa.Connection, number: int, runs: Sequence[Run]) -> None:
+def _cut(connection: sa.Connection, number: int, runs: Sequence[Run]) -> list[Chunk]:
     c = CHUNKS.c
     chunks = connection.execute(
-        sa.select(c["first"], c["count"], c.claimed_at, c.finished_at, c.detail, c.host, c.fingerprint)
+        sa.select(c["first"], c["count"], c.claimed_at, c.finished_at, c.detail, c.host, c.fingerprint, c.digest)
         .where(c.study == number)
         .order_by(c["first"])
     ).all()
     gone: list[dict[str, int]] = []
+    sealed: list[Chunk] = []
     made: list[dict[str, Any]] = []
     at = 0
     for chunk in starmap(_Done, chunks):
@@ -185,9 +191,13 @@ def _cut(connection: sa.Connection, number: int, runs: Sequence[Run]) -> None:
             inside.append((max(first, chunk.first), min(first + count, end)))
         if inside:
             gone.append({"gone": chunk.first})
-            made += _pieces(number, chunk, inside)
+            made += (pieces := _pieces(number, chunk, inside))
+            if chunk.digest is not None:
+                kept = (piece for piece in pieces if piece["state"] is ChunkState.DONE)
+                sealed += [Chunk(number, piece["first"], piece["count"]) for piece in kept]
     connection.execute(sa.delete(CHUNKS).where(c.study == number, c["first"] == sa.bindparam("gone")), gone)
     connection.execute(sa.insert(CHUNKS), made)
+    return sealed
 
 
 def _pieces(number: int, chunk: _Done, inside: Sequence[Run]) -> list[dict[str, Any]]:

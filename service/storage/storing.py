@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 from sqlalchemy.dialects import postgresql, sqlite
 
+from sprag.service.storage.digests import Digests, digest_of, row_words
 from sprag.service.storage.dispatchers import WAITING, Dispatchers
 from sprag.service.storage.origins import names_of
 from sprag.service.storage.reuse import Reuse, copy_rows, endings_of, mark_origin
@@ -23,6 +24,7 @@ from sprag.worker.states import ChunkState, StudyEvent, StudyState
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+    from sprag.service.storage.digests import Words
     from sprag.worker.ports import Chunk, Finished
 
     #: What identifies a chunk in the database: study, first position, number of cases.
@@ -97,6 +99,13 @@ _GAINED = (
 )
 
 
+_SEAL = (
+    sa.update(CHUNKS)
+    .where(CHUNKS.c.study == sa.bindparam("of"), CHUNKS.c["first"] == sa.bindparam("at"))
+    .values(digest=sa.bindparam("new", type_=sa.BigInteger))
+)
+
+
 @cache
 def _counting(dialect: str) -> postgresql.Insert | sqlite.Insert:
     """Adds to the number of cases of a study with an ending."""
@@ -133,7 +142,7 @@ def _change_chunks(connection: sa.Connection, keys: Iterable[Key], values: Mappi
         connection.execute(statement, {**these, **new})
 
 
-class Storing(Reuse, Dispatchers):
+class Storing(Digests, Reuse, Dispatchers):
     """Results and claims."""
 
     def exchange(
@@ -199,7 +208,7 @@ class Storing(Reuse, Dispatchers):
         if not finished:
             return
         kinds = self._kinds(connection, {item.chunk.study for item in finished})
-        self._insert(connection, finished, kinds)
+        digests = self._insert(connection, finished, kinds)
         gains = {number: _Gain() for number in kinds}
         hosts: dict[Key, set[str]] = {}
         for item in finished:
@@ -213,7 +222,11 @@ class Storing(Reuse, Dispatchers):
                 gain.endings += endings_of(connection, model, variant, chunk.study, known.cases)
                 gain.reused += known.cases.size
                 hosts[key_of(chunk)] = self._hosts_of(connection, known)
+            if known is not None:
+                digests[key_of(chunk)] = self.digest_in(connection, chunk)
         self._mark_done(connection, finished, hosts)
+        seals = [{"of": key[0], "at": key[1], "new": digest} for key, digest in digests.items()]
+        connection.execute(_SEAL, seals)
         _count(connection, gains)
         for number, gain in gains.items():
             more = {"more_done": gain.cases, "more_ok": gain.endings[models.OK], "more_reused": gain.reused}
@@ -244,21 +257,32 @@ class Storing(Reuse, Dispatchers):
 
     def _insert(
         self, connection: sa.Connection, finished: Sequence[Finished], kinds: Mapping[int, tuple[str, str]]
-    ) -> None:
-        """Insert the rows of chunks, those of one table together and in the order of their key."""
+    ) -> dict[Key, int]:
+        """Insert the rows of chunks, those of one table together and in the order of their key; their digests."""
+        digests: dict[Key, int] = {}
         blocks: dict[Target, list[Block]] = {}
         for item in sorted(finished, key=attrgetter("chunk.study", "chunk.first")):
             if not item.result.count:
+                digests[key_of(item.chunk)] = 0
                 continue
             chunk, kind = item.chunk, kinds[item.chunk.study]
             cases = self._cases(chunk, connection) if item.known is None else item.known.missing
-            blocks.setdefault(target(*kind), []).append(block(chunk.study, cases, item.result))
+            own = block(chunk.study, cases, item.result)
+            blocks.setdefault(target(*kind), []).append(own)
+            words = [_words(own)]
             # In the same transaction: a case has all of its rows or none.
             more, place = further_block(chunk.study, cases, item.result), further_target(*kind)
             if more is not None and place is not None:
                 blocks.setdefault(place, []).append(more)
+                words.append(_words(more, further=True))
+            digests[key_of(chunk)] = digest_of(*words)
         for place, rows in blocks.items():
             self.session.insert_blocks(connection, place, merged(rows))
+        return digests
+
+
+def _words(rows: Block, *, further: bool = False) -> Words:
+    return row_words(rows.cases, rows.endings, rows.flags, rows.values, further=further)
 
 
 def is_chunk(chunk: Chunk) -> sa.ColumnElement[bool]:

@@ -9,7 +9,7 @@ from sprag.worker import models
 from sprag.worker.states import ChunkState
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0035"
+HEAD_REVISION = "0036"
 
 METADATA = sa.MetaData(
     naming_convention={
@@ -130,6 +130,8 @@ CHUNKS = sa.Table(
     # rows copied from other studies the hosts there, several with commas between them.
     sa.Column("host", sa.String(255)),
     sa.Column("fingerprint", sa.String(64)),
+    # Of its rows (`sprag.service.storage.digests`); NULL: no rows yet, or from before revision 0036.
+    sa.Column("digest", sa.BigInteger),
     sa.Index("ix_chunks_study_state_finished_at", "study", "state", "finished_at"),
     sqlite_with_rowid=False,
 )

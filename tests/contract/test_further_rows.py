@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.storage.columns import _records
+from sprag.service.storage.columns import records
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import further_table
 from sprag.worker import models
@@ -90,7 +90,7 @@ def test_a_failure_between_two_rows_of_columns_is_an_error_of_the_database(store
     query = sa.text("SELECT 1 UNION ALL SELECT abs(-9223372036854775807 - 1)")
     with store.session.read() as connection:
         with pytest.raises(sa.exc.DBAPIError):
-            _records(connection, query, np.dtype([("number", np.int64)]))  # type: ignore[arg-type]
+            records(connection, query, np.dtype([("number", np.int64)]))  # type: ignore[arg-type]
         connection.rollback()
 
 

@@ -1,0 +1,79 @@
+"""Single bits of a database file are flipped: each is noticed, or changes no row.
+
+Each flip is made in a copy of the database of two finished studies, with the service stopped. Then the copy is opened,
+looked over as by `sprag db check`, and every row is read. A flip is silent where the rows differ and nobody says so.
+"""
+
+from __future__ import annotations
+
+import random
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sprag.service.storage.errors import StoreError
+from sprag.service.storage.records import StudyRecord
+from sprag.service.storage.store import Store
+from sprag.worker import models
+from sprag.worker.chunking import Chunking
+from tests.worker import fakes
+
+#: Which results of the studies are counts or categories.
+WHOLE = np.array([info.kind != "real" for info in models.result_infos("vibration-drive", "1")])
+
+
+def flips(folder: Path, *, count: int, seed: int, cases: int) -> dict[str, Any]:
+    """Flip ``count`` bits, one at a time; raises AssertionError where one is silent."""
+    draw = random.Random(seed)
+    whole = folder / "whole.sqlite3"
+    with Store.open(f"sqlite:///{whole}", chunking=Chunking(cases=100)) as store:
+        studies = [store.create_study({}, fakes.study(cases, name)).id for name in ("first", "second")]
+        for study in studies:
+            _finish(store, store.get_study(study), np.random.default_rng(seed))
+        rows = [_rows(store, study) for study in studies]
+    content = whole.read_bytes()
+    used = [place for place, byte in enumerate(content) if byte]  # most of the rest is pages of empty tables
+    outcomes = {"noticed": 0, "without effect on rows": 0, "silent": 0}
+    for _ in range(count):
+        bit = 8 * draw.choice(used) + draw.randrange(8)
+        copy = folder / "flipped.sqlite3"
+        shutil.copy(whole, copy)
+        with copy.open("r+b") as file:
+            file.seek(bit // 8)
+            file.write(bytes([content[bit // 8] ^ 1 << bit % 8]))
+        outcomes[_outcome(copy, studies, rows)] += 1
+        for path in folder.glob(f"{copy.name}*"):
+            path.unlink()
+    assert not outcomes["silent"], outcomes
+    return {"bytes": len(content), "flips": count, **outcomes}
+
+
+def _finish(store: Store, record: StudyRecord, numbers: np.random.Generator) -> None:
+    """Run a study to its end, with results of any size."""
+    epoch = store.take_over("drill")
+    for chunk in store.open_chunks(record.number):
+        store.claim(epoch, [chunk])
+        shape = fakes.values(chunk.first, chunk.count).shape
+        values = np.where(WHOLE, fakes.values(chunk.first, chunk.count), numbers.standard_normal(shape))
+        result = fakes.result(chunk.first, chunk.count)
+        store.commit(epoch, chunk, replace(result, values=values))
+    store.settle(epoch, record.number)
+
+
+def _rows(store: Store, study: str) -> tuple[Any, ...]:
+    block = store.case_rows(study, limit=1_000_000)
+    return block.cases.tobytes(), tuple(block.endings), tuple(block.flags), block.values.tobytes()
+
+
+def _outcome(copy: Path, studies: list[str], rows: list[tuple[Any, ...]]) -> str:
+    try:
+        with Store.open(f"sqlite:///{copy}") as store:
+            if any("pysqlite3" not in problem for problem in store.check().problems):  # the library may be old
+                return "noticed"
+            found = [_rows(store, study) for study in studies]
+    except (StoreError, ValueError, TypeError, OverflowError):
+        return "noticed"
+    return "without effect on rows" if found == rows else "silent"
