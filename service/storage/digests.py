@@ -111,10 +111,8 @@ def row_words(
 
 def digest_of(*parts: Words) -> int:
     """The digest of rows with those hashes, as the database keeps it: a signed number of 64 bits."""
-    total = np.uint64(0)
-    for words in parts:
-        total += words.sum(dtype=np.uint64)
-    return int(np.array(total).astype(np.int64))
+    total = sum(int(words.sum(dtype=np.uint64)) for words in parts) % 2**64
+    return total - 2**64 if total >= 2**63 else total
 
 
 class Digests(Orders):
