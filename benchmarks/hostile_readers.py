@@ -22,6 +22,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+import httpx
+
 from benchmarks.faults.harness import PATIENCE, Service, spec, until
 from benchmarks.reading import build, grid
 from sprag.service.formats import FORMATS
@@ -128,9 +130,19 @@ def ranges(place: Place, seconds: float) -> Counter[str]:
 
 
 def streams(place: Place, seconds: float) -> Counter[str]:
-    """Streams of the events of one study."""
-    head = f"GET /api/v1/studies/{place.waiting}/events HTTP/1.1\r\nHost: localhost\r\n"
-    return held(place, STREAMS, f"{head}Authorization: Bearer {place.reader}\r\n\r\n".encode(), seconds)
+    """Streams of the events of one study that is running."""
+    api = httpx.Client(base_url=f"http://127.0.0.1:{place.port}/api/v1", timeout=PATIENCE, trust_env=False)
+    with api:
+        api.headers["Authorization"] = f"Bearer {place.writer}"
+        submitted = api.post("/studies", json=spec(100_000))
+        assert submitted.status_code == 202, submitted.text
+        study = f"/studies/{submitted.json()['id']}"
+        until(lambda: api.get(study).json()["state"] == "running", "the study is running")
+        head = f"GET /api/v1{study}/events HTTP/1.1\r\nHost: localhost\r\n"
+        answers = held(place, STREAMS, f"{head}Authorization: Bearer {place.reader}\r\n\r\n".encode(), seconds)
+        assert api.get(study).json()["state"] == "running", "it must not end before its streams"
+        assert api.post(f"{study}:cancel").status_code == 202
+    return answers
 
 
 def half_sent(place: Place, seconds: float) -> Counter[str]:
@@ -196,15 +208,22 @@ def running(cases: int) -> Iterator[Place]:
             scopes = {"reader": TokenScope.READ, "other": TokenScope.READ, "writer": TokenScope.WRITE}
             secrets = {who: store.create_token(who, scope)[0] for who, scope in scopes.items()}
         service.start()
-        port = service.http.base_url.port
-        assert port is not None
-        service.http.headers["Authorization"] = f"Bearer {secrets['writer']}"
-        waiting = service.submit(spec(1_000))
-        assert service.http.post(f"/studies/{waiting}:pause").status_code == 202
-        place = Place(port, service.database, study, waiting, **secrets)
-        until(lambda: place.ask("GET", "/readyz", place.other, PATIENCE) == "200", "specs can be checked")
-        yield place
-        service.stop()
+        try:
+            yield _place(service, study, secrets)
+        finally:
+            service.stop()
+
+
+def _place(service: Service, study: str, secrets: dict[str, str]) -> Place:
+    """A started service, once it accepts specs and has a study that waits."""
+    port = service.http.base_url.port
+    assert port is not None
+    service.http.headers["Authorization"] = f"Bearer {secrets['writer']}"
+    waiting = service.submit(spec(1_000))
+    assert service.http.post(f"/studies/{waiting}:pause").status_code == 202
+    place = Place(port, service.database, study, waiting, **secrets)
+    until(lambda: place.ask("GET", "/readyz", place.other, PATIENCE) == "200", "specs can be checked")
+    return place
 
 
 def attack(name: str, cases: int, seconds: float) -> None:
