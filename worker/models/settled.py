@@ -29,7 +29,8 @@ HISTORY_DEPENDENT: Final = "history_dependent"
 HISTORY_FLAGS: Final[dict[str, str]] = {
     HISTORY_DEPENDENT: (
         "The shaft is held and a clutch leans on it all the time: the clutch keeps the windup with which it came "
-        "there, and each windup has a motion of its own. The results belong to this run-up; another start can lead to others."
+        "there, and each windup has a motion of its own. The results belong to this run-up; another start can lead to "
+        "others."
     ),
 }
 #: Flag of a case of a sweep whose motion does not continue that of the case before it.
