@@ -90,6 +90,7 @@ class ScheduleDetail(ScheduleSummary):
 class ScheduleList(TypedDict):
     """All schedules, newest first."""
 
+    off: Annotated[str | None, Doc("why none of them runs: the database is a copy; null where they run")]
     schedules: list[ScheduleSummary]
 
 

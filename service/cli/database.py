@@ -1,4 +1,4 @@
-"""``sprag db``: upgrade, check, back up and move the database."""
+"""``sprag db``: upgrade, check, back up, move and adopt the database."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class AuditForm(StrEnum):
 
 
 app = typer.Typer(
-    help="Upgrade, check, back up and move the database; read its audit log.",
+    help="Upgrade, check, back up, move and adopt the database; read its audit log.",
     no_args_is_help=True,
     cls=Groups,
 )
@@ -149,7 +149,8 @@ def move(
 ) -> None:
     """Copy the whole database into another one, SQLite or PostgreSQL, and compare every row; stop Sprag first.
 
-    The source stays as it is. An interrupted move is continued by the same command.
+    The source stays as it is. An interrupted move is continued by the same command. Schedules and reports of the target
+    are off until `sprag db adopt`.
     """
     from sprag.service.jobs.dispatching import owner_name
     from sprag.service.storage.moving import move as move_all
@@ -163,6 +164,7 @@ def move(
     else:
         places = {"target": other.location, "source": source.location}
         print(_("{target} has every row of {source}; use it with --db from now on", **places))
+        say(_("its schedules and reports are off until `sprag db adopt`; no longer start {source}", **places))
 
 
 @app.command()
@@ -225,3 +227,13 @@ def clock(db: Database = None) -> None:
         store.note_clock(now)
         store.note_change("database.clock", "", now=now.isoformat(timespec="seconds"))
         say(_("the clock is trusted: it is {time}", time=now.isoformat(timespec="seconds")))
+
+
+@app.command()
+def adopt(db: Database = None) -> None:
+    """Confirm that this database, a copy or a moved one, is the deployment: its schedules run, its reports are sent."""
+    with named_store(db, quiet=False) as store:
+        if store.adopt_database():
+            say(_("its schedules are on from now on: see to it that the original is no longer used"))
+        else:
+            say(_("it was no copy: its schedules were on already"))

@@ -20,7 +20,7 @@ from sprag.service.cli.console import ExitCode, WrongInputError, console, write_
 from sprag.service.cli.options import Database, JsonFlag
 from sprag.service.cli.settings import read_settings
 from sprag.service.faults import Fault
-from sprag.service.languages import N_, _, decimal
+from sprag.service.languages import N_, _, decimal, recorded
 from sprag.worker.limits import MAX_TOLERANCE, MIN_TOLERANCE
 
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sqlalchemy", "fastapi", "uvicorn")
@@ -236,7 +236,9 @@ def _schedules(url: str, file: Path | None) -> tuple[bool, str]:
     if file is not None and not file.exists():
         return True, _("none yet")
     with Store.open(url, create=False) as store:
-        late, schedules = late_runs(store), len(store.list_schedules())
+        late, schedules, off = late_runs(store), len(store.list_schedules()), store.has_schedules() and store.is_copy()
+    if off:
+        return False, _(recorded.COPY)
     if late:
         return False, " ".join(f"{each.run.name or each.run.id}: {each.sentence}" for each in late)
     return True, _("{count} schedules, none is late", count=schedules)

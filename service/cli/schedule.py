@@ -153,6 +153,8 @@ def list_schedules(server: Server = DEFAULT_SERVER, token: Token = None, as_json
         window = "-".join(s["window"] or ()) or None
         rows.append((s["id"], _when(s), window, s["finish_by"], _run(s["last_run"]), _next(s), s["name"]))
     show_table("", columns, rows)
+    if found["off"]:
+        say(_known(found["off"]) or "")
 
 
 @app.command()

@@ -5,19 +5,27 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sprag.service.answers import filled
-from sprag.service.answers.schedules import ScheduleDetail, ScheduleRun, ScheduleSummary
+from sprag.service.answers.schedules import ScheduleDetail, ScheduleList, ScheduleRun, ScheduleSummary
 from sprag.service.http.prefix import here
 from sprag.service.http.views import API_PREFIX, study_address
 from sprag.service.jobs.nights import outcome_json
+from sprag.service.languages import recorded
 from sprag.service.schedules.times import local_time
 
 if TYPE_CHECKING:
     from sprag.service.storage.schedule_runs import RunRecord, ScheduleRecord
+    from sprag.service.storage.store import Store
 
 
 def schedule_address(schedule_id: str) -> str:
     """Address of a schedule in the API."""
     return here(f"{API_PREFIX}/schedules/{schedule_id}")
+
+
+def listed(store: Store) -> ScheduleList:
+    """Every schedule, newest first, and why none of them runs."""
+    off = recorded.COPY if store.is_copy() else None
+    return {"off": off, "schedules": [summary(record) for record in store.list_schedules()]}
 
 
 def summary(record: ScheduleRecord) -> ScheduleSummary:

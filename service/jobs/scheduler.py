@@ -48,12 +48,15 @@ class Scheduler(PollingThread):
         super().__init__(_LOG, "the schedules")
         self._store = store
         self._next_recovery = float("-inf")
+        self._off = False
         #: By schedule and due time: the time (monotonic, s) before which a refused run is not tried again.
         self._next_try: dict[tuple[int, int], float] = {}
 
     def look(self) -> None:
         """One check: submit what is due, apply the windows, and keep the outcomes of what is over."""
-        if not self._store.has_schedules():  # as in most databases; then one question each second, instead of four
+        if not self._store.has_schedules():  # as in most databases; then one question each second, instead of five
+            return
+        if self._is_off():
             return
         now = self._store.clock.now()
         if self._store.clock.monotonic() >= self._next_recovery:
@@ -73,6 +76,16 @@ class Scheduler(PollingThread):
             with act_as(_actor(study.schedule)):
                 self._apply_window(study, now)
         conclude_runs(self._store)
+
+    def _is_off(self) -> bool:
+        """Whether this database is a copy of the deployment; its log gets a line whenever that changes."""
+        off = not self._store.is_deployment()
+        if off and not self._off:
+            _LOG.warning("%s", recorded.COPY)
+        elif self._off and not off:
+            _LOG.warning("This database was adopted: its schedules are on.")
+        self._off = off
+        return off
 
     def _apply_window(self, study: BoundStudy, now: datetime) -> None:
         if study.window is None or study.window.open_at(now):

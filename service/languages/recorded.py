@@ -16,6 +16,12 @@ WINDOW: Final = N_("{begin} to {end} ({zone})")
 NO_ROOM: Final = N_("no room: {limit}; the study continues when there is room")
 DISK: Final = N_("the disk that holds {path} has {free} MB left")
 LARGEST_FILE: Final = N_("files cannot grow beyond {size} MB here (ulimit -f)")
+#: Of a database that is not the deployment, and why nothing has run there.
+COPY: Final = N_(
+    "This database is a copy, or was moved: its schedules are off, and it sends no reports, until `sprag db adopt` "
+    "confirms that it takes the place of the original."
+)
+OFF: Final = N_("this database is a copy, whose schedules are off until `sprag db adopt`")
 #: Of an alarm of the watchdog, and why.
 NOTHING_RAN: Final = N_("It was due at {due}, and nothing has run: {why}.")
 NOT_TAKEN: Final = N_("the worker has not taken it up")
@@ -96,7 +102,7 @@ _ALL: Final = (
     OUTSIDE_WINDOW, WINDOW, NO_ROOM, DISK, LARGEST_FILE, EARLIER, PAUSED, DELETED, NOT_IN_TIME, TRIED_AGAIN,
     NOTICED_LATE, NOT_MADE_UP, GRACE, NOTHING_RAN, NOT_TAKEN, NOT_TAKEN_SILENT, NOT_SUBMITTED, NO_WORKER, WAITS_SILENT,
     WAITS_STALLED, WAITS, MANY_STUDIES, SHARE_OF_QUEUE, NO_ROOM_FOR_RESULTS, SILENT, LATE_PART, LATE,
-    ROUNDS_DONE, NO_ROUND, TOKEN_EXPIRED, TOKEN_REVOKED, TOKEN_OF_REMOVED_USER,
+    COPY, OFF, ROUNDS_DONE, NO_ROUND, TOKEN_EXPIRED, TOKEN_REVOKED, TOKEN_OF_REMOVED_USER,
     *_OF_WORKERS, *_OF_ERRORS,
 )  # fmt: skip
 

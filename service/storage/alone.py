@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
-from sprag.service.storage import maintenance
+from sprag.service.storage import deployment, maintenance
 from sprag.service.storage.errors import in_use
 from sprag.service.storage.session import Session
 from sprag.service.storage.tables import HEAD_REVISION
@@ -47,6 +47,7 @@ def upgrade(url: str, owner: str, *, copy: bool = True) -> Upgraded:
             backup = _beside(session.path, before)
             maintenance.backup(session, backup)
         before, after = maintenance.upgrade(session)
+        deployment.settle(session)
         return Upgraded(session.location, before, after, backup)
 
 

@@ -15,6 +15,7 @@ import sqlalchemy as sa
 from sprag.service.stale_files import mark, sweep
 from sprag.service.storage import component_tables, schedule_tables, sessions, tokens, user_tables  # noqa: F401 - their tables are made, too
 from sprag.service.storage.audit import note
+from sprag.service.storage.deployment import settle
 from sprag.service.storage.digests import Digests
 from sprag.service.storage.errors import CREATED_BY, DatabaseError, SchemaError
 from sprag.service.storage.part import SystemClock, micros_of
@@ -229,6 +230,8 @@ def backup(session: Session, path: Path) -> None:
     if not path.parent.is_dir():
         raise DatabaseError(f"the backup cannot be written: there is no folder {path.parent}", "write-failed")
     sweep(path.parent.glob(f".{glob.escape(path.name)}.*{PART_SUFFIX}"))
+    if revision(session) == HEAD_REVISION:  # before an upgrade it may not know of deployments
+        settle(session)
     part = path.with_name(f".{path.name}.{secrets.token_hex(4)}{PART_SUFFIX}")
     try:
         descriptor = create_private(part)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
-from sprag.service.storage import maintenance
+from sprag.service.storage import deployment, maintenance
 from sprag.service.storage.errors import DatabaseError
 from sprag.service.storage.lock import DispatcherLock
 from sprag.service.storage.moved_rows import TableOf, tables_of
@@ -50,6 +50,8 @@ def move(source: Session, target: Session, owner: str, say: Callable[[str], None
         raise maintenance.other_revision(source, found)
     with _unused(source, owner), source.write() as connection:
         _require_known(connection, source)
+        # What the target gets is the place of the source: it is a copy until somebody adopts it.
+        deployment.settle_in(source, connection)
         mark = maintenance.MOVING + hashlib.sha256(name.encode()).hexdigest()[:16]
         resumed = _prepare(target, mark)
         with _unused(target, owner):
@@ -109,7 +111,8 @@ def _prepare(target: Session, mark: str) -> bool:
     if found != HEAD_REVISION:
         raise maintenance.other_revision(target, found)
     with target.read() as connection:
-        full = [table.name for table in all_tables().sorted_tables if _has_rows(connection, table)]
+        tables = [table for table in all_tables().sorted_tables if table is not deployment.DEPLOYMENT]
+        full = [table.name for table in tables if _has_rows(connection, table)]
     if full:
         raise DatabaseError(
             f"{target.location} is not empty: it has rows in {', '.join(full)}; name an empty database",

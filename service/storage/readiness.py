@@ -6,6 +6,7 @@ from contextlib import suppress
 from threading import Lock
 from typing import TYPE_CHECKING, Final
 
+from sprag.service.languages import recorded
 from sprag.service.storage.clock_watch import clock_problem
 from sprag.service.storage.dispatchers import TAKE_OVER_SECONDS
 from sprag.service.storage.errors import DatabaseError
@@ -67,6 +68,8 @@ class Readiness:
         with suppress(StoreError):
             if problem := clock_problem(self._store):
                 found.append(f"{problem}.")
+            if self._store.has_schedules() and self._store.is_copy():
+                found.append(recorded.COPY)
             found += self._hindered()
             if not self._store.session.on_server and (linked := self._store.session.file.second_name()):
                 text = str(linked)

@@ -10,6 +10,7 @@ import sqlalchemy as sa
 from sprag.service.actor import acting
 from sprag.service.languages import recorded
 from sprag.service.storage.audit import by_sender, note, require_own
+from sprag.service.storage.deployment import ANY_SCHEDULE
 from sprag.service.storage.editions import require_edition
 from sprag.service.storage.errors import IdempotencyConflictError, ScheduleNotFoundError, TooManySchedulesError
 from sprag.service.storage.part import micros_of, moment, optional_moment
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 _S = SCHEDULES.c
 #: Number of latest runs reported for a schedule.
 SHOWN_RUNS: Final = 20
-_ANY_SCHEDULE: Final = sa.select(sa.exists(sa.select(_S.number)))
 
 
 class Schedules(ScheduleRuns, Windows):
@@ -132,7 +132,7 @@ class Schedules(ScheduleRuns, Windows):
     def has_schedules(self) -> bool:
         """Whether there is a schedule, or has been one: what it began outlasts it."""
         with self.session.read() as connection:
-            return bool(connection.execute(_ANY_SCHEDULE).scalar_one())
+            return bool(connection.execute(ANY_SCHEDULE).scalar_one())
 
     def due_schedules(self, now: datetime) -> list[ScheduleRecord]:
         """Schedules that are due at ``now``."""

@@ -8,6 +8,7 @@ from sprag.service.storage import maintenance
 from sprag.service.storage.audit import Audit
 from sprag.service.storage.columns import WholeColumns
 from sprag.service.storage.components import Components
+from sprag.service.storage.deployment import Deployment
 from sprag.service.storage.figures import Totals
 from sprag.service.storage.labelling import Labelling
 from sprag.service.storage.late_runs import LateRuns
@@ -48,6 +49,7 @@ class Store(
     LateRuns,
     Components,
     SavedViews,
+    Deployment,
 ):
     """One database. Safe to use from several threads; close it at the end (it is a context manager)."""
 

@@ -15,7 +15,7 @@ from sprag.service.http.context import ID_PATTERN, Context, Ctx, StudyIdConverto
 from sprag.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
 from sprag.service.http.respond import edition_tag, json_response, tagged
 from sprag.service.http.routers import api_router
-from sprag.service.http.schedule_views import detail, schedule_address, summary
+from sprag.service.http.schedule_views import detail, listed, schedule_address
 from sprag.service.http.threads import in_thread
 from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
 from sprag.service.jobs import checks
@@ -187,7 +187,7 @@ async def _fields(context: Context, work: Work, received: Body, old: ScheduleFie
 @router.get("/schedules", response_model=m.ScheduleList, responses=problems("invalid-parameter"))
 def list_schedules(context: Ctx) -> Response:
     """Every schedule with its last and its next run, newest first."""
-    return json_response({"schedules": [summary(record) for record in context.store.list_schedules()]})
+    return json_response(listed(context.store))
 
 
 @router.get("/night", response_model=m.Night, responses=problems("invalid-parameter"))

@@ -15,7 +15,7 @@ from starlette.responses import RedirectResponse, Response
 from sprag.service.http.context import Context, Ctx
 from sprag.service.http.problems import ApiError
 from sprag.service.http.routers import page_router
-from sprag.service.http.schedule_views import summary
+from sprag.service.http.schedule_views import listed
 from sprag.service.http.threads import in_thread
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form.entries import Values
@@ -69,8 +69,7 @@ _FIELD_OF: Final = {"window": "window_begin", "spec": "source"}
 @router.get("/schedules")
 def schedules(context: Ctx) -> Response:
     """Every schedule, newest first."""
-    found = [summary(record) for record in context.store.list_schedules()]
-    return page("schedules.html", schedules=found)
+    return page("schedules.html", **listed(context.store))
 
 
 @router.get("/night")

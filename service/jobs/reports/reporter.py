@@ -43,7 +43,9 @@ class Reporter(PollingThread):
         self._context = context
 
     def look(self) -> None:
-        """Send every report that is due to be sent."""
+        """Send every report that is due to be sent, unless the database is a copy of the deployment."""
+        if self._store.is_copy():
+            return
         with act_as(Actor(Door.SERVICE, "reports", socket.gethostname())):
             while not self._ending.is_set() and (report := self._store.claim_report()) is not None:
                 self._send(report)

@@ -45,9 +45,9 @@ def late_runs(store: Store) -> list[LateRun]:
     silence = store.silence()
     silent = silence is None or silence > LATE.total_seconds()
     stalled = not silent and not store.chunk_finished_since(now - STALLED)
-    found = []
+    off, found = store.is_copy(), []
     for run in expected:
-        why = _why(run, now, silent, stalled)
+        why = Phrase(recorded.OFF) if off and run.study is None else _why(run, now, silent, stalled)
         if why is not None:
             due = wall_clock(run.due, run.zone)
             found.append(LateRun(run, Phrase(recorded.NOTHING_RAN, due=due, why=why)))
@@ -88,7 +88,9 @@ class Watchdog:
         self._known: set[tuple[str, datetime]] = set()
 
     def look(self) -> None:
-        """One look; raises StoreError."""
+        """One look, of which a copy of the deployment says nothing to anybody; raises StoreError."""
+        if self._store.is_copy():
+            return
         found = late_runs(self._store)
         known = {(late.run.id, late.run.due) for late in found}
         for late in found:

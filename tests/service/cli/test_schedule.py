@@ -82,7 +82,7 @@ def test_a_schedule_is_kept_shown_changed_and_deleted(run: Run, service: Service
     assert "next run: 2099" in run("show", name)[2]
     assert json.loads(run("show", name, "--json")[1])["spec"] == SPEC
     assert run("delete", name)[0] == 0
-    assert service.get("/schedules") == {"schedules": []}
+    assert service.get("/schedules") == {"off": None, "schedules": []}
 
 
 def test_what_is_wrong_is_told_by_field(run: Run, spec_file: str) -> None:
@@ -145,3 +145,13 @@ def test_a_schedule_is_named_as_a_study_is(run: Run, service: Service, spec_file
     code, _, err = run("show", "none")
     assert code == 2
     assert "none" in err
+
+
+def test_the_list_of_a_copied_database_says_that_its_schedules_are_off(
+    run: Run, service: Service, spec_file: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert run("add", spec_file, "--cron", "@daily")[0] == 0
+    assert "is a copy" not in run("list")[2]
+    monkeypatch.setattr(service.store, "is_copy", lambda: True)
+    assert "This database is a copy, or was moved: its schedules are off" in run("list")[2]
+    assert "This database is a copy" in json.loads(run("list", "--json")[1])["off"]

@@ -37,7 +37,7 @@ def test_the_interface_keeps_changes_disables_and_deletes(service: Service, cloc
     assert service.http.delete(address).status_code == 204
     assert service.http.get(address).status_code == 404
     assert service.http.patch(address, json={}).status_code == 404
-    assert service.get("/schedules") == {"schedules": []}
+    assert service.get("/schedules") == {"off": None, "schedules": []}
 
 
 def test_pausing_and_resuming_wait_for_no_process(service: Service, clock: Clock) -> None:
