@@ -121,18 +121,21 @@ class Dispatchers(Part):
         return True
 
     def take_overs(self) -> int:
-        """How often in the last `TAKE_OVER_SECONDS` a dispatcher of a file began before the one before it had ended.
+        """How often in the last `TAKE_OVER_SECONDS` a dispatcher began before that of another process ended, in a file.
 
-        A `run_owner`, which leaves its end to the next one, does not count.
+        A process that begins anew takes nothing from another; a `run_owner`, which leaves its end to the next one, does
+        not count either.
         """
         with self.session.read() as connection:
             rows = connection.execute(sa.select(DISPATCHERS)).all()
-        begun = {row.started_at: row.epoch for row in rows}
+        begun = {row.started_at: row for row in rows}
         since = self._now() - TAKE_OVER_SECONDS * 1_000_000
         return sum(
             row.ended_at is not None
             and row.ended_at >= since
-            and begun.get(row.ended_at, 0) > row.epoch
+            and (next_one := begun.get(row.ended_at)) is not None
+            and next_one.epoch > row.epoch
+            and next_one.owner != row.owner
             and not own_study(row.owner)
             for row in rows
         )

@@ -154,3 +154,12 @@ def test_workers_that_take_a_database_from_each_other_are_told(file: Path) -> No
             clock.seconds += 1.0
         store.take_over("host:5")
         assert Readiness(store).problems() == (), "restarts that ended the worker before are none"
+
+
+def test_a_process_that_begins_anew_takes_nothing_from_another(file: Path) -> None:
+    clock = fakes.HandClock()
+    with Store.open(f"sqlite:///{file}", clock=clock) as store:
+        for turn in range(5):
+            clock.seconds = turn
+            store.take_over("host:1")
+        assert Readiness(store).problems() == ()
