@@ -163,6 +163,7 @@ def draw_map(
         None if regimes is None else [regimes[start : start + width] for start in starts],
         None if orders is None else [orders[start : start + width] for start in starts],
         flags=[columns.flags[start : start + width] for start in starts] if columns.flags else None,
+        usable=models.usable(study.model, columns.endings, columns.flags).reshape(cases.shape),
     )
 
 

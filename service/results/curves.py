@@ -155,6 +155,7 @@ class Map:
 
     ``names``, ``held`` and ``title`` (of the result, by default its name) are for display, as in `Selection`; ``units``
     and ``names`` belong to x and y. A refined map has the values in the middles of even squares, which are no cases.
+    ``usable`` says which values count, as of `Curve`.
     """
 
     x: str
@@ -175,6 +176,11 @@ class Map:
     refined: RefinedMap | None = None
     flags: list[list[str]] | None = None
     title: str = ""
+    usable: NDArray[np.bool_] | None = None
+
+    def known(self) -> NDArray[np.float64]:
+        """The values; NaN where there is none that counts, which pictures leave blank."""
+        return self.values if self.usable is None else np.where(self.usable, self.values, np.nan)
 
     def to_json(self) -> MapData:
         """The map as JSON data; ``z.values[j][i]`` belongs to ``y.values[j]`` and ``x.values[i]``."""
@@ -236,6 +242,7 @@ class Map:
             regimes=self.regimes and [[self.regimes[row][column] for column in columns] for row in rows],
             orders=self.orders and [[self.orders[row][column] for column in columns] for row in rows],
             flags=self.flags and [[self.flags[row][column] for column in columns] for row in rows],
+            usable=None if self.usable is None else self.usable[np.ix_(rows, columns)],
         )
 
 

@@ -12,13 +12,15 @@ from sprag.service.results.figures.orders import TITLE, order_map, strip_of
 from sprag.service.results.joined import joined_points
 from sprag.service.results.phrases import Amount, Name, Phrase, joined, term
 from sprag.service.results.refined import jumps_of, sentence
-from sprag.service.results.regimes import DOUBTFUL, MARKED, regimes_of
+from sprag.service.results.regimes import DOUBTFUL, MARKED, UNSETTLED, regimes_of
 from sprag.service.results.sweeps import hysteresis, values_text, without_direction
 from sprag.worker.codes import PENDING
-from sprag.worker.models import WorkerEnding
+from sprag.worker.models import Ending, WorkerEnding
 from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from sprag.service.results.curves import Curve, Curves, Map
     from sprag.worker.models import ResultInfo
 
@@ -45,7 +47,7 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1) -> Figu
     x = Quantity(chosen.names[chosen.x], chosen.units[chosen.x])
     lines = [(study, curve) for study, (_, curves) in enumerate(drawn) for curve in curves.curves]
     family = tuple(Quantity(chosen.names[path], chosen.units[path]) for path in chosen.lines[0].by)
-    occurring = tuple(regimes_of(curve.regimes for _, curve in lines))
+    occurring = tuple(regimes_of(_regimes(curve) for _, curve in lines))
     regimes = occurring if len(occurring) > 1 or set(occurring) & set(MARKED) else ()
     labels = [label for label, _ in drawn]
     panels = []
@@ -169,7 +171,7 @@ def _marks(lines: Sequence[tuple[int, Curve]], infos: Sequence[ResultInfo], regi
         places = [
             (curve, place, info.name)
             for _, curve in lines
-            for place, own in enumerate(curve.regimes or ())
+            for place, own in enumerate(_regimes(curve))
             if own == name and name in MARKED
             for info in infos
         ]
@@ -179,6 +181,17 @@ def _marks(lines: Sequence[tuple[int, Curve]], infos: Sequence[ResultInfo], regi
             np.array([curve.y[result][place] for curve, place, result in places]),
             np.array([curve.line.cases[place] for curve, place, _ in places], dtype=np.int64),
         )
+
+
+def _regimes(curve: Curve) -> Sequence[str | None]:
+    """The regime of each case; of runs of a given time, which have none, that of motions that had not settled."""
+    if curve.regimes is not None or curve.usable is None:
+        return curve.regimes or ()
+    return _not_settled(curve.endings, curve.usable)
+
+
+def _not_settled(endings: Sequence[str], usable: NDArray[np.bool_]) -> list[str | None]:
+    return [UNSETTLED if ending == Ending.OK and not ok else None for ending, ok in zip(endings, usable, strict=True)]
 
 
 def _nothing(drawn: Sequence[tuple[str, Curves]]) -> str:
@@ -211,12 +224,12 @@ def map_quantities(drawn: Map) -> tuple[Quantity, Quantity, Quantity]:
 
 def doubtful_marks(drawn: Map) -> Iterator[Marks]:
     """The points of a map whose motion is not periodic; none of a map whose colours say so."""
+    kinds: Sequence[Sequence[str | None]] = drawn.regimes or ()
+    if drawn.regimes is None and drawn.usable is not None:
+        kinds = list(map(_not_settled, drawn.endings, drawn.usable))
     for name in () if order_map(drawn) else DOUBTFUL:
         places = [
-            (row, column)
-            for row, regimes in enumerate(drawn.regimes or ())
-            for column, own in enumerate(regimes)
-            if own == name
+            (row, column) for row, regimes in enumerate(kinds) for column, own in enumerate(regimes) if own == name
         ]
         if places:
             rows, columns = np.array(places).T

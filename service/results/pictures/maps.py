@@ -52,7 +52,7 @@ def paint_map(figure: Figure, drawn: Map, title: str, *, contours: bool = False)
     axes = figure.subplots()
     borders = map_edges(drawn)
     if orders is None:
-        fields = np.ma.masked_invalid(drawn.values)
+        fields = np.ma.masked_invalid(drawn.known())
         mesh: ScalarMappable = (
             _paint_contours(axes, drawn, fields)
             if contours and _has_levels(fields)
@@ -77,7 +77,7 @@ def paint_map(figure: Figure, drawn: Map, title: str, *, contours: bool = False)
     paint_marks(axes, doubtful, clipped=False)
     below = () if drawn.refined is None else (shown(drawn.refined.sentence),)
     explain_regimes(figure, [marks.regime for marks in doubtful], below=below)
-    missing = int(np.isnan(drawn.values if orders is None else orders.places).sum())
+    missing = int(np.isnan(drawn.known() if orders is None else orders.places).sum())
     grey = plural("grey: {count} case without a result", "grey: {count} cases without a result", missing)
     grey = Phrase("grey: not interpolated") if drawn.refined else grey
     head(figure, title, (*drawn.held, shown(grey)) if missing else drawn.held)

@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from sprag.service.results.curve_cases import draw, select
+from sprag.engine.vibration_drive.regimes import Regime
+from sprag.service.http.web.figures.maps import map_figure
+from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.differences import differences
+from sprag.service.results.figures.curves import curves_figure, doubtful_marks
 from sprag.service.results.joined import joined_points
 from sprag.service.results.sensitivity import sensitivity
 from sprag.service.results.tolerances.batch import Asked
@@ -27,6 +30,7 @@ from sprag.worker.planning.rounds import Rows
 from tests.service import refined_study
 from tests.service.conftest import Service
 from tests.service.results.settled import flagged, settled
+from tests.service.spec_sample import changed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -139,6 +143,8 @@ def test_curves_join_and_compare_what_counts(service: Service) -> None:
     joined = joined_points(curve, SPEED)
     assert joined is not None
     assert [part.tolist() for part in joined] == [[0], [1], [2]]
+    (marks,) = curves_figure([("", drawn)]).panels[0].marks
+    assert (marks.regime, np.asarray(marks.x).tolist()) == ("unsettled", [0.2, 0.7])
     (less,) = differences([("a", drawn), ("b", drawn)], 0)[0][1].curves
     assert np.isnan(less.y[SPEED]).tolist() == [False, True, True]
     body = service.get(f"/studies/{study_id}/curves", x="shaft.load", y=SPEED)
@@ -147,6 +153,31 @@ def test_curves_join_and_compare_what_counts(service: Service) -> None:
     assert [line.split(",")[-2] for line in table.splitlines()] == [
         "flags", "", "not_settled", "windup_out_of_data not_settled",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("run", "flag"), [({"until": "settled"}, "unsettled"), ({"duration": "9 periods"}, "not_settled")]
+)
+def test_maps_leave_blank_and_mark_what_does_not_count(run: dict[str, str], flag: str) -> None:
+    axes = [{"path": "shaft.load", "values": [0.1, 0.2]}, {"path": "excitation.frequency", "values": [20, 25]}]
+    study = parse_spec(changed({"/run": run, "/axes": axes})).study
+    infos = models.study_results(study)
+    flags = ["", flag, "", "windup_out_of_data"]
+
+    def fetch(cases: NDArray[np.int64], names: Sequence[str]) -> CaseColumns:
+        known = {name: np.full(len(cases), 4.0) for name in names} | {SPEED: 1.0 + cases}
+        if "regime" in names:
+            known["regime"] = np.array([Regime.UNSETTLED if flags[case] == flag else Regime.PERIODIC for case in cases])
+        return CaseColumns(cases, ["ok"] * len(cases), known, [flags[case] for case in cases.tolist()])
+
+    drawn = draw_map(study, infos, "shaft.load", "excitation.frequency", SPEED, (), fetch)
+    assert drawn.known()[drawn.cases == 1].size == 1
+    np.testing.assert_array_equal(np.isnan(drawn.known()), drawn.cases == 1)
+    assert not np.isnan(drawn.values).any()
+    figure = map_figure(drawn, contour=False)
+    assert [value is None for row in figure["data"][0]["z"] for value in row] == (drawn.cases == 1).reshape(-1).tolist()
+    (marks,) = doubtful_marks(drawn)
+    assert (marks.regime, np.asarray(marks.cases).tolist()) == ("unsettled", [1])
 
 
 def test_sensitivities_and_explore_leave_out_what_does_not_count(service: Service) -> None:

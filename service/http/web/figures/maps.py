@@ -42,7 +42,7 @@ def map_figure(drawn: Map, contour: bool) -> Data:
         "type": "contour" if contour else "heatmap",
         "x": list(drawn.x_values),
         "y": list(drawn.y_values),
-        "z": [numbers(row) for row in drawn.values],
+        "z": [numbers(row) for row in drawn.known()],
         "customdata": drawn.cases.tolist(),
         "colorscale": "Viridis",
         "colorbar": {"title": {"text": axis_title(z), "side": "right"}},
