@@ -107,7 +107,7 @@ WARNING_MEANINGS: Final[dict[WarningCode, str]] = {
     "implausible-value": "The value is far outside what machines of this kind have; probably it is in another unit.",
     "impossible-inertia": "The inertia is less than that of the mass at its arm alone.",
     "invalid-drives": "Tolerances give some drives a derived parameter out of its range; these drives fail.",
-    "late": "By estimate the study will not be finished by `finish_by`.",
+    "late": "By estimate the study will not be finished by its deadline.",
     "law-ends-falling": (
         "The clutch law has a negative slope at the end of its range, and its straight continuation falls to zero."
     ),
@@ -119,7 +119,7 @@ WARNING_MEANINGS: Final[dict[WarningCode, str]] = {
     "no-compression": "The discharge pressure is below the suction pressure.",
     "no-discharge": "The compressor does not reach the discharge pressure.",
     "no-effect": "The value, or the axis, changes no result.",
-    "no-such-angle": "There are not as many angles with T = T_mean as `phi_c` asks for.",
+    "no-such-angle": "No angle with T = T_mean has the number that was chosen.",
     "not-monotonic": "The values of a list neither rise nor fall throughout.",
     "nothing-acts": "The machine, or one of its parts, has neither a mechanism nor an operation.",
     "nothing-moves": "Both amplitudes of the base are 0.",

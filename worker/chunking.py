@@ -77,7 +77,7 @@ class Chunking:
         what = "case" if length == 1 else "line of the sweep"
         text = (
             f"One {what} takes about {seconds:.3g} s, and {self.timeout:g} s are allowed (SPRAG_CHUNK_TIMEOUT): cases "
-            "will probably end as timed_out."
+            "will probably be stopped as timed out."
         )
         return (models.WarningText(text, "exceeds-chunk-timeout"),)
 

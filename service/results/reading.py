@@ -104,6 +104,10 @@ class Reading:
         return f"{self.caption(name)} ({shown})" if shown else self.caption(name)
 
 
+#: How measured clutches are read, which no study has yet: in the units of the fit.
+CLUTCH: Final = Reading("vibration-drive")
+
+
 def reading_for(study: Study, spec: Mapping[str, Any], choice: Choice) -> Reading:
     """The reading of a choice; raises SelectionError for units that cannot be shown."""
     return Reading(study.model, units_for(study, spec, choice.units), choice.names)

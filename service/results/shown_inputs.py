@@ -30,6 +30,12 @@ _NUMBERED: Final = {
     "steps": N_("Step {number}"),
 }  # fmt: skip
 _NUMBER: Final = re.compile(rf"({'|'.join(_NUMBERED)})\.(\d+)\.")
+#: Parts of a spec beside those of a machine.
+PARTS: Final = (
+    N_("Columns"), N_("Count"), N_("Csv"), N_("Data"), N_("Diagram"), N_("Drives"), N_("Goal"), N_("Limits"),
+    N_("Points"), N_("Rows"), N_("Run"), N_("Sense"), N_("Starts"), N_("Table"), N_("Tolerances"), N_("Torque"),
+    N_("Values"),
+)  # fmt: skip
 _YES_NO: Final = {"true": N_("yes"), "false": N_("no")}
 _COUNT: Final = re.compile(r"(\d+) (period|revolution)s?")
 
@@ -44,11 +50,11 @@ def inputs(study: Study, spec: Mapping[str, Any]) -> list[tuple[str, list[dict[s
         shown = item if item.origin == "derived" else replace(item, value=in_words(item))
         code = item.value if _is_code(item.value) and shown is not item else ""
         sections.setdefault(section, []).append({"name": name, "symbol": symbol, "item": shown, "code": code})
-    return [(_section(section), rows) for section, rows in sections.items()]
+    return [(part_name(section), rows) for section, rows in sections.items()]
 
 
-def _section(path: str) -> str:
-    """What a part of a machine is called: ``Pendulum 0, clutch``."""
+def part_name(path: str) -> str:
+    """What a part of a machine, or of a spec, is called: ``Pendulum 0, clutch``."""
     if not path:
         return _("General")
     names: list[str] = []
@@ -101,6 +107,13 @@ def _counted(text: str) -> str:
     return ngettext("{n} revolution", "{n} revolutions", count, n=grouped(count))
 
 
+def run_name(name: str) -> str:
+    """What a setting of the run is called: ``Largest order``."""
+    if name == "window":
+        return _("evaluated window")
+    return _(_RUN[name].label if name in _RUN else words(name))
+
+
 def run_settings(study: Study, spec: Mapping[str, Any], reading: Reading) -> list[tuple[str, str, Input]]:
     """The settings of the run: what each is called, its value as ``reading`` says, and the setting."""
     found = []
@@ -109,10 +122,7 @@ def run_settings(study: Study, spec: Mapping[str, Any], reading: Reading) -> lis
         value = str(item.value)
         known = {} if entry is None else dict(entry.choices)
         text = _(known[value]) if value in known else _run_value(study, item, reading)
-        label = (
-            _("evaluated window") if item.path == "window" else _(words(item.path) if entry is None else entry.label)
-        )
-        found.append((label, text, item))
+        found.append((run_name(item.path), text, item))
     return found
 
 

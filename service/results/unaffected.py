@@ -51,7 +51,7 @@ def unaffected(study: Study, fetch: Fetch) -> tuple[str, ...]:
         if looked:
             everywhere = looked >= study.cases
             where = "any case" if everywhere else f"any of {looked:,} cases that were compared"
-            text = f"{' = '.join(axis.paths)} was varied, but changes no result in {where}"
+            text = f"/axes/{position} ({' = '.join(axis.paths)}): was varied, but changes no result in {where}"
             found.append(models.WarningText(text, "no-effect"))
     return tuple(found)
 

@@ -215,7 +215,7 @@ def _chosen_angle(report: Report, study: Study) -> None:
         report.warn(
             "no-such-angle",
             f"/base/phi_c: {chosen} is out of range: the machine of base has {count:.0f} angles with T = T_mean, "
-            f"numbered 0 to {count - 1:.0f}; phi_c and the results of s3 and s4 stay empty",
+            f"numbered 0 to {count - 1:.0f}; it and the results of s3 and s4 stay empty",
         )
 
 
@@ -255,8 +255,8 @@ def _upright(report: Report, study: Study, pendulums: int) -> None:
         report.warn(
             "stays-upright",
             "/base/pendulums: with vibration along y alone a pendulum that starts upright without speed stays upright, "
-            "even at parametric resonance, and nothing moves; give an initial_angle such as 0.01 rad or an amplitude_x"
-            + _share(still, weight),
+            "even at parametric resonance, and nothing moves; give an initial angle such as 0.01 rad or a horizontal "
+            "amplitude" + _share(still, weight),
         )
 
 

@@ -40,6 +40,12 @@ def caption(model: str, name: str, translate: Callable[[str], str] = str) -> str
     return translate(text).format(index) + (f", {translate(part[0])} {part[1]}" if part else "")
 
 
+def has_caption(model: str, name: str) -> bool:
+    """Whether ``name`` is a parameter of ``model``, or has a caption of its own."""
+    captions = model_of(model).presentation.captions
+    return model_parameter(model, name) is not None or not captions.keys().isdisjoint((name, general_path(name)))
+
+
 @lru_cache(maxsize=4096)
 def _caption(model: str, name: str) -> tuple[str, str, tuple[str, str] | None]:
     """The text, the number for its ``{}``, and word and number of the part that it belongs to."""

@@ -27,6 +27,7 @@ from sprag.service.languages import N_, recorded
 from sprag.service.languages.ranges import allowed_text
 from sprag.service.results.fault_texts import fault_text, warning_text
 from sprag.service.results.phrases import Phrase, model_title, shown, titled, word
+from sprag.service.results.reading import CLUTCH
 from sprag.service.results.wording import counted, duration, number, symbol, typed_text, unit_text
 from sprag.service.schedules.times import wall_clock
 from sprag.worker.models import WarningText
@@ -78,10 +79,13 @@ def _text_of(one: str, many: str, number: float) -> str:
 
 
 def _read(value: object) -> object:
-    """What a page writes: phrases and warnings in the reader's language, anything else as it is."""
-    if isinstance(value, Phrase):
-        return shown(value)
-    return warning_text(value) if isinstance(value, WarningText) else value
+    """What a page writes: phrases in the reader's language, anything else as it is.
+
+    A warning needs a reading: a template writes it by the filter ``warning``.
+    """
+    if isinstance(value, WarningText):
+        raise TypeError("a warning is written by the filter `warning`")
+    return shown(value) if isinstance(value, Phrase) else value
 
 
 @lru_cache(maxsize=1)
@@ -115,6 +119,7 @@ def _templates() -> Environment:
         "recorded": recorded.said,
         "say": shown,
         "fault": fault_text,
+        "warning": warning_text,
         "allowed": allowed_text,
         "day": day,
         "model": model_title,
@@ -136,6 +141,7 @@ def _templates() -> Environment:
     environment.globals["read_only"] = _read_only
     environment.globals["units_back"] = _units_back
     environment.globals["explained"] = explained
+    environment.globals["clutch_reading"] = CLUTCH
     environment.globals["administers"] = _administers
     return environment
 

@@ -133,7 +133,7 @@ def document_of(report: Report, block: TitleBlock) -> Document:
 
 def _warnings(report: Report) -> Iterator[Block]:
     for text in report.warnings:
-        yield Text(warning_text(text), warning=True)
+        yield Text(warning_text(text, report.reading), warning=True)
 
 
 def _machine(report: Report) -> Iterator[Block]:

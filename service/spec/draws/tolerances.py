@@ -134,7 +134,7 @@ def warn_of_invalid_drives(report: Report, study: Study) -> None:
             each = study.cases // part.cases
             report.warn(
                 "invalid-drives",
-                f"/tolerances: {path} is out of its range ({entry.range_text()}) in {wrong * each:,} of "
+                f"/derive ({path}): is out of its range ({entry.range_text()}) in {wrong * each:,} of "
                 f"{study.cases:,} cases: these drives fail",
             )
 

@@ -305,6 +305,6 @@ def _read_within(
         )  # fmt: skip
         return None
     if width is not None and width >= abs(value) > 0.0:
-        pointer = join(where, "within")
-        report.warn("wide-limit", f"{pointer}: is at least as wide as the value, so that 0 fulfils the limit, too")
+        place = f"{join(where, 'within')} ({info.name})"
+        report.warn("wide-limit", f"{place}: is at least as wide as the value, so that 0 fulfils the limit, too")
     return width

@@ -20,6 +20,7 @@ from sprag.service.languages import language
 from sprag.service.results.branches import range_of
 from sprag.service.results.explore import ExploreQuery, plan_of
 from sprag.service.results.fault_texts import fault_text, warning_text
+from sprag.service.results.reading import Reading
 from sprag.service.results.selection import locate_values
 from sprag.service.results.tolerances.conditions import read_conditions
 from sprag.service.results.trajectories import span
@@ -278,8 +279,9 @@ def test_a_list_that_goes_up_and_down_is_pointed_out() -> None:
     assert "0.2 N*m" in warning
     assert "100 N*m" in warning
     with language("uk"):
-        assert "0,2 Н·м" in warning_text(warning)
-        assert "/axes/0/values" in warning_text(warning)
+        said = warning_text(warning, Reading("vibration-drive"))
+    assert said.startswith("Момент навантаження: ")
+    assert "0,2 Н·м" in said
     assert not found([0, 0.05, 0.1])
     assert not found([0.3, 0.2, 0.1])
     assert not found([0.3, 0.2])

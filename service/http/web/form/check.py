@@ -15,14 +15,14 @@ from sprag.service.http.web.form.shaft import is_shaft
 from sprag.service.http.web.form.shaft_spec import step_of
 from sprag.service.http.web.form.spec import clutch_pointers, field_of, pendulums_of, spec_of
 from sprag.service.jobs.preview import preview_json
-from sprag.service.languages import gettext
+from sprag.service.languages import _, gettext
 from sprag.service.languages.ranges import allowed_text
 from sprag.service.results.draft_words import draft_words
-from sprag.service.results.fault_texts import fault_text
+from sprag.service.results.fault_texts import fault_text, warning_text
 from sprag.service.results.figures.linkage import Drawing, drawings
 from sprag.service.results.fits import fit_json
 from sprag.service.results.quantities import TYPED
-from sprag.service.results.reading import Choice, reading_for
+from sprag.service.results.reading import CLUTCH, Choice, reading_for
 from sprag.service.results.wording import duration, unit_text
 from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
 from sprag.service.spec.derive import with_values
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from datetime import datetime
 
     from sprag.service.answers.studies import ClutchFitReport, Preview
+    from sprag.service.results.reading import Reading
     from sprag.worker.chunking import Chunking
     from sprag.worker.study import Study
 
@@ -53,7 +54,7 @@ class Checked:
     ``faults`` contains the messages by field ("" for general ones); ``preview`` is None while there are any. ``fits``
     contains the report and the picture of each clutch that could be fitted, regardless of other faults; ``notes`` the
     assumptions about measured data. ``finish`` is the deadline, which is not part of the spec. ``sketch`` contains the
-    mechanisms of a machine shaft, ``words`` the study in a sentence.
+    mechanisms of a machine shaft, ``words`` the study in a sentence, and ``warnings`` those of the preview for people.
     """
 
     spec: dict[str, Any]
@@ -67,6 +68,7 @@ class Checked:
     empty: frozenset[str] = frozenset()
     sketch: tuple[Drawing, ...] = ()
     words: str = ""
+    warnings: tuple[str, ...] = ()
 
     @property
     def query(self) -> str:
@@ -109,13 +111,14 @@ def look_over(
     if fault:
         checked.faults["finish_by"], checked.parsed, checked.preview = [fault], None, None
     if checked.parsed is not None and checked.preview is not None:
-        checked.words = _words(checked.parsed, checked.preview, choice or Choice(TYPED))
+        reading = reading_for(checked.parsed.study, checked.parsed.spec, choice or Choice(TYPED))
+        checked.words = _words(checked.parsed, checked.preview, reading)
+        checked.warnings = tuple(warning_text(text, reading) for text in checked.preview["warnings"])
     return checked
 
 
-def _words(parsed: ParsedSpec, preview: Preview, choice: Choice) -> str:
+def _words(parsed: ParsedSpec, preview: Preview, reading: Reading) -> str:
     """The study in a sentence."""
-    reading = reading_for(parsed.study, parsed.spec, choice)
     seconds = preview["estimated_seconds"]
     time = gettext("about {time}", time=duration(seconds)) if seconds >= 1.0 else duration(seconds)
     return draft_words(parsed.study, parsed.spec, preview, reading, time)
@@ -164,9 +167,10 @@ def _beside(name: str, edited: str) -> str:
 def _assumed(text: str) -> list[str]:
     """Assumptions about pasted data; none for data that cannot be read, which is reported elsewhere."""
     try:
-        return [f"Measured data: {note}." for note in parse_measured(text, parse_quantity).warnings]
+        notes = parse_measured(text, parse_quantity).warnings
     except MeasuredDataError:
         return []
+    return [_("Measured data: {text}.", text=warning_text(note, CLUTCH)) for note in notes]
 
 
 def check_text(

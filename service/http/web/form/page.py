@@ -60,6 +60,8 @@ from sprag.service.http.web.templates import fragment, page, spec_text
 from sprag.service.http.work import Attended, Work
 from sprag.service.jobs.submission import Submission, take_in
 from sprag.service.presets import preset_names
+from sprag.service.results.places import place_text
+from sprag.service.results.reading import Reading
 from sprag.service.spec.design import design_spec
 from sprag.service.spec.document import UNNAMED, accepted
 from sprag.service.spec.report import SpecError
@@ -174,7 +176,8 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
         try:
             address = await work.check(laboratory_address, checked.spec)
         except SpecError as error:
-            text = "; ".join(f"{item.where or 'the spec'}: {message(item)}" for item in error.faults)
+            reading = Reading(checked.spec["model"])
+            text = "; ".join(f"{place_text(item.where or '', reading)}: {message(item)}" for item in error.faults)
             checked.faults.setdefault("", []).append(f"The laboratory cannot show this machine: {text}")
         else:
             return RedirectResponse(address, status_code=303)
