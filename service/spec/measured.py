@@ -169,7 +169,7 @@ def _assumed(factors: tuple[float | None, float | None], rows: NDArray[np.float6
 
 def _numbers(table: Split, factors: tuple[float | None, float | None]) -> MeasuredData:
     rows, doubt = settled_table(table)
-    problems = list(itertools.islice(_wrong_rows(table.rows, rows), _MAX_PROBLEMS))
+    problems = list(itertools.islice(_wrong_rows(table, rows), _MAX_PROBLEMS))
     if doubt is not None and not doubt.likely:
         problems.append(Fault(f"line {doubt.line}", "ambiguous-point", question(doubt.text), doubt.text, WITHOUT_DOUBT))
     if problems:
@@ -187,14 +187,14 @@ def _numbers(table: Split, factors: tuple[float | None, float | None]) -> Measur
     return MeasuredData(scaled, tuple(row.line for row in rows), tuple(warnings))
 
 
-def _wrong_rows(written: Sequence[CsvRow], rows: Sequence[CsvRow]) -> Iterator[Fault]:
-    for given, (number, cells) in zip(written, rows, strict=True):
+def _wrong_rows(written: Split, rows: Sequence[CsvRow]) -> Iterator[Fault]:
+    for given, (number, cells) in zip(written.rows, rows, strict=True):
         if len(cells) != 2:
             few = f"{len(cells)} column" + ("" if len(cells) == 1 else "s")
             allowed = (
                 "two columns: angle, torque; decimal commas only where tabs, semicolons or quotes separate the columns"
             )
-            yield Fault(f"line {number}", "unequal-lengths", few, ", ".join(given.cells)[:80], allowed)
+            yield Fault(f"line {number}", "unequal-lengths", few, written.separator.join(given.cells)[:80], allowed)
             continue
         for cell, (name, _) in zip(cells, _QUANTITIES, strict=True):
             value = parse_number(cell)
