@@ -16,6 +16,7 @@ from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId,
 from sprag.service.cli.remote import connection
 from sprag.service.languages import N_, _, ngettext
 from sprag.service.spec.numbers import could_be_one, in_language, parse_number, settled
+from sprag.service.spec.printed import could_be_values
 from sprag.service.spec.together import with_last_unit
 from sprag.worker.limits import (
     MAX_BODY_BYTES,
@@ -161,6 +162,11 @@ def _values(text: str) -> list[float | str]:
         raise wrong_option(
             "--axis", "ambiguous-comma", N_("could be one value or two"), text,
             allowed=_("semicolons between values, or a decimal point"),
+        )  # fmt: skip
+    if could_be_values(text):
+        raise wrong_option(
+            "--axis", "invalid-text", N_("could be one value or several"), text,
+            allowed=_("semicolons between values, or no blanks"),
         )  # fmt: skip
     items = settled([in_language(item) for item in text.split(";")]) if ";" in text else text.split(",")
     return [_value(item) for item in with_last_unit([item.strip() for item in items])]

@@ -42,6 +42,8 @@ _ANGLE: Final = {"radian": Fraction(1)}
 _PI: Final = {"pi": Fraction(1)}
 #: What has no dimension of its own.
 _BESIDE: Final = frozenset({"radian", "cycle", "pi"})
+_PER_MINUTE: Final = Fraction(1, 60)
+_SECOND_BELOW: Final = {"second": Fraction(-1)}
 _HERTZ: Final = re.compile(r"(?<![A-Za-z])([num\u00b5cdkMG]?)(?:Hz|hertz)(?![A-Za-z])")
 #: Functions of an angle.
 _OF_ANGLE: Final = frozenset({"sin", "cos", "tan"})
@@ -264,7 +266,9 @@ def _measured(unit: str) -> tuple[Fraction, dict[str, Fraction]]:
     text = latin(unit)
     factor, powers = measure(text)
     found = {name: Fraction(power) for name, power in powers.items()}
-    if _HERTZ.search(text):
+    if found == _SECOND_BELOW and factor == _PER_MINUTE:
+        found["cycle"] = Fraction(1)  # min^-1 of nameplates are revolutions, as in fields of a speed
+    elif _HERTZ.search(text):
         # A revolution per second has the radian that a hertz has not.
         turns = measure(_HERTZ.sub(r"\1rps", text))[1].get("radian", 0) - powers.get("radian", 0)
         found["cycle"] = Fraction(turns)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from sprag.service.languages import decimal
 from sprag.service.spec.printed import keyboard
@@ -126,12 +126,6 @@ def settle(texts: Sequence[str], *, decimal: bool = False) -> Settled:
 def settled(texts: Sequence[str], *, decimal: bool = False) -> list[str]:
     """The texts of `settle` alone: points that nothing proves to separate thousands are decimal."""
     return settle(texts, decimal=decimal).texts
-
-
-def settled_items(items: Sequence[Any]) -> list[Any]:
-    """The items of a list in a spec, their texts as `settled` has them."""
-    texts = iter(settled([item for item in items if isinstance(item, str)]))
-    return [next(texts) if isinstance(item, str) else item for item in items]
 
 
 def has_doubtful_point(text: str) -> bool:

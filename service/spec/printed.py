@@ -17,6 +17,8 @@ _POWER: Final = re.compile(
 _LOWERED: Final = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺\u2212", "0123456789-+-")
 #: Groups of three digits between blanks, and nothing else.
 _ONLY_GROUPS: Final = re.compile(rf"\s*[+\-\u2212]?[1-9][0-9]{{0,2}}(?:[{_BLANKS}][0-9]{{3}})+\s*")
+#: Groups of three digits between blanks of the keyboard, each of which could be a value.
+_VALUES: Final = re.compile(r"\s*[+\-\u2212]?[1-9][0-9]{0,2}(?: [1-9][0-9]{2})+(?![0-9])(?! 0)")
 
 
 def keyboard(text: str) -> str:
@@ -32,6 +34,14 @@ def keyboard(text: str) -> str:
         return text
     exponent = (power[4] or power[5]).translate(_LOWERED)
     return f"{power[1]}{power[2]}{power[3] or 1}e{exponent}{text[power.end() :]}"
+
+
+def could_be_values(text: str) -> bool:
+    """Whether the only item of a list, such as ``100 200 300 N*mm``, could also be several values between blanks.
+
+    A value does not begin with a zero, as the groups of ``20 000`` do, and pages print narrower blanks.
+    """
+    return _VALUES.match(text) is not None
 
 
 def could_be_several(text: str) -> bool:

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Final
 
 from sprag.service.faults import Code
 from sprag.service.spec.cyrillic import latin
+from sprag.service.spec.numbers import assumption, settle
+from sprag.service.spec.printed import could_be_values
 from sprag.service.spec.units import PERIOD_NAMES, QuantityError, measure, parse_exact, split_typed
 
 if TYPE_CHECKING:
@@ -101,6 +103,30 @@ def refuse_mixed(report: Report, items: Iterable[tuple[str, object]], unit: str 
         pointer, value = pairs[one.place]
         report.fault(pointer, AMBIGUOUS_UNIT, one.message, value, allowed=one.allowed, unit=units[one.place])
     return bool(asked)
+
+
+def read_together(
+    report: Report, items: Sequence[tuple[str, object]], unit: str | Sequence[str]
+) -> list[object] | None:
+    """The items of one list or range, their texts with decimal points; None, and faults recorded, where one is unclear.
+
+    ``items`` are JSON Pointers with their values, ``unit`` is their SI unit, or that of each. Points that could
+    separate thousands and that no other item settles are decimal, with a warning.
+    """
+    if len(items) == 1 and isinstance(items[0][1], str) and could_be_values(items[0][1]):
+        message = "could be one value or several"
+        report.fault(items[0][0], "invalid-text", message, items[0][1], allowed="separate values, or no blanks")
+        return None
+    written = [(pointer, value) for pointer, value in items if isinstance(value, str)]
+    texts, doubt = settle([text for _, text in written])
+    rest = iter(texts)
+    pairs = [(pointer, next(rest) if isinstance(value, str) else value) for pointer, value in items]
+    if refuse_mixed(report, pairs, unit):
+        return None
+    if doubt is not None:
+        pointer, text = written[doubt]
+        report.warn("ambiguous-point", f"{pointer}: {assumption(text)}")
+    return [value for _, value in pairs]
 
 
 def _carried(name: str, unit: str, wanted: str) -> str:

@@ -22,6 +22,7 @@ from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.results.reading import Reading
 from sprag.service.spec.catalogue import unit_of
+from sprag.service.spec.document import accepted
 from sprag.service.spec.fields import WHICH_CASES
 from sprag.worker import models
 from sprag.worker.limits import MAX_NAME_LENGTH
@@ -48,7 +49,7 @@ async def send_points(context: Ctx, work: Attended, values: Form) -> Response:
     """Submit the calibration, or show what is wrong with it."""
     study_id = values.get("study", "")
     spec = await in_thread(context.store.spec, study_id)
-    content = json.dumps(calibration_spec(spec, values)).encode()
+    content = json.dumps(calibration_spec(await in_thread(accepted, spec), values)).encode()
     try:
         made = await work.check(
             checks.new_study, context.library, content, "json", False, None, context.store.clock.now(), {}

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag.service.spec.fields import read_exact, read_number, read_whole
-from sprag.service.spec.numbers import settled_items
 from sprag.service.spec.report import Report, join
-from sprag.service.spec.together import refuse_mixed
+from sprag.service.spec.together import read_together
 from sprag.service.spec.units import QuantityError, parse_exact, to_float
 from sprag.worker.limits import MAX_AXIS_VALUES
 from sprag.worker.models import Parameter
@@ -63,10 +62,10 @@ def plan_values(report: Report, pointer: str, data: object, parameter: Parameter
     plain = _plain_numbers(data)
     if plain is not None and in_range(plain, parameter).all():
         return Plan(pointer, plain.size, lambda: plain, listed=True)
-    data = settled_items(data)
-    if _mixed(report, pointer, data, parameter):
+    items = _together(report, pointer, data, parameter)
+    if items is None:
         return None
-    numbers = [read_number(report, join(pointer, index), value, parameter) for index, value in enumerate(data)]
+    numbers = [read_number(report, join(pointer, index), value, parameter) for index, value in enumerate(items)]
     known = [number for number in numbers if number is not None]
     if len(known) < len(numbers):
         return None
@@ -83,9 +82,9 @@ def _plain_numbers(data: list[Any]) -> Values | None:
         return None
 
 
-def _mixed(report: Report, pointer: str, items: Sequence[Any], parameter: Parameter) -> bool:
-    """Whether bare numbers stand beside quantities of another scale; each is recorded as a fault."""
-    return refuse_mixed(report, [(join(pointer, index), item) for index, item in enumerate(items)], parameter.unit)
+def _together(report: Report, pointer: str, items: Sequence[Any], parameter: Parameter) -> list[Any] | None:
+    """Items that are typed together, with decimal points; None, and faults recorded, where one is unclear."""
+    return read_together(report, [(join(pointer, index), item) for index, item in enumerate(items)], parameter.unit)
 
 
 def plan_linspace(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:
@@ -112,8 +111,9 @@ def plan_geomspace(report: Report, pointer: str, data: object, parameter: Parame
 
 def plan_range(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:
     """The plan of ``[from, to, step]``; ``to`` is included when a whole number of steps reaches it."""
-    items = _three(report, pointer, data, "[from, to, step]")
-    if items is None or _mixed(report, pointer, items, parameter):
+    three = _three(report, pointer, data, "[from, to, step]")
+    items = None if three is None else _together(report, pointer, three, parameter)
+    if items is None:
         return None
     start = read_exact(report, join(pointer, 0), items[0], parameter)
     stop = read_exact(report, join(pointer, 1), items[1], parameter)
@@ -158,12 +158,13 @@ def _three(report: Report, pointer: str, data: object, allowed: str) -> Sequence
 def _division(
     report: Report, pointer: str, data: object, parameter: Parameter
 ) -> tuple[Fraction, Fraction, int] | None:
-    items = _three(report, pointer, data, "[from, to, count]")
-    if items is None or _mixed(report, pointer, items[:2], parameter):
+    three = _three(report, pointer, data, "[from, to, count]")
+    ends = None if three is None else _together(report, pointer, three[:2], parameter)
+    if three is None or ends is None:
         return None
-    start = read_exact(report, join(pointer, 0), items[0], parameter)
-    stop = read_exact(report, join(pointer, 1), items[1], parameter)
-    count = read_whole(report, join(pointer, 2), items[2], 1, MAX_AXIS_VALUES)
+    start = read_exact(report, join(pointer, 0), ends[0], parameter)
+    stop = read_exact(report, join(pointer, 1), ends[1], parameter)
+    count = read_whole(report, join(pointer, 2), three[2], 1, MAX_AXIS_VALUES)
     if start is None or stop is None or count is None:
         return None
     if count == 1 and start != stop:

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 from sprag.service.spec.described import Described, Listed, choice, named
 from sprag.service.spec.draws.distributions import SIGMAS
 from sprag.service.spec.fields import read_number
-from sprag.service.spec.numbers import settled_items
 from sprag.service.spec.report import Report, join
 from sprag.service.spec.shares import in_percent
-from sprag.service.spec.together import refuse_mixed
+from sprag.service.spec.together import read_together
 from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker.limits import MAX_CORRELATIONS, MAX_DRIVES, MAX_TOLERANCES
 
@@ -86,9 +85,9 @@ def read_plus_minus(
 def read_measured(report: Report, pointer: str, data: object, parameters: Sequence[Parameter]) -> list[float] | None:
     """Measured values (SI), in the range of every one of ``parameters``; None, and faults recorded, where invalid."""
     read_items = MEASURED.read(report, pointer, data)
-    items = None if read_items is None else settled_items(read_items)
-    given = [(join(pointer, index), item) for index, item in enumerate(items or ())]
-    if items is None or refuse_mixed(report, given, parameters[0].unit):
+    given = [(join(pointer, index), item) for index, item in enumerate(read_items or ())]
+    items = None if read_items is None else read_together(report, given, parameters[0].unit)
+    if items is None:
         return None
     read = [
         [read_number(report, join(pointer, index), item, parameter) for parameter in parameters]

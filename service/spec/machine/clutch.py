@@ -11,9 +11,8 @@ import numpy as np
 
 from sprag.service.spec.described import FIT, Listed
 from sprag.service.spec.fields import missing, placed, read_number, read_object
-from sprag.service.spec.numbers import settled_items
 from sprag.service.spec.report import Report, join, quantity_text
-from sprag.service.spec.together import refuse_mixed
+from sprag.service.spec.together import read_together
 from sprag.worker import models
 from sprag.worker.limits import MAX_CLUTCH_LAWS, MAX_CLUTCH_ROWS
 from sprag.worker.models import CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, Parameter
@@ -114,11 +113,12 @@ def _given(report: Report, pointer: str, data: Mapping[str, Any], prefix: str) -
     items = COEFFICIENTS.read(report, where, data.get("coefficients"))
     if items is None:
         return None
-    items = settled_items(items)
     own = [placed(CLUTCH_COEFFICIENT, f"{prefix}coefficients.{k}") for k in range(len(items))]
-    if refuse_mixed(report, [(join(where, k), item) for k, item in enumerate(items)], [entry.unit for entry in own]):
+    given = [(join(where, k), item) for k, item in enumerate(items)]
+    read = read_together(report, given, [entry.unit for entry in own])
+    if read is None:
         return None
-    numbers = [read_number(report, join(where, k), item, own[k]) for k, item in enumerate(items)]
+    numbers = [read_number(report, join(where, k), item, own[k]) for k, item in enumerate(read)]
     if limit is None or None in numbers:
         return None
     return Clutch(pointer, prefix, tuple(number for number in numbers if number is not None), limit)

@@ -10,7 +10,7 @@ from sprag.service.spec.fields import exact
 from sprag.service.spec.numbers import is_ambiguous, parse_number
 from sprag.service.spec.report import Report
 from sprag.service.spec.table_text import heading_of
-from sprag.service.spec.units import AmbiguousCommaError, QuantityError, parse_exact, to_float
+from sprag.service.spec.units import AmbiguousCommaError, QuantityError, has_unit, parse_exact, to_float
 from sprag.worker.models import Parameter, machine_shaft
 
 #: The end of a heading that may be a unit: ``angle_deg``, ``angle deg``, ``angle / deg``.
@@ -76,8 +76,8 @@ def _unit_of(name: str, unit: str, column: Parameter) -> str:
 def _read_cell(report: Report, where: str, line: int, cell: str, unit: str, column: Parameter) -> float | None:
     text = cell.strip()
     try:
-        value: object = f"{text} {unit}"
-        if not unit or column.unit == "1":
+        value: object = text if has_unit(text) else f"{text} {unit}"
+        if column.unit == "1" or not (unit or has_unit(text)):
             number = parse_number(text)
             if number is None and is_ambiguous(text):
                 raise AmbiguousCommaError

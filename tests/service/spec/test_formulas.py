@@ -112,6 +112,7 @@ def test_the_value_is_that_of_the_formula_by_hand(text: str, unit: str, expected
         ("ratio^2 deg", "rad", "put the power in brackets"),
         ("frequency * 1 ms", "rad", "one revolution is 2 pi rad"),
         ("25 Hz * 1 ms", "rad", "one revolution is 2 pi rad"),
+        ("1500 min^-1 * 1 ms", "rad", "one revolution is 2 pi rad"),
         ("0.025 kHz * 1 ms", "rad", "one revolution is 2 pi rad"),
         ("25 Гц * 1 мс", "rad", "one revolution is 2 pi rad"),
         ("angle + frequency * 1 ms", "rad", "adds rad and a number of periods"),

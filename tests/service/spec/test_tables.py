@@ -226,3 +226,10 @@ def test_clutch_data_are_read_likewise(text: str) -> None:
 def test_a_table_that_ends_long_before_its_cycle_is_warned_of(angles: Any, warned: bool) -> None:
     table = [[f"{angle} deg", 10] for angle in angles]
     assert ("table-ends-early" in rows_of(table)[1]) == warned
+
+
+def test_cells_of_a_shaft_table_may_have_units_of_their_own() -> None:
+    """The unit of a cell holds before that of its heading, as in tables of cases."""
+    own, _ = rows_of("angle [deg];torque [N*m]\n0;0\n90 deg;2 kN*m\n0.5 rev;2000\n300;0\n")
+    plain, _ = rows_of("angle [deg];torque [N*m]\n0;0\n90;2000\n180;2000\n300;0\n")
+    assert own == plain

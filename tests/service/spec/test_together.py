@@ -322,3 +322,43 @@ def test_what_was_accepted_before_is_read_as_it_was() -> None:
 )
 def test_only_a_unit_holds_for_others(texts: list[str], expected: list[str]) -> None:
     assert with_last_unit(texts) == expected
+
+
+@pytest.mark.parametrize("text", ["100 200 300 N*mm", "100 200 N*mm", "100 200"])
+def test_blanks_between_values_are_asked_about(text: str) -> None:
+    """Blanks separate thousands only where no group could be a value by itself."""
+    checked = check_form(form(way="values", values=text), Chunking())
+    assert checked.faults["/axes/0/values"][0].startswith("could be one value or several; got 100 200")
+    with pytest.raises(FaultError, match="invalid option"):
+        _values(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("1 000 N*mm", [1.0]),
+        ("100\u202f200 N*mm", [100.2]),
+        ("100 200; 300 400 N*mm", [100.2, 300.4]),
+        ("0.1\t0.2 N*m", [0.1, 0.2]),
+    ],
+)
+def test_blanks_that_separate_thousands_for_certain(text: str, expected: list[float]) -> None:
+    assert loads(way="values", values=text) == expected
+
+
+def test_the_ends_of_a_range_settle_their_points_together() -> None:
+    ends = {"way": "linspace", "from": "0,5", "to": "1.000 N*mm", "count": "3"}
+    assert loads(**ends) == [0.0005, 0.50025, 1.0]
+    study = parsed({"/axes": [{"path": LOAD, "linspace": ["0,5 N*mm", "1.000 N*mm", 3]}]}).study
+    assert study.columns(range(3))[LOAD].tolist() == [0.0005, 0.50025, 1.0]
+
+
+@pytest.mark.parametrize("text", ["20.000; 25.000", "20.000; 25.000 N*mm"])
+def test_points_of_a_list_that_could_separate_thousands_are_told(text: str) -> None:
+    checked = check_form(form(way="values", values=text), Chunking())
+    assert checked.parsed is not None
+    told = [*checked.notes, *checked.parsed.warnings]
+    assert [warning for warning in told if "is read as 20; write 20000 if its point separates thousands" in warning]
+    certain = check_form(form(way="values", values="20.000; 25.5 N*mm"), Chunking())
+    assert certain.parsed is not None
+    assert not [warning for warning in (*certain.notes, *certain.parsed.warnings) if "is read as" in warning]

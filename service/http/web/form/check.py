@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 from sprag.service.faults import Fault
 from sprag.service.http.web.figures.fit import FitChart, fit_chart
 from sprag.service.http.web.form.columns import COLUMNS
-from sprag.service.http.web.form.entries import Faults
+from sprag.service.http.web.form.entries import Faults, items_of, list_of
 from sprag.service.http.web.form.shaft import is_shaft
 from sprag.service.http.web.form.shaft_spec import step_of
 from sprag.service.http.web.form.spec import clutch_pointers, field_of, pendulums_of, spec_of
@@ -29,8 +29,10 @@ from sprag.service.spec.derive import with_values
 from sprag.service.spec.document import ParsedSpec, SpecError, accepted, load_spec, parse_spec
 from sprag.service.spec.machine.clutch import read_clutch
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
+from sprag.service.spec.numbers import assumption, settle
 from sprag.service.spec.report import Report
 from sprag.service.spec.units import QuantityError, parse_quantity
+from sprag.worker.models import WarningText
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -152,6 +154,7 @@ def check_form(
         found.preview = preview_json(found.parsed, chunking, known(found.parsed.study), left)
         if is_shaft(values):
             found.sketch = drawings(found.parsed.study, _SKETCHED)
+    found.notes += _points(values)
     for pointer in clutch_pointers(values):
         if values.get(f"{pointer}/kind") == "data":
             found.notes += _assumed(values.get(f"{pointer}/data", ""))
@@ -162,6 +165,18 @@ def check_form(
 def _beside(name: str, edited: str) -> str:
     """The field for a fault at ``name``: where it is about a part of the machine, that of it which was changed last."""
     return edited if name.startswith("/base/") and edited.startswith(f"{name}/") else name
+
+
+def _points(values: Mapping[str, str]) -> list[str]:
+    """Points of bare numbers of lists that are taken as decimal; quantities with units have warnings of the spec."""
+    notes = []
+    for name, text in values.items():
+        if name.endswith("/values") and "." in text:
+            items = items_of(text)
+            doubt = settle(items).doubt
+            if doubt is not None and not isinstance(list_of(text)[doubt], str):
+                notes.append(warning_text(WarningText(f"{name}: {assumption(items[doubt])}", "ambiguous-point")))
+    return notes
 
 
 def _assumed(text: str) -> list[str]:

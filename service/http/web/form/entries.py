@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from sprag.service.spec.numbers import in_language, settled, with_point
-from sprag.service.spec.printed import keyboard
+from sprag.service.spec.printed import could_be_values, keyboard
 from sprag.service.spec.together import with_last_unit, with_unit_of_range
 
 Values = dict[str, str]
@@ -15,8 +15,8 @@ Faults = dict[str, list[str]]
 
 _NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _WHOLE: Final = re.compile(r"[+-]?[0-9]{1,18}")
-#: Separator of a list: a comma counts only before a blank, otherwise it is decimal.
-_BETWEEN: Final = re.compile(r"[;\n]|,\s")
+#: Separator of a list, tabs those of pasted cells: a comma counts only before a blank, otherwise it is decimal.
+_BETWEEN: Final = re.compile(r"[;\n\t]|,\s")
 
 
 def plain(text: str) -> Any:
@@ -31,9 +31,11 @@ def plain(text: str) -> Any:
 def list_of(text: str) -> list[Any]:
     """The entries of a list, whose commas are decimal for all of them where one settles it.
 
-    A unit at the end holds for the bare numbers before it.
+    A unit at the end holds for the bare numbers before it. One item that could also be several values between blanks
+    stays a text, about which the reader of the spec asks.
     """
-    return [plain(item) for item in with_last_unit(items_of(text))]
+    items = with_last_unit(items_of(text))
+    return items if len(items) == 1 and could_be_values(items[0]) else [plain(item) for item in items]
 
 
 def items_of(text: str) -> list[str]:
@@ -43,7 +45,8 @@ def items_of(text: str) -> list[str]:
 
 def range_of(values: Mapping[str, str], pointer: str, names: Sequence[str] = ("from", "to")) -> dict[str, Any]:
     """The ends of a range, and its step where it has one, by name; a unit at the end holds for the bare numbers."""
-    texts = {name: values.get(f"{pointer}{name}", "").strip() for name in names}
+    written = [in_language(values.get(f"{pointer}{name}", "").strip()) for name in names]
+    texts = dict(zip(names, settled(written), strict=True))
     if "step" in texts:
         texts["from"], texts["to"], texts["step"] = with_unit_of_range(texts["from"], texts["to"], texts["step"])
     else:

@@ -56,7 +56,7 @@
   }
 
   let boxed = null; // cases selected in the scatter
-  const numbers = (axis) => axis.inputs.map((input) => (input.value.trim() === "" ? NaN : Number(input.value)));
+  const numbers = (axis) => axis.inputs.map((input) => (input.value.trim() === "" ? NaN : Number(input.value.trim().replace(",", "."))));
   const kept = (design) => axes.every((axis) => {
     const [low, high] = numbers(axis), own = axis.of(design);
     return !(own < low) && !(own > high) && (own !== null || (Number.isNaN(low) && Number.isNaN(high)));

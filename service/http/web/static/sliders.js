@@ -24,7 +24,7 @@ sprag.slider = (() => {
   // The unit beside a field is that of plain numbers; a text with a unit of its own needs none.
   const unitOf = (field) => {
     const unit = field.parentElement.querySelector(".unit");
-    if (unit) unit.hidden = /[^-+\d.eE\s]/.test(field.value);
+    if (unit) unit.hidden = /[^-+\d.,eE\s]/.test(field.value);
   };
 
   // Let each slider of a form write into its field, and each field place its slider; `changed` hears of both.
