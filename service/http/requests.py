@@ -73,7 +73,7 @@ def editions(if_match: str | None) -> frozenset[str] | None:
     tags = None if if_match is None else parse_etags(if_match)
     if tags is None or tags.star_tag:
         return None
-    return frozenset(tag.partition(".")[0] for tag in tags.as_set(include_weak=True))
+    return frozenset((tag or "").partition(".")[0] for tag in tags.as_set(include_weak=True))
 
 
 @contextmanager

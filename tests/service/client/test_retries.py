@@ -62,7 +62,7 @@ REPEATED: list[Callable[[Client], object]] = [
     lambda client: client.models(),
     lambda client: client.submit({}),
     lambda client: client.preview({}),
-    lambda client: Study(client, "st_1").download("csv"),
+    lambda client: Study(client, "st_1").download("html"),
 ]
 
 

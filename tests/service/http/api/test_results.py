@@ -242,7 +242,7 @@ def trajectory(service: Service, study_id: str, query: str = "") -> Any:
 
 
 def test_instantaneous_values_of_a_case(service: Service, one_case: str) -> None:
-    response = trajectory(service, one_case, "?points=50&from=0.01&to=20%20ms")
+    response = trajectory(service, one_case, "?points=50&from=10&to=20%20ms")
     assert response.status_code == 200, response.text
     body = response.json()
     fits(results.Trajectory, body)

@@ -224,7 +224,7 @@ def test_the_client_has_the_motions_of_a_case(
         study = client.study(started)
         one, two = study.regimes(1)
         assert (one["number"], two["results"]["regime.start"]) == (0, 5)
-        grid = study.basin(1, y=y, y_range=("-10 deg", 0.2), points=2)
+        grid = study.basin(1, y=y, y_range=("-10 deg", "0.2 rad"), points=2)
         assert (grid["x"], grid["numbers"], grid["y_values"][1]) == (SPEED, [[0, 1], [0, -1]], 0.2)
         curves = study.curves("shaft.load", "shaft.speed.mean", number=1)
         assert curves.data["curves"][0]["y"]["shaft.speed.mean"] == [None, 3.5]
@@ -247,7 +247,7 @@ def test_a_basin_is_a_grid_of_two_initial_values(
 ) -> None:
     monkeypatch.setattr(basins, "basin_of", _basin)
     own = f"/studies/{started}/cases/1/basin"
-    asked = {"y": "pendulums.0.initial_angle", "y_from": "-10 deg", "y_to": "0.2", "points": 2}
+    asked = {"y": "pendulums.0.initial_angle", "y_from": "-10 deg", "y_to": "0.2 rad", "points": 2}
     body = service.get(own, **asked)
     assert (body["x"], body["y"], body["numbers"]) == (SPEED, asked["y"], [[0, 1], [0, -1]])
     assert body["x_values"] == [1.0, 30.0]

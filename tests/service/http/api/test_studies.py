@@ -113,9 +113,9 @@ def test_a_finished_study_shows_its_counts_and_keeps_its_tag(service: Service) -
     service.fill(study_id, range(2))
     running = service.http.get(f"{STUDIES}/{study_id}")
     assert running.json()["progress"]["done"] == 2
-    assert "etag" not in running.headers
     service.fill(study_id)
-    done = service.http.get(f"{STUDIES}/{study_id}")
+    done = service.http.get(f"{STUDIES}/{study_id}", headers={"If-None-Match": running.headers["etag"]})
+    assert done.status_code == 200
     assert done.json()["state"] == "finished"
     assert done.json()["progress"]["endings"] == {"ok": 8, "chatter": 1}
     assert done.json()["finished_at"] is not None
