@@ -121,6 +121,11 @@ def limits() -> Iterator[Row]:
         f"{limit.FILE_SECONDS / 3600:g} h, {limit.FILE_BYTES / 2**30:g} GiB",
     )
     yield (
+        "processes for them, of which may send rows while they are read",
+        f"{limit.FILE_PROCESSES}, {limit.SENDING_PROCESSES}",
+    )
+    yield "time in which a file gets its turn, and then a process", f"{limit.FILE_WAIT_SECONDS:g} s each"
+    yield (
         "time in which a client takes a piece of the rows that are sent while they are read",
         f"{limit.PIECE_SECONDS:g} s",
     )

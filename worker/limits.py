@@ -115,9 +115,14 @@ MAX_REQUESTS_EACH: Final = 400
 WRITING_THREADS: Final = 16
 LOCK_SECONDS: Final = 30.0
 #: Processes that write files of rows; files of one token, and of all tokens together, that are written or wait.
-FILE_PROCESSES: Final = 2
+FILE_PROCESSES: Final = 3
 MAX_FILES_EACH: Final = 32
 MAX_FILES: Final = 64
+#: Of these processes those that may send rows while they are read: as slowly as their clients read, so that some are
+#: left for files that are kept.
+SENDING_PROCESSES: Final = 2
+#: Seconds for which a file waits for earlier ones of its token, and then for a process.
+FILE_WAIT_SECONDS: Final = 600.0
 #: Seconds within which a client must take one of the pieces in which rows are sent while they are read.
 PIECE_SECONDS: Final = 600.0
 #: Seconds of processor time, and bytes of memory, within which a file of rows must be written.

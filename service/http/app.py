@@ -111,6 +111,7 @@ from sprag.worker.limits import (
     FILE_BYTES,
     FILE_PROCESSES,
     FILE_SECONDS,
+    FILE_WAIT_SECONDS,
     MAX_CHECKS,
     MAX_CHECKS_EACH,
     MAX_COMPUTATIONS,
@@ -389,7 +390,7 @@ def _checker(settings: Settings) -> ProcessComputer:
 
 
 def _writer() -> ProcessComputer:
-    limits = Limits(FILE_SECONDS, FILE_BYTES, MAX_FILES, "too-costly")
+    limits = Limits(FILE_SECONDS, FILE_BYTES, MAX_FILES, "too-costly", turn_seconds=FILE_WAIT_SECONDS)
     return ProcessComputer(limits, FILE_PROCESSES, row_files.prepare)
 
 

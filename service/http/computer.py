@@ -9,14 +9,17 @@ from collections.abc import AsyncGenerator, Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol, TypeVar, TypeVarTuple
+from typing import Any, Protocol, TypeVar, TypeVarTuple
+
+import anyio
 
 from sprag.service.faults import Kind
 from sprag.service.http.problems import ApiError
+from sprag.service.http.shares import not_in_time
 from sprag.worker import models
 from sprag.worker.limits import LOAD_SECONDS, PIECE_SECONDS, WALL_TIMES
 from sprag.worker.pool.child_pool import ChildPool, Job, JobStoppedError
-from sprag.worker.pool.child_process import ProcessDiedError, ProcessStartError, send_piece
+from sprag.worker.pool.child_process import KILL_SECONDS, ProcessDiedError, ProcessStartError, send_piece
 from sprag.worker.pool.processes import limit_memory, single_threaded_children, within_processor_time
 
 Args = TypeVarTuple("Args")
@@ -67,6 +70,8 @@ class Limits:
     leave_seconds : float
         Time for a computation to end after its client disconnected, before its process is killed; about the start time
         of another process. Until then it counts toward its client's share.
+    turn_seconds : float or None
+        Time within which a process must become free; a request that gets none is refused. None: no limit.
     """
 
     seconds: float
@@ -76,6 +81,7 @@ class Limits:
     setting: str = ""
     died: Kind = "not-computed"
     leave_seconds: float = 2.0
+    turn_seconds: float | None = None
 
 
 class ProcessComputer:
@@ -143,7 +149,9 @@ class ProcessComputer:
     async def _run(self, wall: float, function: Callable[[*Args], R], *args: *Args) -> R:
         job = self._schedule(wall, within_processor_time, self._limits.seconds, function, *args)
         future = asyncio.wrap_future(job.future)
+        future.add_done_callback(_retrieve)  # nobody else retrieves the outcome for a client that has left
         try:
+            await self._begun(job, future)
             return await asyncio.shield(future)
         except asyncio.CancelledError:
             task = asyncio.current_task()
@@ -162,7 +170,10 @@ class ProcessComputer:
                     wall, pieces.receive, within_processor_time, self._limits.seconds, _send_all, function, args
                 )
             job.future.add_done_callback(pieces.end)
+            future = asyncio.wrap_future(job.future)
+            future.add_done_callback(_retrieve)
             try:
+                await self._begun(job, future)
                 while (piece := await pieces.next()) is not None:
                     yield piece
                 if job.future.cancelled():
@@ -170,7 +181,17 @@ class ProcessComputer:
                 job.future.result()
             finally:
                 pieces.leave()
-                job.stop()
+                await _stopped(job, future)
+
+    async def _begun(self, job: Job[R], future: asyncio.Future[R]) -> None:
+        """Wait until a process takes a job; ApiError where none becomes free in time."""
+        seconds = self._limits.turn_seconds
+        if seconds is None:
+            return
+        begun = asyncio.wrap_future(job.begun)
+        await asyncio.wait((begun, future), timeout=seconds, return_when=asyncio.FIRST_COMPLETED)
+        if not begun.done() and not future.done() and job.future.cancel():
+            raise not_in_time("Other requests", seconds)
 
     async def _leave(self, job: Job[R], future: asyncio.Future[R]) -> None:
         """End a job that nobody waits for; its process is killed only if the job continues for long."""
@@ -179,8 +200,7 @@ class ProcessComputer:
         try:
             await asyncio.wait([future], timeout=self._limits.leave_seconds)
         finally:
-            job.stop()
-            future.cancel()
+            await _stopped(job, future)
 
     async def load(self, shape: models.KernelShape) -> None:
         """Load a kernel. Its compilation continues when the request is cancelled, so that the next one finds it."""
@@ -304,7 +324,15 @@ class _Pieces:
         self._room.release()
 
 
-def _retrieve(future: asyncio.Future[None]) -> None:
+async def _stopped(job: Job[R], future: asyncio.Future[R]) -> None:
+    """End a job, and wait for the end of the process that ran it, which then writes nowhere any more."""
+    job.stop()
+    with anyio.CancelScope(shield=True):
+        await asyncio.wait([future], timeout=KILL_SECONDS)
+    future.cancel()
+
+
+def _retrieve(future: asyncio.Future[Any]) -> None:
     """Retrieve the outcome of a future, so that asyncio does not log an exception that nobody awaits."""
     if not future.cancelled():
         future.exception()

@@ -29,6 +29,7 @@ from sprag.worker.limits import (
     MAX_FILES_EACH,
     MAX_STARTS,
     MAX_STREAMS,
+    SENDING_PROCESSES,
 )
 
 if TYPE_CHECKING:
@@ -51,8 +52,8 @@ class Context:
 
     ``ending`` is set when the service begins to shut down.
     ``checker`` runs the functions that read, expand, fit or draw user input, and ``library`` gives them the store.
-    ``writer`` writes files of rows. Requests use all three through `sprag.service.http.work`, which enforces the share
-    of each token.
+    ``writer`` writes files of rows, and ``sending`` are the places for rows that are sent meanwhile. Requests use all
+    of them through `sprag.service.http.work`, which enforces the share of each token.
     ``unaffected`` finds parameters without effect; ``streams`` are the places for event streams, and ``looks`` what
     these look at. ``ready`` is set when the checker accepts work.
     """
@@ -71,6 +72,7 @@ class Context:
     check_shares: Shares = field(default_factory=lambda: Shares(1, MAX_CHECKS_EACH, MAX_CHECKS))
     file_shares: Shares = field(default_factory=lambda: Shares(1, MAX_FILES_EACH, MAX_FILES))
     looks: Looks = field(default_factory=Looks)
+    sending: Semaphore = field(default_factory=lambda: Semaphore(SENDING_PROCESSES))
     files: KeptFiles = field(default_factory=KeptFiles)
 
     def cut(self) -> None:

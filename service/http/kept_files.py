@@ -10,17 +10,19 @@ import shutil
 import tempfile
 import threading
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable, Iterator
-from contextlib import AbstractAsyncContextManager
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO, Final
 
+import anyio
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 
 from sprag.service.http.problems import ApiError
-from sprag.service.http.threads import iterated
+from sprag.service.http.threads import Threads, in_thread, iterated
 from sprag.service.stale_files import mark, sweep
 
 #: All kept files together have at most this size; a larger one is kept alone until the next.
@@ -31,14 +33,32 @@ _PIECE: Final = 1 << 20
 _RANGE: Final = re.compile(r"bytes=(?:([0-9]{1,18})-([0-9]{1,18})?|-([0-9]{1,18}))")
 
 
+#: Writes a file to the path, with the folder for what it needs in between.
+Write = Callable[[str, str], Awaitable[None]]
+Turn = Callable[[], AbstractAsyncContextManager[None]]
+
+
 @dataclass
 class _Entry:
-    """A file, or who is about to write it: ``attempts`` of those who wait for their turn or ``writer``, who has it."""
+    """A file, or who is about to write it.
+
+    Attributes
+    ----------
+    path : Path or None
+        The file once it is whole.
+    clients : int
+        Requests that want it and do not have it yet.
+    attempts : tasks that wait for the turn of an owner, or write
+    writer : owner of the attempt that writes
+    written : set once the file is whole
+    """
 
     path: Path | None = None
     size: int = 0
+    clients: int = 0
+    attempts: dict[str, asyncio.Task[None]] = field(default_factory=dict)
     writer: str | None = None
-    attempts: dict[str, asyncio.Future[None]] = field(default_factory=dict)
+    written: asyncio.Event = field(default_factory=asyncio.Event)
 
 
 class KeptFiles:
@@ -51,70 +71,109 @@ class KeptFiles:
         self._folder: Path | None = None
         self._descriptor = -1
 
-    async def opened(
-        self,
-        tag: str,
-        owner: str,
-        turn: Callable[[], AbstractAsyncContextManager[None]],
-        write: Callable[[str], Awaitable[None]],
-    ) -> BinaryIO:
+    async def opened(self, tag: str, owner: str, turn: Turn, write: Write) -> BinaryIO:
         """The file of a tag, open for reading; where it is not kept, ``write`` makes it in a ``turn`` of the ``owner``.
 
-        An open file stays readable when it is removed. One of several requests for a file writes it, and the others
-        wait for it, or for its failure; where its client leaves, another one goes on.
+        An open file stays readable when it is removed. It is written once for all requests that wait for it, as long as
+        anybody does; a failure is everybody's.
         """
-        entry = self._entries.setdefault(tag, _Entry())
-        while entry.path is None:
-            attempt = entry.attempts.get(entry.writer or owner)
-            if attempt is not None:
-                await asyncio.shield(attempt)
-            else:
-                await self._attempt(entry, owner, turn, write)
-        with self._lock:
-            self._entries[tag] = entry
-            self._entries.move_to_end(tag)
-        file = entry.path.open("rb")
+        file = None
+        while file is None:
+            entry = self._entries.setdefault(tag, _Entry())
+            await self._written(tag, entry, owner, turn, write)
+            file = self._open(tag, entry)
         self._trim(tag)
         return file
 
-    async def _attempt(
-        self,
-        entry: _Entry,
-        owner: str,
-        turn: Callable[[], AbstractAsyncContextManager[None]],
-        write: Callable[[str], Awaitable[None]],
-    ) -> None:
-        """Wait for a turn, and write the file unless somebody else has done it or is doing it by then."""
-        attempt = entry.attempts[owner] = asyncio.get_running_loop().create_future()
-        try:
-            async with turn():
-                if entry.path is None and entry.writer is None:
-                    entry.writer = owner
-                    try:
-                        await self._write(entry, write)
-                    finally:
-                        entry.writer = None
-        except Exception as error:
-            attempt.set_exception(error)
-            attempt.exception()  # there may be nobody else to whom it matters
-            raise
-        finally:
-            del entry.attempts[owner]
-            for waiting in (attempt, *(entry.attempts.values() if entry.path is not None else ())):
-                if not waiting.done():
-                    waiting.set_result(None)
+    def _open(self, tag: str, entry: _Entry) -> BinaryIO | None:
+        """The file of an entry; None where it has been removed in the meantime, by whomever."""
+        assert entry.path is not None
+        with self._lock:
+            try:
+                file = entry.path.open("rb")
+            except FileNotFoundError:
+                if self._entries.get(tag) is entry:
+                    del self._entries[tag]
+                return None
+            if self._entries.get(tag) is entry:
+                self._entries.move_to_end(tag)
+            return file
 
-    async def _write(self, entry: _Entry, write: Callable[[str], Awaitable[None]]) -> None:
+    async def _written(self, tag: str, entry: _Entry, owner: str, turn: Turn, write: Write) -> None:
+        """Wait until the file is whole, beginning to write it where nobody does."""
+        entry.clients += 1
+        whole = asyncio.ensure_future(entry.written.wait())
+        try:
+            while entry.path is None:
+                attempt = entry.attempts.get(entry.writer or owner)
+                if attempt is None:
+                    attempt = entry.attempts[owner] = asyncio.create_task(self._attempt(entry, owner, turn, write))
+                    attempt.add_done_callback(partial(self._ended, tag, entry, owner))
+                await asyncio.wait((attempt, whole), return_when=asyncio.FIRST_COMPLETED)
+                if entry.path is None and attempt.done() and not attempt.cancelled():
+                    attempt.result()
+        finally:
+            whole.cancel()
+            entry.clients -= 1
+            if not entry.clients:
+                for attempt in entry.attempts.values():
+                    attempt.cancel()
+            self._forget(tag, entry)
+
+    async def _attempt(self, entry: _Entry, owner: str, turn: Turn, write: Write) -> None:
+        """Wait for a turn, and write the file unless another owner has one; then that one's attempt goes on alone."""
+        async with turn():
+            if entry.path is None and entry.writer is None:
+                entry.writer = owner
+                try:
+                    await self._write(entry, write)
+                finally:
+                    entry.writer = None
+        for waiting in entry.attempts.values():  # for a turn that nobody needs any more
+            if entry.path is not None and waiting is not asyncio.current_task():
+                waiting.cancel()
+
+    def _ended(self, tag: str, entry: _Entry, owner: str, attempt: asyncio.Task[None]) -> None:
+        del entry.attempts[owner]
+        if not attempt.cancelled():
+            attempt.exception()  # there may be nobody left to whom it matters
+        self._forget(tag, entry)
+
+    def _forget(self, tag: str, entry: _Entry) -> None:
+        """Drop an entry without a file that nobody wants any more."""
+        if entry.path is None and not entry.clients and not entry.attempts and self._entries.get(tag) is entry:
+            del self._entries[tag]
+
+    async def _write(self, entry: _Entry, write: Write) -> None:
         handle, name = tempfile.mkstemp(dir=self._place())
         os.close(handle)
         path = Path(name)
         try:
-            await write(name)
+            async with self.scratch() as folder:
+                await write(name, folder)
             entry.size = path.stat().st_size
         except BaseException:
             path.unlink(missing_ok=True)
             raise
         entry.path = path
+        entry.written.set()
+
+    @asynccontextmanager
+    async def scratch(self) -> AsyncIterator[str]:
+        """A folder for what a process needs while it writes, removed at the end however that process ends.
+
+        Where there is no room for it, it has no name.
+        """
+        try:
+            folder = tempfile.mkdtemp(dir=self._place())
+        except OSError:
+            yield ""
+            return
+        try:
+            yield folder
+        finally:
+            with anyio.CancelScope(shield=True):
+                await in_thread(partial(shutil.rmtree, folder, ignore_errors=True), threads=Threads.FILES)
 
     def _place(self) -> Path:
         with self._lock:
@@ -135,7 +194,7 @@ class KeptFiles:
                 total -= entry.size
                 del self._entries[tag]
                 assert entry.path is not None
-                entry.path.unlink()
+                entry.path.unlink(missing_ok=True)
 
     def close(self) -> None:
         """Remove all files."""

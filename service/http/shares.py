@@ -12,6 +12,26 @@ if TYPE_CHECKING:
     from collections.abc import AsyncIterator
 
 
+@asynccontextmanager
+async def turn(places: asyncio.Semaphore, seconds: float | None, others: str) -> AsyncIterator[None]:
+    """A place among so many; ApiError where ``others`` leave none within so many ``seconds`` (None: no limit)."""
+    try:
+        async with asyncio.timeout(seconds):
+            await places.acquire()
+    except TimeoutError:
+        raise not_in_time(others, seconds or 0.0) from None
+    try:
+        yield
+    finally:
+        places.release()
+
+
+def not_in_time(others: str, seconds: float) -> ApiError:
+    """The error for a request that has waited in vain for what ``others`` leave."""
+    detail = f"{others} left no turn within {seconds:g} s."
+    return ApiError("unavailable", detail, headers={"Retry-After": "60"})
+
+
 class _Share:
     """The share of one owner: its number of requests, and its semaphore."""
 
@@ -39,8 +59,8 @@ class Shares:
         return sum(share.taken for share in list(self._owners.values()))
 
     @asynccontextmanager
-    async def take(self, owner: str, at_most: int = 0) -> AsyncIterator[None]:
-        """Wait for a turn; ApiError immediately when the owner has too many requests.
+    async def take(self, owner: str, at_most: int = 0, seconds: float | None = None) -> AsyncIterator[None]:
+        """Wait for a turn; ApiError immediately when the owner has too many requests, and after so many ``seconds``.
 
         ``at_most`` limits the simultaneous requests of this owner further; 0 does not.
         """
@@ -53,7 +73,7 @@ class Shares:
             raise ApiError("too-many-requests", detail, headers={"Retry-After": "5"})
         share.taken += 1
         try:
-            async with share.turns:
+            async with turn(share.turns, seconds, "Earlier requests of this user or token"):
                 yield
         finally:
             share.taken -= 1

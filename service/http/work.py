@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from contextlib import aclosing
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Final, TypeVar, TypeVarTuple, cast
 
 from fastapi import Depends, Request
@@ -13,11 +14,13 @@ from sprag.service import languages
 from sprag.service.http.access import OPEN
 from sprag.service.http.context import study_with
 from sprag.service.http.respond import streamed
+from sprag.service.http.shares import turn
 from sprag.service.http.threads import in_thread
 from sprag.service.languages.elsewhere import speak
 from sprag.service.results.start_states import check_start
 from sprag.service.spec.machine.shaft_check import NotCompiledError
 from sprag.worker import models
+from sprag.worker.limits import FILE_WAIT_SECONDS
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Callable, Coroutine, Iterator
@@ -69,26 +72,33 @@ class Work:
         context = self.context
         return await self._attended(self._in_turn(context.compute_shares, context.computer, 0, function, *args))
 
-    async def kept_file(self, tag: str, function: Callable[[*Args, str], None], *args: *Args) -> BinaryIO:
+    async def kept_file(self, tag: str, function: Callable[[*Args, str, str], None], *args: *Args) -> BinaryIO:
         """The kept file of a tag, open for reading, which a process writes first where it is not there.
 
-        ``function(*args, path)`` writes it. Raises OSError where there is no place for files.
+        ``function(*args, path, folder)`` writes it, with a folder for what it needs in between. Raises OSError where
+        there is no place for files.
         """
         context, owner = self.context, self._grant.share
 
-        async def write(path: str) -> None:
-            await context.writer.run(function, *args, path)
+        async def write(path: str, folder: str) -> None:
+            await context.writer.run(function, *args, path, folder)
 
-        return await self._attended(context.files.opened(tag, owner, lambda: context.file_shares.take(owner), write))
+        own_turn = partial(context.file_shares.take, owner, seconds=FILE_WAIT_SECONDS)
+        return await self._attended(context.files.opened(tag, owner, own_turn, write))
 
     async def rows(
-        self, media_type: str, name: str, function: Callable[[*Args], Iterator[bytes]], *args: *Args
+        self, media_type: str, name: str, function: Callable[[*Args, str], Iterator[bytes]], *args: *Args
     ) -> Response:
-        """The answer with the pieces that a function yields in a process, which ends with the client."""
+        """The answer with the pieces of ``function(*args, folder)``, run in a process that ends with the client."""
         context, owner = self.context, self._grant.share
 
         async def pieces() -> AsyncGenerator[bytes]:
-            async with context.file_shares.take(owner), aclosing(context.writer.stream(function, *args)) as made:
+            async with (
+                context.file_shares.take(owner, seconds=FILE_WAIT_SECONDS),
+                turn(context.sending, FILE_WAIT_SECONDS, "Rows that are sent to others"),
+                context.files.scratch() as folder,
+                aclosing(context.writer.stream(function, *args, folder)) as made,
+            ):
                 async for piece in made:
                     yield piece
 

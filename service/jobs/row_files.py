@@ -18,15 +18,18 @@ def prepare() -> None:
     """Prepare a process: load this module."""
 
 
-def pieces(library: Library, study_id: str, form: Format, units: str, header: Header) -> Iterator[bytes]:
-    """All rows of a study; raises StoreError, SelectionError, and FaultError "storage-full"."""
+def pieces(library: Library, study_id: str, form: Format, units: str, header: Header, folder: str) -> Iterator[bytes]:
+    """All rows of a study, with ``folder`` for what is built first (by default a new one).
+
+    Raises StoreError, SelectionError, and FaultError "storage-full".
+    """
     store = library.store
     record, study = store.get_study(study_id), store.study(study_id)
-    return export(stored(store, record, study, units, header), form)
+    return export(stored(store, record, study, units, header), form, Path(folder) if folder else None)
 
 
-def write(library: Library, study_id: str, form: Format, units: str, header: Header, path: str) -> None:
-    """Write all rows of a study into a file; raises what `pieces` raises."""
+def write(library: Library, study_id: str, form: Format, units: str, header: Header, path: str, folder: str) -> None:
+    """Write all rows of a study into a file, with ``folder`` for what is built first; raises what `pieces` raises."""
     with room_required(str(Path(path).parent)), Path(path).open("wb") as file:
-        for piece in pieces(library, study_id, form, units, header):
+        for piece in pieces(library, study_id, form, units, header, folder):
             file.write(piece)

@@ -29,11 +29,14 @@ class Job(Generic[R]):
     future : Future
         Its value, or TimeoutError, ProcessDiedError, ProcessStartError, JobStoppedError, or what it raised; cancelled
         when it was stopped before a process took it.
+    begun : Future
+        Done once a process has taken it.
     """
 
     future: Future[R]
 
     def __init__(self) -> None:
+        self.begun: Future[None] = Future()
         self._child: ChildProcess | None = None
         self._stopped = False
         self._lock = threading.Lock()
@@ -118,6 +121,7 @@ class ChildPool:
         receive: Callable[[bytes], None] | None,
     ) -> R:
         child = self._idle.get()
+        job.begun.set_result(None)
         try:
             return self._run_in(child, job, timeout, function, args, receive)
         finally:

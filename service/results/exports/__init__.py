@@ -9,6 +9,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterator
 from importlib import import_module
+from pathlib import Path
 from typing import Final
 
 from sprag.service.formats import Format
@@ -50,12 +51,18 @@ _WRITERS: Final[dict[Format, tuple[str, str]]] = {
 }
 
 
-def export(source: Source, form: Format) -> Iterator[bytes]:
+#: Those that are built as a file before their first piece.
+_BUILT: Final[frozenset[Format]] = frozenset({"xlsx", "netcdf"})
+
+
+def export(source: Source, form: Format, folder: Path | None = None) -> Iterator[bytes]:
     """The file in pieces of about one block of rows.
 
+    What cannot be written piece by piece is built in ``folder``, by default one that is removed with the last piece.
     Raises FaultError "storage-full" where the folder for temporary files has no room, MissingRowsError where rows of a
     stored study are missing.
     """
     module, write = _WRITERS[form]
+    further = (folder,) if form in _BUILT else ()
     with room_required(tempfile.gettempdir()):
-        yield from getattr(import_module(f"{__name__}.{module}"), write)(source)
+        yield from getattr(import_module(f"{__name__}.{module}"), write)(source, *further)

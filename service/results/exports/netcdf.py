@@ -41,9 +41,9 @@ def cf_name(name: str) -> str:
     return name.replace(".", "_")
 
 
-def netcdf_pieces(source: Source) -> Iterator[bytes]:
+def netcdf_pieces(source: Source, folder: Path | None = None) -> Iterator[bytes]:
     """The file in pieces. It is built on disk, a few results at a time, to limit memory."""
-    return spooled(partial(_write, source))
+    return spooled(partial(_write, source), folder)
 
 
 def _write(source: Source, folder: Path) -> Path:

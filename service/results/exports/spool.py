@@ -24,17 +24,24 @@ _NAMED: Final = re.compile(
 )
 
 
-def spooled(write: Callable[[Path], Path]) -> Iterator[bytes]:
-    """The bytes of the file that ``write`` creates in the given folder; the folder is deleted with the last piece.
+def spooled(write: Callable[[Path], Path], folder: Path | None = None) -> Iterator[bytes]:
+    """The bytes of the file that ``write`` creates in ``folder``, which its owner removes.
 
-    Folders left behind by killed processes are removed.
+    By default it is a new folder, deleted with the last piece; those left behind by killed processes are removed.
     """
+    if folder is not None:
+        yield from _bytes_of(write(folder))
+        return
     sweep(Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"))
     with (
-        tempfile.TemporaryDirectory(prefix=_PREFIX) as folder,
-        marked(Path(folder)),
-        write(Path(folder)).open("rb") as file,
+        tempfile.TemporaryDirectory(prefix=_PREFIX) as name,
+        marked(Path(name)),
     ):
+        yield from _bytes_of(write(Path(name)))
+
+
+def _bytes_of(path: Path) -> Iterator[bytes]:
+    with path.open("rb") as file:
         while piece := file.read(_PIECE):
             yield piece
 

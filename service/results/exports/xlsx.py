@@ -84,9 +84,9 @@ class _ExactSheet(Worksheet):  # type: ignore[misc]
         table.update({"range": cells, "a_range": cells, "autofilter": cells})
 
 
-def xlsx_pieces(source: Source) -> Iterator[bytes]:
+def xlsx_pieces(source: Source, folder: Path | None = None) -> Iterator[bytes]:
     """The workbook in pieces. It is first written to disk row by row, to limit memory."""
-    return spooled(partial(_write, source))
+    return spooled(partial(_write, source), folder)
 
 
 def _write(source: Source, folder: Path, sheet_rows: int = SHEET_ROWS) -> Path:

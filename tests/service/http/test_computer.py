@@ -10,10 +10,12 @@ import signal
 import time
 from collections.abc import AsyncIterator, Iterator
 from contextlib import aclosing
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import psutil
 import pytest
 
 from sprag.service.http.computer import MAX_WAITING, Limits, ProcessComputer
@@ -240,3 +242,39 @@ def test_pieces_end_with_the_service(portal: BlockingPortal) -> None:
         await closing
 
     portal.call(end)
+
+
+def test_the_wait_for_a_process_ends(portal: BlockingPortal) -> None:
+    made = ProcessComputer(Limits(600.0, 2**30, turn_seconds=600.0), prepare=fakes.prepare_nothing)
+
+    async def wait() -> None:
+        pieces = made.stream(fakes.numbered, 0, 2**17)
+        assert await anext(pieces)
+        made._limits = replace(made._limits, turn_seconds=0.01)
+        with pytest.raises(ApiError) as refused:
+            await made.run(math.sqrt, 4.0)
+        assert (refused.value.type.status, refused.value.headers) == (503, {"Retry-After": "60"})
+        await pieces.aclose()
+
+    try:
+        portal.call(wait)
+    finally:
+        made.close()
+
+
+def test_who_leaves_waits_until_its_process_has_ended(tmp_path: Path, portal: BlockingPortal) -> None:
+    told = tmp_path / "told"
+    os.mkfifo(told)
+    made = ProcessComputer(Limits(600.0, 2**30, leave_seconds=0.0), prepare=fakes.prepare_nothing)
+
+    async def leave() -> None:
+        running = asyncio.ensure_future(made.run(fakes.tell_and_wait, str(told)))
+        process = int(await asyncio.to_thread(told.read_text))
+        running.cancel()
+        await asyncio.wait([running])
+        assert not psutil.pid_exists(process)
+
+    try:
+        portal.call(leave)
+    finally:
+        made.close()

@@ -113,8 +113,9 @@ def test_files_are_written_once_and_the_oldest_go(tmp_path: Any, portal: Blockin
     files, made = KeptFiles(most_bytes=25), list[str]()
 
     def opened(name: str, content: str | None = None) -> Any:
-        async def write(path: str) -> None:
+        async def write(path: str, between: str) -> None:
             made.append(name)
+            (Path(between) / "part").write_text("what a killed process would leave")
             if content is None:
                 raise ValueError("broken")
             Path(path).write_text(content)
@@ -142,7 +143,7 @@ def test_files_are_written_once_and_the_oldest_go(tmp_path: Any, portal: Blockin
     assert made[-1] == "d"
     assert files._folder is not None
     folder = files._folder
-    assert len(list(folder.iterdir())) == 2
+    assert [path.is_file() for path in folder.iterdir()] == [True, True]
     files.close()
     assert not folder.exists()
 

@@ -13,16 +13,17 @@ import httpx
 import pytest
 
 from sprag.service.formats import FORMATS
-from sprag.service.http import guard, looks
+from sprag.service.http import guard, looks, work
+from sprag.service.http.api import curves
 from sprag.service.http.problems import ApiError
 from sprag.service.http.threads import ThreadedRoute
 from sprag.service.jobs import row_files
 from sprag.service.storage.scopes import TokenScope
-from sprag.worker.limits import MAX_FILES_EACH, WRITING_THREADS
+from sprag.worker.limits import FILE_PROCESSES, MAX_FILES_EACH, SENDING_PROCESSES, WRITING_THREADS
 from tests.service.conftest import API, Service
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
+    from collections.abc import AsyncGenerator, Awaitable, Callable
 
     from anyio.from_thread import BlockingPortal
 
@@ -32,8 +33,8 @@ STREAMS = 50
 
 @pytest.fixture
 def tokens(service: Service) -> dict[str, str]:
-    """Secrets of two readers and a writer; the service's client is the writer."""
-    scopes = {"one": TokenScope.READ, "other": TokenScope.READ, "writer": TokenScope.WRITE}
+    """Secrets of three readers and a writer; the service's client is the writer."""
+    scopes = {**dict.fromkeys(("one", "other", "third"), TokenScope.READ), "writer": TokenScope.WRITE}
     secrets = {name: service.store.create_token(name, scope)[0] for name, scope in scopes.items()}
     service.http.headers["Authorization"] = f"Bearer {secrets['writer']}"
     return secrets
@@ -115,7 +116,7 @@ def test_one_request_writes_what_many_want(
     portal.call(export)
 
 
-def test_a_client_that_leaves_leaves_the_file_to_another(
+def test_a_file_is_written_on_while_anybody_wants_it(
     service: Service, ended: str, tokens: dict[str, str], portal: BlockingPortal
 ) -> None:
     async def export() -> None:
@@ -125,10 +126,112 @@ def test_a_client_that_leaves_leaves_the_file_to_another(
         )
         await until(lambda: len(held.begun) == 1)
         first.cancel()
-        await until(lambda: len(held.begun) == 2)
+        await asyncio.wait([first])
         held.allowed.set()
         assert (await second).content == (await third).content
-        assert len(held.begun) == 2
+        assert len(held.begun) == 1, "whoever left had begun it, and could keep the others waiting so"
+
+    portal.call(export)
+
+
+def test_the_last_client_ends_the_file_and_the_next_begins_anew(
+    service: Service, ended: str, tokens: dict[str, str], portal: BlockingPortal
+) -> None:
+    files = service.app.state.context.files
+
+    async def export() -> None:
+        held = Held(service)
+        asked = [asyncio.ensure_future(ask(service, rows(ended, "csv"), tokens[name])) for name in ("one", "other")]
+        await until(lambda: len(held.begun) == 1)
+        for task in asked:
+            task.cancel()
+        await asyncio.wait(asked)
+        again = asyncio.ensure_future(ask(service, rows(ended, "csv"), tokens["one"]))
+        await until(lambda: len(held.begun) == 2)
+        again.cancel()
+        await until(lambda: not files._entries)
+        held.allowed.set()
+        assert (await ask(service, rows(ended, "csv"), tokens["other"])).status_code == 200
+        assert [path.is_file() for path in files._folder.iterdir()] == [True], "what was begun is gone"
+
+    portal.call(export)
+
+
+def test_who_waits_for_a_turn_takes_a_file_that_another_has_written(
+    service: Service, ended: str, tokens: dict[str, str], portal: BlockingPortal
+) -> None:
+    async def export() -> None:
+        shares = service.app.state.context.file_shares
+        held = Held(service)
+        large = asyncio.ensure_future(ask(service, rows(ended, "xlsx"), tokens["one"]))
+        await until(lambda: held.begun == [(row_files.write, "xlsx")])
+        mine = asyncio.ensure_future(ask(service, rows(ended, "csv"), tokens["one"]))
+        await until(lambda: shares.requests == 2)
+        run, service.writer.run = service.writer.run, held._run  # type: ignore[method-assign]
+        assert (await ask(service, rows(ended, "csv"), tokens["other"])).status_code == 200
+        assert (await mine).status_code == 200, "its token still writes another file"
+        assert not large.done()
+        service.writer.run = run  # type: ignore[method-assign]
+        held.allowed.set()
+        assert (await large).status_code == 200
+        await until(lambda: not shares.requests)
+
+    portal.call(export)
+
+
+def test_a_kept_file_that_somebody_removed_is_written_anew(
+    service: Service, ended: str, tokens: dict[str, str]
+) -> None:
+    whole = service.http.get(rows(ended, "csv")).content
+    for path in service.app.state.context.files._folder.iterdir():
+        path.unlink()
+    part = service.http.get(rows(ended, "csv"), headers={"Range": "bytes=0-99"})
+    assert (part.status_code, part.content) == (206, whole[:100])
+
+
+def test_the_wait_for_earlier_files_of_a_token_ends(
+    service: Service, ended: str, tokens: dict[str, str], portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def export() -> None:
+        held = Held(service)
+        first = asyncio.ensure_future(ask(service, rows(ended, "csv"), tokens["one"]))
+        await until(lambda: len(held.begun) == 1)
+        monkeypatch.setattr(work, "FILE_WAIT_SECONDS", 0.01)
+        refused = await ask(service, rows(ended, "json"), tokens["one"])
+        assert (refused.status_code, refused.headers["Retry-After"]) == (503, "60")
+        assert "Earlier requests of this user or token left no turn within 0.01 s" in refused.json()["detail"]
+        held.allowed.set()
+        assert (await first).status_code == 200
+        assert (await ask(service, rows(ended, "json"), tokens["one"])).status_code == 200
+
+    portal.call(export)
+
+
+def test_rows_that_are_read_slowly_leave_a_process_for_files(
+    service: Service, ended: str, tokens: dict[str, str], portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(curves, "_AT_ONCE", 0)
+    assert SENDING_PROCESSES < FILE_PROCESSES
+
+    async def export() -> None:
+        begun, go_on = list[str](), anyio.Event()
+
+        async def slowly(_: Any, *args: Any) -> AsyncGenerator[bytes]:
+            begun.append(args[2])
+            yield b"a piece"
+            await go_on.wait()
+
+        service.writer.stream = slowly  # type: ignore[method-assign]
+        names = ("one", "other", "writer")
+        asked = [asyncio.ensure_future(ask(service, rows(ended, "csv"), tokens[name])) for name in names]
+        await until(lambda: len(begun) == SENDING_PROCESSES)
+        part = await ask(service, rows(ended, "csv"), tokens["third"], Range="bytes=0-9")
+        assert part.status_code == 206
+        assert len(begun) == SENDING_PROCESSES
+        asked[0].cancel()
+        await until(lambda: len(begun) == SENDING_PROCESSES + 1)
+        go_on.set()
+        assert [(await task).content for task in asked[1:]] == [b"a piece"] * 2
 
     portal.call(export)
 
