@@ -56,9 +56,9 @@ _VIEWER: Final = (
     "GET /", "GET /new", "POST /new/check", "GET /calibrate",
     f"GET {_PAGE}",
     *(f"GET {_PAGE}/{part}" for part in (
-        "delete", "extend", "labels", "front", "figures/front", "figures/search", "front/search.svg", "explore", "explore/new",
-        "explore/compare", "figures/explore", "calibration", "figures/calibration", "drives", "figures/ribbon",
-        "figures/yield", "sensitivity", "figures/sensitivity", "curves", "map", "figures/curves", "figures/answers",
+        "delete", "extend", "labels", "front", "figures/front", "figures/search", "front/search.svg", "explore",
+        "explore/new", "explore/compare", "figures/explore", "calibration", "figures/calibration", "drives",
+        "figures/ribbon", "figures/yield", "sensitivity", "figures/sensitivity", "curves", "map", "figures/curves", "figures/answers",
         "figures/map", "cases",
     )),
     f"GET {_PAGE_CASE}",
