@@ -58,8 +58,8 @@ _VIEWER: Final = (
     *(f"GET {_PAGE}/{part}" for part in (
         "delete", "extend", "labels", "front", "figures/front", "figures/search", "front/search.svg", "explore",
         "explore/new", "explore/compare", "figures/explore", "calibration", "figures/calibration", "drives",
-        "figures/ribbon", "figures/yield", "sensitivity", "figures/sensitivity", "curves", "map", "figures/curves", "figures/answers",
-        "figures/map", "cases",
+        "figures/ribbon", "figures/yield", "sensitivity", "figures/sensitivity", "curves", "map", "figures/curves",
+        "figures/answers", "figures/map", "cases",
     )),
     f"GET {_PAGE_CASE}",
     *(f"GET {_PAGE_CASE}/{part}" for part in (
