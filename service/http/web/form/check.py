@@ -22,7 +22,7 @@ from sprag.service.results.fault_texts import fault_text, warning_text
 from sprag.service.results.figures.linkage import Drawing, drawings
 from sprag.service.results.fits import fit_json
 from sprag.service.results.quantities import TYPED
-from sprag.service.results.reading import CLUTCH, Choice, reading_for
+from sprag.service.results.reading import CLUTCH, Choice, Reading, reading_for
 from sprag.service.results.wording import duration, unit_text
 from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
 from sprag.service.spec.derive import with_values
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from datetime import datetime
 
     from sprag.service.answers.studies import ClutchFitReport, Preview
-    from sprag.service.results.reading import Reading
     from sprag.worker.chunking import Chunking
     from sprag.worker.study import Study
 
@@ -169,13 +168,16 @@ def _beside(name: str, edited: str) -> str:
 
 def _points(values: Mapping[str, str]) -> list[str]:
     """Points of bare numbers of lists that are taken as decimal; quantities with units have warnings of the spec."""
-    notes = []
+    notes, reading = [], Reading("machine-shaft" if is_shaft(values) else "vibration-drive")
     for name, text in values.items():
         if name.endswith("/values") and "." in text:
             items = items_of(text)
             doubt = settle(items).doubt
             if doubt is not None and not isinstance(list_of(text)[doubt], str):
-                notes.append(warning_text(WarningText(f"{name}: {assumption(items[doubt])}", "ambiguous-point")))
+                path = values.get(f"{name.removesuffix('values')}path", "")
+                place = f"{name} ({path})"
+                warning = WarningText(f"{place}: {assumption(items[doubt])}", "ambiguous-point")
+                notes.append(warning_text(warning, reading))
     return notes
 
 
