@@ -40,7 +40,7 @@ def test_from_an_empty_form_to_a_curve_and_a_file(visitor: Visitor, office: Offi
     fill(page, {"/name": "My first drive", **FIELDS})
     named(page, "/axes/0/path").select_option("shaft.load")
     named(page, "/axes/0/way").select_option("values")
-    named(page, "/axes/0/values").fill("0; 0.1; 200 N*mm; 0.4")
+    named(page, "/axes/0/values").fill("0; 100; 200; 400 N*mm")
     expect(page.locator("[data-cases]")).to_have_text("4")
     expect(page.locator(".wrong:not(:empty)")).to_have_count(0)
     page.get_by_role("button", name="Submit the study").click()
