@@ -50,6 +50,7 @@ OTHERS = {
     "db backup": "writes another file",
     "db audit": "reads",
     "db move": "writes another database, which has the log of this one",
+    "db adopt": "changes a copy only; tests/service/schedules/test_copies.py",
     "db upgrade": "test_an_upgrade_is_in_the_log_of_the_new_revision",
 }
 
