@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import IO, TYPE_CHECKING, Any, Final
 
 import xlsxwriter
 from xlsxwriter.utility import xl_range
@@ -89,24 +89,55 @@ def xlsx_pieces(source: Source, folder: Path | None = None) -> Iterator[bytes]:
     return spooled(partial(_write, source), folder)
 
 
+class _Archive:
+    """The file of a workbook. Once it is closed, it ignores what is written.
+
+    On a full disk the library leaves its archive open, and the archive writes its end when it is collected.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.file = path.open("wb")
+
+    def write(self, data: Any) -> int:
+        """The number of bytes that are taken."""
+        return len(data) if self.file.closed else self.file.write(data)
+
+    def tell(self) -> int:
+        """The place of the next byte."""
+        return 0 if self.file.closed else self.file.tell()
+
+    def seek(self, place: int) -> int:
+        """Go to that place."""
+        return place if self.file.closed else self.file.seek(place)
+
+    def flush(self) -> None:
+        """Give the bytes to the system."""
+        if not self.file.closed:
+            self.file.flush()
+
+
 def _write(source: Source, folder: Path, sheet_rows: int = SHEET_ROWS) -> Path:
     path = folder / "results.xlsx"
     options = {"constant_memory": True, "tmpdir": str(folder), "use_zip64": True, "strings_to_urls": False}
-    book = xlsxwriter.Workbook(str(path), options)
+    archive = _Archive(path)
+    book = xlsxwriter.Workbook(archive, options)
     try:
         unit = book.add_format({"italic": True, "font_color": "#666666"})
         _cases(book, source, unit, sheet_rows)
         _inputs(book, source, book.add_format({"bold": True, "bottom": 1}))
         book.close()
+        archive.file.close()
     except BaseException:
-        _abandon(book)
+        _abandon(book, archive.file)
         raise
     return path
 
 
-def _abandon(book: Any) -> None:
+def _abandon(book: Any, archive: IO[bytes]) -> None:
     """Close the files of a workbook that cannot be finished, which the library leaves open."""
     book.fileclosed = True
+    with suppress(OSError):
+        archive.close()
     for part in (book, *book.worksheets()):
         for file in (getattr(part, "fh", None), getattr(part, "row_data_fh", None)):
             with suppress(OSError, ValueError):  # what it holds back has no room
