@@ -7,12 +7,13 @@ They are stored with the study and its rounds, not with the rows. Studies of bef
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import sqlalchemy as sa
 
 from sprag.service.storage.part import MAX_INTEGER, Part
+from sprag.service.storage.reserve import makes_room
 from sprag.service.storage.tables import CASE_KEYS, STUDIES
 from sprag.worker import fingerprint, models
 from sprag.worker.case_keys import case_keys
@@ -115,14 +116,21 @@ class CaseKeys(Part):
                     connection.execute(sa.update(STUDIES).where(c.number == number).values(keyed=keyed))
             yield number
 
-    def _remove_keys(self, number: int) -> Iterator[int]:
-        """Remove the keys of a study in short transactions; yields the number of rows of each."""
+    def _keys(self, number: int) -> list[int]:
+        """The keys that a study has."""
         c = STUDIES.c
         with self.session.read() as connection:
             query = sa.select(c.study, c.kin_hash).where(c.number == number, c.keyed == KEYED)
             row = connection.execute(query).one_or_none()
-        keys: list[Any] = [] if row is None else case_keys(Study.from_text(row.study), row.kin_hash).tolist()
-        for first in range(0, len(keys), _WRITTEN):
-            with self.session.write() as connection:
-                mine = CASE_KEYS.c.key.in_(keys[first : first + _WRITTEN]) & (CASE_KEYS.c.study == number)
-                yield connection.execute(sa.delete(CASE_KEYS).where(mine)).rowcount
+        return [] if row is None else sorted(case_keys(Study.from_text(row.study), row.kin_hash).tolist())
+
+    @makes_room
+    def _delete_keys(self, keys: list[int], number: int, rows: int) -> tuple[int, bool]:
+        """Delete about that many of the ``keys`` of a study, which then keeps the others: how many, and whether any are
+        left.
+        """
+        with self.session.write() as connection:
+            mine = CASE_KEYS.c.key.in_(keys[:rows]) & (CASE_KEYS.c.study == number)
+            deleted = connection.execute(sa.delete(CASE_KEYS).where(mine)).rowcount
+        del keys[:rows]
+        return deleted, bool(keys)

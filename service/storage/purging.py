@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from datetime import timedelta
+from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import sqlalchemy as sa
@@ -31,7 +32,7 @@ from sprag.service.storage.view_tables import SAVED_VIEWS
 from sprag.worker.states import TERMINAL, StudyState
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
+    from collections.abc import Callable, Collection, Iterator
     from datetime import datetime
     from threading import Event
 
@@ -126,11 +127,12 @@ class Purging(Users, CaseKeys):
                 return
         for number, model, variant in self._taken_away(over):
             rows = results_table(model, variant)
-            yield from self._emptied(rows, rows.c.case_number, number)
+            yield from _emptied(partial(self._delete_first, rows, rows.c.case_number, number))
             if (further := further_table(model, variant)) is not None:
-                yield from self._emptied(further, further.c.case_number, number)
-            yield from self._emptied(CHUNKS, CHUNKS.c["first"], number)
-            yield from self._remove_keys(number)
+                yield from _emptied(partial(self._delete_first, further, further.c.case_number, number))
+            yield from _emptied(partial(self._delete_first, CHUNKS, CHUNKS.c["first"], number))
+            if keys := self._keys(number):
+                yield from _emptied(partial(self._delete_keys, keys, number))
             self._remove(number)
             yield 1
 
@@ -151,22 +153,11 @@ class Purging(Users, CaseKeys):
                 connection.execute(sa.delete(table).where(table.c.study == number))
             connection.execute(sa.delete(STUDIES).where(STUDIES.c.number == number))
 
-    def _emptied(self, table: sa.Table, key: sa.Column[int], number: int) -> Iterator[int]:
-        """Delete the rows of a study from a table, in the order of ``key``, which few rows share."""
-        rows, left = PURGED_ROWS, True
-        while left:
-            try:
-                deleted, left = self._delete_first(table, key, number, rows)
-            except DatabaseFullError:
-                if rows <= LEAST_PURGED_ROWS:
-                    raise
-                rows //= 10  # even a deletion writes pages to the log
-            else:
-                yield deleted
-
     @makes_room
     def _delete_first(self, table: sa.Table, key: sa.Column[int], number: int, rows: int) -> tuple[int, bool]:
-        """Delete about that many rows of a study: how many, and whether any are left."""
+        """Delete about that many rows of a study from a table, in the order of ``key``, which few rows share: how many,
+        and whether any are left.
+        """
         mine = table.c.study == number
         with self.session.write() as connection:
             # The first row that is kept; none where the rest is small enough.
@@ -175,3 +166,17 @@ class Purging(Users, CaseKeys):
             ).scalar_one_or_none()
             deleted = connection.execute(sa.delete(table).where(mine, sa.true() if edge is None else key < edge))
         return deleted.rowcount, edge is not None
+
+
+def _emptied(delete_first: Callable[[int], tuple[int, bool]]) -> Iterator[int]:
+    """Call the function, which deletes about so many rows, until none are left; yields how many it deleted."""
+    rows, left = PURGED_ROWS, True
+    while left:
+        try:
+            deleted, left = delete_first(rows)
+        except DatabaseFullError:
+            if rows <= LEAST_PURGED_ROWS:
+                raise
+            rows //= 10  # even a deletion writes pages to the log
+        else:
+            yield deleted

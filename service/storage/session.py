@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from contextlib import contextmanager
 from pathlib import Path
@@ -239,5 +240,5 @@ def _begin(connection: sa.Connection) -> None:
     options = connection.get_execution_options()
     if statement := options.get(_BEGIN):
         if _WAIT in options and connection.dialect.name == "sqlite":
-            connection.exec_driver_sql(f"PRAGMA busy_timeout = {int(options[_WAIT] * 1000)}")
+            connection.exec_driver_sql(f"PRAGMA busy_timeout = {math.ceil(options[_WAIT] * 1000)}")
         connection.exec_driver_sql(statement)

@@ -48,7 +48,7 @@ from sprag.service.storage.tables import (
     RECORD_COLUMNS,
     STUDIES,
 )
-from sprag.service.storage.users import WAITING_STUDY, Users, require_queue
+from sprag.service.storage.users import Users, require_queue
 from sprag.service.storage.windows import lift_window
 from sprag.worker import models
 from sprag.worker.chunking import Chunking, spans
@@ -235,11 +235,6 @@ class Studies(Users, Orders, Dispatchers):
         with self._lock, suppress(ValueError):  # too large for the cache
             self._studies[study_id] = study
         return study
-
-    def waiting_studies(self) -> int:
-        """Number of studies that have not ended, except those held at their deadline."""
-        with self.session.read() as connection:
-            return connection.execute(sa.select(sa.func.count()).where(WAITING_STUDY)).scalar_one()
 
     def progress(self, study_id: str) -> Progress:
         """Progress of the study; raises StudyNotFoundError."""

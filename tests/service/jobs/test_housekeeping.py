@@ -49,7 +49,7 @@ def test_deleting_removes_no_row_itself_and_each_step_few(store: Store, monkeypa
     with pytest.raises(StudyNotFoundError):
         store.get_study(record.id)
     assert count(store, "vibration_drive_1") == 18
-    assert list(store.purge_steps()) == [4, 4, 1, 4, 1, 1]  # rows, chunks, the study itself
+    assert list(store.purge_steps()) == [4, 4, 1, 4, 1, 4, 4, 1, 1]  # rows, chunks, keys, the study itself
     assert (count(store, "vibration_drive_1"), count(store, "chunks"), count(store, "studies")) == (9, 5, 1)
     assert list(store.purge_steps()) == []
     assert len(store.case_rows(other.id)) == 9

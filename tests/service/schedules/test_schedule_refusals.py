@@ -61,7 +61,7 @@ def test_a_deadline_outside_the_window_is_kept(store: Store, clock: Clock) -> No
     held = store.get_study(study.id)
     assert (held.state, held.time_over) == (StudyState.PAUSED, True)
     assert (held.reason or "").startswith("its deadline passed at 2026-01-01T00:28:00+00:00: 0 of 9 cases are done")
-    assert store.waiting_studies() == 0
+    assert store.active_studies() == []
     clock.set("2026-01-02T00:25")
     look()
     assert store.get_study(study.id) == held, "the window that opens again does not let it go on"
@@ -140,11 +140,11 @@ def test_a_schedule_that_is_paused_as_its_study_is_checked_gets_none(
     kept = store.create_schedule(fields(at="2026-01-01T22:00"))
     clock.set("2026-01-01T22:00")
 
-    def pausing(*_: Any) -> int:
+    def pausing() -> int:
         store.change_schedule(kept.id, change_fields(kept.fields, {"enabled": False}, clock.now()))
-        return 0
+        return 10**15
 
-    monkeypatch.setattr(store, "waiting_studies", pausing)
+    monkeypatch.setattr(store, "room", pausing)
     Scheduler(store).look()
     assert store.list_studies().studies == ()
     (run,) = store.schedule_runs(kept.id)
