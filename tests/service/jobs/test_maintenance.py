@@ -163,9 +163,9 @@ def test_old_studies_are_deleted_by_command_too(
         assert execute([*arguments, *options]) == code
     told = capsys.readouterr()
     first, text, last = told.out.splitlines()
-    assert json.loads(first) == {"deleted": [], "found": [study.id]}
+    assert json.loads(first) == {"database": settings.database, "deleted": [], "found": [study.id]}
     assert text == study.id
-    assert json.loads(last) == {"deleted": [], "found": []}
+    assert json.loads(last) == {"database": settings.database, "deleted": [], "found": []}
     assert "1 studies deleted" in told.err
 
 

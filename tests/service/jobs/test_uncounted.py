@@ -48,7 +48,7 @@ class Script:
 def answer(script: Script, timeout: float, monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(child_process, "wait", script.wait)
     monkeypatch.setattr(child_process, "time", script)
-    return ChildProcess(int)._answer_of(script, timeout)  # type: ignore[arg-type]
+    return ChildProcess(int)._answer_of(script, timeout, None)  # type: ignore[arg-type]
 
 
 def test_time_of_loading_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -236,7 +236,8 @@ def test_what_one_door_reads_all_read() -> None:
     """Form, spec and command, for a few of everything."""
     for text, expected in (("1500 об/хв", 50 * math.pi), ("1 500 RPM", 50 * math.pi), ("1.5·10³ min⁻¹", 50 * math.pi)):
         assert parse_quantity(plain(text), "rad/s") == pytest.approx(expected)
-        assert parse_quantity(_values(text)[0], "rad/s") == pytest.approx(expected)
+        # In a list an ordinary blank could also separate values; pages print a narrow one.
+        assert parse_quantity(_values(text.replace("1 500", "1\u202f500"))[0], "rad/s") == pytest.approx(expected)
     spec = changed({"/base/excitation/frequency": "1 500 об/хв", "/base/shaft/inertia": "2·10⁻³ кг·м2"})
     from sprag.service.spec.document import parse_spec
 

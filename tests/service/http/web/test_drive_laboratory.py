@@ -100,7 +100,7 @@ def test_a_clutch_that_cannot_continue_its_engagement_starts_free(office: Office
 def test_what_is_wrong_is_named_by_field(office: Office) -> None:
     answer = office.http.get(OWN, params={"shaft.load": "-1"})
     assert answer.status_code == 422
-    assert "shaft.load: is out of range; got -1; allowed: &gt;= 0 N·m" in answer.text
+    assert "Load torque: is out of range; got -1; allowed: &gt;= 0 N·m" in answer.text
     assert office.http.get(f"{OWN}/picture.svg", params={"shaft.load": "-1"}).status_code == 422
     assert office.http.get(OWN, params={"machine": "mill"}).status_code == 404
     assert office.http.get(f"{OWN}/study", params={"along": "age"}).status_code == 404
