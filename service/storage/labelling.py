@@ -11,6 +11,7 @@ from sprag.service.storage.editions import require_edition
 from sprag.service.storage.listing import Listing
 from sprag.service.storage.searching import search_text
 from sprag.service.storage.tables import STUDIES
+from sprag.service.storage.users import TEXTS, size_of_texts
 from sprag.worker.limits import MAX_TAGS
 
 if TYPE_CHECKING:
@@ -26,12 +27,13 @@ class Labelling(Listing):
     def change_study(self, study_id: str, change: StudyChange, read: Collection[str] | None = None) -> StudyRecord:
         """Change what people write about a study; raises StudyNotFoundError.
 
-        FaultError where it would have more than `MAX_TAGS` tags. ``read``: the editions (`StudyRecord.etag`) that the
+        FaultError where it would have more than `MAX_TAGS` tags, or its longer texts exceed the quota of the present
+        user. ``read``: the editions (`StudyRecord.etag`) that the
         change is meant for; ChangedMeanwhileError for any other.
         """
         c = STUDIES.c
         with self.session.write() as connection:
-            row = self._row(connection, study_id, c.number, c.owner, c.name, c.notes, c.tags, c.archived_at)
+            row = self._row(connection, study_id, c.number, c.owner, c.name, c.notes, c.tags, c.search, c.archived_at)
             require_own("study", study_id, row.owner)
             require_edition("study", study_id, self._study_record(connection, study_id).etag, read)
             name = row.name if change.name is None else change.name
@@ -48,7 +50,10 @@ class Labelling(Listing):
             }
             changed = {field: value for field, value in values.items() if value != getattr(row, field)}
             if changed:
-                self._change(connection, row.number, **changed, search=search_text(name, tags, notes))
+                written = {**changed, "search": search_text(name, tags, notes)}
+                before: dict[str, str] = {field: getattr(row, field) for field in TEXTS if field in written}
+                self._require_quota(connection, 0, size_of_texts(written) - size_of_texts(before))
+                self._change(connection, row.number, **written)
                 detail = {field: value for field, value in changed.items() if field == "name"}
                 if "tags" in changed:
                     detail["tags"] = list(tags)

@@ -48,7 +48,7 @@ from sprag.service.storage.tables import (
     RECORD_COLUMNS,
     STUDIES,
 )
-from sprag.service.storage.users import Users, require_queue
+from sprag.service.storage.users import STUDY_BYTES, Users, require_queue, size_of_texts
 from sprag.service.storage.windows import lift_window
 from sprag.worker import models
 from sprag.worker.chunking import Chunking, spans
@@ -155,7 +155,7 @@ class Studies(Users, Orders, Dispatchers):
                 if earlier is not None:
                     return earlier
             require_queue(connection, queue)
-            size = (row.get("estimated_bytes") or 0) + sum(len(row[name]) for name in ("spec", "study", "warnings"))
+            size = (row.get("estimated_bytes") or 0) + STUDY_BYTES + size_of_texts(values)
             self._require_quota(connection, row["most_cases"] or row["cases"], size)
             values["rank"] = rank_of(connection, priority)
             number = connection.execute(sa.insert(STUDIES).values(values).returning(STUDIES.c.number)).scalar_one()

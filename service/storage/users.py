@@ -6,7 +6,7 @@ A user has no password: users log in with a token of theirs, or a trusted proxy 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
@@ -25,11 +25,16 @@ from sprag.service.storage.view_tables import SAVED_VIEWS
 from sprag.worker.states import TERMINAL
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from datetime import datetime
 
     from sprag.service.settings import Settings
 
 _U = USERS.c
+#: The texts of a study, which people can make long.
+TEXTS: Final = ("name", "spec", "study", "warnings", "notes", "tags", "search")
+#: What the rest of a study takes: its row, its first chunk, its key, and their places in indexes.
+STUDY_BYTES: Final = 1024
 #: Condition: a study has not ended, and is not held at its deadline.
 WAITING_STUDY = STUDIES.c.state.not_in([state.value for state in TERMINAL]) & STUDIES.c.waits_for.is_distinct_from(
     HELD_AT_DEADLINE
@@ -151,7 +156,7 @@ class Users(Part):
             return _usage(connection, name)
 
     def _require_quota(self, connection: sa.Connection, cases: int, size: int) -> None:
-        """Raise FaultError where a new study of that many cases and bytes exceeds a quota of the present user."""
+        """Raise FaultError where that many more cases or bytes exceed a quota of the present user."""
         user = acting().user
         if user is None:
             return
@@ -163,10 +168,10 @@ class Users(Part):
                 "quota-exceeded",
                 f"{cases:,} more cases exceed the quota of {user}: {used.cases:,} of {quota.cases:,} wait already.",
             )
-        if quota.bytes and used.bytes + size > quota.bytes:
+        if size > 0 and quota.bytes and used.bytes + size > quota.bytes:
             raise FaultError(
                 "quota-exceeded",
-                f"The results would take about {_mib(size)} MiB, and {user} has used {_mib(used.bytes)} of "
+                f"That would take about {_mib(size)} MiB more, and {user} has used {_mib(used.bytes)} of "
                 f"{_mib(quota.bytes)} MiB: delete studies for good first; deleted ones that can be restored count too.",
             )
 
@@ -192,14 +197,15 @@ def require_user(connection: sa.Connection, name: str, *, removed: bool = False)
 def _usage(connection: sa.Connection, name: str) -> Usage:
     """What counts against the quota: cases that wait, and what lies on the disk, of deleted studies too.
 
-    A study has its rows, all of them or, once it has ended, those that it got; and the texts that describe it.
+    A study has its rows, all of them or, once it has ended, those that it got; the texts that describe it; and what
+    every study takes.
     """
     c = STUDIES.c
     most = sa.func.coalesce(c.most_cases, c.cases)
     ended = c.state.in_([state.value for state in TERMINAL])
     whole = sa.func.coalesce(c.estimated_bytes, 0)
     rows = sa.case((ended & (most > 0), whole * c.done / sa.func.nullif(most, 0)), else_=whole)
-    texts = sum((sa.func.length(column) for column in (c.spec, c.study, c.warnings)), start=sa.literal(0))
+    texts = sum((_octets(connection, c[name]) for name in TEXTS), start=sa.literal(STUDY_BYTES))
     waits = WAITING_STUDY & c.deleted_at.is_(None)
     row = connection.execute(
         sa.select(
@@ -208,6 +214,18 @@ def _usage(connection: sa.Connection, name: str) -> Usage:
         ).where(c.owner == name)
     ).one()
     return Usage(int(row.cases), int(row.bytes))
+
+
+def size_of_texts(values: Mapping[str, str]) -> int:
+    """Bytes that these texts of a study take, by column; those that are missing are empty."""
+    return sum(len(values.get(name, "").encode()) for name in TEXTS)
+
+
+def _octets(connection: sa.Connection, column: sa.Column[str]) -> sa.ColumnElement[int]:
+    """The length of a text in bytes of UTF-8."""
+    if connection.dialect.name == "postgresql":
+        return sa.func.octet_length(column)
+    return sa.func.length(sa.cast(column, sa.LargeBinary))  # octet_length is missing before SQLite 3.43
 
 
 def _columns(quota: Quota) -> dict[str, int | None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ import sqlalchemy as sa
 from sprag.service.actor import Actor, Door, Role, act_as, acting, of_machine
 from sprag.service.faults import FaultError
 from sprag.service.spec.components import Component
+from sprag.service.spec.labels import StudyChange
 from sprag.service.spec.saved_views import View
 from sprag.service.storage import purging
 from sprag.service.storage.audit import AuditFilter
@@ -22,7 +24,8 @@ from sprag.service.storage.errors import IdempotencyConflictError, NotOwnerError
 from sprag.service.storage.scopes import TokenScope
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import STUDIES
-from sprag.service.storage.users import Quota
+from sprag.service.storage.users import STUDY_BYTES, TEXTS, Quota
+from sprag.worker.limits import MAX_NOTES_LENGTH
 from sprag.worker.states import StudyState
 from tests.contract.filling import create, finish
 from tests.worker import fakes
@@ -167,13 +170,16 @@ def test_quotas_count_what_waits_and_what_is_stored(store: Store) -> None:
         create(store, 30)
     with store.session.write() as connection:
         connection.execute(sa.update(STUDIES).where(STUDIES.c.id == first.id).values(estimated_bytes=900))
-        written = sa.func.length(STUDIES.c.spec) + sa.func.length(STUDIES.c.study) + sa.func.length(STUDIES.c.warnings)
-        texts = connection.execute(sa.select(sa.func.sum(written)).where(STUDIES.c.owner == "dora")).scalar_one()
+        studies = connection.execute(sa.select(STUDIES).where(STUDIES.c.owner == "dora")).mappings().all()
+        texts = sum(STUDY_BYTES + sum(len(study[name].encode()) for name in TEXTS) for study in studies)
     assert (store.usage("dora").cases, store.usage("dora").bytes) == (50, 900 + texts)
-    store.default_quota = Quota(cases=10, bytes=1000 + texts)
+    store.default_quota = Quota(cases=10, bytes=1000 + STUDY_BYTES + texts)
     store.change_user("dora", quota=Quota(cases=0))
     row = {"name": "", "spec": "{}"}
-    with act_as(user("dora")), pytest.raises(FaultError, match=r"about 20,480 MiB, and dora has used 0\.0 of 0\.0 MiB"):
+    with (
+        act_as(user("dora")),
+        pytest.raises(FaultError, match=r"about 20,480 MiB more, and dora has used 0\.0 of 0\.0 MiB"),
+    ):
         store.insert_study({**_row(store), **row, "estimated_bytes": 20 * 2**30})
     with act_as(user("dora")), pytest.raises(FaultError, match="MiB"):
         store.insert_study({**_row(store), **row, "estimated_bytes": 101})
@@ -188,6 +194,45 @@ def test_quotas_count_what_waits_and_what_is_stored(store: Store) -> None:
     with act_as(user("dora")):
         store.insert_study({**_row(store), **row, "estimated_bytes": 1000})
     create(store, 1000)  # of nobody
+
+
+def on_disk(store: Store) -> int:
+    """Bytes of all studies, rows and indexes, as the database has them."""
+    with store.session.read() as connection:
+        if connection.dialect.name == "postgresql":
+            return int(connection.execute(sa.text("SELECT pg_total_relation_size('studies')")).scalar_one())
+        pages, size = (
+            connection.execute(sa.text(f"PRAGMA {name}")).scalar_one() for name in ("page_count", "page_size")
+        )
+        return int(pages * size)
+
+
+@pytest.mark.parametrize(
+    "letters",
+    ["abcdefghijklmnopqrstuvwxyz0123456789", "абвгґдеєжзиіїйклмнопрстуфхцчшщьюя"],
+    ids=["Latin", "Ukrainian"],
+)
+def test_notes_count_as_they_lie_on_the_disk(store: Store, letters: str) -> None:
+    """Of any alphabet; and nobody writes more of them than the quota allows."""
+    store.add_user("dora", Role.DESIGNER)
+    chance = random.Random(5)
+    before = on_disk(store)
+    notes = ["".join(chance.choices(letters, k=MAX_NOTES_LENGTH)) for _ in range(30)]
+    with act_as(user("dora")):
+        made = [create(store, 3) for _ in notes]
+        for study, text in zip(made, notes, strict=True):
+            store.change_study(study.id, StudyChange(notes=text))
+        taken = on_disk(store) - before
+        # PostgreSQL packs long texts, and leaves room between them.
+        most = 2.5 if store.session.on_server else 1.3
+        assert 0.6 < store.usage("dora").bytes / taken < most
+        store.change_user("dora", quota=Quota(bytes=store.usage("dora").bytes))
+        with pytest.raises(FaultError, match="MiB more") as refused:
+            store.change_study(made[0].id, StudyChange(notes=notes[0] + "more"))
+        assert refused.value.code == "quota-exceeded"
+        assert store.get_study(made[0].id).notes == notes[0]
+        for shorter in (notes[0][:-1], "", notes[0]):
+            assert store.change_study(made[0].id, StudyChange(notes=shorter)).notes == shorter
 
 
 def test_an_ended_study_is_restored_over_the_quota_of_cases(store: Store) -> None:

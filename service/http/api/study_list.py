@@ -50,6 +50,7 @@ def list_studies(
         *CHECK_PROBLEMS,
         "study-not-found",
         "precondition-failed",
+        "quota-exceeded",
     ),
     openapi_extra=body(
         {
