@@ -16,7 +16,7 @@ from sprag.service.storage.errors import NothingToRetryError
 from sprag.service.storage.records import StudyRecord, record_of
 from sprag.service.storage.reuse import endings_of
 from sprag.service.storage.tables import CHUNKS, ENDINGS, RECORD_COLUMNS, STUDIES, results_table
-from sprag.service.storage.users import require_queue
+from sprag.service.storage.users import Users, require_queue
 from sprag.worker import models
 from sprag.worker.chunking import MAX_CHUNKS
 from sprag.worker.limits import MAX_WAITING_STUDIES
@@ -51,7 +51,7 @@ class _Done:
     digest: int | None
 
 
-class Retries(Digests):
+class Retries(Users, Digests):
     """Returning failed cases to waiting."""
 
     def retry_study(self, study_id: str, endings: Collection[str] | None = None) -> StudyRecord:
@@ -59,7 +59,7 @@ class Retries(Digests):
 
         All other rows are kept; of a sweep those of lines without such a case. Raises StudyNotFoundError,
         TransitionError when the study has not ended or was cancelled, NothingToRetryError when there is no such case,
-        and FaultError when too many studies wait.
+        and FaultError when too many studies or cases wait.
         """
         c = STUDIES.c
         while True:
@@ -84,6 +84,7 @@ class Retries(Digests):
                 if now.revision != row.revision:  # it was run again or deleted in the meantime
                     continue
                 require_queue(connection, MAX_WAITING_STUDIES)
+                self._require_quota(connection, sum(counts.values()), 0)
                 for chunk in _give_back(connection, row, runs, counts, cases):
                     self.seal(connection, chunk)
                 self._move(connection, row.number, StudyEvent.RETRY)

@@ -52,7 +52,7 @@ from sprag.service.storage.users import STUDY_BYTES, Users, require_queue, size_
 from sprag.service.storage.windows import lift_window
 from sprag.worker import models
 from sprag.worker.chunking import Chunking, spans
-from sprag.worker.limits import MAX_AXIS_VALUES
+from sprag.worker.limits import MAX_AXIS_VALUES, MAX_WAITING_STUDIES
 from sprag.worker.ports import Chunk
 from sprag.worker.states import ChunkState, StudyEvent, StudyState
 from sprag.worker.study import Study
@@ -69,6 +69,7 @@ if TYPE_CHECKING:
 KEPT_STUDIES = 32
 KEPT_VALUES = 2 * MAX_AXIS_VALUES
 _CHANGED = (STUDIES.c.owner, STUDIES.c.revision)
+_LEFT = (STUDIES.c.most_cases, STUDIES.c.cases, STUDIES.c.done)
 
 
 class Studies(Users, Orders, Dispatchers):
@@ -289,7 +290,11 @@ class Studies(Users, Orders, Dispatchers):
         return self._wish(study_id, StudyEvent.PAUSE)
 
     def resume_study(self, study_id: str) -> StudyRecord:
-        """Let a held study continue; raises StudyNotFoundError, TransitionError when it has ended."""
+        """Let a held study continue.
+
+        Raises StudyNotFoundError, TransitionError when it has ended, and FaultError for one that is held at its
+        deadline, which counts as waiting again, when too many studies or cases wait.
+        """
         return self._wish(study_id, StudyEvent.RESUME)
 
     def cancel_study(self, study_id: str) -> StudyRecord:
@@ -299,8 +304,11 @@ class Studies(Users, Orders, Dispatchers):
     @makes_room
     def _wish(self, study_id: str, event: StudyEvent) -> StudyRecord:
         with self.session.write() as connection:
-            row = self._row(connection, study_id, STUDIES.c.number, *_CHANGED, STUDIES.c.waits_for)
+            row = self._row(connection, study_id, STUDIES.c.number, *_CHANGED, STUDIES.c.waits_for, *_LEFT)
             require_own("study", study_id, row.owner)
+            if event is StudyEvent.RESUME and row.waits_for == HELD_AT_DEADLINE:
+                require_queue(connection, MAX_WAITING_STUDIES)
+                self._require_quota(connection, (row.most_cases or row.cases) - row.done, 0)
             self._move(connection, row.number, event)
             if event is StudyEvent.RESUME:
                 self._lift_deadline(connection, row.number)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import timedelta
 from typing import TYPE_CHECKING
 
 import pytest
@@ -13,6 +14,7 @@ from sprag.service.spec.saved_views import View
 from sprag.service.storage.errors import TooManyComponentsError, TooManyViewsError
 from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.study_row import study_row
+from sprag.service.storage.users import Quota
 from sprag.worker.states import StudyState
 from tests.contract.filling import create, finish
 from tests.worker import fakes
@@ -121,3 +123,52 @@ def test_without_users_every_priority_counts(store: Store) -> None:
     with act_as(TOKEN):
         record = submit(store, 100)
     assert ranks(store) == {record.number: (100, 100)}
+
+
+def held_at_deadline(store: Store, clock: fakes.HandClock, count: int) -> list[StudyRecord]:
+    """So many studies of three cases of the present user, held at their deadline."""
+    end = store.clock.now() + timedelta(hours=1)
+    made = [store.create_study({}, fakes.study(3), finish_by=end) for _ in range(count)]
+    clock.seconds += 3601.0
+    epoch = store.take_over("test")
+    for record in made:
+        store.time_is_over(epoch, record.number)
+        assert store.get_study(record.id).time_over
+    return made
+
+
+def test_nobody_fills_the_queue_with_studies_that_were_held_at_their_deadline(
+    office: Store, clock: fakes.HandClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sprag.service.storage.studies.MAX_WAITING_STUDIES", 4, raising=False)
+    with act_as(DORA):
+        made = held_at_deadline(office, clock, 3)
+        for record in made[:2]:
+            assert office.resume_study(record.id).state is StudyState.QUEUED
+            office.pause_study(record.id)
+            office.resume_study(record.id)  # it waits already
+        office.pause_study(made[2].id)
+        with pytest.raises(FaultError) as refused:
+            office.resume_study(made[2].id)
+        assert refused.value.code == "queue-full"
+        assert office.get_study(made[2].id).time_over
+        finish(office, made[0])
+        assert office.resume_study(made[2].id).state is StudyState.QUEUED
+
+
+def test_cases_that_wait_again_count_against_the_quota(office: Store, clock: fakes.HandClock) -> None:
+    """Also of whoever has used up the quota of storage, in which they are already."""
+    with act_as(DORA):
+        (late,) = held_at_deadline(office, clock, 1)
+        failed = create(office, 3)
+        office.change_user("dora", quota=Quota(cases=3, bytes=1))
+        with pytest.raises(FaultError) as refused:
+            office.resume_study(late.id)
+        assert refused.value.code == "quota-exceeded"
+        finish(office, failed, "chatter")
+        assert office.resume_study(late.id).state is StudyState.QUEUED
+        with pytest.raises(FaultError) as refused:
+            office.retry_study(failed.id)
+        assert refused.value.code == "quota-exceeded"
+        finish(office, late)
+        assert office.retry_study(failed.id).state is StudyState.QUEUED

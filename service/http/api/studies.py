@@ -171,7 +171,7 @@ def get_rounds(context: Ctx, study_id: StudyId) -> m.RoundList:
     return {"study": study_id, "rounds": [round_json(found) for found in context.store.rounds(study_id)]}
 
 
-def _verb(name: str, sentence: str) -> None:
+def _verb(name: str, sentence: str, *refused: str) -> None:
     def act(context: Ctx, study_id: StudyId) -> Response:
         wish = {
             "cancel": context.store.cancel_study,
@@ -186,20 +186,26 @@ def _verb(name: str, sentence: str) -> None:
         name=f"{name}_study",
         description=sentence,
         response_model=m.StudySummary,
-        responses=problems("invalid-parameter", "study-not-found", "wrong-state"),
+        responses=problems("invalid-parameter", "study-not-found", "wrong-state", *refused),
     )(act)
 
 
 _verb("cancel", "Stop a study for good: finished cases are kept, the others are not run.")
 _verb("pause", "Hold a study: no new cases are started until it is resumed.")
-_verb("resume", "Resume a study that is held; a past deadline or a closed window no longer applies.")
+_verb(
+    "resume",
+    "Resume a study that is held; a past deadline or a closed window no longer applies. One that is held at its "
+    "deadline waits again and counts against queue and quota.",
+    "queue-full",
+    "not-owner",
+)
 
 
 @router.post(
     "/studies/{study_id:study}:retry",
     status_code=202,
     response_model=m.StudySummary,
-    responses=problems("invalid-parameter", "study-not-found", "wrong-state", "queue-full"),
+    responses=problems("invalid-parameter", "study-not-found", "wrong-state", "queue-full", "not-owner"),
 )
 def retry_study(
     context: Ctx,
