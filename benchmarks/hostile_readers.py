@@ -32,7 +32,7 @@ from sprag.service.storage.sqlite_files import sqlite_driver
 from sprag.service.storage.store import Store
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
 EXPORTS: Final = 45
 STREAMS: Final = 200
@@ -130,7 +130,7 @@ def ranges(place: Place, seconds: float) -> Counter[str]:
 
 
 def streams(place: Place, seconds: float) -> Counter[str]:
-    """Streams of the events of one study that is running."""
+    """Streams of the events of one study that is running, half of them by the reader, as many as it gets."""
     api = httpx.Client(base_url=f"http://127.0.0.1:{place.port}/api/v1", timeout=PATIENCE, trust_env=False)
     with api:
         api.headers["Authorization"] = f"Bearer {place.writer}"
@@ -139,7 +139,8 @@ def streams(place: Place, seconds: float) -> Counter[str]:
         study = f"/studies/{submitted.json()['id']}"
         until(lambda: api.get(study).json()["state"] == "running", "the study is running")
         head = f"GET /api/v1{study}/events HTTP/1.1\r\nHost: localhost\r\n"
-        answers = held(place, STREAMS, f"{head}Authorization: Bearer {place.reader}\r\n\r\n".encode(), seconds)
+        asked = [f"{head}Authorization: Bearer {token}\r\n\r\n".encode() for token in (place.reader, place.writer)]
+        answers = held(place, STREAMS, asked, seconds)
         assert api.get(study).json()["state"] == "running", "it must not end before its streams"
         assert api.post(f"{study}:cancel").status_code == 202
     return answers
@@ -147,15 +148,15 @@ def streams(place: Place, seconds: float) -> Counter[str]:
 
 def half_sent(place: Place, seconds: float) -> Counter[str]:
     """Requests of which the second half never comes."""
-    return held(place, HALF_SENT, b"GET /api/v1/studies HTTP/1.1\r\nHost: local", seconds)
+    return held(place, HALF_SENT, [b"GET /api/v1/studies HTTP/1.1\r\nHost: local"], seconds)
 
 
-def held(place: Place, number: int, sent: bytes, seconds: float) -> Counter[str]:
-    """Connections that send something and are held for a time; how many got an answer by then."""
+def held(place: Place, number: int, sent: Sequence[bytes], seconds: float) -> Counter[str]:
+    """Connections that send one of these each, in turn, and are held for a time; how many got an answer by then."""
     opened = []
-    for _ in range(number):
+    for at in range(number):
         connection = socket.create_connection(("127.0.0.1", place.port), timeout=PATIENCE)
-        connection.sendall(sent)
+        connection.sendall(sent[at % len(sent)])
         opened.append(connection)
     time.sleep(seconds)
     answers: Counter[str] = Counter()

@@ -107,7 +107,10 @@ def limits() -> Iterator[Row]:
     yield told, f"{MAX_PERIODS}"
     yield "studies that have not ended", f"{limit.MAX_WAITING_STUDIES:,}"
     yield "schedules", f"{limit.MAX_SCHEDULES:,}"
-    yield "streams of events", f"{limit.MAX_STREAMS:,}"
+    yield (
+        "streams of events, and those of one token, where tokens are needed",
+        f"{limit.MAX_STREAMS}, {limit.MAX_STREAMS_EACH}",
+    )
     yield "checks, fits and pictures of one token, of all together", f"{limit.MAX_CHECKS_EACH}, {limit.MAX_CHECKS}"
     together = f"{limit.MAX_COMPUTATIONS_EACH}, {limit.MAX_COMPUTATIONS}"
     yield "instantaneous values asked for by one token, by all together", together

@@ -95,8 +95,9 @@ MAX_PRIORITY: Final = 100
 MAX_FINISH_DAYS: Final = 366
 #: Studies that have not ended; a further one is refused.
 MAX_WAITING_STUDIES: Final = 1_000
-#: Streams of events that are open at once.
+#: Streams of events that are open at once, and those of one user or token, where tokens are needed.
 MAX_STREAMS: Final = 200
+MAX_STREAMS_EACH: Final = 100
 #: Simultaneous connections; a further one is answered with 503.
 MAX_CONNECTIONS: Final = 800
 #: Size of the head of a request, which the parser of HTTP would limit to 16 KiB, and of the address in it: the address

@@ -29,6 +29,7 @@ from sprag.worker.limits import (
     MAX_FILES_EACH,
     MAX_STARTS,
     MAX_STREAMS,
+    MAX_STREAMS_EACH,
     SENDING_PROCESSES,
 )
 
@@ -54,8 +55,9 @@ class Context:
     ``checker`` runs the functions that read, expand, fit or draw user input, and ``library`` gives them the store.
     ``writer`` writes files of rows, and ``sending`` are the places for rows that are sent meanwhile. Requests use all
     of them through `sprag.service.http.work`, which enforces the share of each token.
-    ``unaffected`` finds parameters without effect; ``streams`` are the places for event streams, and ``looks`` what
-    these look at. ``ready`` is set when the checker accepts work.
+    ``unaffected`` finds parameters without effect; ``streams`` are the places for event streams,
+    ``stream_shares`` the share of each token of them, and ``looks`` what these look at.
+    ``ready`` is set when the checker accepts work.
     """
 
     settings: Settings
@@ -70,6 +72,7 @@ class Context:
     unaffected: Unaffected = field(default_factory=Unaffected)
     compute_shares: Shares = field(default_factory=lambda: Shares(1, MAX_COMPUTATIONS_EACH, MAX_COMPUTATIONS))
     check_shares: Shares = field(default_factory=lambda: Shares(1, MAX_CHECKS_EACH, MAX_CHECKS))
+    stream_shares: Shares = field(default_factory=lambda: Shares(MAX_STREAMS_EACH, MAX_STREAMS_EACH, MAX_STREAMS))
     file_shares: Shares = field(default_factory=lambda: Shares(1, MAX_FILES_EACH, MAX_FILES))
     looks: Looks = field(default_factory=Looks)
     sending: Semaphore = field(default_factory=lambda: Semaphore(SENDING_PROCESSES))

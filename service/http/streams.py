@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import AsyncIterator, Callable, Hashable
+from contextlib import AsyncExitStack
 from typing import TYPE_CHECKING, Final
 
 from starlette.responses import Response, StreamingResponse
 
+from sprag.service.http.access import ASKING, OPEN
 from sprag.service.http.problems import ApiError
 from sprag.service.json_text import to_bytes
 from sprag.service.storage.errors import StoreError
@@ -34,28 +36,32 @@ async def event_stream(
 ) -> Response:
     """The stream of what has that key, to a client that has ``received`` the event of that mark.
 
-    All streams of a key share one ``look``, which runs in a thread. Raises ApiError where too many streams are open.
+    All streams of a key share one ``look``, which runs in a thread. Raises ApiError where too many streams are open,
+    or too many of the present user or token.
     """
     if context.streams.locked():
         detail = f"{MAX_STREAMS} streams of events are open already."
         raise ApiError("unavailable", detail, headers={"Retry-After": "10"})
-    await context.streams.acquire()
-    return _Stream(context, _events(context, key, look, received, LOOK_SECONDS if seconds is None else seconds))
+    async with AsyncExitStack() as place:
+        grant = ASKING.get() or OPEN
+        if grant is not OPEN:
+            await place.enter_async_context(context.stream_shares.take(grant.share))
+        await place.enter_async_context(context.streams)
+        kept = place.pop_all()
+    return _Stream(kept, _events(context, key, look, received, LOOK_SECONDS if seconds is None else seconds))
 
 
 class _Stream(StreamingResponse):
     """The stream, which releases its place however it ends."""
 
-    def __init__(self, context: Context, content: AsyncIterator[bytes]) -> None:
+    def __init__(self, place: AsyncExitStack, content: AsyncIterator[bytes]) -> None:
         super().__init__(content, media_type=MEDIA_TYPE)
-        self._places = context.streams
+        self._place = place
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send it."""
-        try:
+        async with self._place:
             await super().__call__(scope, receive, send)
-        finally:
-            self._places.release()
 
 
 async def _events(

@@ -28,7 +28,7 @@ LastEventId = Annotated[
     responses={
         **files("Events `progress`, and `end` as the last one.", [MEDIA_TYPE]),
         204: {"description": "The study has ended and the client knows it: it must not reconnect."},
-        **problems("invalid-parameter", "study-not-found"),
+        **problems("invalid-parameter", "study-not-found", "too-many-requests", "unavailable"),
     },
 )
 async def get_events(context: Ctx, study_id: StudyId, last_event_id: LastEventId = None) -> Response:

@@ -19,7 +19,7 @@ from sprag.service.http.problems import ApiError
 from sprag.service.http.threads import ThreadedRoute
 from sprag.service.jobs import row_files
 from sprag.service.storage.scopes import TokenScope
-from sprag.worker.limits import FILE_PROCESSES, MAX_FILES_EACH, SENDING_PROCESSES, WRITING_THREADS
+from sprag.worker.limits import FILE_PROCESSES, MAX_FILES_EACH, MAX_STREAMS_EACH, SENDING_PROCESSES, WRITING_THREADS
 from tests.service.conftest import API, Service
 
 if TYPE_CHECKING:
@@ -386,6 +386,49 @@ def test_one_look_serves_all_streams_of_a_study(
 
     portal.call(follow)
     assert len(seen) < STREAMS
+
+
+@pytest.mark.parametrize("needed", [True, False], ids=["tokens", "no tokens"])
+def test_one_token_has_a_part_of_the_streams(
+    service: Service,
+    needed: bool,
+    request: pytest.FixtureRequest,
+    portal: BlockingPortal,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where no token is needed, nobody can be told from anybody else, and all places are there."""
+    secrets: dict[str, str] = request.getfixturevalue("tokens") if needed else dict.fromkeys(("one", "other"), "")
+    study_id = service.submit()
+
+    async def many() -> None:
+        go_on = anyio.Event()
+
+        async def between_looks(_: float) -> None:
+            await go_on.wait()
+
+        monkeypatch.setattr(looks, "_pause", between_looks)
+        path = f"{API}/studies/{study_id}/events"
+        opened = [asyncio.ensure_future(ask(service, path, secrets["one"])) for _ in range(MAX_STREAMS_EACH)]
+        followed = service.app.state.context.looks._followed
+        await until(lambda: [one.streams for one in followed.values()] == [MAX_STREAMS_EACH])
+        opened.append(asyncio.ensure_future(ask(service, path, secrets["other"])))
+        await until(lambda: [one.streams for one in followed.values()] == [MAX_STREAMS_EACH + 1])
+        further = asyncio.ensure_future(ask(service, path, secrets["one"]))
+        if needed:
+            refused = await further
+            assert (refused.status_code, refused.json()["type"]) == (429, "/problems/too-many-requests")
+            assert refused.headers["retry-after"]
+        else:
+            opened.append(further)
+            await until(lambda: [one.streams for one in followed.values()] == [MAX_STREAMS_EACH + 2])
+        await anyio.to_thread.run_sync(service.fill, study_id)
+        go_on.set()
+        assert {answer.status_code for answer in await asyncio.gather(*opened)} == {200}
+        again = await asyncio.gather(*(ask(service, path, secrets["one"]) for _ in range(3)))
+        assert {answer.status_code for answer in again} == {200}
+
+    portal.call(many)
+    assert not service.app.state.context.stream_shares.requests
 
 
 def test_one_token_has_a_part_of_the_connections(
