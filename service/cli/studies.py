@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from itertools import islice
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -15,8 +15,12 @@ from sprag.service.cli.following import show_study
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
 from sprag.service.cli.remote import act_on, connection
+from sprag.service.faults import FaultError
 from sprag.service.languages import N_, _
 from sprag.worker.states import StudyState
+
+if TYPE_CHECKING:
+    from sprag.service.client import ServiceClient
 
 #: Most studies of one request.
 _PAGE: Final = 100
@@ -104,9 +108,12 @@ def delete(
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Delete a study that has ended, or is held at its deadline; `sprag restore` undoes it for some days."""
+    """Delete a study that has ended, or is held at its deadline; `sprag restore` undoes it for some days.
+
+    With --at-once, one that is deleted already can be named by its whole id, as `sprag list --deleted` has it.
+    """
     with connection(server, token) as client:
-        study = client.study(study_of(client, study_id))
+        study = _to_delete(client, study_id, at_once=at_once)
         described = _(
             "{study} ({name}, {cases} cases)",
             study=study["id"],
@@ -127,6 +134,19 @@ def delete(
         said = _("{what} is deleted", what=described)
         undone = _("`sprag restore {study}` undoes it", study=study["id"])
         say(said if at_once else f"{said}; {undone}")
+
+
+def _to_delete(client: ServiceClient, text: str, *, at_once: bool) -> dict[str, Any]:
+    """The study that is meant; ``at_once``: also one that is deleted and can be restored, by its whole id."""
+    study_id = study_of(client, text)
+    try:
+        return client.study(study_id)
+    except FaultError as error:
+        if at_once and error.code == "study-not-found":
+            for study in client.studies([("search", study_id), ("deleted", "true")]):
+                if study["id"] == study_id:
+                    return study
+        raise
 
 
 def restore(

@@ -92,6 +92,26 @@ def test_a_study_is_deleted_after_asking(service: Service, sprag: Sprag, here: N
     assert service.http.get(f"{API}/studies/{study_id}").status_code == 404
 
 
+def test_a_deleted_study_is_deleted_for_good_by_its_whole_id(
+    service: Service, sprag: Sprag, here: None, spec: dict[str, Any]
+) -> None:
+    kept, gone = (submit(service, spec, name) for name in ("kept", "old"))
+    for study_id in (kept, gone):
+        service.fill(study_id)
+        cases = service.get(f"/studies/{study_id}")["progress"]["done"]
+        assert sprag("delete", study_id, "--yes").code == 0
+    for named in ("old", gone[:-1], "st_0000000000000000"):  # names and beginnings mean studies that are there
+        assert sprag("delete", named, "--yes", "--at-once").code == 2, named
+    assert sprag("delete", gone, "--yes").code == 2
+    assert sprag("restore", gone).code == 0
+    assert sprag("delete", gone, "--yes").code == 0
+    assert sprag("delete", gone, "--at-once", "--json").code == 2, "nobody can be asked here"
+    done = sprag("delete", gone, "--yes", "--at-once")
+    assert (done.code, done.out + done.err) == (0, f"{gone} (old, {cases} cases) is deleted\n")
+    assert sprag("restore", gone).code == 2
+    assert [study["id"] for study in json.loads(sprag("list", "--deleted", "--json").out)["studies"]] == [kept]
+
+
 def test_a_case_and_its_motions(
     service: Service, sprag: Sprag, here: None, spec: dict[str, Any], tmp_path: Path
 ) -> None:
