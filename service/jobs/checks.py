@@ -23,7 +23,7 @@ from sprag.service.results.selection import locate_axes
 from sprag.service.schedules.fields import ScheduleFields, change_fields, read_fields
 from sprag.service.spec import units
 from sprag.service.spec.components import Component, read_components
-from sprag.service.spec.document import accepted, load_spec, parse_spec
+from sprag.service.spec.document import load_spec, parse_spec
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.labels import StudyChange, read_change
 from sprag.service.spec.longer import longer_spec
@@ -31,6 +31,7 @@ from sprag.service.spec.machine.shaft_check import compile_elsewhere
 from sprag.service.spec.narrow import narrowed_spec, swept_axis
 from sprag.service.spec.report import SpecError
 from sprag.service.spec.saved_views import View, ViewChange, read_view, read_view_change
+from sprag.service.spec.stored import accepted
 from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.pool.child_process import uncounted
@@ -127,7 +128,8 @@ def extended_study(
 ) -> Submission:
     """A study extended by the body of a request; raises SpecError and StudyNotFoundError."""
     store = library.store
-    parsed = parse_extended(accepted(store.spec(study_id)), store.study(study_id), load_spec(content, form))
+    study = store.study(study_id)
+    parsed = parse_extended(accepted(store.spec(study_id), study), study, load_spec(content, form))
     return submission(parsed, store, now, finish_by=finish, given=given)
 
 
@@ -144,9 +146,10 @@ def longer_study(
     There must be at least one. Raises SpecError and StudyNotFoundError.
     """
     store = library.store
-    named = {"regime" if models.is_settled(store.study(study_id).run) else "flag": kind}
+    study = store.study(study_id)
+    named = {"regime" if models.is_settled(study.run) else "flag": kind}
     cases = store.cases_of_kind(study_id, **named)
-    parsed = parse_spec(longer_spec(accepted(store.spec(study_id)), store.study(study_id), cases, at_most))
+    parsed = parse_spec(longer_spec(accepted(store.spec(study_id), study), study, cases, at_most))
     return submission(parsed, store, now, given=given)
 
 
@@ -177,7 +180,7 @@ def narrowed_study(
         cases, indices = cases[indices[axis] == index], tuple(one[indices[axis] == index] for one in indices)
     if not cases.size:
         raise FaultError("wrong-state", "No case of the study has the flag jumped" + (" there." if fixed else "."))
-    parsed = parse_spec(narrowed_spec(accepted(store.spec(study_id)), study, cases, steps, fixed))
+    parsed = parse_spec(narrowed_spec(accepted(store.spec(study_id), study), study, cases, steps, fixed))
     return submission(parsed, store, now, given=given)
 
 

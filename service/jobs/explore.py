@@ -18,7 +18,7 @@ from sprag.service.results.figures.read import read_figure
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.selection import refused
 from sprag.service.spec.design import points_spec
-from sprag.service.spec.document import accepted
+from sprag.service.spec.stored import accepted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -116,7 +116,7 @@ def selection_spec(library: Library, study_id: str, query: ExploreQuery) -> dict
     if not cases:
         raise refused("where", "empty", "no case is selected")
     try:
-        return points_spec(accepted(library.store.spec(study_id)), found.study, cases)
+        return points_spec(accepted(library.store.spec(study_id), found.study), found.study, cases)
     except ValueError as error:
         raise refused("study", "nothing-varies", "no parameter of this study varies") from error
 

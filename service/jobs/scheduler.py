@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from sprag.service.storage.schedule_runs import OpenRun, ScheduleRecord
     from sprag.service.storage.store import Store
     from sprag.service.storage.windows import BoundStudy
+    from sprag.worker.study import Study
 
 _LOG = logging.getLogger("sprag.schedules")
 
@@ -119,13 +120,14 @@ class Scheduler(PollingThread):
 
         from sprag.service.faults import FaultError
         from sprag.service.jobs.submission import accept
-        from sprag.service.spec.document import accepted, parse_spec
+        from sprag.service.spec.document import parse_spec
         from sprag.service.spec.report import SpecError
+        from sprag.service.spec.stored import accepted
 
         if not self._may_overlap(run):
             return
         try:
-            parsed = parse_spec(accepted(run.fields.spec))
+            parsed = parse_spec(accepted(run.fields.spec, self._latest(run)))
             if run.fields.name:
                 parsed = replace(parsed, study=replace(parsed.study, name=run.fields.name))
             fields = run.fields
@@ -145,6 +147,14 @@ class Scheduler(PollingThread):
             return
         self._next_try.pop((run.schedule, run.due), None)
         _LOG.info("The schedule %s was due: study %s.", run.id, study.id)
+
+    def _latest(self, run: OpenRun) -> Study | None:
+        """The study of the last due time of that schedule that has one."""
+        study_id = self._store.latest_study(run)
+        try:
+            return None if study_id is None else self._store.study(study_id)
+        except StudyNotFoundError:  # deleted in the meantime
+            return None
 
     def _may_overlap(self, run: OpenRun) -> bool:
         """Apply the policy for earlier studies that have not ended; False where the run is skipped."""

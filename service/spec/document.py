@@ -6,7 +6,6 @@ Its parts are the modules beside it (`text`, `units`, `run`, `warnings`, the `re
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
@@ -18,23 +17,20 @@ from sprag.service.spec.derive import check_derived, layout, read_machine
 from sprag.service.spec.draws.tolerances import read_tolerances, warn_of_invalid_drives, with_drives
 from sprag.service.spec.fields import TOLERANCE_FIELDS, read_object
 from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.numbers import has_doubtful_point, with_decimal
 from sprag.service.spec.plan.outline import Outline, chooses, first_round, read_outline
 from sprag.service.spec.report import Report, SpecError, did_you_mean
 from sprag.service.spec.starts import read_starts
 from sprag.service.spec.text import Format, load_spec
-from sprag.service.spec.together import AMBIGUOUS_UNIT
 from sprag.worker import models
 from sprag.worker.limits import MAX_NAME_LENGTH
 from sprag.worker.study import Study
 
 if TYPE_CHECKING:
-    from sprag.service.faults import Fault
     from sprag.service.spec.machine.machine import Machine
     from sprag.worker.models import ClutchFit
     from sprag.worker.study import Combine
 
-__all__ = ["VERSION", "ParsedSpec", "SpecError", "accepted", "format_of", "load_spec", "parse_spec"]
+__all__ = ["VERSION", "ParsedSpec", "SpecError", "format_of", "load_spec", "parse_spec"]
 
 #: The supported version of the spec.
 VERSION: Final = 1
@@ -126,54 +122,6 @@ def parse_spec(data: object) -> ParsedSpec:
         warn_of_invalid_drives(report, study)
     part.warn(report, study)
     return ParsedSpec(study, tuple(report.warnings), machine.fits, dict(found))
-
-
-def accepted(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """A spec that was accepted before, without what is asked about now.
-
-    Earlier versions read bare numbers beside quantities of another scale as SI, and points that could separate
-    thousands as decimal points, so that is what they are: their unit and a further decimal are written.
-    """
-    settled: dict[str, Any] = dict(spec)
-    while unclear := _unclear(settled):
-        settled = copy.deepcopy(settled)
-        for fault in unclear:
-            *parents, last = (part.replace("~1", "/").replace("~0", "~") for part in (fault.where or "").split("/")[1:])
-            place: Any = settled
-            for key in parents:
-                place = place[int(key)] if isinstance(place, list) else place[key]
-            index: Any = int(last) if isinstance(place, list) else last
-            if fault.code == AMBIGUOUS_UNIT:
-                place[index] = f"{place[index]!r} {fault.unit}"
-            else:
-                place[index] = with_decimal(place[index], str(fault.value))
-    return settled
-
-
-def _unclear(spec: Mapping[str, Any]) -> list[Fault]:
-    """The faults of bare numbers beside quantities of another scale, and of points that could separate thousands."""
-    if not _mixed(spec) and not _grouped(spec):
-        return []
-    try:
-        parse_spec(spec)
-    except SpecError as error:
-        return [fault for fault in error.faults if fault.code in {AMBIGUOUS_UNIT, "ambiguous-point"}]
-    return []
-
-
-def _grouped(data: object) -> bool:
-    """Whether a text has a point that could separate thousands."""
-    if isinstance(data, str):
-        return has_doubtful_point(data)
-    items = data.values() if isinstance(data, Mapping) else data if isinstance(data, list) else ()
-    return any(map(_grouped, items))
-
-
-def _mixed(data: object) -> bool:
-    """Whether a list, rows or an object have both numbers and texts."""
-    items = list(data.values()) if isinstance(data, Mapping) else data if isinstance(data, list) else []
-    every = [part for item in items for part in (item if isinstance(item, list) else [item])]
-    return {str} < {type(item) for item in every} & {str, int, float} or any(map(_mixed, items))
 
 
 def _read_version(report: Report, found: Mapping[str, Any]) -> None:

@@ -133,6 +133,11 @@ def has_doubtful_point(text: str) -> bool:
     return _DOUBTFUL.search(text) is not None
 
 
+def with_decimals(text: str) -> str:
+    """``text`` with a further decimal in each number whose point could separate thousands, which is decimal then."""
+    return _DOUBTFUL.sub(r"\g<0>0", text)
+
+
 def with_decimal(text: str, cell: str) -> str:
     """``text`` with a further decimal in each number ``cell``, which makes its point a decimal one."""
     return re.sub(

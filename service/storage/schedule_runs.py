@@ -177,6 +177,19 @@ class ScheduleRuns(RunOutcomes):
         with self.session.read() as connection:
             return list(connection.execute(query).scalars())
 
+    def latest_study(self, run: OpenRun) -> str | None:
+        """Id of the study of the last earlier due time of that schedule that has one."""
+        c = STUDIES.c
+        query = (
+            sa.select(c.id)
+            .join_from(SCHEDULE_RUNS, STUDIES, c.number == _R.study)
+            .where(_R.schedule == run.schedule, _R.due < run.due, c.deleted_at.is_(None))
+            .order_by(_R.due.desc())
+            .limit(1)
+        )
+        with self.session.read() as connection:
+            return connection.execute(query).scalar_one_or_none()
+
     @staticmethod
     def _runs(connection: sa.Connection, number: int, most: int) -> tuple[RunRecord, ...]:
         rows = connection.execute(

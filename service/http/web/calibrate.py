@@ -22,8 +22,8 @@ from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.results.reading import Reading
 from sprag.service.spec.catalogue import unit_of
-from sprag.service.spec.document import accepted
 from sprag.service.spec.fields import WHICH_CASES
+from sprag.service.spec.stored import accepted
 from sprag.worker import models
 from sprag.worker.limits import MAX_NAME_LENGTH
 from sprag.worker.planning.calibrate.plan import LOSSES
@@ -49,7 +49,8 @@ async def send_points(context: Ctx, work: Attended, values: Form) -> Response:
     """Submit the calibration, or show what is wrong with it."""
     study_id = values.get("study", "")
     spec = await in_thread(context.store.spec, study_id)
-    content = json.dumps(calibration_spec(await in_thread(accepted, spec), values)).encode()
+    study = await in_thread(context.store.study, study_id)
+    content = json.dumps(calibration_spec(await in_thread(accepted, spec, study), values)).encode()
     try:
         made = await work.check(
             checks.new_study, context.library, content, "json", False, None, context.store.clock.now(), {}

@@ -28,8 +28,8 @@ from sprag.service.languages import N_
 from sprag.service.presets import preset_names
 from sprag.service.schedules.fields import ScheduleFields, change_fields
 from sprag.service.schedules.report_to import require_deliverable
-from sprag.service.spec.document import accepted
 from sprag.service.spec.report import SpecError
+from sprag.service.spec.stored import accepted
 from sprag.service.storage.errors import ChangedMeanwhileError, StudyNotFoundError, TooManySchedulesError
 from sprag.service.zones import zones
 from sprag.worker.limits import MAX_PRIORITY
@@ -192,7 +192,7 @@ def _data_of(context: Context, values: Mapping[str, str]) -> dict[str, Any]:
     data[when] = values.get(when, "").strip() or None
     kind, _, name = values.get("source", "").partition(" ")
     if kind == "study":
-        data["spec"] = accepted(context.store.spec(name))
+        data["spec"] = accepted(context.store.spec(name), context.store.study(name))
     elif kind == "preset" and name in preset_names():
         data["spec"] = preset_of(name)["spec"]
     return data

@@ -134,7 +134,11 @@ async def shown_study(
     with what is ``untaken`` of it.
     """
     spec = await in_thread(context.store.spec, study_id)
-    fits = await work.check(fits_of, spec) if has_measured_clutch(spec) else {}
+    fits = (
+        await work.check(fits_of, spec, await in_thread(context.store.study, study_id))
+        if has_measured_clutch(spec)
+        else {}
+    )
     usual, many = await in_thread(_usual_curves, context, study_id)
     asked = (context.library, study_id, work.request.query_params.multi_items(), usual, CHOICE.get())
     view = await (work.check(answers_view, *asked) if many else in_thread(answers_view, *asked))

@@ -79,6 +79,26 @@ def test_a_look_asks_one_question_where_there_are_no_schedules(service: Service,
     assert names(service.store) == ["nightly"]
 
 
+def test_a_schedule_from_before_goes_on_as_before(
+    service: Service, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A table that an earlier version read with decimal points beside decimal commas."""
+    old, then = (
+        {**SPEC, "axes": [{"points": f"gravity [mm/s^2];shaft.load [N*mm]\n{rows}"}], "combine": "zip"}
+        for rows in ("20.000;100,5\n25.000;100,5\n", "20;100.5\n25;100.5\n")
+    )
+    store, look = service.store, Scheduler(service.store).look
+    store.create_schedule(read_fields({"spec": old, "cron": "0 22 * * *"}, NEW_YEAR))
+    with monkeypatch.context() as patch:
+        patch.setattr("sprag.service.spec.stored.accepted", lambda *_: then)
+        clock.set("2026-01-01T22:00")
+        look()
+    clock.set("2026-01-02T22:00")
+    look()
+    made = [store.study(study.id) for study in store.list_studies().studies]
+    assert [study.columns(range(2))["gravity"].tolist() for study in made] == [pytest.approx([0.020, 0.025])] * 2
+
+
 def test_missed_times_become_one_run(service: Service, clock: Clock) -> None:
     kept = service.store.create_schedule(fields(cron="0 * * * *"))
     clock.set("2026-01-01T05:20")

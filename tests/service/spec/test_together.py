@@ -25,8 +25,9 @@ from sprag.service.results.selection import locate_values
 from sprag.service.results.tolerances.conditions import read_conditions
 from sprag.service.results.trajectories import span
 from sprag.service.spec.components import faults_of
-from sprag.service.spec.document import accepted, parse_spec
+from sprag.service.spec.document import parse_spec
 from sprag.service.spec.extend import parse_extended
+from sprag.service.spec.stored import accepted
 from sprag.service.spec.together import question, with_last_unit
 from sprag.worker import models
 from sprag.worker.chunking import Chunking

@@ -26,11 +26,12 @@ from sprag.service.results.reading import CLUTCH, Choice, Reading, reading_for
 from sprag.service.results.wording import duration, unit_text
 from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
 from sprag.service.spec.derive import with_values
-from sprag.service.spec.document import ParsedSpec, SpecError, accepted, load_spec, parse_spec
+from sprag.service.spec.document import ParsedSpec, SpecError, load_spec, parse_spec
 from sprag.service.spec.machine.clutch import read_clutch
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
 from sprag.service.spec.numbers import assumption, settle
 from sprag.service.spec.report import Report
+from sprag.service.spec.stored import accepted
 from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker.models import WarningText
 
@@ -268,12 +269,13 @@ def has_measured_clutch(spec: Mapping[str, Any]) -> bool:
     return any(isinstance(clutch, dict) and "data" in clutch for clutch in clutches)
 
 
-def fits_of(spec: dict[str, Any]) -> dict[str, tuple[ClutchFitReport, FitChart]]:
-    """Report and picture of each clutch law that the spec gives as measured data, by their JSON Pointers."""
+def fits_of(spec: dict[str, Any], study: Study) -> dict[str, tuple[ClutchFitReport, FitChart]]:
+    """Report and picture of each clutch law that the spec of a ``study`` gives as measured data, by JSON Pointer."""
     # The fit is not stored, because it follows from the spec exactly.
     found = {}
+    spec = accepted(spec, study)
     alone = {key: value for key, value in spec.items() if key in ("sprag", "model", "name", "base", "derive", "run")}
-    parsed = parse_spec(accepted(alone))
+    parsed = parse_spec(alone)
     for pointer, fit in parsed.fits.items():
         known = backlashes(_with_derived(spec, parsed.study), pointer)
         found[pointer] = (fit_json(fit), fit_chart(fit, clutch_at(spec, pointer), known[0] if known else 0.0))

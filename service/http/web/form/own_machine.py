@@ -14,9 +14,10 @@ from sprag.service.http.views import preset_of
 from sprag.service.http.web.form.check import message
 from sprag.service.spec.derive import with_values
 from sprag.service.spec.design import design_spec
-from sprag.service.spec.document import accepted, parse_spec
+from sprag.service.spec.document import parse_spec
 from sprag.service.spec.fields import WHICH_CASES
 from sprag.service.spec.report import SpecError
+from sprag.service.spec.stored import accepted
 from sprag.worker import models
 from sprag.worker.limits import MAX_ADDRESS_BYTES
 

@@ -63,8 +63,9 @@ from sprag.service.presets import preset_names
 from sprag.service.results.places import place_text
 from sprag.service.results.reading import Reading
 from sprag.service.spec.design import design_spec
-from sprag.service.spec.document import UNNAMED, accepted
+from sprag.service.spec.document import UNNAMED
 from sprag.service.spec.report import SpecError
+from sprag.service.spec.stored import accepted
 from sprag.worker import models
 from sprag.worker.models import MAX_PENDULUMS
 
@@ -139,9 +140,10 @@ def _start(
     if clone is not None and case is not None:
         study = study_with(context, clone, case)
         known = along is None or (along in study.base and along not in study.derive)
-        return design_spec(accepted(context.store.spec(clone)), study, case, along if known else None)
+        return design_spec(accepted(context.store.spec(clone), study), study, case, along if known else None)
     if clone is not None:
-        spec, name = accepted(context.store.spec(clone)), context.store.get_study(clone).name
+        name = context.store.get_study(clone).name
+        spec = accepted(context.store.spec(clone), context.store.study(clone))
         # A study that was given another name is cloned under that.
         return spec if spec.get("name", UNNAMED) == name else {**spec, "name": name}
     if preset is None:

@@ -1,0 +1,120 @@
+"""Specs that were accepted before: they are read as they were read then, whatever is asked about in new ones."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from sprag.service.spec.document import parse_spec
+from sprag.service.spec.numbers import has_doubtful_point, with_decimal, with_decimals
+from sprag.service.spec.report import SpecError
+from sprag.service.spec.together import AMBIGUOUS_UNIT
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from sprag.service.faults import Fault
+    from sprag.worker.study import Study
+
+#: Numbers farther apart than this (relative) were read differently, and not only computed by another version.
+_APART: Final = 1e-3
+
+
+def accepted(spec: Mapping[str, Any], study: Study | None = None) -> dict[str, Any]:
+    """A spec that was accepted before, without what is asked about now.
+
+    Earlier versions read bare numbers beside quantities of another scale as SI, and points that could separate
+    thousands as decimal points, so that is what they are: their unit and a further decimal are written. Beside decimal
+    commas such points separate thousands, unless the ``study`` that is stored with the spec shows that they were
+    decimal.
+    """
+    settled = _settled(spec)
+    if study is None or not any(map(has_doubtful_point, _texts(settled))):
+        return settled
+    earlier = {name: value if name == "name" else _with_decimals(value) for name, value in settled.items()}
+    return earlier if _unlike(earlier, study) < _unlike(settled, study) else settled
+
+
+def _settled(spec: Mapping[str, Any]) -> dict[str, Any]:
+    settled: dict[str, Any] = dict(spec)
+    while unclear := _unclear(settled):
+        settled = copy.deepcopy(settled)
+        for fault in unclear:
+            *parents, last = (part.replace("~1", "/").replace("~0", "~") for part in (fault.where or "").split("/")[1:])
+            place: Any = settled
+            for key in parents:
+                place = place[int(key)] if isinstance(place, list) else place[key]
+            index: Any = int(last) if isinstance(place, list) else last
+            if fault.code == AMBIGUOUS_UNIT:
+                place[index] = f"{place[index]!r} {fault.unit}"
+            else:
+                place[index] = with_decimal(place[index], str(fault.value))
+    return settled
+
+
+def _unclear(spec: Mapping[str, Any]) -> list[Fault]:
+    """The faults of bare numbers beside quantities of another scale, and of points that could separate thousands."""
+    if not _mixed(spec) and not any(map(has_doubtful_point, _texts(spec))):
+        return []
+    try:
+        parse_spec(spec)
+    except SpecError as error:
+        return [fault for fault in error.faults if fault.code in {AMBIGUOUS_UNIT, "ambiguous-point"}]
+    return []
+
+
+def _mixed(data: object) -> bool:
+    """Whether a list, rows or an object have both numbers and texts."""
+    items = list(data.values()) if isinstance(data, Mapping) else data if isinstance(data, list) else []
+    every = [part for item in items for part in (item if isinstance(item, list) else [item])]
+    return {str} < {type(item) for item in every} & {str, int, float} or any(map(_mixed, items))
+
+
+def _texts(data: object) -> Iterator[str]:
+    """Every text of some JSON data."""
+    if isinstance(data, str):
+        yield data
+    for item in data.values() if isinstance(data, Mapping) else data if isinstance(data, list) else ():
+        yield from _texts(item)
+
+
+def _with_decimals(data: Any) -> Any:
+    """Some JSON data with a further decimal in each number whose point could separate thousands."""
+    if isinstance(data, str):
+        return with_decimals(data)
+    if isinstance(data, Mapping):
+        return {name: _with_decimals(value) for name, value in data.items()}
+    return list(map(_with_decimals, data)) if isinstance(data, list) else data
+
+
+def _unlike(spec: Mapping[str, Any], study: Study) -> float:
+    """How many numbers of the study that a spec describes are others than in the stored one; infinity for a wrong spec.
+
+    Only what both have counts: a study that chooses its own cases has got more of them, and later versions have
+    parameters that earlier ones did not have.
+    """
+    try:
+        made = parse_spec(spec).study
+    except SpecError:
+        return math.inf
+    pairs = [(new.array[: len(old)], old.array[: len(new)]) for new, old in zip(made.axes, study.axes, strict=False)]
+    new, old = (
+        dict(_numbers([each.base, each.run, each.structure, each.plan, each.spread and each.spread.to_json()]))
+        for each in (made, study)
+    )
+    both = [place for place in new if place in old]
+    pairs.append((np.array([new[place] for place in both]), np.array([old[place] for place in both])))
+    return float(sum(np.count_nonzero(~np.isclose(one, other, _APART, 0.0)) for one, other in pairs))
+
+
+def _numbers(data: object, place: tuple[object, ...] = ()) -> Iterator[tuple[tuple[object, ...], float]]:
+    """The numbers of some JSON data with their places."""
+    if isinstance(data, int | float):
+        yield place, float(data)
+    items = data.items() if isinstance(data, Mapping) else enumerate(data) if isinstance(data, list | tuple) else ()
+    for key, item in items:
+        yield from _numbers(item, (*place, key))
