@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from enum import StrEnum
@@ -93,19 +93,20 @@ def backup(
     db: Database = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Write a consistent copy of the database while others continue to use it."""
+    """Write a consistent copy of the database while others use it. Exit code 3: rows in it changed on the disk."""
     from sprag.service.storage.maintenance import backup as write_copy
 
     target = Path(file)
     if target.exists():
         raise WrongInputError("file-exists", _("{file}: exists already; a backup never replaces a file", file=file))
     with _opened(db) as session:
-        write_copy(session, target)
+        problems = write_copy(session, target)
     size = target.stat().st_size
     if as_json:
-        write_json({"database": session.location, "backup": str(target), "bytes": size})
+        write_json({"database": session.location, "backup": str(target), "bytes": size, "problems": problems})
     else:
         say(_("{file}: {size} bytes, a copy of {database}", file=file, size=size, database=session.location))
+    _tell_damaged(problems)
 
 
 @app.command()
@@ -150,7 +151,7 @@ def move(
     """Copy the whole database into another one, SQLite or PostgreSQL, and compare every row; stop Sprag first.
 
     The source stays as it is. An interrupted move is continued by the same command. Schedules and reports of the target
-    are off until `sprag db adopt`.
+    are off until `sprag db adopt`. Exit code 3: rows in it changed on the disk, and were copied as they are.
     """
     from sprag.service.jobs.dispatching import owner_name
     from sprag.service.storage.moving import move as move_all
@@ -165,6 +166,7 @@ def move(
         places = {"target": other.location, "source": source.location}
         print(_("{target} has every row of {source}; use it with --db from now on", **places))
         say(_("its schedules and reports are off until `sprag db adopt`; no longer start {source}", **places))
+    _tell_damaged(moved.problems)
 
 
 @app.command()
@@ -201,6 +203,15 @@ def audit(
         raise WrongInputError("invalid-parameter", _("invalid option"), named) from error
     with named_store(db, quiet=False) as store:
         write_pieces(output, audit_pieces(store.audit_rows(wanted), form.value))
+
+
+def _tell_damaged(problems: Sequence[str]) -> None:
+    """Name rows that changed since they were stored and end with exit code 3; without any nothing happens."""
+    for problem in problems:
+        say(problem)
+    if problems:
+        say(_("the copy has these rows as they are; Sprag finds them there, too, and runs them again"))
+        raise typer.Exit(ExitCode.TROUBLE)
 
 
 @contextmanager

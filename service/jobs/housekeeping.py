@@ -23,7 +23,7 @@ REST_TIMES: Final = 50.0
 
 
 class Scrubbing:
-    """Looks over the rows of one ended study after the other, and has those run again that changed on the disk.
+    """Looks over the rows of one study after the other, and has those run again that changed on the disk.
 
     One study at a time, when `Housekeeping` asks, but resting for `REST_TIMES` as long as it took; after the last one
     it begins anew.
@@ -46,13 +46,10 @@ class Scrubbing:
             self._next = now + REST_TIMES * (now - began)
 
     def _look(self) -> None:
-        found = self._store.ended_after(self._last)
+        found = self._store.with_rows_after(self._last)
         self._last = 0 if found is None else found[0]
-        if found is None:
-            return
-        for damaged in self._store.run_damaged_again(found[1]):
-            text = str(damaged)
-            _LOG.error("%s%s: they are run again.", text[:1].upper(), text[1:])
+        if found is not None:
+            self._store.run_damaged_again(found[1])
 
 
 class Housekeeping(threading.Thread):

@@ -15,24 +15,12 @@ if TYPE_CHECKING:
     from sprag.service.results.curves import Curve, CurveQuery, Curves, Map
     from sprag.service.storage.store import Store
 
-#: Most cases of a study whose rows are looked over before its first curve.
-LOOKED_OVER: Final = 20_000
 #: Further motions of each case that a picture marks.
 _MOST_FURTHER: Final = 4
 
 
-def _require_undamaged(store: Store, study_id: str) -> None:
-    """Raise DatabaseError where rows of an ended study changed on the disk.
-
-    Larger studies than `LOOKED_OVER` are left to the housekeeping: nobody waits for a curve until all rows are read.
-    """
-    if store.get_study(study_id).cases <= LOOKED_OVER:
-        store.require_undamaged(study_id)
-
-
 def stored_curves(store: Store, study_id: str, query: CurveQuery) -> Curves:
     """The curves of a study; raises StudyNotFoundError, and SelectionError as `select` does."""
-    _require_undamaged(store, study_id)
     study = store.study(study_id)
     selection = select(study, models.study_results(study), query)
     return draw(selection, partial(store.rows_for_cases, study_id, number=query.number))
@@ -54,7 +42,6 @@ def drawn_curves(store: Store, study_id: str, query: CurveQuery) -> Curves:
 
 def stored_map(store: Store, study_id: str, query: CurveQuery) -> Map:
     """The map of the one result of ``query`` over its x and its one axis of by; raises as `stored_curves` does."""
-    _require_undamaged(store, study_id)
     study = store.study(study_id)
     fetch = partial(store.rows_for_cases, study_id, number=query.number)
     return draw_map(study, models.study_results(study), query.x, query.by[0], query.y[0], query.at, fetch)

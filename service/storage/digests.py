@@ -1,25 +1,25 @@
 """Digests of rows: flipped bits in stored results are noticed, whatever the database thinks of its pages.
 
-Each finished chunk has the sum of a hash of each of its rows, so that rows may be read in any order. The hash is
-multilinear in the 64-bit patterns of a row's numbers: with odd factors, a change of one number always changes it.
+Each finished chunk has the sum of the hashes of its rows (`sprag.service.storage.row_hashes`).
 """
 
 from __future__ import annotations
 
-import hashlib
+import logging
 from dataclasses import dataclass
-from functools import lru_cache
+from threading import Lock
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import sqlalchemy as sa
-from cachetools import LRUCache
+from cachetools import TTLCache
 
 from sprag.service.storage.audit import note
 from sprag.service.storage.cases import conditions
 from sprag.service.storage.columns import as_number, records
 from sprag.service.storage.errors import DatabaseError
 from sprag.service.storage.order import Orders
+from sprag.service.storage.row_hashes import digest_of, row_words
 from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES, further_table, results_table
 from sprag.worker import models
 from sprag.worker.ports import Chunk
@@ -30,18 +30,23 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from sprag.service.storage.row_hashes import Words
     from sprag.service.storage.session import Session
     from sprag.worker.ports import Clock
 
-    Words = NDArray[np.uint64]
+_LOG = logging.getLogger("sprag.digests")
 
+#: Most cases whose rows are looked over before an answer about a study is given; housekeeping looks over the rest.
+LOOKED_OVER: Final = 20_000
+#: Finished chunks that a process keeps in memory as looked over.
+_KEPT: Final = 50_000
+#: Seconds after which a process looks at rows again.
+_AGAIN: Final = 600.0
 #: What reading flipped bits as numbers, cases and texts may raise.
 _UNREADABLE: Final = (ValueError, TypeError, OverflowError, IndexError, sa.exc.DBAPIError)
 #: Rows that are read at once.
 _PART: Final = 5_000
-_MIX_A: Final = np.uint64(0xFF51AFD7ED558CCD)
-_MIX_B: Final = np.uint64(0xC4CEB9FE1A85EC53)
-_FURTHER: Final = np.uint64(0x9E3779B97F4A7C15)
+_CANCELLED: Final = frozenset({StudyState.CANCELLING, StudyState.CANCELLED})
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,75 +63,21 @@ class DamagedRows:
         return f"the rows of the study {self.study}, {cases}, are not those that were stored"
 
 
-@lru_cache(maxsize=64)
-def _factors(count: int) -> Words:
-    """Odd factors, one for each word of a row, always the same."""
-    text = b"".join(hashlib.blake2b(f"row {index}".encode(), digest_size=8).digest() for index in range(count))
-    return np.frombuffer(text, dtype="<u8").astype(np.uint64) | np.uint64(1)
-
-
-@lru_cache(maxsize=4096)
-def _text_word(ending: str, flags: str) -> int:
-    return int.from_bytes(hashlib.blake2b(f"{ending}\n{flags}".encode(), digest_size=8).digest(), "little")
-
-
-def _text_words(endings: Sequence[str], flags: Sequence[str]) -> Words:
-    """A word for the ending and the flags of each row; one for all where they are the same, which is faster."""
-    if len(endings) and all(list(texts).count(texts[0]) == len(texts) for texts in (endings, flags)):
-        return np.array(_text_word(endings[0], flags[0]), dtype=np.uint64)
-    pairs = zip(endings, flags, strict=True)
-    return np.array([_text_word(*pair) for pair in pairs], dtype=np.uint64)
-
-
-def row_words(
-    cases: NDArray[np.int64],
-    endings: Sequence[str],
-    flags: Sequence[str],
-    values: NDArray[np.float64],
-    *,
-    further: bool = False,
-) -> Words:
-    """A hash of each row, uint64 array of shape (rows,); ``values`` has shape (rows, results).
-
-    Numbers count as the database keeps them: infinities as missing, and zeros without a sign. ``further``: the rows are
-    those beside the first ones of their cases.
-    """
-    kept = np.ascontiguousarray(values, dtype=np.float64) + 0.0
-    finite = np.isfinite(kept)
-    if not finite.all():
-        kept[~finite] = np.nan  # one pattern for all of them
-    factors = _factors(kept.shape[1] + 2)
-    words: Words = kept.view(np.uint64) @ factors[2:]
-    words += cases.astype(np.uint64) * factors[0]
-    words += _text_words(endings, flags) * factors[1]
-    if further:
-        words ^= _FURTHER
-    words ^= words >> np.uint64(33)
-    words *= _MIX_A
-    words ^= words >> np.uint64(33)
-    words *= _MIX_B
-    words ^= words >> np.uint64(33)
-    return words
-
-
-def digest_of(*parts: Words) -> int:
-    """The digest of rows with those hashes, as the database keeps it: a signed number of 64 bits."""
-    total = sum(int(words.sum(dtype=np.uint64)) for words in parts) % 2**64
-    return total - 2**64 if total >= 2**63 else total
-
-
 class Digests(Orders):
     """Looking for rows that are not those that were stored, and running them again."""
 
     def __init__(self, session: Session, clock: Clock) -> None:
         super().__init__(session, clock)
+        self._looking = Lock()
         #: Revision of the studies whose rows were looked at last.
-        self._looked_at: LRUCache[str, int] = LRUCache(1024)
+        self._looked_at: TTLCache[str, int] = TTLCache(1024, _AGAIN)
+        #: Study, first position and digest of chunks whose rows were looked at last.
+        self._sound: TTLCache[tuple[int, int, int], bool] = TTLCache(_KEPT, _AGAIN)
 
     def run_damaged_again(self, study_id: str) -> list[DamagedRows]:
-        """Return the damaged chunks of a study that has ended to waiting, with the reason; what they were.
+        """Delete the rows of the damaged chunks of a study and return the chunks to waiting; which they were.
 
-        Of a study that has not ended, or was cancelled, they are only told.
+        Those of a study that was cancelled, or is being cancelled, are only logged.
         """
         damaged = self.damaged_rows(study_id)
         if not damaged:
@@ -134,8 +85,11 @@ class Digests(Orders):
         with self.session.write() as connection:
             c = STUDIES.c
             row = self._row(connection, study_id, c.number, c.model, c.variant, c.state)
-            if StudyState(row.state) not in {StudyState.FINISHED, StudyState.FAILED}:
+            state = StudyState(row.state)
+            if state in _CANCELLED:
+                _tell(damaged, "they are kept")
                 return damaged
+            damaged = [item for item in damaged if self._still_damaged(connection, item.chunk)]
             for item in damaged:
                 cases = self._cases(item.chunk, connection)
                 for table, _ in _tables(row.model, row.variant):
@@ -145,25 +99,90 @@ class Digests(Orders):
                 waiting = {"state": ChunkState.WAITING, "epoch": None, "detail": str(item), "failures": 0}
                 none = dict.fromkeys(("claimed_at", "finished_at", "host", "fingerprint", "digest"))
                 connection.execute(sa.update(CHUNKS).where(this).values({**waiting, **none}))
+            if not damaged:  # somebody else was faster
+                return []
             _count_again(connection, row)
-            self._move(connection, row.number, StudyEvent.RETRY)
+            if state.terminal:
+                self._move(connection, row.number, StudyEvent.RETRY)
             # They must be run, not copied from a study that may have copied them from here.
             self._change(connection, row.number, fresh=1)
             note(connection, self._now(), "study.damaged", study_id, chunks=len(damaged))
+        _tell(damaged, "they are run again")
         return damaged
 
-    def require_undamaged(self, study_id: str) -> None:
-        """Raise DatabaseError where rows are not those that were stored; of an ended study they are run again.
+    def _still_damaged(self, connection: sa.Connection, chunk: Chunk) -> bool:
+        c = CHUNKS.c
+        this = (c.study == chunk.study) & (c["first"] == chunk.first) & (c["count"] == chunk.count)
+        query = sa.select(c.digest).where(this, c.state == ChunkState.DONE)
+        digest = connection.execute(query).scalar_one_or_none()
+        return digest is not None and not self.has_digest(connection, chunk, digest)
 
-        A revision of a study is looked at once.
+    def require_undamaged(self, study_id: str, cases: NDArray[np.int64] | None = None, *, anew: bool = False) -> None:
+        """Raise DatabaseError where rows of a study are not those that were stored; they are run again.
+
+        With ``cases`` only the chunks with these cases are looked at where the study is under way or has more than
+        `LOOKED_OVER`, and none where these chunks have more than that, too. What was sound counts for ten minutes,
+        unless ``anew``.
         """
         with self.session.read() as connection:
-            now = self._row(connection, study_id, STUDIES.c.revision, STUDIES.c.state)
-        if not StudyState(now.state).terminal or self._looked_at.get(study_id) == now.revision:
-            return
-        if damaged := self.run_damaged_again(study_id):
-            raise DatabaseError(f"{damaged[0]}: they are run again", "database-damaged")
-        self._looked_at[study_id] = now.revision
+            c = STUDIES.c
+            now = self._row(connection, study_id, c.number, c.revision, c.state, c.cases)
+            ended = StudyState(now.state).terminal
+            if not anew and self._kept(self._looked_at, study_id) == now.revision:
+                return
+            if cases is not None and (now.cases > LOOKED_OVER or not ended):
+                cases = cases[(cases >= 0) & (cases < now.cases)]
+                if not self.damaged_chunks(connection, now.number, cases, LOOKED_OVER):
+                    return
+        damaged = self.run_damaged_again(study_id)
+        if damaged:
+            again = StudyState(now.state) not in _CANCELLED
+            rest = "they are run again" if again else "the study was cancelled, so submit it as a new one"
+            raise DatabaseError(f"{damaged[0]}: {rest}", "database-damaged")
+        with self._looking:
+            self._looked_at[study_id] = now.revision
+
+    def _kept(self, kept: TTLCache[Any, Any], key: object) -> Any:
+        with self._looking:
+            return kept.get(key)
+
+    def damaged_chunks(
+        self, connection: sa.Connection, number: int, cases: NDArray[np.int64], most: int | None = None
+    ) -> list[Chunk]:
+        """The finished chunks with any of these cases of a study whose rows changed.
+
+        None are looked at where they have more than ``most`` cases together. What was sound counts for ten minutes.
+        """
+        if not cases.size:
+            return []
+        order, c = self._order(number, connection), CHUNKS.c
+        places = np.sort(cases if order is None else order.positions(cases))
+        query = sa.select(c["first"], c["count"], c.digest).where(
+            c.study == number, c.state == ChunkState.DONE, c.digest.is_not(None),
+            c["first"] <= int(places[-1]), c["first"] + c["count"] > int(places[0]),
+        )  # fmt: skip
+        with_cases = []
+        for first, count, digest in connection.execute(query.order_by(c["first"])):
+            at = np.searchsorted(places, first)
+            if at < places.size and places[at] < first + count:
+                with_cases.append((Chunk(number, first, count), digest))
+        if most is not None and sum(chunk.count for chunk, _ in with_cases) > most:
+            return []
+        damaged = []
+        for chunk, digest in with_cases:
+            key = (chunk.study, chunk.first, digest)
+            if self._kept(self._sound, key):
+                continue
+            if self.has_digest(connection, chunk, digest):
+                with self._looking:
+                    self._sound[key] = True
+            else:
+                damaged.append(chunk)
+        return damaged
+
+    def has_digest(self, connection: sa.Connection, chunk: Chunk, digest: int) -> bool:
+        """Whether a chunk has the rows with that digest."""
+        return self._digest_or_none(connection, chunk) == digest
 
     def damaged_rows(self, study_id: str) -> list[DamagedRows]:
         """The finished chunks of a study whose rows changed since they were stored; raises StudyNotFoundError.
@@ -223,11 +242,11 @@ class Digests(Orders):
         for study_id in studies:
             yield from self.damaged_rows(study_id)
 
-    def ended_after(self, number: int) -> tuple[int, str] | None:
-        """Number and id of the next study that finished or failed; None after the last one."""
+    def with_rows_after(self, number: int) -> tuple[int, str] | None:
+        """Number and id of the next study with rows; None after the last one."""
         c = STUDIES.c
-        ended = c.state.in_([StudyState.FINISHED.value, StudyState.FAILED.value]) & c.deleted_at.is_(None)
-        query = sa.select(c.number, c.id).where(ended, c.number > number).order_by(c.number).limit(1)
+        some = (c.done > 0) & c.deleted_at.is_(None)
+        query = sa.select(c.number, c.id).where(some, c.number > number).order_by(c.number).limit(1)
         with self.session.read() as connection:
             found = connection.execute(query).one_or_none()
         return None if found is None else (found.number, found.id)
@@ -238,6 +257,12 @@ class Digests(Orders):
         with self.session.read() as connection:
             without = query.where(CHUNKS.c.state == ChunkState.DONE, CHUNKS.c.digest.is_(None))
             return int(connection.execute(without).scalar_one())
+
+    def count_endings_again(self, study_id: str) -> None:
+        """Make the numbers of cases by ending those of the rows; raises StudyNotFoundError."""
+        with self.session.write() as connection:
+            c = STUDIES.c
+            _count_again(connection, self._row(connection, study_id, c.number, c.model, c.variant))
 
     def seal(self, connection: sa.Connection, chunk: Chunk) -> None:
         """Give a finished chunk the digest of the rows that the database has."""
@@ -257,12 +282,19 @@ class Digests(Orders):
         return digest_of(*found)
 
 
+def _tell(damaged: Sequence[DamagedRows], rest: str) -> None:
+    for item in damaged:
+        text = str(item)
+        _LOG.error("%s%s: %s.", text[:1].upper(), text[1:], rest)
+
+
 def _count_again(connection: sa.Connection, row: sa.Row[Any]) -> None:
     """Count the endings of a study from its rows: those counted before belong to rows that are gone."""
+    # Deleted first: this waits for dispatchers that have added to them, whose rows are counted, too.
+    connection.execute(sa.delete(ENDINGS).where(ENDINGS.c.study == row.number))
     c = results_table(row.model, row.variant).c
     counted = sa.select(c.ending, sa.func.count()).where(c.study == row.number).group_by(c.ending)
     endings = {ending: int(cases) for ending, cases in connection.execute(counted)}
-    connection.execute(sa.delete(ENDINGS).where(ENDINGS.c.study == row.number))
     if endings:
         rows = [{"study": row.number, "ending": ending, "cases": cases} for ending, cases in endings.items()]
         connection.execute(sa.insert(ENDINGS), rows)

@@ -175,9 +175,8 @@ def check(session: Session) -> CheckReport:
         if not session.on_server:
             problems += _look_over_file(session)
         if found == HEAD_REVISION and not problems:
-            looking = Digests(session, SystemClock())
-            problems += map(str, looking.all_damaged_rows())
-            unchecked = looking.undigested()
+            problems += damaged_rows(session)
+            unchecked = Digests(session, SystemClock()).undigested()
     except DatabaseError as error:
         problems.append(str(error))
     if session.on_server:
@@ -215,8 +214,8 @@ def checkpoint(session: Session) -> None:
             connection.exec_driver_sql("PRAGMA wal_checkpoint(PASSIVE)")
 
 
-def backup(session: Session, path: Path) -> None:
-    """Write a consistent copy of the database to ``path`` while others continue to work.
+def backup(session: Session, path: Path) -> tuple[str, ...]:
+    """Write a consistent copy of the database to ``path`` while others continue to work; its damaged rows.
 
     Raises DatabaseError when the file exists or cannot be written, or the database is on a server.
     """
@@ -248,3 +247,11 @@ def backup(session: Session, path: Path) -> None:
         raise DatabaseError(f"the backup {path} cannot be written: {error.strerror}", "write-failed") from None
     finally:
         part.unlink(missing_ok=True)
+    return damaged_rows(session)
+
+
+def damaged_rows(session: Session) -> tuple[str, ...]:
+    """Sentences on the rows that changed since they were stored; none of a database of another revision."""
+    if revision(session) != HEAD_REVISION:
+        return ()
+    return tuple(map(str, Digests(session, SystemClock()).all_damaged_rows()))

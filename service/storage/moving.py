@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
@@ -31,10 +31,14 @@ _NOT_MOVED: Final = frozenset({"alembic_version", "sqlite_sequence"})
 
 @dataclass(frozen=True, slots=True)
 class Moved:
-    """Rows of each table of the target after a move, and how many of them were there from an earlier attempt."""
+    """Rows of each table of the target after a move, and how many of them were there from an earlier attempt.
+
+    ``problems``: sentences on rows that had changed in the source since they were stored, which are moved as they are.
+    """
 
     rows: dict[str, int]
     there: int
+    problems: tuple[str, ...] = ()
 
 
 def move(source: Session, target: Session, owner: str, say: Callable[[str], None]) -> Moved:
@@ -52,10 +56,11 @@ def move(source: Session, target: Session, owner: str, say: Callable[[str], None
         _require_known(connection, source)
         # What the target gets is the place of the source: it is a copy until somebody adopts it.
         deployment.settle_in(source, connection)
+        problems = maintenance.damaged_rows(source)
         mark = maintenance.MOVING + hashlib.sha256(name.encode()).hexdigest()[:16]
         resumed = _prepare(target, mark)
         with _unused(target, owner):
-            moved = _copy(connection, target, resumed=resumed, say=say)
+            moved = replace(_copy(connection, target, resumed=resumed, say=say), problems=problems)
             maintenance.set_revision(target, HEAD_REVISION)
     return moved
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise, starmap
 from typing import TYPE_CHECKING, Any
 
@@ -25,13 +26,15 @@ from sprag.worker.states import ChunkState, StudyEvent, StudyState, follow
 from sprag.worker.sweeps import LineOrder
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from numpy.typing import NDArray
 
     from sprag.worker.order import Order
 
     Cases = NDArray[np.int64]
+    #: Whether a chunk has the rows with that digest.
+    IsSound = Callable[[Chunk, int], bool]
 
 #: First and count of consecutive places: case numbers, or positions in the study's order.
 Run = tuple[int, int]
@@ -75,17 +78,21 @@ class Retries(Users, Digests):
                 order = self._order(row.number, connection)
                 ended = tuple(counts)
                 runs = _runs(connection, row, ended) if order is None else _places(connection, row, ended, order)
-                cases = None
+                cases, in_lines = None, isinstance(order, LineOrder)
                 if isinstance(order, LineOrder):
                     cases = np.sort(order.cases(np.concatenate([np.arange(a, a + n) for a, n in runs])))
                     counts = dict(endings_of(connection, row.model, row.variant, row.number, cases))
+            if not runs or (not in_lines and sum(count for _, count in runs) != sum(counts.values())):
+                self.require_undamaged(study_id, anew=True)  # rows with these endings are not there
+                self.count_endings_again(study_id)
+                continue
             with self.session.write() as connection:
                 now = self._row(connection, study_id, c.revision)
                 if now.revision != row.revision:  # it was run again or deleted in the meantime
                     continue
                 require_queue(connection, MAX_WAITING_STUDIES)
                 self._require_quota(connection, sum(counts.values()), 0)
-                for chunk in _give_back(connection, row, runs, counts, cases):
+                for chunk in _give_back(connection, row, runs, counts, cases, partial(self.has_digest, connection)):
                     self.seal(connection, chunk)
                 self._move(connection, row.number, StudyEvent.RETRY)
                 self._lift_deadline(connection, row.number)
@@ -146,18 +153,23 @@ def _few(runs: list[Run]) -> list[Run]:
 
 
 def _give_back(
-    connection: sa.Connection, row: sa.Row[Any], runs: Sequence[Run], counts: dict[str, int], cases: Cases | None
+    connection: sa.Connection,
+    row: sa.Row[Any],
+    runs: Sequence[Run],
+    counts: dict[str, int],
+    cases: Cases | None,
+    is_sound: IsSound,
 ) -> list[Chunk]:
     """Delete the rows that are run again and cut the chunks so that exactly these cases wait.
 
     They are ``cases``, ascending, or all with the endings of ``counts``, which has their number by ending. Returns the
-    finished pieces of chunks that had a digest.
+    finished pieces of chunks that have the rows of their digest. Those of others keep it, so that they stay damaged.
     """
+    finished = _cut(connection, row.number, runs, is_sound)
     table = results_table(row.model, row.variant)
     own = [table.c.ending.in_(tuple(counts))] if cases is None else conditions(table.c.case_number, cases)
     for condition in own:
         connection.execute(sa.delete(table).where(table.c.study == row.number, condition))
-    finished = _cut(connection, row.number, runs)
     for ending, count in counts.items():
         this = (ENDINGS.c.study == row.number) & (ENDINGS.c.ending == ending)
         connection.execute(sa.update(ENDINGS).where(this).values(cases=ENDINGS.c.cases - count))
@@ -170,7 +182,7 @@ def _give_back(
     return finished
 
 
-def _cut(connection: sa.Connection, number: int, runs: Sequence[Run]) -> list[Chunk]:
+def _cut(connection: sa.Connection, number: int, runs: Sequence[Run], is_sound: IsSound) -> list[Chunk]:
     c = CHUNKS.c
     chunks = connection.execute(
         sa.select(c["first"], c["count"], c.claimed_at, c.finished_at, c.detail, c.host, c.fingerprint, c.digest)
@@ -193,7 +205,7 @@ def _cut(connection: sa.Connection, number: int, runs: Sequence[Run]) -> list[Ch
         if inside:
             gone.append({"gone": chunk.first})
             made += (pieces := _pieces(number, chunk, inside))
-            if chunk.digest is not None:
+            if chunk.digest is not None and is_sound(Chunk(number, chunk.first, chunk.count), chunk.digest):
                 kept = (piece for piece in pieces if piece["state"] is ChunkState.DONE)
                 sealed += [Chunk(number, piece["first"], piece["count"]) for piece in kept]
     connection.execute(sa.delete(CHUNKS).where(c.study == number, c["first"] == sa.bindparam("gone")), gone)
@@ -210,7 +222,7 @@ def _pieces(number: int, chunk: _Done, inside: Sequence[Run]) -> list[dict[str, 
     waiting = {first for first, _ in inside}
     borders = sorted({chunk.first, chunk.first + chunk.count, *(border for part in inside for border in part)})
     pace = (chunk.finished_at - chunk.claimed_at) / chunk.count
-    nothing = dict.fromkeys(("claimed_at", "finished_at", "detail", "host", "fingerprint"))
+    nothing = dict.fromkeys(("claimed_at", "finished_at", "detail", "host", "fingerprint", "digest"))
     pieces = []
     for first, end in pairwise(borders):
         piece: dict[str, Any] = {"study": number, "first": first, "count": end - first, "failures": 0}
@@ -219,6 +231,6 @@ def _pieces(number: int, chunk: _Done, inside: Sequence[Run]) -> list[dict[str, 
         else:
             begin, finish = (chunk.claimed_at + round(pace * (border - chunk.first)) for border in (first, end))
             piece |= {"state": ChunkState.DONE, "claimed_at": begin, "finished_at": finish}
-            piece |= {name: getattr(chunk, name) for name in ("detail", "host", "fingerprint")}
+            piece |= {name: getattr(chunk, name) for name in ("detail", "host", "fingerprint", "digest")}
         pieces.append(piece)
     return pieces

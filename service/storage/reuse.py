@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass
 from threading import Lock
 from typing import TYPE_CHECKING, Any, Final
@@ -13,7 +14,8 @@ from cachetools import LRUCache
 
 from sprag.service.storage.case_keys import KEYED, any_below, newest_with
 from sprag.service.storage.cases import conditions
-from sprag.service.storage.order import Orders
+from sprag.service.storage.digests import Digests
+from sprag.service.storage.errors import StudyNotFoundError
 from sprag.service.storage.origins import HOSTS_BETWEEN
 from sprag.service.storage.round_table import latest_round
 from sprag.service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, further_table, results_table
@@ -72,7 +74,7 @@ class _Found:
     there: Cases
 
 
-class Reuse(Orders):
+class Reuse(Digests):
     """Equal cases of other studies."""
 
     def __init__(self, session: Session, clock: Clock) -> None:
@@ -105,8 +107,34 @@ class Reuse(Orders):
         there = found.cases[at] == cases
         if plain and not there.any():
             return None
+        if not self._leave_damaged(study, cases, there, found.studies[at], found.there[at]) and plain:
+            return None
         at = at[there]
         return Known(cases[~there], found.cases[at], found.studies[at], found.there[at])
+
+    def _leave_damaged(
+        self, study: Study, cases: Cases, wanted: NDArray[np.bool_], studies: Cases, there: Cases
+    ) -> bool:
+        """Unmark those of the ``wanted`` cases whose rows changed in the chunks of other studies, which run again.
+
+        Whether any case is left.
+        """
+        damaged: list[int] = []
+        with self.session.read() as connection:
+            for source in np.unique(studies[wanted]).tolist():
+                these = np.flatnonzero(wanted & (studies == source))
+                for chunk in self.damaged_chunks(connection, source, there[these]):
+                    wanted[these[np.isin(there[these], self._cases(chunk, connection))]] = False
+                    damaged.append(source)
+            ids = connection.execute(sa.select(STUDIES.c.id).where(STUDIES.c.number.in_(damaged))).scalars().all()
+        for study_id in ids:
+            with suppress(StudyNotFoundError):  # deleted since it was found
+                self.run_damaged_again(study_id)
+        if ids and study.sweep is not None:
+            # A line of which some cases are missing is run as a whole.
+            marked = np.flatnonzero(wanted)
+            wanted[marked[~whole_lines(study, cases[marked])]] = False
+        return bool(wanted.any())
 
     def _of_study(self, study: Study, number: int) -> _Found | None:
         if number not in self._found:

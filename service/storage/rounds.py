@@ -8,7 +8,7 @@ import numpy as np
 import sqlalchemy as sa
 
 from sprag.service.storage.case_keys import KEYED, add_keys
-from sprag.service.storage.cases import Cases
+from sprag.service.storage.checked_rows import CheckedRows
 from sprag.service.storage.part import add_chunks
 from sprag.service.storage.round_table import add_round, rounds_of
 from sprag.service.storage.studies import Studies
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from sprag.worker.study import Study
 
 
-class Rounds(Studies, Cases, Work):
+class Rounds(Studies, CheckedRows, Work):
     """The rounds of studies."""
 
     def rounds(self, study_id: str) -> list[RoundRecord]:
@@ -38,13 +38,19 @@ class Rounds(Studies, Cases, Work):
             return rounds_of(connection, self._row(connection, study_id, STUDIES.c.number).number)
 
     def rounds_done(self, number: int) -> list[range] | None:
-        """The cases of every round of a study that needs its next one; None where it needs none now."""
+        """The cases of every round of a study that needs its next one; None where it needs none now.
+
+        It needs none while rows of its rounds that changed on the disk are run again.
+        """
         with self.session.read() as connection:
             if not _needs_round(connection, number):
                 return None
             c = ROUNDS.c
             query = sa.select(c.first, c["count"]).where(c.study == number, c["count"] > 0).order_by(c.round)
-            return [range(first, first + count) for first, count in connection.execute(query)]
+            rounds = [range(first, first + count) for first, count in connection.execute(query)]
+            damaged = self.damaged_chunks(connection, number, np.arange(max(cases.stop for cases in rounds)))
+            study_id = connection.execute(sa.select(STUDIES.c.id).where(STUDIES.c.number == number)).scalar_one()
+        return None if damaged and self.run_damaged_again(study_id) else rounds
 
     def round_rows(self, number: int, study: Study, cases: range, results: Sequence[str]) -> Rows:
         """The rows of one round."""

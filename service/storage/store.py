@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Self
 
 from sprag.service.storage import maintenance
 from sprag.service.storage.audit import Audit
-from sprag.service.storage.columns import WholeColumns
 from sprag.service.storage.components import Components
 from sprag.service.storage.deployment import Deployment
 from sprag.service.storage.figures import Totals
@@ -36,7 +35,6 @@ if TYPE_CHECKING:
 class Store(
     Labelling,
     Rounds,
-    WholeColumns,
     Purging,
     Retries,
     Room,
@@ -86,9 +84,9 @@ class Store(
         """Check the database; can take minutes on a large one."""
         return maintenance.check(self.session)
 
-    def backup(self, path: Path) -> None:
-        """Write a consistent copy to ``path`` while others continue to work; raises DatabaseError."""
-        maintenance.backup(self.session, path)
+    def backup(self, path: Path) -> tuple[str, ...]:
+        """Write a consistent copy to ``path`` while others continue to work; its damaged rows. Raises DatabaseError."""
+        return maintenance.backup(self.session, path)
 
     def checkpoint(self) -> None:
         """Move the write-ahead log into the file as far as no reader needs the old state; blocks nobody."""

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 from sqlalchemy.dialects import postgresql, sqlite
 
-from sprag.service.storage.digests import Digests, digest_of, row_words
 from sprag.service.storage.dispatchers import WAITING, Dispatchers
 from sprag.service.storage.origins import names_of
 from sprag.service.storage.reuse import Reuse, copy_rows, endings_of, mark_origin
+from sprag.service.storage.row_hashes import digest_of, row_words
 from sprag.service.storage.rows import Block, Target, block, further_block, further_target, merged, target
 from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES
 from sprag.worker import fingerprint, models
@@ -24,7 +24,7 @@ from sprag.worker.states import ChunkState, StudyEvent, StudyState
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from sprag.service.storage.digests import Words
+    from sprag.service.storage.row_hashes import Words
     from sprag.worker.ports import Chunk, Finished
 
     #: What identifies a chunk in the database: study, first position, number of cases.
@@ -142,7 +142,7 @@ def _change_chunks(connection: sa.Connection, keys: Iterable[Key], values: Mappi
         connection.execute(statement, {**these, **new})
 
 
-class Storing(Digests, Reuse, Dispatchers):
+class Storing(Reuse, Dispatchers):
     """Results and claims."""
 
     def exchange(

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import sqlalchemy as sa
 
+from sprag.service.jobs.housekeeping import Scrubbing
 from sprag.service.storage import digests
-from sprag.service.storage.digests import digest_of, row_words
-from sprag.service.storage.errors import DatabaseError
+from sprag.service.storage.errors import DatabaseError, NothingToRetryError
+from sprag.service.storage.row_hashes import digest_of, row_words
 from sprag.service.storage.store import Store
-from sprag.service.storage.tables import CHUNKS, results_table
+from sprag.service.storage.tables import CHUNKS, ENDINGS, results_table
+from sprag.worker import models
+from sprag.worker.ports import Chunk
 from sprag.worker.states import StudyState
 from tests.contract.filling import create, finish
 from tests.faults import refused
+from tests.worker import fakes
 
 TABLE = results_table("vibration-drive", "1")
 
@@ -75,6 +81,173 @@ def test_damaged_rows_are_held_back_and_run_again(store: Store) -> None:
     np.testing.assert_array_equal(again.values, rows.values)
     store.require_undamaged(record.id)
     assert store.get_study(record.id).done == 25
+
+
+def flip(store: Store, case: int) -> None:
+    """Change one number of the row of a case."""
+    column = next(c for c in TABLE.c if isinstance(c.type, sa.Double))
+    change(store, case, **{column.name: 1e9 + case})
+
+
+@pytest.mark.parametrize("most", [20_000, 20])
+def test_no_answer_is_made_of_damaged_rows(store: Store, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(digests, "LOOKED_OVER", most)  # of a larger study the chunks with the wanted cases
+    record = create(store, 25)
+    answers: tuple[Callable[[], object], ...] = (
+        lambda: store.case_row(record.id, 13),
+        lambda: store.case_page(record.id, 12, 5),
+        lambda: store.case_page(record.id, ending="ok", limit=14),
+        lambda: store.all_rows(record.id, 13),
+        lambda: store.rows_for_cases(record.id, [13], [models.result_infos("vibration-drive", "1")[0].name]),
+    )
+    for answer in answers:
+        finish(store, record)
+        flip(store, 13)
+        with refused(DatabaseError, "database-damaged"):
+            answer()
+        assert store.get_study(record.id).state is StudyState.QUEUED
+    finish(store, record)
+    for answer in answers:
+        answer()
+
+
+def test_columns_of_all_rows_are_looked_over(store: Store) -> None:
+    record = create(store, 25)
+    finish(store, record)
+    flip(store, 13)
+    with refused(DatabaseError, "database-damaged"):
+        store.row_columns(record.id, [])
+    assert store.row_columns(record.id, []).cases.tolist() == [*range(10), *range(20, 25)]
+
+
+def test_rows_that_changed_later_are_noticed_by_exports_at_once(store: Store) -> None:
+    record = create(store, 25)
+    finish(store, record)
+    store.require_undamaged(record.id)
+    flip(store, 13)
+    with refused(DatabaseError, "database-damaged"):
+        store.require_undamaged(record.id, anew=True)
+
+
+def test_damaged_rows_are_not_copied_for_another_study(store: Store) -> None:
+    record = create(store, 25)
+    finish(store, record)
+    right = store.case_rows(record.id).values
+    flip(store, 13)
+    later, study = create(store, 30, "a larger one"), fakes.study(30, "a larger one")
+    epoch, taken = store.take_over("test"), []
+    for chunk in store.open_chunks(later.number):
+        assert store.claim(epoch, [chunk]) == [chunk]
+        known = store.known(study, chunk)
+        if known is None:
+            assert store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+            continue
+        taken += known.cases.tolist()
+        assert store.commit(epoch, chunk, fakes.result(0, known.missing.size), known)
+    store.settle(epoch, later.number)
+    assert taken == [*range(10), *range(20, 25)]
+    np.testing.assert_array_equal(store.case_rows(later.id).values[:25], right)
+    assert (store.get_study(record.id).state, store.get_study(record.id).done) == (StudyState.QUEUED, 15)
+    assert damaged(store) == []
+
+
+def test_a_retry_does_not_bless_damaged_rows(store: Store) -> None:
+    record = create(store, 25)
+    finish(store, record)
+    with store.session.write() as connection:  # case 12 failed, honestly stored
+        at = sa.update(TABLE).where(TABLE.c.case_number == 12).values(ending="diverged")
+        connection.execute(at)
+        connection.execute(sa.update(ENDINGS).values(cases=24))
+        connection.execute(sa.insert(ENDINGS).values(study=record.number, ending="diverged", cases=1))
+        for first in (0, 10, 20):
+            store.seal(connection, Chunk(record.number, first, min(10, 25 - first)))
+    flip(store, 15)
+    store.retry_study(record.id)
+    assert damaged(store) == [
+        f"the rows of the study {record.id}, cases 10 to 11, are not those that were stored",
+        f"the rows of the study {record.id}, cases 13 to 19, are not those that were stored",
+    ]
+    store.run_damaged_again(record.id)
+    finish(store, record)
+    assert (damaged(store), store.get_study(record.id).done) == ([], 25)
+    np.testing.assert_array_equal(store.case_rows(record.id).values, fakes.values(0, 25))
+
+
+def test_a_retry_notices_that_the_failed_row_is_gone(store: Store) -> None:
+    record = create(store, 25)
+    epoch = store.take_over("test")
+    for chunk in store.open_chunks(record.number):
+        store.claim(epoch, [chunk])
+        ending = models.OK if chunk.first else "diverged"
+        store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count, ending))
+    store.settle(epoch, record.number)
+    change(store, 3, ending="diverge$")
+    with refused(DatabaseError, "database-damaged"):
+        store.retry_study(record.id)
+    finish(store, record)
+    assert (damaged(store), store.get_study(record.id).done, store.get_study(record.id).ok) == ([], 25, 25)
+
+
+def test_a_retry_with_wrong_numbers_of_endings_counts_again(store: Store) -> None:
+    record = create(store, 25)
+    finish(store, record)
+    with store.session.write() as connection:
+        connection.execute(sa.insert(ENDINGS).values(study=record.number, ending="diverged", cases=1))
+    with refused(NothingToRetryError, "wrong-state"):
+        store.retry_study(record.id)
+    assert [ending for ending, _ in store.look(record.id)[1].endings.items()] == ["ok"]
+
+
+@pytest.mark.parametrize("answer", ["export", "page"])
+def test_answers_of_a_study_under_way_are_not_made_of_damaged_rows(store: Store, answer: str) -> None:
+    record = create(store, 25)
+    epoch = store.take_over("test")
+    first, second, _ = store.open_chunks(record.number)
+    for chunk in (first, second):
+        store.claim(epoch, [chunk])
+        store.commit(epoch, chunk, fakes.result(chunk.first, 10))
+    flip(store, 13)
+    with refused(DatabaseError, "database-damaged"):
+        store.require_undamaged(record.id, anew=True) if answer == "export" else store.case_row(record.id, 13)
+    assert (store.get_study(record.id).state, store.get_study(record.id).done) == (StudyState.RUNNING, 10)
+    assert store.case_row(record.id, 13) is None
+    assert store.case_row(record.id, 3) is not None
+
+
+@pytest.mark.parametrize("paused", [False, True])
+def test_a_damaged_chunk_of_a_study_under_way_is_run_again_by_the_housekeeping(store: Store, paused: bool) -> None:
+    record = create(store, 25)
+    epoch = store.take_over("test")
+    first, second, third = store.open_chunks(record.number)
+    store.claim(epoch, [first, second])
+    store.commit(epoch, first, fakes.result(0, 10))
+    if paused:
+        store.pause_study(record.id)
+    flip(store, 3)
+    Scrubbing(store).look()
+    assert (store.get_study(record.id).done, store.get_study(record.id).ok) == (0, 0)
+    assert store.commit(epoch, second, fakes.result(10, 10)), "what runs is not disturbed"
+    assert [chunk.first for chunk in store.open_chunks(record.number)] == [first.first, third.first]
+    if paused:
+        store.resume_study(record.id)
+    finish(store, record)
+    assert (damaged(store), store.get_study(record.id).done) == ([], 25)
+    np.testing.assert_array_equal(store.case_rows(record.id).values, fakes.values(0, 25))
+
+
+def test_damaged_rows_of_a_cancelled_study_are_held_back_and_kept(store: Store) -> None:
+    record = create(store, 25)
+    epoch = store.take_over("test")
+    first = store.open_chunks(record.number)[0]
+    store.claim(epoch, [first])
+    store.commit(epoch, first, fakes.result(0, 10))
+    store.cancel_study(record.id)
+    store.settle(epoch, record.number)
+    flip(store, 3)
+    with refused(DatabaseError, "database-damaged") as caught:
+        store.case_row(record.id, 3)
+    assert "cancelled, so submit it as a new one" in str(caught.value)
+    assert (store.get_study(record.id).state, store.get_study(record.id).done) == (StudyState.CANCELLED, 10)
 
 
 def test_chunks_without_a_digest_are_said_to_be_unchecked(store: Store) -> None:

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 import sqlalchemy as sa
+from numpy.typing import NDArray
 
 from sprag.service.storage.errors import StudyNotFoundError
 from sprag.service.storage.part import SystemClock
 from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.store import Store
-from sprag.service.storage.tables import ROUNDS
+from sprag.service.storage.tables import ROUNDS, results_table
 from sprag.worker import models
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.inline import InlineExecutor
@@ -27,6 +28,8 @@ from sprag.worker.study import Study
 from tests.contract.filling import SPEC
 from tests.worker import fakes
 from tests.worker.planning import toy
+
+INFOS = models.result_infos("vibration-drive", "1")
 
 
 @pytest.fixture(params=["sqlite_url", "postgres_url"])
@@ -46,10 +49,15 @@ def create(store: Store, study: Study | None = None, **options: Any) -> StudyRec
     return store.create_study(SPEC, study or toy.study(), **options)
 
 
+def numbers(loads: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Results that follow from the loads; counts and categories are whole, as integer columns keep them."""
+    values = loads[:, None] * np.arange(1.0, 1.0 + fakes.RESULTS)
+    return np.where([info.kind == "real" for info in INFOS], values, np.floor(values))
+
+
 def results(study: Study, first: int, count: int) -> ChunkResult:
     """Numbers that follow from the parameters of the cases."""
-    loads = study.points(range(first, first + count))[:, 0]
-    values = loads[:, None] * np.arange(1.0, 1.0 + fakes.RESULTS)
+    values = numbers(study.points(range(first, first + count))[:, 0])
     return ChunkResult(first, [models.OK] * count, [""] * count, values)
 
 
@@ -317,8 +325,7 @@ def test_a_derived_value_out_of_range_in_a_later_round_is_not_run(store: Store) 
 
 def spread(task: ChunkTask) -> ChunkResult:
     """Numbers that follow from the parameters of the cases."""
-    loads = np.asarray(task.columns["shaft.load"], dtype=np.float64)
-    values = loads[:, None] * np.arange(1.0, 1.0 + fakes.RESULTS)
+    values = numbers(np.asarray(task.columns["shaft.load"], dtype=np.float64))
     return ChunkResult(task.first, [models.OK] * task.count, [""] * task.count, values)
 
 
@@ -336,3 +343,20 @@ def test_the_dispatcher_runs_all_rounds_and_holds_what_cannot_be_planned(store: 
     held = store.get_study(broken.id)
     assert (held.state, held.cases) == (StudyState.PAUSED, 50)
     assert held.reason == "the next round cannot be planned: ValueError: there is no such round"
+
+
+def test_no_round_is_chosen_from_rows_that_changed_on_the_disk(store: Store) -> None:
+    whole_one = create(store)
+    finish(store, whole_one)
+    record = create(store, fresh=True)
+    epoch = finish(store, record, rounds=2)
+    run_chunks(store, epoch, record.number)
+    table = results_table("vibration-drive", "1")
+    column = next(c for c in table.c if isinstance(c.type, sa.Double))
+    with store.session.write() as connection:
+        this = (table.c.study == record.number) & (table.c.case_number == 53)
+        connection.execute(sa.update(table).where(this).values({column.name: 1e9}))
+    assert store.rounds_done(record.number) is None
+    assert store.get_study(record.id).done < store.get_study(record.id).cases
+    finish(store, record)
+    assert whole(store, record) == whole(store, whole_one)

@@ -101,7 +101,7 @@ class StoredRows:
 
 def stored(store: Store, record: StudyRecord, study: Study, units: str = SI, header: Header = "names") -> Source:
     """The rows of a study of the database; raises SelectionError for ``units`` that cannot be shown."""
-    store.require_undamaged(record.id)
+    store.require_undamaged(record.id, anew=True)
     origins = store.origins(record.id)
     about: dict[str, Any] = {
         "study": record.id,

@@ -16,7 +16,8 @@ from sprag.service.storage.maintenance import revision
 from sprag.service.storage.session import Session
 from sprag.service.storage.sqlite_files import sqlite_driver
 from sprag.service.storage.store import Store
-from sprag.service.storage.tables import HEAD_REVISION
+from sprag.service.storage.tables import HEAD_REVISION, results_table
+from tests.contract.filling import create, finish
 from tests.faults import refused
 from tests.migrations.freeze import FOLDER
 from tests.service.calibrating import spec_of
@@ -179,3 +180,25 @@ def test_an_upgrade_on_a_server_is_refused_while_anybody_is_connected(
         connection.exec_driver_sql(f"UPDATE alembic_version SET version_num = '{HEAD_REVISION}'")
     store.close()
     assert execute(["db", "upgrade", "--db", postgres_url]) == 0
+
+
+@pytest.mark.parametrize("command", ["backup", "move"])
+def test_copies_of_a_database_name_rows_that_changed_on_the_disk(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    database, target = tmp_path / "here.sqlite3", tmp_path / "there.sqlite3"
+    with Store.open(f"sqlite:///{database}") as store:
+        record = create(store, 25)
+        last = max(chunk.count for chunk in store.open_chunks(record.number)) - 1
+        finish(store, record)
+    connection = sqlite3.connect(database)
+    name = results_table("vibration-drive", "1").name
+    connection.execute(f"UPDATE {name} SET flags = 'odd' WHERE case_number = 0")
+    connection.commit()
+    connection.close()
+    assert execute(["db", command, str(target), "--db", str(database)]) == 3
+    told = capsys.readouterr()
+    assert f"the rows of the study {record.id}, cases 0 to {last}, are not those that were stored" in told.err
+    with Store.open(f"sqlite:///{target}") as store:
+        assert store.case_rows(record.id).cases.size == 25
+        assert [item.study for item in store.all_damaged_rows()] == [record.id]

@@ -1,0 +1,81 @@
+"""Hashes of rows, and digests of chunks: sums of them, so that rows may be read in any order.
+
+The hash is multilinear in the 64-bit patterns of a row's numbers: with odd factors, a change of one number always
+changes it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    Words = NDArray[np.uint64]
+
+_MIX_A: Final = np.uint64(0xFF51AFD7ED558CCD)
+_MIX_B: Final = np.uint64(0xC4CEB9FE1A85EC53)
+_FURTHER: Final = np.uint64(0x9E3779B97F4A7C15)
+
+
+@lru_cache(maxsize=64)
+def _factors(count: int) -> Words:
+    """Odd factors, one for each word of a row, always the same."""
+    text = b"".join(hashlib.blake2b(f"row {index}".encode(), digest_size=8).digest() for index in range(count))
+    return np.frombuffer(text, dtype="<u8").astype(np.uint64) | np.uint64(1)
+
+
+@lru_cache(maxsize=4096)
+def _text_word(ending: str, flags: str) -> int:
+    return int.from_bytes(hashlib.blake2b(f"{ending}\n{flags}".encode(), digest_size=8).digest(), "little")
+
+
+def _text_words(endings: Sequence[str], flags: Sequence[str]) -> Words:
+    """A word for the ending and the flags of each row; one for all where they are the same, which is faster."""
+    if len(endings) and all(list(texts).count(texts[0]) == len(texts) for texts in (endings, flags)):
+        return np.array(_text_word(endings[0], flags[0]), dtype=np.uint64)
+    pairs = zip(endings, flags, strict=True)
+    return np.array([_text_word(*pair) for pair in pairs], dtype=np.uint64)
+
+
+def row_words(
+    cases: NDArray[np.int64],
+    endings: Sequence[str],
+    flags: Sequence[str],
+    values: NDArray[np.float64],
+    *,
+    further: bool = False,
+) -> Words:
+    """A hash of each row, uint64 array of shape (rows,); ``values`` has shape (rows, results).
+
+    Numbers count as the database keeps them: infinities as missing, and zeros without a sign. ``further``: the rows are
+    those beside the first ones of their cases.
+    """
+    kept = np.ascontiguousarray(values, dtype=np.float64) + 0.0
+    finite = np.isfinite(kept)
+    if not finite.all():
+        kept[~finite] = np.nan  # one pattern for all of them
+    factors = _factors(kept.shape[1] + 2)
+    words: Words = kept.view(np.uint64) @ factors[2:]
+    words += cases.astype(np.uint64) * factors[0]
+    words += _text_words(endings, flags) * factors[1]
+    if further:
+        words ^= _FURTHER
+    words ^= words >> np.uint64(33)
+    words *= _MIX_A
+    words ^= words >> np.uint64(33)
+    words *= _MIX_B
+    words ^= words >> np.uint64(33)
+    return words
+
+
+def digest_of(*parts: Words) -> int:
+    """The digest of rows with those hashes, as the database keeps it: a signed number of 64 bits."""
+    total = sum(int(words.sum(dtype=np.uint64)) for words in parts) % 2**64
+    return total - 2**64 if total >= 2**63 else total
