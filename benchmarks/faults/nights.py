@@ -167,7 +167,7 @@ def main(url: str, port: int, address: str, seconds: float, fatal: int) -> None:
         reporter.send_webhook = around(reporter.send_webhook)
         Scheduler(store).look()
         phase = _RUNNING
-        Dispatcher(store, InlineExecutor(fakes.run), clock).run(lambda: not store.waiting_studies())
+        Dispatcher(store, InlineExecutor(fakes.run), clock).run(lambda: not store.active_studies())
         phase = _CONCLUDING
         Scheduler(store).look()
         phase = _SENDING
