@@ -21,7 +21,10 @@ class RunOutcome(TypedDict):
     ]
     trouble: Annotated[
         bool,
-        Doc("it did not end as planned, some cases failed or are unsettled, or due times before it were not run"),
+        Doc(
+            "it did not end as planned, some cases failed or have one of `trouble_flags`, or due times before it were "
+            "not run"
+        ),
     ]
     sentence: str
     cases: int
@@ -32,6 +35,9 @@ class RunOutcome(TypedDict):
         Doc("cases by ending other than ok; null until the run is over and they have been counted"),
     ]
     flags: Annotated[dict[str, int] | None, Doc("cases by flag; null until the run is over and they have been counted")]
+    trouble_flags: Annotated[
+        list[str] | None, Doc("flags that count as trouble of this run; null until they have been counted")
+    ]
     coverage: Annotated[str | None, Doc("complete part of a study that is run coarse to fine, once the run is over")]
     ended_at: Moment | None
     seconds: Annotated[float | None, Doc("from the first chunk of the study to its end, in s")]
@@ -68,6 +74,10 @@ class ScheduleSummary(TypedDict):
     misfire_grace: Annotated[str | None, Doc("longest delay with which a due time is still run; null: any")]
     enabled: bool
     paused_until: Annotated[Moment | None, Doc("it is not due before")]
+    trouble_flags: Annotated[
+        list[str] | None,
+        Doc("flags of cases that need attention; null: those of motions that had not settled, as the model names them"),
+    ]
     report_email: Annotated[list[str], Doc("addresses to which its runs are reported")]
     report_webhook: Annotated[str | None, Doc("address of a webhook to which its runs are reported")]
     report_when: Annotated[str, Doc("always; trouble: only runs that need attention")]

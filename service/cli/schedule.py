@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -24,6 +24,9 @@ app = typer.Typer(
     no_args_is_help=True,
     cls=Groups,
 )
+
+#: In place of flags: those that count unless others are named.
+_DEFAULT: Final = "default"
 
 ScheduleId = Annotated[
     str,
@@ -84,6 +87,16 @@ Grace = Annotated[
         help='Longest delay with which a due time is still run, such as "30 min"; "" for any.',
     ),
 ]
+TroubleFlags = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--trouble-flag",
+        metavar="FLAG",
+        help="Flag of a case that needs attention; may be repeated; "
+        '"" for none, default (default) for those of motions that had not settled.',
+        autocompletion=completion.flags,
+    ),
+]
 Email = Annotated[
     list[str] | None,
     typer.Option("--email", metavar="ADDRESS", help='Report its runs by mail; may be repeated; "" for none.'),
@@ -115,6 +128,7 @@ def add(
     overlap: Overlap = None,
     catch_up: CatchUp = None,
     misfire_grace: Grace = None,
+    trouble_flag: TroubleFlags = None,
     email: Email = None,
     webhook: Webhook = None,
     report: ReportWhen = None,
@@ -131,6 +145,7 @@ def add(
         "spec": read_spec(spec),
         **_given(cron=cron, at=at, zone=zone, name=name, finish_by=finish_by, **_window(window)),
         **_given(overlap=overlap, catch_up=catch_up, misfire_grace=misfire_grace, **_report(email, webhook, report)),
+        **_trouble(trouble_flag),
         "priority": priority,
         "fresh": fresh,
     }
@@ -217,6 +232,7 @@ def change(
     overlap: Overlap = None,
     catch_up: CatchUp = None,
     misfire_grace: Grace = None,
+    trouble_flag: TroubleFlags = None,
     email: Email = None,
     webhook: Webhook = None,
     report: ReportWhen = None,
@@ -228,6 +244,7 @@ def change(
     fields = _given(
         cron=cron, at=at, zone=zone, name=name, priority=priority, fresh=fresh, finish_by=finish_by, **_window(window)
     ) | _given(overlap=overlap, catch_up=catch_up, misfire_grace=misfire_grace, **_report(email, webhook, report))
+    fields |= _trouble(trouble_flag)
     if spec is not None:
         fields["spec"] = read_spec(spec)
     if not fields:
@@ -285,6 +302,12 @@ def _given(**fields: Any) -> dict[str, Any]:
 def _report(email: list[str] | None, webhook: str | None, when: str | None) -> dict[str, Any]:
     addresses = None if email is None else [address for address in email if address]
     return {"report_email": addresses, "report_webhook": webhook, "report_when": when}
+
+
+def _trouble(flags: list[str] | None) -> dict[str, Any]:
+    if flags is None:
+        return {}
+    return {"trouble_flags": None if flags == [_DEFAULT] else [flag for flag in flags if flag]}
 
 
 def _window(text: str | None) -> dict[str, Any]:

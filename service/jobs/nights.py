@@ -11,14 +11,16 @@ from sprag.service.answers.schedules import Night, NightRun, RunOutcome, SentRep
 from sprag.service.delivery import origin_of
 from sprag.service.jobs.reports.watchdog import late_json, late_runs
 from sprag.service.json_text import timestamp
-from sprag.service.schedules.outcomes import TROUBLE_FLAGS
 from sprag.service.schedules.times import local_time
+from sprag.service.schedules.trouble import usual_flags
 from sprag.service.storage.errors import StudyNotFoundError
 from sprag.worker import models
 
 if TYPE_CHECKING:
     from sprag.service.schedules.outcomes import Outcome
     from sprag.service.storage.reports import ReportRecord
+    from sprag.service.storage.run_outcomes import EndedRun
+    from sprag.service.storage.run_outcomes import NightRun as Run
     from sprag.service.storage.store import Store
 
 #: Hours that are looked back on by default, and at most.
@@ -28,30 +30,38 @@ MOST_HOURS: Final = 24 * 31
 MOST_RUNS: Final = 1000
 
 
-def whole_outcome(store: Store, outcome: Outcome) -> Outcome:
-    """The outcome of a run, with the endings, flags and coverage of its study where it is over; raises StoreError."""
+def whole_outcome(store: Store, run: EndedRun | Run) -> Outcome:
+    """The outcome of a run, with the endings, flags and coverage of its study where it is over; raises StoreError.
+
+    The flags are judged once, as its schedule says by then; irregular motion is a regime like others, unless the
+    schedule names it.
+    """
+    outcome = run.outcome
     if outcome.study is None or not outcome.result.final or outcome.flags is not None:
         return outcome
     try:
-        _, progress = store.look(outcome.study)
+        study, progress = store.look(outcome.study)
         kinds = store.kinds(outcome.study)
     except StudyNotFoundError:  # it was deleted in the meantime
         return outcome
+    usual = usual_flags(study.model)
+    trouble = usual if run.trouble_flags is None else run.trouble_flags
     return replace(
         outcome,
         endings={name: count for name, count in progress.endings.items() if name != "ok"},
         flags={
             name: count
             for name, count in kinds.flags.items()
-            if name in TROUBLE_FLAGS or name not in models.REGIME_SENTENCES
+            if name in {*trouble, *usual} or name not in models.REGIME_SENTENCES
         },
+        trouble_flags=trouble,
         coverage=None if progress.covered is None else str(progress.covered),
     )
 
 
 def conclude_runs(store: Store) -> int:
     """Keep the outcomes of the due times that are over by now; returns how many."""
-    return sum(store.conclude_run(run, whole_outcome(store, run.outcome)) for run in store.ended_runs())
+    return sum(store.conclude_run(run, whole_outcome(store, run)) for run in store.ended_runs())
 
 
 def outcome_json(outcome: Outcome) -> RunOutcome:
@@ -71,7 +81,7 @@ def night(store: Store, hours: float = HOURS) -> Night:
     since = until - timedelta(hours=hours)
     found, sent = store.runs_between(since, until, MOST_RUNS), store.reports_between(since, until)
     # Those that ended a moment ago, or were changed since, have not been counted yet.
-    found = [replace(run, outcome=whole_outcome(store, run.outcome)) for run in found]
+    found = [replace(run, outcome=whole_outcome(store, run)) for run in found]
     runs = [
         filled(
             NightRun,

@@ -18,6 +18,7 @@ from sprag.service.schedules.times import (
     read_moment,
     read_time_of_day,
 )
+from sprag.service.schedules.trouble import read_trouble_flags
 from sprag.service.spec.described import Described, choice, named
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.fields import read_object
@@ -56,7 +57,7 @@ PLAIN: Final = named(
 )
 FIELDS: Final = (
     *("name", "spec", "cron", "at", "zone", "window", "finish_by", *PLAIN, "misfire_grace", "paused_until"),
-    *("report_email", "report_webhook"),
+    *("trouble_flags", "report_email", "report_webhook"),
 )
 _CRON_ALLOWED: Final = 'five fields, such as "0 22 * * 1-5": at 22:00 from Monday to Friday; or "@daily" and the like'
 _AT_ALLOWED: Final = 'a future time, such as "2027-01-31T22:00"'
@@ -70,7 +71,8 @@ _RUNS_LOOKED_AT: Final = 7
 class ScheduleFields:
     """A complete schedule: what is run (``spec``, the user's own), when, and how.
 
-    Each run is held at ``finish_by``, whether finished or not: a time of day in the zone, or a duration.
+    Each run is held at ``finish_by``, whether finished or not: a time of day in the zone, or a duration. Cases with one
+    of ``trouble_flags`` need attention; None: `usual_flags` of the model.
     """
 
     name: str
@@ -83,6 +85,7 @@ class ScheduleFields:
     finish_by: str | None = None
     policies: Policies = field(default_factory=Policies)
     report_to: ReportTo = field(default_factory=ReportTo)
+    trouble_flags: tuple[str, ...] | None = None
 
     @property
     def times(self) -> tuple[Timing, Window | None, str | None, bool, datetime | None]:
@@ -120,6 +123,7 @@ class ScheduleFields:
             "misfire_grace": policies.misfire_grace,
             "enabled": self.enabled,
             "paused_until": None if paused is None else local_time(paused, timing.zone),
+            "trouble_flags": None if self.trouble_flags is None else list(self.trouble_flags),
             **self.report_to.to_json(),
         }
 
@@ -155,6 +159,7 @@ def _read(data: object, now: datetime, old: ScheduleFields | None = None) -> Sch
     paused_until = _read_pause(report, found.get("paused_until"), zone, now, old)
     report_to = read_report_to(report, found, when)
     title, spec = _read_spec(report, found, old)
+    flags = read_trouble_flags(report, found, spec.get("model"))
     name = _read_name(report, found.get("name"), title)
     report.raise_if_any()
     assert timing is not None
@@ -164,7 +169,7 @@ def _read(data: object, now: datetime, old: ScheduleFields | None = None) -> Sch
         )
         report.raise_if_any()
     policies = Policies(Overlap(overlap), CatchUp(catch_up), grace, paused_until)
-    fields = ScheduleFields(name, spec, timing, window, priority, fresh, enabled, finish_by, policies, report_to)
+    fields = ScheduleFields(name, spec, timing, window, priority, fresh, enabled, finish_by, policies, report_to, flags)
     if old is None or fields.times != old.times:
         _require_open_window(report, fields, now)
         report.raise_if_any()

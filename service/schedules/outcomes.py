@@ -49,8 +49,8 @@ _SENTENCES: Final = {
 }
 
 
-#: Flags of cases that end ok and still have no result to rely on.
-TROUBLE_FLAGS: Final = ("unsettled",)
+#: A flag that has a sentence of its own, and that counted in outcomes which do not say which flags do.
+_UNSETTLED: Final = "unsettled"
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +68,7 @@ class Outcome:
     missed : due times just before that were not run
     ended_at : end of its study, or of the run without one
     seconds : from the first chunk of its study to its end
+    trouble_flags : flags that count as trouble of this run; None until they have been counted
     """
 
     result: Result
@@ -83,19 +84,21 @@ class Outcome:
     missed: int = 0
     ended_at: datetime | None = None
     seconds: float | None = None
+    trouble_flags: tuple[str, ...] | None = None
 
     @property
     def trouble(self) -> bool:
-        """Whether somebody should look: the run did not end as planned, some cases failed or have a flag of
-        `TROUBLE_FLAGS`, or due times were missed.
+        """Whether somebody should look: the run did not end as planned, some cases failed or have one of its
+        ``trouble_flags``, or due times were missed.
         """
         planned = self.result in {Result.FINISHED, Result.DEADLINE} or not self.result.final
-        return not planned or self.ok < self.done or self.missed > 0 or self.unsettled > 0
+        return not planned or self.ok < self.done or self.missed > 0 or bool(self.flagged)
 
     @property
-    def unsettled(self) -> int:
-        """Cases with a flag of `TROUBLE_FLAGS`, as far as they have been counted."""
-        return sum((self.flags or {}).get(name, 0) for name in TROUBLE_FLAGS)
+    def flagged(self) -> dict[str, int]:
+        """Numbers of cases by flag that counts as trouble, as far as they have been counted; no zeros."""
+        flags = self.flags or {}
+        return {name: flags[name] for name in self.trouble_flags or () if flags.get(name)}
 
     @property
     def sentence(self) -> str:
@@ -105,20 +108,11 @@ class Outcome:
         first = gettext(_SENTENCES[self.result])
         if self.study is None or self.result is Result.FAILED:
             first += f": {said(self.reason)}" if self.reason else ""
-        elif self.result is Result.FINISHED and self.ok == self.cases and not self.unsettled:
+        elif self.result is Result.FINISHED and self.ok == self.cases and not self.flagged:
             first += ": " + gettext("all {cases} cases ended ok", **shown)
         else:
             first += ": " + gettext("{done} of {cases} cases are done, and {ok} of them ended ok", **shown)
-        parts = [first]
-        if self.unsettled:
-            parts.append(
-                ngettext(
-                    "The motion of {count} case is unsettled",
-                    "The motions of {count} cases are unsettled",
-                    self.unsettled,
-                    count=grouped(self.unsettled),
-                )
-            )
+        parts = [first, *(_flagged(name, count) for name, count in self.flagged.items())]
         if self.result is Result.HELD and self.reason:
             parts.append(gettext("It is held: {reason}", reason=said(self.reason)))
         if self.coverage and self.result is not Result.FINISHED:
@@ -143,5 +137,23 @@ class Outcome:
     def of_json(cls, data: dict[str, Any]) -> Outcome:
         """The outcome that `to_json` wrote."""
         ended = data["ended_at"]
-        own = {"result": Result(data["result"]), "ended_at": None if ended is None else datetime.fromisoformat(ended)}
+        flags = data.get("trouble_flags", None if data["flags"] is None else [_UNSETTLED])
+        own = {
+            "result": Result(data["result"]),
+            "ended_at": None if ended is None else datetime.fromisoformat(ended),
+            "trouble_flags": None if flags is None else tuple(flags),
+        }
         return cls(**{**data, **own})
+
+
+def _flagged(name: str, count: int) -> str:
+    """That so many cases have a flag."""
+    if name == _UNSETTLED:
+        return ngettext(
+            "The motion of {count} case is unsettled",
+            "The motions of {count} cases are unsettled",
+            count,
+            count=grouped(count),
+        )
+    cases = ngettext("{count} case", "{count} cases", count, count=grouped(count))
+    return gettext("Flag {name}", name=gettext(name.replace("_", " "))) + f": {cases}"

@@ -16,7 +16,7 @@ from sprag.service.schedules.report_to import ReportWhen
 from sprag.service.schedules.times import local_time
 from sprag.service.storage.part import micros_of, moment, optional_moment
 from sprag.service.storage.reports import Reports, add_reports
-from sprag.service.storage.schedule_rows import report_to_of
+from sprag.service.storage.schedule_rows import report_to_of, trouble_flags_of
 from sprag.service.storage.schedule_tables import SCHEDULE_RUNS, SCHEDULES
 from sprag.service.storage.tables import HELD_AT_DEADLINE, STUDIES
 from sprag.worker.states import TERMINAL, StudyState
@@ -56,17 +56,21 @@ COLUMNS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class EndedRun:
-    """A due time that is over and has not been concluded yet; its ``outcome`` lacks endings, flags and coverage."""
+    """A due time that is over and has not been concluded yet; its ``outcome`` lacks endings, flags and coverage.
+
+    ``trouble_flags`` are those of its schedule.
+    """
 
     schedule: int
     id: str
     due: int
     outcome: Outcome
+    trouble_flags: tuple[str, ...] | None
 
 
 @dataclass(frozen=True, slots=True)
 class NightRun:
-    """A due time with its schedule: id, name and zone."""
+    """A due time with its schedule: id, name, zone and ``trouble_flags``."""
 
     schedule: str
     name: str
@@ -74,6 +78,7 @@ class NightRun:
     due: datetime
     study: str | None
     outcome: Outcome
+    trouble_flags: tuple[str, ...] | None
 
 
 def runs_with_studies() -> sa.FromClause:
@@ -129,7 +134,7 @@ class RunOutcomes(Reports):
         """Due times that are over and have not been concluded yet, a limited number."""
         over = _C.state.in_([state.value for state in TERMINAL]) | (_C.waits_for == HELD_AT_DEADLINE)
         query = (
-            sa.select(_S.id.label("schedule_id"), *COLUMNS)
+            sa.select(_S.id.label("schedule_id"), _S.trouble_flags, *COLUMNS)
             .select_from(runs_with_studies().join(SCHEDULES, _S.number == _R.schedule))
             .where(_R.concluded_at.is_(None), _R.state != "taken", _C.number.is_(None) | over)
             .order_by(_R.due)
@@ -137,7 +142,9 @@ class RunOutcomes(Reports):
         )
         with self.session.read() as connection:
             rows = connection.execute(query).all()
-        return [EndedRun(row.schedule, row.schedule_id, row.due, outcome_of(row)) for row in rows]
+        return [
+            EndedRun(row.schedule, row.schedule_id, row.due, outcome_of(row), trouble_flags_of(row)) for row in rows
+        ]
 
     def conclude_run(self, run: EndedRun, outcome: Outcome) -> bool:
         """Keep the outcome of a due time, and add its reports; False when another process has done so."""
@@ -162,7 +169,7 @@ class RunOutcomes(Reports):
     def runs_between(self, since: datetime, until: datetime, most: int) -> list[NightRun]:
         """Due times from ``since`` until ``until``, also of deleted schedules, latest first."""
         query = (
-            sa.select(_S.id.label("schedule_id"), _S.name.label("schedule_name"), _S.zone, *COLUMNS)
+            sa.select(_S.id.label("schedule_id"), _S.name.label("schedule_name"), _S.zone, _S.trouble_flags, *COLUMNS)
             .select_from(runs_with_studies().join(SCHEDULES, _S.number == _R.schedule))
             .where(_R.due >= micros_of(since), _R.due <= micros_of(until))
             .order_by(_R.due.desc(), _R.schedule)
@@ -171,6 +178,14 @@ class RunOutcomes(Reports):
         with self.session.read() as connection:
             rows = connection.execute(query).all()
         return [
-            NightRun(row.schedule_id, row.schedule_name, row.zone, moment(row.due), row.study, outcome_of(row))
+            NightRun(
+                row.schedule_id,
+                row.schedule_name,
+                row.zone,
+                moment(row.due),
+                row.study,
+                outcome_of(row),
+                trouble_flags_of(row),
+            )
             for row in rows
         ]

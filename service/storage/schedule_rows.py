@@ -44,6 +44,7 @@ def row_values(fields: ScheduleFields, now: datetime, *, new: bool) -> dict[str,
         "report_email": "\n".join(fields.report_to.email),
         "report_webhook": fields.report_to.webhook,
         "report_when": fields.report_to.when.value,
+        "trouble_flags": None if fields.trouble_flags is None else ",".join(fields.trouble_flags),
         "next_due": None if due is None else micros_of(due),
     }
 
@@ -69,12 +70,18 @@ def fields_of(row: Any) -> ScheduleFields:
         row.finish_by,
         Policies(Overlap(row.overlap), CatchUp(row.catch_up), row.misfire_grace, optional_moment(row.paused_until)),
         report_to_of(row),
+        trouble_flags_of(row),
     )
 
 
 def report_to_of(row: Any) -> ReportTo:
     """To whom the schedule of a row reports."""
     return ReportTo(tuple(row.report_email.split()), row.report_webhook, ReportWhen(row.report_when))
+
+
+def trouble_flags_of(row: Any) -> tuple[str, ...] | None:
+    """The flags that the schedule of a row names as trouble; None: the usual ones of the model."""
+    return None if row.trouble_flags is None else tuple(filter(None, row.trouble_flags.split(",")))
 
 
 def logged_fields(fields: ScheduleFields) -> dict[str, Any]:

@@ -46,6 +46,8 @@ SCHEDULES = sa.Table(
     sa.Column("report_email", sa.Text, nullable=False, server_default=""),
     sa.Column("report_webhook", sa.Text),
     sa.Column("report_when", sa.String(8), nullable=False, server_default="always"),
+    # Flags of cases that need attention, joined by commas; NULL: the usual ones of the model.
+    sa.Column("trouble_flags", sa.Text),
     sa.Index("ix_schedules_sender_idempotency_key", "sender", "idempotency_key", unique=True),
     sqlite_autoincrement=True,
 )

@@ -9,7 +9,7 @@ from sprag.worker import models
 from sprag.worker.states import ChunkState
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0037"
+HEAD_REVISION = "0038"
 
 METADATA = sa.MetaData(
     naming_convention={

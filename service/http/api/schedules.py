@@ -29,6 +29,7 @@ from sprag.service.spec.described import schemas
 from sprag.service.storage.editions import require_edition
 from sprag.service.storage.errors import ChangedMeanwhileError
 from sprag.service.storage.schedule_runs import ScheduleRecord
+from sprag.worker.codes import FLAG_MASKS
 from sprag.worker.limits import MAX_NAME_LENGTH
 
 router = api_router("schedules")
@@ -77,6 +78,14 @@ _FIELDS: Final[dict[str, Any]] = {
         "type": ["string", "null"],
         "description": "the schedule is not due before: a future time, in `zone` unless it has its own offset",
     },
+    "trouble_flags": {
+        "type": ["array", "null"],
+        "uniqueItems": True,
+        "items": {"enum": list(FLAG_MASKS)},
+        "default": None,
+        "description": "a run with a case that has one of these flags of its model needs attention; an empty list: "
+        "flags do not matter; null: those of motions that had not settled, `unsettled` and `not_settled`",
+    },
     "report_email": {
         "type": "array",
         "maxItems": MOST_RECIPIENTS,
@@ -110,6 +119,7 @@ EXAMPLE: Final[dict[str, Any]] = {
     "zone": "Europe/Berlin",
     "window": ["22:00", "06:00"],
     "finish_by": "06:00",
+    "trouble_flags": ["unsettled", "history_dependent"],
     "spec": examples.SPEC,
 }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from datetime import datetime
 from typing import Annotated, Any, Final
@@ -18,6 +18,7 @@ from sprag.service.http.routers import page_router
 from sprag.service.http.schedule_views import listed
 from sprag.service.http.threads import in_thread
 from sprag.service.http.views import preset_of
+from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.entries import Values
 from sprag.service.http.web.form.values import Form, changed_meanwhile
 from sprag.service.http.web.templates import page
@@ -26,12 +27,15 @@ from sprag.service.jobs import checks
 from sprag.service.jobs.nights import HOURS, MOST_HOURS, night
 from sprag.service.languages import N_
 from sprag.service.presets import preset_names
+from sprag.service.results.phrases import meanings
 from sprag.service.schedules.fields import ScheduleFields, change_fields
 from sprag.service.schedules.report_to import require_deliverable
+from sprag.service.schedules.trouble import usual_flags
 from sprag.service.spec.report import SpecError
 from sprag.service.spec.stored import accepted
 from sprag.service.storage.errors import ChangedMeanwhileError, StudyNotFoundError, TooManySchedulesError
 from sprag.service.zones import zones
+from sprag.worker import models
 from sprag.worker.limits import MAX_PRIORITY
 
 router = page_router()
@@ -62,6 +66,9 @@ _CHANGES: Final[dict[str, dict[str, object]]] = {
     "pause": {"enabled": False},
     "resume": {"enabled": True, "paused_until": None},
 }
+#: Beginning of the names of the boxes for flags, and a field that says that the form has them.
+_FLAG: Final = "trouble_flags/"
+_WITH_FLAGS: Final = "trouble_flags"
 #: Field of the form by the first part of a fault's JSON Pointer.
 _FIELD_OF: Final = {"window": "window_begin", "spec": "source"}
 
@@ -81,7 +88,7 @@ def last_night(context: Ctx, hours: Annotated[float, Query(ge=1, le=MOST_HOURS)]
 @router.get("/schedules/new")
 def new_schedule(context: Ctx, study: Annotated[str | None, Query(max_length=80)] = None) -> Response:
     """The form, empty, or for a study."""
-    values = dict(_EMPTY)
+    values = {**_EMPTY, **_ticks(_usual())}
     if study is not None:
         context.store.get_study(study)
         values["source"] = f"study {study}"
@@ -146,8 +153,7 @@ async def _save(context: Context, work: Work, values: Values, schedule_id: str |
     except SpecError as error:
         for fault in error.faults:
             first = fault.where.split("/")[1] if fault.where else ""
-            sentence = f"{fault.message}; allowed: {fault.allowed}" if fault.allowed else fault.message
-            faults.setdefault(_FIELD_OF.get(first, first), []).append(sentence)
+            faults.setdefault(_FIELD_OF.get(first, first), []).append(message(fault))
     except (StudyNotFoundError, TooManySchedulesError) as error:
         faults["source"] = [str(error)]
     except ChangedMeanwhileError:
@@ -188,6 +194,10 @@ def _data_of(context: Context, values: Mapping[str, str]) -> dict[str, Any]:
         "report_email": re.split(r"[\s,;]+", emails) if (emails := values.get("report_email", "").strip()) else [],
         "report_webhook": values.get("report_webhook", "").strip() or None,
     }
+    if _WITH_FLAGS in values:
+        ticked = [flag for flag in _flags() if _FLAG + flag in values]
+        # Those that count by default stand for the ones that the model of the study has.
+        data["trouble_flags"] = None if set(ticked) == _usual() else ticked
     when = "at" if values.get("when") == "at" else "cron"
     data[when] = values.get(when, "").strip() or None
     kind, _, name = values.get("source", "").partition(" ")
@@ -196,6 +206,21 @@ def _data_of(context: Context, values: Mapping[str, str]) -> dict[str, Any]:
     elif kind == "preset" and name in preset_names():
         data["spec"] = preset_of(name)["spec"]
     return data
+
+
+def _flags() -> dict[str, str]:
+    """Every flag that a case of some model can have, with its description."""
+    return {flag: text for model in models.model_names() for flag, text in models.flags_of(model).items()}
+
+
+def _usual() -> set[str]:
+    """The flags that count as trouble by default, of every model."""
+    return {flag for model in models.model_names() for flag in usual_flags(model)}
+
+
+def _ticks(flags: Iterable[str]) -> Values:
+    """The ticked boxes of these flags."""
+    return {_FLAG + flag: "on" for flag in flags}
 
 
 def _values_of(fields: ScheduleFields) -> Values:
@@ -219,6 +244,7 @@ def _values_of(fields: ScheduleFields) -> Values:
         "report_webhook": fields.report_to.webhook or "",
         "report_when": fields.report_to.when.value,
         **({"fresh": "on"} if fields.fresh else {}),
+        **_ticks(_usual() if fields.trouble_flags is None else fields.trouble_flags),
     }
 
 
@@ -246,6 +272,7 @@ def _form(
         schedule_id=schedule_id,
         studies=studies,
         presets=[preset_of(name) for name in preset_names()],
+        flags=meanings(_flags()),
         zones=sorted(zones()),
         most_priority=MAX_PRIORITY,
     )

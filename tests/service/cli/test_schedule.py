@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from datetime import timedelta
 from typing import TYPE_CHECKING
 
 import pytest
 
-from sprag.service.cli.app import execute
 from sprag.service.schedules.policies import DueTime
+from tests.service.schedule_command import Run, runner
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
@@ -18,31 +17,10 @@ if TYPE_CHECKING:
 
     from tests.service.conftest import Service
 
-Run = Callable[..., tuple[int, str, str]]
-
 
 @pytest.fixture
 def run(service: Service, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
-    """Runs a command; exit code, standard output, standard error."""
-    from sprag.service import client
-
-    class Connected(client.ServiceClient):
-        def __init__(self, server: str, token: str | None = None) -> None:
-            super().__init__(server, token)
-            self._http.close()
-            self._http = service.http
-
-        def __exit__(self, *_: object) -> None:
-            """The test goes on with it."""
-
-    monkeypatch.setattr(client, "ServiceClient", Connected)
-
-    def execute_and_read(*arguments: str) -> tuple[int, str, str]:
-        code = execute(["schedule", *arguments])
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return execute_and_read
+    return runner(service, monkeypatch, capsys)
 
 
 @pytest.fixture
