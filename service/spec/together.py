@@ -7,6 +7,7 @@ the SI unit: beside quantities in units of another scale it is never guessed but
 
 from __future__ import annotations
 
+import re
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 from sprag.service.faults import Code
 from sprag.service.spec.cyrillic import latin
-from sprag.service.spec.numbers import assumption, settle
+from sprag.service.spec.numbers import assumption, settle, settled
 from sprag.service.spec.printed import could_be_values
 from sprag.service.spec.units import PERIOD_NAMES, QuantityError, measure, parse_exact, split_typed
 
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 #: Code of a bare number that could be in several units.
 AMBIGUOUS_UNIT: Final[Code] = "ambiguous-unit"
 _LISTED: Final = 3
+#: Between values of a list in one text, tabs those of pasted cells: a comma counts only before a blank, otherwise it is
+#: decimal.
+_BETWEEN: Final = re.compile(r"[;\n\t]|,\s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +50,11 @@ def with_last_unit(texts: Sequence[str]) -> list[str]:
     if not last or _kind(last) is None or len({_kind(unit) for unit in units if unit}) > 1:
         return list(texts)
     return [f"{text.strip()} {last}" if unit == "" else text for text, unit in zip(texts, units, strict=True)]
+
+
+def split_list(text: str) -> list[str]:
+    """The values of a list that is typed as one text, as they are written."""
+    return [item.strip() for item in _BETWEEN.split(text) if item.strip()]
 
 
 def with_unit_of_range(first: str, last: str, step: str) -> tuple[str, str, str]:
@@ -127,6 +136,18 @@ def read_together(
         pointer, text = written[doubt]
         report.warn("ambiguous-point", f"{pointer}: {assumption(text)}")
     return [value for _, value in pairs]
+
+
+def read_list_text(report: Report, pointer: str, text: str, unit: str) -> list[object] | None:
+    """The items of a list that is one text, such as ``0; 50; 100 N*mm``; None, and faults recorded, where unclear."""
+    typed = split_list(text)
+    if len(typed) == 1 and "," in typed[0]:
+        report.fault(
+            pointer, "invalid-text", "could be one value or several", text,
+            allowed="values separated by semicolons, or a list of them",
+        )  # fmt: skip
+        return None
+    return read_together(report, [(pointer, item) for item in with_last_unit(settled(typed))], unit)
 
 
 def _carried(name: str, unit: str, wanted: str) -> str:

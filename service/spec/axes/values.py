@@ -12,7 +12,7 @@ import numpy as np
 
 from sprag.service.spec.fields import read_exact, read_number, read_whole
 from sprag.service.spec.report import Report, join
-from sprag.service.spec.together import read_together
+from sprag.service.spec.together import read_list_text, read_together
 from sprag.service.spec.units import QuantityError, parse_exact, to_float
 from sprag.worker.limits import MAX_AXIS_VALUES
 from sprag.worker.models import Parameter
@@ -52,20 +52,25 @@ class Plan:
 
 
 def plan_values(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:
-    """The plan of a plain list of quantities."""
-    if not isinstance(data, list) or not data:
-        message = "has no values" if data == [] else "must be a list of values"
+    """The plan of a plain list of quantities, or of one text with all of them."""
+    if not isinstance(data, list | str) or not data or not str(data).strip():
+        empty = isinstance(data, list | str)
+        message = "has no values" if empty else "must be a list of values"
         report.fault(
-            pointer, "empty" if data == [] else "wrong-type", message, data, allowed=f"1 to {MAX_AXIS_VALUES:,} values"
+            pointer, "empty" if empty else "wrong-type", message, data, allowed=f"1 to {MAX_AXIS_VALUES:,} values"
         )
         return None
-    plain = _plain_numbers(data)
+    plain = _plain_numbers(data) if isinstance(data, list) else None
     if plain is not None and in_range(plain, parameter).all():
         return Plan(pointer, plain.size, lambda: plain, listed=True)
-    items = _together(report, pointer, data, parameter)
+    if isinstance(data, str):
+        items = read_list_text(report, pointer, data, parameter.unit)
+    else:
+        items = _together(report, pointer, data, parameter)
     if items is None:
         return None
-    numbers = [read_number(report, join(pointer, index), value, parameter) for index, value in enumerate(items)]
+    places = [pointer if isinstance(data, str) else join(pointer, index) for index in range(len(items))]
+    numbers = [read_number(report, place, value, parameter) for place, value in zip(places, items, strict=True)]
     known = [number for number in numbers if number is not None]
     if len(known) < len(numbers):
         return None

@@ -10,7 +10,7 @@ from sprag.service.spec.draws.distributions import SIGMAS
 from sprag.service.spec.fields import read_number
 from sprag.service.spec.report import Report, join
 from sprag.service.spec.shares import in_percent
-from sprag.service.spec.together import read_together
+from sprag.service.spec.together import read_list_text, read_together, split_list
 from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker.limits import MAX_CORRELATIONS, MAX_DRIVES, MAX_TOLERANCES
 
@@ -83,15 +83,24 @@ def read_plus_minus(
 
 
 def read_measured(report: Report, pointer: str, data: object, parameters: Sequence[Parameter]) -> list[float] | None:
-    """Measured values (SI), in the range of every one of ``parameters``; None, and faults recorded, where invalid."""
-    read_items = MEASURED.read(report, pointer, data)
-    given = [(join(pointer, index), item) for index, item in enumerate(read_items or ())]
-    items = None if read_items is None else read_together(report, given, parameters[0].unit)
+    """Measured values (SI), a list or one text with all of them, in the range of every one of ``parameters``.
+
+    None, and faults recorded, where they are invalid.
+    """
+    unit = parameters[0].unit
+    listed = MEASURED.read(report, pointer, split_list(data) if isinstance(data, str) else data)
+    if listed is None:
+        return None
+    if isinstance(data, str):
+        items = read_list_text(report, pointer, data, unit)
+    else:
+        items = read_together(report, [(join(pointer, index), item) for index, item in enumerate(listed)], unit)
     if items is None:
         return None
+    places = [pointer if isinstance(data, str) else join(pointer, index) for index in range(len(items))]
     read = [
-        [read_number(report, join(pointer, index), item, parameter) for parameter in parameters]
-        for index, item in enumerate(items)
+        [read_number(report, place, item, parameter) for parameter in parameters]
+        for place, item in zip(places, items, strict=True)
     ]
     values = [numbers[0] for numbers in read if None not in numbers]
     return [value for value in values if value is not None] if len(values) == len(items) else None

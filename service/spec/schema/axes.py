@@ -10,7 +10,7 @@ from sprag.service.spec.axes.sweep import SWEPT
 from sprag.service.spec.described import Listed, schemas
 from sprag.service.spec.schema.draws import correlations_schema, distribution_schema
 from sprag.service.spec.schema.plan import adaptive_schema
-from sprag.service.spec.schema.quantity import QUANTITY, Schema, object_schema, one_of
+from sprag.service.spec.schema.quantity import QUANTITY, Schema, object_schema, one_of, values_schema
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_TIED_PATHS
 
 
@@ -23,7 +23,7 @@ def axis_schema() -> Schema:
 
     count = {"type": "integer", "minimum": 1, "maximum": MAX_AXIS_VALUES}
     ways: Schema = {
-        "values": Listed("values", 1, MAX_AXIS_VALUES, "the values themselves").schema(QUANTITY),
+        "values": values_schema(Listed("values", 1, MAX_AXIS_VALUES, "the values themselves")),
         "linspace": three(count, "[from, to, count], evenly divided, both ends included"),
         "geomspace": three(count, "[from, to, count], each value the same multiple of the previous one"),
         "range": three(QUANTITY, "[from, to, step], the end included when a whole number of steps leads there"),

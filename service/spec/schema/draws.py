@@ -13,13 +13,13 @@ from sprag.service.spec.draws.described import (
     SHARED,
     TOLERANCES,
 )
-from sprag.service.spec.schema.quantity import QUANTITY, Schema, object_schema
+from sprag.service.spec.schema.quantity import QUANTITY, Schema, object_schema, values_schema
 
 
 def distribution_schema() -> dict[str, Schema]:
     """Schemas of the fields of a distribution, by name."""
     plus_minus = {**QUANTITY, "description": f"{PLUS_MINUS.help}: {PLUS_MINUS.limits}", "examples": ["5 %", "0.2 mm"]}
-    return {"plus_minus": plus_minus, "distribution": DISTRIBUTION.schema(), "values": MEASURED.schema(QUANTITY)}
+    return {"plus_minus": plus_minus, "distribution": DISTRIBUTION.schema(), "values": values_schema(MEASURED)}
 
 
 def correlations_schema() -> Schema:

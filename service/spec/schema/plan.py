@@ -9,7 +9,7 @@ from sprag.service.spec.plan.calibrate import CSV_HELP, OTHER, UNKNOWN
 from sprag.service.spec.plan.goal import AT, BEST, MAX, SEARCH, SUBJECT_TO, VARY, WITHIN
 from sprag.service.spec.plan.refine import ERROR, FINEST, MOST, RESULTS, START
 from sprag.service.spec.plan.robust import QUANTILE, YIELD
-from sprag.service.spec.schema.quantity import QUANTITY, Schema, object_schema
+from sprag.service.spec.schema.quantity import QUANTITY, Schema, object_schema, values_schema
 
 _RESULT: Final[Schema] = {"type": "string", "examples": ["shaft.speed.mean", "efficiency", "torque.max"]}
 
@@ -48,7 +48,7 @@ def goal_schema(path: Schema) -> Schema:
             "path": path,
             "from": QUANTITY,
             "to": QUANTITY,
-            "values": Listed("values", 1, 10_000, "the values to choose from").schema(QUANTITY),
+            "values": values_schema(Listed("values", 1, 10_000, "the values to choose from")),
         },
         required=("path",),
     )

@@ -6,6 +6,7 @@ import copy
 import json
 from typing import Any
 
+import jsonschema
 import numpy as np
 import pytest
 
@@ -27,6 +28,8 @@ from sprag.service.results.trajectories import span
 from sprag.service.spec.components import faults_of
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.extend import parse_extended
+from sprag.service.spec.report import SpecError
+from sprag.service.spec.schema.document import spec_schema
 from sprag.service.spec.stored import accepted
 from sprag.service.spec.together import question, with_last_unit
 from sprag.worker import models
@@ -363,3 +366,61 @@ def test_points_of_a_list_that_could_separate_thousands_are_told(text: str) -> N
     certain = check_form(form(way="values", values="20.000; 25.5 N*mm"), Chunking())
     assert certain.parsed is not None
     assert not [warning for warning in (*certain.notes, *certain.parsed.warnings) if "is read as" in warning]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("0; 50; 100; 200 N*mm", [0.0, 0.05, 0.1, 0.2]),
+        ("0, 50, 100 N*mm", [0.0, 0.05, 0.1]),
+        ("0.05 N*m; 100 N*mm", [0.05, 0.1]),
+        ("0,05; 0,1 N*m", [0.05, 0.1]),
+        ("1.000,5; 2.000 N*mm", [1.0005, 2.0]),
+        ("0.1\n0.2 N*m\n", [0.1, 0.2]),
+        ("100 N*mm", [0.1]),
+        ("1 000; 2 000 N*mm;", [1.0, 2.0]),
+    ],
+)
+def test_a_list_of_a_spec_is_one_text(text: str, expected: list[float]) -> None:
+    """Each value of the list and what the form makes of the text are the same."""
+    spec = changed({"/axes": [{"path": LOAD, "values": text}]})
+    study = parse_spec(spec).study
+    assert study.columns(range(study.cases))[LOAD].tolist() == pytest.approx(expected)
+    jsonschema.validate(spec, spec_schema())
+    shown = values_of(spec)
+    assert np.array_equal(parse_spec(spec_of(shown)[0]).study.axes[0].array, study.axes[0].array)
+
+
+@pytest.mark.parametrize(
+    ("text", "asked"),
+    [
+        ("50; 100 N*mm; 0.2", "ambiguous-unit"),
+        ("100,200,300 N*mm", "invalid-text"),
+        ("0,5", "invalid-text"),
+        ("100 200 300 N*mm", "invalid-text"),
+        ("1,234; 5,678 N*mm", "ambiguous-comma"),
+        ("0.1 N*m; much", "not-a-number"),
+        ("0.1; 1e10 N*m", "out-of-range"),
+        ("0.1; 0.2", "missing-unit"),
+        (" ", "empty"),
+        ("", "empty"),
+    ],
+)
+def test_a_text_that_is_unclear_is_refused_where_it_stands(text: str, asked: str) -> None:
+    with pytest.raises(SpecError) as refused:
+        parse_spec(changed({"/axes": [{"path": LOAD, "values": text}]}))
+    assert {(fault.where, fault.code) for fault in refused.value.faults} == {("/axes/0/values", asked)}
+
+
+def test_points_of_a_text_that_could_separate_thousands_are_told() -> None:
+    (warning,) = parsed({"/axes": [{"path": LOAD, "values": "20.000; 25.000 N*mm"}]}).warnings
+    assert warning.startswith("/axes/0/values: '20.000 N*mm' is read as 20; write 20000")
+
+
+def test_lists_of_goals_measured_values_and_extensions_are_texts_too() -> None:
+    drawn: dict[str, Any] = {"sample": "random", "count": 4, "ranges": [{"path": LOAD, "values": "50; 100; 200 N*mm"}]}
+    drawn["ranges"].append({"path": "gravity", "from": 1, "to": 2})
+    assert set(parsed({"/axes": [drawn]}).study.columns(range(4))[LOAD]) <= {0.05, 0.1, 0.2}
+    study = parsed({"/axes": [{"path": LOAD, "values": "50; 100 N*mm"}]})
+    longer = parse_extended(study.spec, study.study, {"axes": [{"path": LOAD, "values": "150; 200 N*mm"}]}).study
+    assert longer.columns(range(4))[LOAD].tolist() == pytest.approx([0.05, 0.1, 0.15, 0.2])

@@ -8,15 +8,13 @@ from typing import Any, Final
 
 from sprag.service.spec.numbers import in_language, settled, with_point
 from sprag.service.spec.printed import could_be_values, keyboard
-from sprag.service.spec.together import with_last_unit, with_unit_of_range
+from sprag.service.spec.together import split_list, with_last_unit, with_unit_of_range
 
 Values = dict[str, str]
 Faults = dict[str, list[str]]
 
 _NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _WHOLE: Final = re.compile(r"[+-]?[0-9]{1,18}")
-#: Separator of a list, tabs those of pasted cells: a comma counts only before a blank, otherwise it is decimal.
-_BETWEEN: Final = re.compile(r"[;\n\t]|,\s")
 
 
 def plain(text: str) -> Any:
@@ -40,7 +38,12 @@ def list_of(text: str) -> list[Any]:
 
 def items_of(text: str) -> list[str]:
     """The items of a list as texts, with decimal points."""
-    return settled([in_language(item) for item in _BETWEEN.split(text) if item.strip()])
+    return settled([in_language(item) for item in split_list(text)])
+
+
+def list_text(values: str | Sequence[Any]) -> str:
+    """The text of a field with a list of a spec, which can be one text too."""
+    return "; ".join(split_list(values) if isinstance(values, str) else map(text_of, values))
 
 
 def range_of(values: Mapping[str, str], pointer: str, names: Sequence[str] = ("from", "to")) -> dict[str, Any]:

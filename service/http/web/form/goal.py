@@ -6,7 +6,17 @@ import re
 from collections.abc import Mapping
 from typing import Any, Final
 
-from sprag.service.http.web.form.entries import Faults, Values, list_of, path_values, paths_of, plain, range_of, text_of
+from sprag.service.http.web.form.entries import (
+    Faults,
+    Values,
+    list_of,
+    list_text,
+    path_values,
+    paths_of,
+    plain,
+    range_of,
+    text_of,
+)
 from sprag.service.http.web.form.parts import PARTS, filled
 from sprag.service.languages import N_
 from sprag.service.spec.plan import goal
@@ -141,7 +151,7 @@ def _variable_values(pointer: str, item: Mapping[str, Any]) -> Values:
     _only(item, "path", *_VARIABLE[way])
     values = path_values(pointer, item["path"]) | {f"{pointer}/way": way}
     if way == "values":
-        return values | {f"{pointer}/values": "; ".join(map(text_of, item["values"]))}
+        return values | {f"{pointer}/values": list_text(item["values"])}
     return values | {f"{pointer}/{name}": text_of(item[name]) for name in ("from", "to")}
 
 

@@ -22,6 +22,7 @@ from sprag.service.http.web.form.entries import (
     count_in,
     items_of,
     list_of,
+    list_text,
     names_of,
     path_values,
     paths_of,
@@ -387,5 +388,5 @@ def _axis_values(pointer: str, axis: Mapping[str, Any]) -> Values:
     found = {**path_values(pointer, axis["path"]), f"{pointer}/way": way}
     found |= {f"{pointer}/{SWEPT.name}": str(axis[SWEPT.name])} if SWEPT.name in axis else {}
     if way == "values":
-        return found | {f"{pointer}/values": "; ".join(map(text_of, axis[way]))}
+        return found | {f"{pointer}/values": list_text(axis[way])}
     return found | {f"{pointer}/{name}": text_of(item) for name, item in zip(WAYS[way], axis[way], strict=True)}

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from sprag.service.http.web.form.entries import Values, count_in, list_of, names_of, plain, text_of
+from sprag.service.http.web.form.entries import Values, count_in, list_of, list_text, names_of, plain, text_of
 from sprag.service.http.web.form.fields import Field, described, pendulum, sections
 from sprag.service.http.web.form.shaft import blocks, is_shaft
 from sprag.service.languages import _
@@ -118,7 +118,7 @@ def tolerance_values(spec: Mapping[str, Any], values: Mapping[str, str]) -> Valu
                 raise ValueError(f"the form has no field for the tolerance of {first}")
             name = own_name(shown[first])
             order.append(name)
-            measured = "; ".join(map(text_of, item.get("values", ())))
+            measured = list_text(item.get("values", ()))
             found[f"{name}/plus_minus"] = measured or text_of(item["plus_minus"])
             found[f"{name}/distribution"] = MEASURED if measured else item.get("distribution", _NORMAL)
             if others:
