@@ -119,12 +119,14 @@ def test_one_request_writes_what_many_want(
 def test_a_file_is_written_on_while_anybody_wants_it(
     service: Service, ended: str, tokens: dict[str, str], portal: BlockingPortal
 ) -> None:
+    files = service.app.state.context.files
+
     async def export() -> None:
         held = Held(service)
         first, second, third = (
             asyncio.ensure_future(ask(service, rows(ended, "csv"), tokens[name])) for name in ("one", "one", "other")
         )
-        await until(lambda: len(held.begun) == 1)
+        await until(lambda: [entry.clients for entry in files._entries.values()] == [3] and bool(held.begun))
         first.cancel()
         await asyncio.wait([first])
         held.allowed.set()
@@ -223,8 +225,9 @@ def test_rows_that_are_read_slowly_leave_a_process_for_files(
 
         service.writer.stream = slowly  # type: ignore[method-assign]
         names = ("one", "other", "writer")
-        asked = [asyncio.ensure_future(ask(service, rows(ended, "csv"), tokens[name])) for name in names]
+        asked = [asyncio.ensure_future(ask(service, rows(ended, "csv"), tokens[name])) for name in names[:2]]
         await until(lambda: len(begun) == SENDING_PROCESSES)
+        asked.append(asyncio.ensure_future(ask(service, rows(ended, "csv"), tokens[names[2]])))
         part = await ask(service, rows(ended, "csv"), tokens["third"], Range="bytes=0-9")
         assert part.status_code == 206
         assert len(begun) == SENDING_PROCESSES
