@@ -47,7 +47,7 @@ def with_last_unit(texts: Sequence[str]) -> list[str]:
     """
     units = [_typed_unit(text) for text in texts]
     last = next((unit for text, unit in zip(reversed(texts), reversed(units), strict=True) if text.strip()), None)
-    if not last or _kind(last) is None or len({_kind(unit) for unit in units if unit}) > 1:
+    if not last or _kind(last) is None or len({_kind(unit) for unit in set(units) if unit}) > 1:
         return list(texts)
     return [f"{text.strip()} {last}" if unit == "" else text for text, unit in zip(texts, units, strict=True)]
 
@@ -88,7 +88,9 @@ def questions(values: Sequence[object], units: Sequence[str]) -> list[Question]:
     if not any(isinstance(value, str) for value in values):
         return []
     typed = [_typed_unit(value) if isinstance(value, str) else None for value in values]
-    others = [(name, unit) for name, unit in zip(typed, units, strict=True) if name and _differs(name, unit)]
+    # Each once, however many values there are: whether a name is a unit takes long where it is none.
+    pairs = dict.fromkeys((name, unit) for name, unit in zip(typed, units, strict=True) if name)
+    others = [pair for pair in pairs if _differs(*pair)]
     asked = []
     for place, (value, own) in enumerate(zip(values, typed, strict=True)):
         number = _bare(value, own) if others else None

@@ -6,6 +6,7 @@ import asyncio
 import base64
 import hashlib
 import hmac
+import math
 import smtplib
 import socket
 import ssl
@@ -76,8 +77,10 @@ class _Limited(smtplib.SMTP):
     """A connection that ends after `MOST_SECONDS`, whatever it waits for."""
 
     limit: threading.Timer | None = None
+    until: float = math.inf
 
     def connect(self, *place: Any, **named: Any) -> tuple[int, bytes]:
+        self.until = time.monotonic() + MOST_SECONDS
         self.limit = threading.Timer(MOST_SECONDS, self._cut)
         self.limit.daemon = True
         self.limit.start()
@@ -86,6 +89,11 @@ class _Limited(smtplib.SMTP):
         except BaseException:
             self.close()
             raise
+
+    def getreply(self) -> tuple[int, bytes]:
+        if self.file is None and self.sock is not None:
+            self.file = _Replies(self.sock.makefile("rb"), self.until)
+        return super().getreply()
 
     def close(self) -> None:
         if self.limit is not None:
@@ -97,6 +105,24 @@ class _Limited(smtplib.SMTP):
             with suppress(OSError):
                 # The method of a TLS socket would change its state under the thread that reads from it.
                 socket.socket.shutdown(self.sock, socket.SHUT_RDWR)
+
+
+class _Replies:
+    """What a server says, line by line until a time: what arrives is read even after the connection was shut down."""
+
+    def __init__(self, file: Any, until: float) -> None:
+        self._file, self._until = file, until
+
+    def readline(self, limit: int) -> bytes:
+        """The next line, cut to so many bytes; raises TimeoutError after the time."""
+        if time.monotonic() >= self._until:
+            raise TimeoutError
+        line: bytes = self._file.readline(limit)
+        return line
+
+    def close(self) -> None:
+        """Read no more."""
+        self._file.close()
 
 
 class _LimitedTLS(_Limited, smtplib.SMTP_SSL):
