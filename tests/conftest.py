@@ -37,6 +37,7 @@ gc.disable()
 LONG = (
     "acceptance/test_readme.py",
     "service/http/test_fuzzing.py",
+    "service/http/web/test_accessibility.py",
     "engine/compile/test_ways.py",
     "service/http/web/test_study_pages.py",
     "acceptance/test_faults.py",

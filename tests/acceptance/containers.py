@@ -26,6 +26,8 @@ from tests.conftest import ROOT
 IGNORED = tuple(
     line for line in (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines() if line and line[0] != "#"
 )
+#: Compiled kernels of the tests serve the containers, too: their sources are the same.
+KERNELS = {"SPRAG_KERNEL_CACHE": os.environ.get("SPRAG_KERNEL_CACHE", str(Path.home() / ".cache" / "sprag"))}
 #: Top folders of the containers that lie below the root of a test.
 _OWN = re.compile(r"(?<![\w.:/-])(?=/(?:opt|build|var)/?)")
 

@@ -16,6 +16,7 @@ import pytest
 
 from benchmarks.faults.harness import COMMAND, kill_family, until
 from sprag.service.storage.store import Store
+from tests.acceptance.containers import KERNELS
 from tests.acceptance.unit import settings
 from tests.conftest import ROOT
 from tests.service.timed_spec import SPEC
@@ -57,9 +58,7 @@ def environment(root: Path, **more: str) -> dict[str, str]:
         for letter, folder in _FOLDERS.items():
             value = value.replace(letter, folder)
         found[name] = value.replace("/var/", f"{root}/var/")
-    if kernels := os.environ.get("SPRAG_KERNEL_CACHE"):
-        found["SPRAG_KERNEL_CACHE"] = kernels
-    return {**found, "SPRAG_PROCESSES": "1", "SPRAG_CHECK_PROCESSES": "1", **more}
+    return {**found, **KERNELS, "SPRAG_PROCESSES": "1", "SPRAG_CHECK_PROCESSES": "1", **more}
 
 
 def under(unit: Path, *command: str) -> list[str]:

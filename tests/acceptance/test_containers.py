@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import stat
 import subprocess
@@ -18,7 +17,7 @@ import pytest
 
 from benchmarks.faults.harness import free_port, kill_family, until
 from tests import postgres
-from tests.acceptance.containers import Image, compose, interpolated, is_sent, started_before, steps
+from tests.acceptance.containers import KERNELS, Image, compose, interpolated, is_sent, started_before, steps
 from tests.conftest import ROOT
 from tests.service.timed_spec import SPEC
 from tests.worker.executors.certificates import require_openssl
@@ -27,8 +26,6 @@ RECIPE = ROOT / "examples" / "Containerfile"
 COMPOSE = ROOT / "examples" / "compose.yaml"
 TOKEN = "a-token-of-the-tests"
 BEARER = {"Authorization": f"Bearer {TOKEN}"}
-#: Compiled kernels of the tests serve the containers, too: their sources are the same.
-KERNELS = {"SPRAG_KERNEL_CACHE": os.environ.get("SPRAG_KERNEL_CACHE", str(Path.home() / ".cache" / "sprag"))}
 
 
 @pytest.fixture(scope="module")
