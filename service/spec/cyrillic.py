@@ -28,6 +28,7 @@ _WITH_PREFIX: Final = {
 #: Every Cyrillic name of a unit, and the Latin one.
 NAMES: Final = {
     **{prefix + name: latin + unit for prefix, latin in _PREFIXES.items() for name, unit in _WITH_PREFIX.items()},
+    **dict.fromkeys(("гц", "герц", "Герц"), "Hz"),
     "т": "t",
     "сек": "s",
     **dict.fromkeys(("мин", "хв"), "min"),
@@ -44,6 +45,7 @@ NAMES: Final = {
         for gram, latin_gram in (("кг", "kg"), ("г", "g"))
         for length, latin_length in (("м", "m"), ("мм", "mm"))
     },
+    "гсм": "gcm",  # but "кгсм" is either kg*cm or kgf*m
     "дюйм": "in",
     "фут": "ft",
     "фунт": "lb",

@@ -26,15 +26,15 @@ DEFINITIONS: Final = (
         "ounce = 28.349523125 * gram = oz",
     ),
     *("minute = 60 * second = min", "hour = 3600 * second = h = hr"),
-    f"turn = {TWO_PI} * radian = _ = revolution = rev = cycle = r = U",  # nameplates: r/min, U/min
+    f"turn = {TWO_PI} * radian = _ = revolution = rev = cycle = r = U = Umdr",  # nameplates: r/min, U/min
     *(
         "degree = turn / 360 = deg = °",
         "arcminute = degree / 60 = arcmin",
         "arcsecond = degree / 3600 = arcsec",
         "gon = turn / 400",
     ),
-    *("revolution_per_minute = turn / minute = rpm = RPM", "revolution_per_second = turn / second = rps"),
-    *("hertz = 1 / second = Hz", "newton = 1000 * gram * meter / second**2 = N", "joule = newton * meter = J"),
+    *("revolution_per_minute = turn / minute = rpm = RPM = Upm", "revolution_per_second = turn / second = rps = cps"),
+    *("hertz = 1 / second = Hz = Hertz", "newton = 1000 * gram * meter / second**2 = N", "joule = newton * meter = J"),
     *("pascal = newton / meter**2 = Pa", "bar = 1e5 * pascal", "atmosphere = 101325 * pascal = atm"),
     *("watt = joule / second = W", "kilogram_force = 9.80665 * newton = kgf = kp"),
     *("pound_force = 4.4482216152605 * newton = lbf", "ounce_force = pound_force / 16 = ozf"),
@@ -79,7 +79,9 @@ _WORDS: Final = (
 )
 _WITH_PLURAL: Final = ("lb", "lbf", "oz", "ozf", "hr", "sec", "min", "deg", "rad", "rev", "bar", "kg")
 _WORD_LENGTH: Final = 4
-_QUESTIONS: Final = dict.fromkeys(("grad", "Grad", "GRAD"), "could be degrees or gons: deg or gon?")
+_QUESTIONS: Final = dict.fromkeys(("grad", "Grad", "GRAD"), "could be degrees or gons: deg or gon?") | {
+    "кгсм": "could be kg*cm or kgf*m: кг*см or кгс*м?"
+}
 
 
 @lru_cache(maxsize=1)

@@ -52,13 +52,20 @@ _EXAMPLES: Final = {
 
 _PER_MINUTE: Final = Fraction(1, 60)
 _QUANTITY: Final = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?)\s*(.*)", re.DOTALL)
+_LETTERS: Final = "A-Za-zµ°А-Яа-яЁёІіЇїЄєҐґ"
 _TOKEN: Final = re.compile(
-    r"\s*(?:(?P<name>[A-Za-zµ°А-Яа-яЁёІіЇїЄєҐґ][A-Za-zµ°А-Яа-яЁёІіЇїЄєҐґ_0]*)|(?:\*\*|\^)\s*(?P<power>[+-]?[0-9]{1,2})(?![0-9])"
+    rf"\s*(?:(?P<name>[{_LETTERS}][{_LETTERS}_0]*)|(?:\*\*|\^)\s*(?P<power>[+-]?[0-9]{{1,2}})(?![0-9])"
     r"|(?P<operator>[*/()])|(?P<one>1)(?![0-9]))"
 )
 _SUPERSCRIPT: Final = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+")
 #: A power without its sign, as in "mm2" and "min-1"; no name of a unit has another digit than 0.
-_DIGIT: Final = re.compile(r"([A-Za-zµ°])(-?[1-9])(?![0-9.])")
+_DIGIT: Final = re.compile(rf"([{_LETTERS}])(-?[1-9])(?![0-9.])")
+#: Points: between units they multiply, as in "kg.m2", and behind an abbreviation they mean nothing, as in "об./мин".
+_POINT: Final = re.compile(rf"(?<=[{_LETTERS}])\.(?=([{_LETTERS}])|[\s/*)]|$)")
+#: Torques with a hyphen, as in "in-lb" and "ozf-in", also times seconds: their pounds and ounces are forces.
+_TORQUE: Final = re.compile(r"(?<![A-Za-z])(?:(in|ft)-(lb|oz)f?s?|(lb|oz)f?-(in|ft))(?![A-Za-z]|\^?-?[0-9])(-(?=s))?")
+#: Moments of inertia with a hyphen, as in "lb-in2".
+_POUNDS: Final = re.compile(r"(?<![A-Za-z])(lb|oz)-(in|ft)(?=\^?2(?![0-9.]))")
 #: Moments of inertia without the multiplication sign, as in "kgm2".
 _INERTIA: Final = re.compile(r"(?<![A-Za-z])(k?g)(m|cm|mm)\^?2(?![0-9.])")
 _LONGEST_UNIT: Final = 40
@@ -272,7 +279,11 @@ def _measure(text: str) -> tuple[Fraction, dict[str, int]]:
     tokens: list[str] = []
     position = 0
     spelled = _SUPERSCRIPT.sub(lambda found: "^" + found[0].translate(_SUPERSCRIPTS), text)
-    spelled = _DIGIT.sub(r"\1^\2", _INERTIA.sub(r"\1*\2^2", spelled.replace("\N{SUBSCRIPT ZERO}", "0")))
+    spelled = _POINT.sub(lambda found: "*" if found[1] else "", spelled.replace("\N{SUBSCRIPT ZERO}", "0"))
+    spelled = _POUNDS.sub(r"\1*\2", _TORQUE.sub(_torque, spelled))
+    spelled = _DIGIT.sub(r"\1^\2", _INERTIA.sub(r"\1*\2^2", spelled))
+    if spelled.lstrip().startswith("/"):
+        spelled = f"1{spelled.lstrip()}"  # as in "1500 /min"
     while position < len(spelled):
         match = _TOKEN.match(spelled, position)
         if match is None:
@@ -284,6 +295,11 @@ def _measure(text: str) -> tuple[Fraction, dict[str, int]]:
     if tokens:
         raise QuantityError("wrong-unit", f"has a unit that cannot be read: '{text}'")
     return factor, {name: power for name, power in powers.items() if power}
+
+
+def _torque(found: re.Match[str]) -> str:
+    """A product of a force and a length, and a sign before the seconds behind it."""
+    return f"({found[2] or found[3]}f*{found[1] or found[4]})" + ("*" if found[5] else "")
 
 
 @lru_cache(maxsize=64)

@@ -20,7 +20,8 @@ MEANING: Final[dict[str, tuple[Fraction | int | str, str]]] = {
     "m": (1, "m"), "g": ("0.001", "kg"), "s": (1, "s"), "sec": (1, "s"), "rad": (1, "rad"), "in": (_INCH, "m"),
     "ft": (_FOOT, "m"), "t": (1000, "kg"), "lb": ("0.45359237", "kg"), "oz": (Fraction("0.45359237") / 16, "kg"),
     "min": (60, "s"), "h": (3600, "s"), "hr": (3600, "s"), "rev": (_TURN, "rad"), "r": (_TURN, "rad"),
-    "U": (_TURN, "rad"), "deg": (Fraction(_TURN) / 360, "rad"), "°": (Fraction(_TURN) / 360, "rad"),
+    "U": (_TURN, "rad"), "Umdr": (_TURN, "rad"), "Upm": (Fraction(_TURN) / 60, "rad/s"), "cps": (_TURN, "rad/s"),
+    "Hertz": (1, "1/s"), "deg": (Fraction(_TURN) / 360, "rad"), "°": (Fraction(_TURN) / 360, "rad"),
     "arcmin": (Fraction(_TURN) / 21600, "rad"), "arcsec": (Fraction(_TURN) / 1296000, "rad"),
     "gon": (Fraction(_TURN) / 400, "rad"), "rpm": (Fraction(_TURN) / 60, "rad/s"),
     "RPM": (Fraction(_TURN) / 60, "rad/s"), "rps": (_TURN, "rad/s"), "Hz": (1, "1/s"), "N": (1, "kg*m/s^2"),
@@ -133,3 +134,55 @@ def test_times_as_rates_stay_refused() -> None:
     for text in ("5 1/s", "5 s-1", "5 Hz", "5 kHz"):
         with pytest.raises(QuantityError):
             parse_quantity(text, "rad/s")
+
+
+_LB: Final = 4.4482216152605
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        *(("1500 " + text, "Hz", 25.0) for text in ("/min", "1/min", "Umdr/min", "Upm", "об./мин", "об./хв.", "min⁻¹")),
+        ("1500/min", "Hz", 25.0),
+        ("60 /min", "rad/s", 2.0 * 3.141592653589793),
+        *(("25 " + text, "Hz", 25.0) for text in ("/s", "гц", "герц", "Герц", "Hertz", "cps", "1/с", "Гц.")),
+        *(("2 " + text, "kg*m^2", 2.0) for text in ("kg.m2", "kg.m^2", "kg.m²", "кг.м2", "кг.м²", "N.m.s²")),
+        ("3 гсм2", "kg*m^2", 3e-7),
+        ("1.5 N.mm", "N*m", 0.0015),
+        ("2 N.m.s/rad", "N*m*s/rad", 2.0),
+        *(
+            ("3 " + text, "N*m", 3.0 * 0.0254 * _LB)
+            for text in ("in-lb", "in-lbf", "lb-in", "lbf-in", "in-lbs", "in–lb")
+        ),
+        *(("3 " + text, "N*m", 3.0 * 0.0254 * _LB / 16.0) for text in ("oz-in", "ozf-in", "in-oz", "in-ozf")),
+        *(("3 " + text, "N*m", 3.0 * 0.3048 * _LB) for text in ("ft-lb", "ft-lbf", "lb-ft", "lbf-ft")),
+        ("3 in-lb/rad", "N*m/rad", 3.0 * 0.0254 * _LB),
+        ("3 in-lb-s^2", "kg*m^2", 3.0 * 0.0254 * _LB),
+        ("3 lb-in^2", "kg*m^2", 3.0 * 0.45359237 * 0.0254**2),
+        ("3 lb-ft²", "kg*m^2", 3.0 * 0.45359237 * 0.3048**2),
+        ("3 oz-in2", "kg*m^2", 3.0 * 0.45359237 / 16.0 * 0.0254**2),
+    ],
+)
+def test_spellings_of_nameplates_and_data_sheets(text: str, unit: str, value: float) -> None:
+    assert parse_quantity(text, unit) == pytest.approx(value, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "why"),
+    [
+        ("3 кгсм2", "kg*m^2", "could be kg*cm or kgf*m: кг*см or кгс*м"),
+        ("3 lbf-in2", "kg*m^2", "cannot be read"),
+        ("3 in-lb2", "kg*m^2", "cannot be read"),
+        ("3 in-lb", "kg", "not a unit of this field"),
+        ("3 /", "Hz", "cannot be read"),
+        ("3 //s", "Hz", "cannot be read"),
+        ("3 mm^2.0", "m^2", "cannot be read"),
+        ("3 kg..m2", "kg*m^2", "cannot be read"),
+        ("3 .kg", "kg", "one decimal point"),
+        ("3 kg-m2", "kg*m^2", "cannot be read"),
+        ("25 /s", "rad/s", "not a unit of this field"),
+    ],
+)
+def test_what_could_be_two_things_or_none_is_refused(text: str, unit: str, why: str) -> None:
+    with pytest.raises(QuantityError, match=re.escape(why)):
+        parse_quantity(text, unit)
