@@ -70,6 +70,13 @@ def machines(folder: Path, cases: int) -> dict[str, dict[str, Any]]:
         ends = [f"{float(inertia) * factor} {unit}".strip() for factor in (1, 2)]
         axis = {"path": "drive.inertia", "linspace": [*ends, cases]}
         found[file.stem] = {name: spec[name] for name in ("sprag", "model", "base")} | {"axes": [axis]}
+    # A motor by its table, and losses by the direction of a load: torques with kinks that follow from the motion.
+    slotter = found["slotter"]
+    rows = [["0 rpm", "700 N*m"], ["26 rpm", "900 N*m"], ["29 rpm", "650 N*m"], ["32 rpm", "0 N*m"]]
+    motor = {"kind": "table", "table": rows, "interpolation": "linear"}
+    drive, operation = slotter["base"]["drive"] | {"motor": motor}, slotter["base"]["operation"] | {"efficiency": 0.9}
+    found["slotter, table"] = slotter | {"base": slotter["base"] | {"drive": drive}}
+    found["slotter, losses"] = slotter | {"base": slotter["base"] | {"operation": operation}}
     return found
 
 

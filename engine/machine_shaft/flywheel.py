@@ -6,9 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine.machine_shaft.columns import Columns
+from sprag.engine.machine_shaft.results import result_infos
 from sprag.engine.machine_shaft.roots import bracketed_roots
 from sprag.engine.machine_shaft.spec import Flywheel as Shapes
-from sprag.engine.machine_shaft.spec import MeanSpeed
+from sprag.engine.machine_shaft.spec import MachineSpec, MeanSpeed
 from sprag.engine.machine_shaft.start import Shape, Stop, least_mean_speed, mean_speed
 
 Floats = NDArray[np.float64]
@@ -133,3 +135,38 @@ def _runs(
         own = whole.take(none)
         runs[none] = mean[none] > least_mean_speed(own, Stop.of(own), kind, torque[none])
     return np.asarray(runs)
+
+
+def flywheel_results(
+    spec: MachineSpec, columns: Columns, known: Mapping[str, Floats], *, fixed: bool
+) -> dict[str, Floats]:
+    """The required inertia by the energy alone, and the results of a flywheel given by its dimensions.
+
+    Parameters
+    ----------
+    spec : MachineSpec
+    columns : Columns
+        The numbers of the cases.
+    known : mapping
+        Other results by name, each (cases,).
+    fixed : bool
+        Whether the torques are the same at any speed; otherwise the required inertia is not known.
+
+    Returns
+    -------
+    dict
+        Results by name, each (cases,); NaN for those that the cases do not have.
+    """
+    names = [info.name for info in result_infos()]
+    none = np.full(columns.cases, np.nan)
+    out = {name: none for name in names if name.startswith("flywheel.")} | {"required_inertia.energy": none}
+    if fixed:
+        wanted = columns.row("wanted_irregularity") * np.square(columns.row("mean_speed"))
+        finite = np.isfinite(wanted)
+        out["required_inertia.energy"] = np.where(
+            finite, known["energy.fluctuation"] / np.where(finite, wanted, 1.0), np.nan
+        )
+    if spec.drive.flywheel:
+        flywheel = Flywheel.of(spec.drive.flywheel, columns.values)
+        out |= flywheel.results(known["omega.max"], known["inertia.drive"], known["required_inertia"])
+    return out

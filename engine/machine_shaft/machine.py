@@ -199,6 +199,11 @@ class Machine:
             own.append(Formula("drive", drive, used))
         return own
 
+    @property
+    def motor(self) -> dict[str, Floats]:
+        """Numbers of the motor as it acts on the main shaft."""
+        return self.train.motor(self.columns.under("drive.motor."))
+
     def _drive(self, phi: Floats) -> Floats:
         values = self.columns.values
         if self.spec.balance == "motor":

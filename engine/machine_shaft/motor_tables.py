@@ -14,6 +14,8 @@ Floats = NDArray[np.float64]
 
 #: Speeds at which the falling branch is sampled for the first guess of a steady speed.
 _SAMPLES = 513
+#: Size of a torque, as a share of the largest, up to which it is rounding error.
+_ROUNDING = 1e-11
 #: From four values within a piece to the coefficients of its cubic.
 _ROWS = [[105, -105, 63, -15], [-568, 1128, -744, 184], [960, -2496, 2112, -576], [-512, 1536, -1536, 512]]
 _TO_POWERS = np.array(_ROWS, dtype=np.float64) / 48.0
@@ -24,6 +26,8 @@ class MotorTable:
 
     Attributes
     ----------
+    kinks : array, shape (n,)
+        Speeds in rad/s of the rows at which its slope or one of the next two derivatives jumps.
     free : float
         Speed without load in rad/s: the last at which the torque passes zero.
     """
@@ -39,6 +43,7 @@ class MotorTable:
         self._speeds = np.linspace(x[peak], x[-1], _SAMPLES)[::-1]
         self._torques = np.maximum.accumulate(curve(self._speeds))
         self.free = float(np.interp(0.0, self._torques, self._speeds))
+        self.kinks = x[self._jumps() > _ROUNDING * np.abs(values).max()]
 
     def at(self, omega: Floats) -> tuple[Floats, Floats]:
         """Torque in N*m at speeds in rad/s, and its derivative by the speed."""
@@ -59,6 +64,17 @@ class MotorTable:
             rows.append([high, low, *(power / own for power, own in zip(powers, widths, strict=True))])
         rows.append([np.inf, x[-1], float(self._curve(x[-1:])[0]), self._outside[1], 0.0, 0.0])
         return np.array(rows)
+
+    def _jumps(self) -> Floats:
+        """By how much the pieces before and after each row disagree within their lengths, in N*m, shape (n,)."""
+        pieces, widths = self.pieces(), np.diff(self._curve.knots)
+        c1, c2, c3 = pieces[:-1, 3:].T
+        u = np.append(0.0, widths)
+        slope = np.abs(c1 + u * (2.0 * c2 + 3.0 * u * c3) - pieces[1:, 3])
+        curvature, third = np.abs(c2 + 3.0 * u * c3 - pieces[1:, 4]), np.abs(c3 - pieces[1:, 5])
+        # The straight ends count with the length of the piece beside them.
+        length = np.maximum(np.append(widths[:1], widths), np.append(widths, widths[-1:]))
+        return np.asarray(length * (slope + length * (curvature + length * third)))
 
     def speed_for(self, torque: Floats) -> Floats:
         """Speed on the falling branch, in rad/s, for a torque; that of the largest torque where it cannot give it."""

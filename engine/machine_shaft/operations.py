@@ -1,16 +1,16 @@
 """The resistance of the operation, and the weight and spring of a mechanism, as torques on the shaft."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine import elementary
 from sprag.engine.machine_shaft.expressions import MEAN_SPEED, Expression
-from sprag.engine.machine_shaft.mechanisms import Mechanism, Values
-from sprag.engine.machine_shaft.roots import bracketed_roots, switches
+from sprag.engine.machine_shaft.mechanisms import Values
+from sprag.engine.machine_shaft.roots import switches
 from sprag.engine.machine_shaft.spec import OperationChoice
+from sprag.engine.machine_shaft.strokes import Stroke
 from sprag.engine.machine_shaft.tables import Curve, along_strokes, over_stroke, periodic
 
 Floats = NDArray[np.float64]
@@ -20,65 +20,6 @@ SpeedLaw = Callable[[Floats], tuple[Floats, Floats]]
 _TURN = 2.0 * np.pi
 #: Samples per revolution in the search for sign changes of a formula.
 _SAMPLES = 720
-
-
-@dataclass(frozen=True, slots=True)
-class Stroke:
-    """The strokes of a mechanism.
-
-    Attributes
-    ----------
-    start, end : arrays, shape (cases or 1, 1, 1)
-        Angles at which the forward stroke starts and ends, ``end`` within a revolution after ``start``.
-    length : array of that shape
-        Length of a stroke in m.
-    """
-
-    mechanism: Mechanism
-    values: Values
-    start: Floats
-    end: Floats
-    length: Floats
-
-    @classmethod
-    def of(cls, mechanism: Mechanism, values: Values) -> "Stroke":
-        """The strokes of ``mechanism``; NaN where it cannot be assembled."""
-        with np.errstate(all="ignore"):
-            start, end = mechanism.dead_centres(values)
-            end = start + np.mod(end - start, _TURN)
-            return cls(mechanism, values, start, end, mechanism.way(values, end))
-
-    def take(self, rows: NDArray[np.int64]) -> "Stroke":
-        """The strokes of some of the cases."""
-        values = {name: value[rows] if len(value) > 1 else value for name, value in self.values.items()}
-        own = (value[rows] if len(value) > 1 else value for value in (self.start, self.end, self.length))
-        return Stroke(self.mechanism, values, *own)
-
-    def fraction(self, phi: Floats) -> Floats:
-        """Fraction of the stroke at ``phi``, 0 where the forward stroke starts, 1 where it ends."""
-        return np.clip(self.mechanism.way(self.values, phi) / self.length, 0.0, 1.0)
-
-    def forward(self, phi: Floats) -> NDArray[np.bool_]:
-        """Whether the forward stroke is under way."""
-        return np.asarray(np.mod(phi - self.start, _TURN) < self.end - self.start)
-
-    def backward(self, phi: Floats) -> NDArray[np.bool_]:
-        """Whether the return stroke is under way; in the dwells of a cam no stroke is."""
-        start, length = self.mechanism.return_stroke(self.values)
-        if start is None or length is None:
-            return ~self.forward(phi)
-        return np.asarray(np.mod(phi - start, _TURN) < length)
-
-    def angles(self, fraction: Floats, *, forward: bool) -> Floats:
-        """Angles at which a stroke has come to ``fraction`` (cases or 1, 1, n); NaN outside 0 .. 1."""
-        low, high = (self.start, self.end) if forward else (self.end, self.start + _TURN)
-        shape = np.broadcast_shapes(low.shape, high.shape, fraction.shape)
-        low, high, target = (np.broadcast_to(part, shape) for part in (low, high, fraction))
-        rising = 1.0 if forward else -1.0
-        inside = (target > 0.0) & (target < 1.0)
-        edge = np.where(inside, -1.0, 0.0)
-        found = bracketed_roots(lambda phi: rising * (self.fraction(phi) - target), low, high, edge, -edge)
-        return np.where(inside, found, np.nan)
 
 
 def every_revolution(angles: Floats, revolutions: int) -> Floats:
@@ -188,6 +129,18 @@ class Operation:
         """Whether its formula uses ``t``, the time in which an even shaft comes to ``phi``."""
         own = self.expression
         return own is not None and MEAN_SPEED in own.used
+
+    @property
+    def loses(self) -> bool:
+        """Whether less of its power arrives than is sent."""
+        efficiency = self._values.get("efficiency")
+        return self._choice.quantity != "none" and efficiency is not None and bool((efficiency != 1.0).any())
+
+    def switch(self, index: int, phi: Floats, omega: Floats) -> Floats:
+        """Value of a switch of a formula that follows the speed, at its own angles and the speeds there."""
+        if self._expression is None:
+            raise AssertionError("only a formula has switches")
+        return np.asarray(self._expression.switch(index, self._environment(phi) | {"omega": (omega, 0.0)}))
 
     def speed_law(self, phi: Floats, way_slope: Floats | None) -> SpeedLaw:
         """The torque at ``phi`` by the speed, of an operation that follows it; parameters as in ``lossless``."""

@@ -20,10 +20,11 @@ from sprag.engine.machine_shaft.four_bars import FourBar, ParallelCrank
 from sprag.engine.machine_shaft.linkages import CrankShaper, ScotchYoke, SliderCrank, Whitworth
 from sprag.engine.machine_shaft.linked_rams import DragLink, Toggle
 from sprag.engine.machine_shaft.mechanisms import Mechanism, Motion, RodMechanism, Values
-from sprag.engine.machine_shaft.operations import Operation, SpeedLaw, Stroke, every_revolution, formula_breaks
+from sprag.engine.machine_shaft.operations import Operation, SpeedLaw, every_revolution, formula_breaks
 from sprag.engine.machine_shaft.pieces import Formula
 from sprag.engine.machine_shaft.problems import TableError
 from sprag.engine.machine_shaft.spec import MechanismChoice, MechanismKind, PartChoice
+from sprag.engine.machine_shaft.strokes import Stroke
 from sprag.engine.machine_shaft.tables import Curve, periodic
 
 Floats = NDArray[np.float64]
@@ -218,6 +219,23 @@ class ShaftPart:
     def uses_time(self) -> bool:
         """Whether the formula of its operation uses ``t``."""
         return self._operation.uses_time
+
+    @property
+    def loses(self) -> bool:
+        """Whether power is lost on the way to the operation, so that its torque has a kink where its sign changes."""
+        return self._operation.loses
+
+    @property
+    def switch_count(self) -> int:
+        """Number of switches of the formula of the operation."""
+        return self._operation.expression.switch_count if self._operation.expression is not None else 0
+
+    def switch(self, index: int, phi: Floats, omega: Floats) -> Floats:
+        """A switch of an operation that follows the speed: a value whose sign changes where its formula has a kink.
+
+        ``phi`` are angles of the shaft, and ``omega`` the speeds there in rad/s, both of shape (cases, panels, nodes).
+        """
+        return self._operation.switch(index, self.own_angle(phi), omega)
 
     def speed_law(self, phi: Floats) -> SpeedLaw:
         """The torque of an operation that follows the speed, at angles of the shaft (cases or 1, panels, nodes)."""

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from sprag.engine.machine_shaft.enclosures import Program
 from sprag.engine.machine_shaft.expressions import Expression
-from sprag.engine.machine_shaft.operations import Stroke
 from sprag.engine.machine_shaft.panels import NODES, POSITIONS, WEIGHTS, Panels, Points
 from sprag.engine.machine_shaft.roots import switches
+from sprag.engine.machine_shaft.strokes import Stroke
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -13,10 +13,10 @@ from sprag.engine.machine_shaft.balance import balanced
 from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.decomposition import Decomposition, characteristics
 from sprag.engine.machine_shaft.drive_train import Train
-from sprag.engine.machine_shaft.flywheel import Flywheel, required_inertia
+from sprag.engine.machine_shaft.flywheel import flywheel_results, required_inertia
+from sprag.engine.machine_shaft.kinks import motion_kinks
 from sprag.engine.machine_shaft.machine import Fields, Machine, check_structure
-from sprag.engine.machine_shaft.motor import LimitCycle, characteristic, limit_cycle
-from sprag.engine.machine_shaft.operations import SpeedLaw
+from sprag.engine.machine_shaft.motor import characteristic, limit_cycle
 from sprag.engine.machine_shaft.panels import Panels
 from sprag.engine.machine_shaft.pieces import Pieces, pieces
 from sprag.engine.machine_shaft.results import result_infos
@@ -33,6 +33,9 @@ Bools = NDArray[np.bool_]
 #: Initial panels per revolution, and the number at which a case is abandoned.
 PANELS, MAX_PANELS = 16, 600
 MAX_ATTEMPTS = 48
+#: Attempts after which panels are halved although the motion has a kink in them, and after which a kink alone makes no
+#: further attempt: near a speed that is only touched, kinks may come and go.
+_KINKS_FIRST, _MOST_CUTS = 3, 10
 #: Cases computed together: few enough for their arrays to stay in the processor's cache.
 BLOCK = 64
 
@@ -85,18 +88,19 @@ class Solved:
 
 
 def attempts(spec: MachineSpec, columns: Columns) -> Iterator[tuple[NDArray[np.int64], Solved]]:
-    """Solve assembled cases repeatedly, halving the panels that are too rough.
+    """Solve assembled cases repeatedly, halving the panels that are too rough and cutting where the motion has kinks.
 
     Yields case numbers with their attempts; the last attempt of a case counts.
     """
     rows = np.arange(columns.cases)
-    cuts = np.empty((rows.size, 0))
+    cuts = kinks = np.empty((rows.size, 0))
     found: list[Pieces] | None = None
-    for _ in range(MAX_ATTEMPTS):
+    for number in range(MAX_ATTEMPTS):
         if not rows.size:
             return
-        solved = _attempt(spec, columns.take(rows), cuts)
-        _mark_unreached(spec, columns.take(rows), solved)
+        machine = Machine(spec, columns.take(rows))
+        solved = _attempt(machine, np.concatenate([cuts, kinks], axis=1))
+        _mark_unreached(spec, machine.columns, solved)
         panels = solved.decomposition.panels
         first = found is None
         if found is None:
@@ -105,13 +109,17 @@ def attempts(spec: MachineSpec, columns: Columns) -> Iterator[tuple[NDArray[np.i
             solved.unknown[...] |= np.broadcast_to(own.unknown, (columns.cases,))[rows]
         resolution.compare(spec, columns, rows, found, solved.decomposition, solved.rough, solved.omega)
         yield rows, solved
+        kinks, cut = motion_kinks(machine, solved.decomposition)
         chosen = solved.rough | solved.slow | solved.rough_pace
+        if number < _KINKS_FIRST:
+            chosen &= ~cut
+        cut &= number < _MOST_CUTS
         real = np.broadcast_to((panels.half > 0.0).sum(axis=1), rows.shape)
-        again = np.nonzero(chosen.any(axis=1) & (real <= MAX_PANELS * spec.cycle) & ~solved.unknown)[0]
+        again = np.nonzero((chosen | cut).any(axis=1) & (real <= MAX_PANELS * spec.cycle) & ~solved.unknown)[0]
         more = [panels.take(again).middles(chosen[again])]
         if first:
             more += [np.broadcast_to(own.breaks, (columns.cases, own.breaks.shape[1]))[again] for own in found]
-        rows, cuts = rows[again], np.concatenate([cuts[again], *more], axis=1)
+        rows, kinks, cuts = rows[again], kinks[again], np.concatenate([cuts[again], *more], axis=1)
 
 
 def _mark_unreached(spec: MachineSpec, columns: Columns, solved: Solved) -> None:
@@ -172,9 +180,8 @@ def settle(spec: MachineSpec, columns: Columns, solved: Solved) -> Bools:
     return np.asarray(lost)
 
 
-def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
-    machine = Machine(spec, columns)
-    cycle = machine.cycle
+def _attempt(machine: Machine, cuts: Floats) -> Solved:
+    spec, columns, cycle = machine.spec, machine.columns, machine.cycle
     panels = Panels.over(cycle, [*machine.breaks(), cuts], PANELS * spec.cycle, machine.given_breaks())
     with np.errstate(all="ignore"):
         fields = machine.fields(panels.angles)
@@ -199,7 +206,7 @@ def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
     results |= machine.train.results(panels, d.drive.torque, results)
     fixed = spec.balance != "motor" and moved.omega is None
     results["required_inertia"] = _required(spec, columns, d, endings, fixed=fixed)
-    results |= _flywheel(spec, columns, results, fixed=fixed)
+    results |= flywheel_results(spec, columns, results, fixed=fixed)
     no_cycle = (endings == _CODE[Ending.MOTOR_STALLED]) | (endings == _CODE[Ending.MOTOR_OVERRUN])
     if no_cycle.any():
         for name, values in results.items():
@@ -238,7 +245,9 @@ def _moved(machine: Machine, columns: Columns, panels: Panels, fields: Fields, e
         with np.errstate(all="ignore"):
             fields = fields.less(law(np.broadcast_to(machine.pace, fields.inertia.shape))[0])
     if spec.balance == "motor":
-        found = _motored(spec, columns, panels, cycle, fields, law)
+        found = limit_cycle(
+            characteristic(spec.drive), machine.motor, panels, cycle, fields.inertia, fields.resistance, law
+        )
         endings[found.stalled & ok] = _CODE[Ending.MOTOR_STALLED]
         endings[found.overrun & ok] = _CODE[Ending.MOTOR_OVERRUN]
         if law is not None:
@@ -263,13 +272,6 @@ def _moved(machine: Machine, columns: Columns, panels: Panels, fields: Fields, e
     # The least speed of a load that follows the speed is another than at these torques.
     least = none if law is not None else least
     return _Moved(fields, drive, resistance, start, least, balance.factor, omega, lost, stiff, stability)
-
-
-def _motored(
-    spec: MachineSpec, columns: Columns, panels: Panels, cycle: float, fields: Fields, law: SpeedLaw | None
-) -> LimitCycle:
-    values = Train.of(spec.drive, columns.values).motor(columns.under("drive.motor."))
-    return limit_cycle(characteristic(spec.drive), values, panels, cycle, fields.inertia, fields.resistance, law)
 
 
 def _started(
@@ -323,22 +325,6 @@ def _required(spec: MachineSpec, columns: Columns, d: Decomposition, endings: Co
                 spec.mean_speed_is, columns.row("mean_speed")[rows], wanted[rows],
             )  # fmt: skip
     return required
-
-
-def _flywheel(spec: MachineSpec, columns: Columns, known: Mapping[str, Floats], *, fixed: bool) -> dict[str, Floats]:
-    """The required inertia by the energy alone, and the results of a flywheel given by its dimensions."""
-    none = np.full(columns.cases, np.nan)
-    out = {name: none for name in _NAMES if name.startswith("flywheel.")} | {"required_inertia.energy": none}
-    if fixed:
-        wanted = columns.row("wanted_irregularity") * np.square(columns.row("mean_speed"))
-        finite = np.isfinite(wanted)
-        out["required_inertia.energy"] = np.where(
-            finite, known["energy.fluctuation"] / np.where(finite, wanted, 1.0), np.nan
-        )
-    if spec.drive.flywheel:
-        flywheel = Flywheel.of(spec.drive.flywheel, columns.values)
-        out |= flywheel.results(known["omega.max"], known["inertia.drive"], known["required_inertia"])
-    return out
 
 
 def _block(spec: MachineSpec, columns: Columns) -> tuple[Floats, Codes]:

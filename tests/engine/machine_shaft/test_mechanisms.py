@@ -16,7 +16,7 @@ from sprag.engine.machine_shaft.four_bars import FourBar, ParallelCrank
 from sprag.engine.machine_shaft.linkages import CrankShaper, ScotchYoke, SliderCrank, Whitworth
 from sprag.engine.machine_shaft.linked_rams import DragLink, Toggle
 from sprag.engine.machine_shaft.mechanisms import Mechanism
-from sprag.engine.machine_shaft.operations import Stroke
+from sprag.engine.machine_shaft.strokes import Stroke
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
