@@ -2,7 +2,7 @@
 
 Columns are separated by tabs, semicolons or commas, a comma also with blanks behind it, so that ``0,5, 1,25`` has two
 cells. A first line ``sep=;`` names the separator. Cells may be in double quotes, and columns that are empty from the
-first line to the last are left out.
+first line to the last are left out, and so are comments (``#``) above the headings.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ SEPARATORS: Final = ("\t", ";", ", ", ",")
 MAX_HEADING: Final = 200
 _NAMED: Final = re.compile(r'\s*"?sep=([,;\t|])"?[,;\t|]*[^\S\n]*(?:\n|$)', re.IGNORECASE)
 _CYRILLIC_WORD: Final = re.compile(r"(?<![^\W\d_])[\u0400-\u04ff]{2,}(?![^\W\d_])")
+_BEGINS_WITH_NUMBER: Final = re.compile(r'\s*"?[+\-\u2212]?[.,]?[0-9]')
 _QUOTED: Final = re.compile(r'"[^"]*"')
 #: A heading: a name and, in brackets, a unit. Names may have blanks.
 _HEADING: Final = re.compile(r"\s*+([^\[\(]*[^\[\(\s])\s*+(?:[\[\(]\s*+([^\]\)]+?)\s*[\]\)]\s*+)?")
@@ -100,10 +101,11 @@ def split(text: str, separators: Sequence[str] = SEPARATORS) -> Split:
     csv.Error
         When quotes are not closed.
     """
-    text = lines_of(text)
+    text = _without_comments(lines_of(text))
     named = _NAMED.match(text)
     if named is not None:
-        return _even(_rows("\n" + text[named.end() :], named[1]), named[1], '"' in text)
+        before = "\n" * max(named[0].count("\n"), 1)
+        return _even(_rows(before + text[named.end() :], named[1]), named[1], '"' in text)
     quoted = '"' in text
     first = _QUOTED.sub("", text.lstrip().partition("\n")[0])
     present = [sign for sign in separators if sign in first and not (sign == ", " and quoted)]
@@ -113,6 +115,23 @@ def split(text: str, separators: Sequence[str] = SEPARATORS) -> Split:
             return _even(rows, sign, quoted)
     sign = next((sign for sign in present if sign != ", "), "")
     return _even(_rows(text, sign or separators[-1]), sign, quoted)
+
+
+def _without_comments(text: str) -> str:
+    """A table without the comments (``#``) above it, whose lines are empty then.
+
+    The last one is the line of headings where numbers follow it.
+    """
+    lines = text.split("\n")
+    first = next((at for at, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), None)
+    if not first:
+        return text
+    comments = [at for at in range(first) if lines[at].strip()]
+    if comments and _BEGINS_WITH_NUMBER.match(lines[first]):
+        comments.pop()
+    for at in comments:
+        lines[at] = ""
+    return "\n".join(lines)
 
 
 def _halved(rows: Sequence[CsvRow], sign: str) -> bool:

@@ -234,3 +234,22 @@ def test_cells_of_a_shaft_table_may_have_units_of_their_own() -> None:
     own, _ = rows_of("angle [deg];torque [N*m]\n0;0\n90 deg;2 kN*m\n0.5 rev;2000\n300;0\n")
     plain, _ = rows_of("angle [deg];torque [N*m]\n0;0\n90;2000\n180;2000\n300;0\n")
     assert own == plain
+
+
+@pytest.mark.parametrize(
+    "above", ["# exported 2026-11-03\n", "# one; two\n\n  # three, four\n", "\ufeff#\n", "# a\nsep=;\n"]
+)
+def test_comments_above_a_table_are_left_out(above: str) -> None:
+    table = "angle [deg];torque [N*m]\n0;1\n90;3,5\n300;1\n"
+    assert rows_of(above + table) == rows_of(table)
+    points = POINTS + "100;1500\n200;1500\n"
+    assert loads(above + points) == loads(points)
+    with pytest.raises(SpecError, match=f"line {above.count(chr(10)) + 3}") as refused:
+        rows_of(above + table.replace("90;3,5", "90;bad"))
+    assert len(refused.value.faults) == 1
+
+
+def test_headings_behind_the_sign_of_a_comment_are_headings() -> None:
+    table = "angle [deg];torque [N*m]\n0;1\n90;3,5\n300;1\n"
+    assert rows_of("# measured\n#" + table) == rows_of(table)
+    assert rows_of("# " + table) == rows_of(table)
