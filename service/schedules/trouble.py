@@ -29,8 +29,9 @@ def read_trouble_flags(report: Report, found: Mapping[str, Any], model: str | No
     if value is None:
         return None
     known = () if model is None else tuple(models.flags_of(model))
-    allowed = f"a list of {', '.join(known)}" if known else "[], or null"
+    names = ", ".join(known)
     if not isinstance(value, list):
+        allowed = f"a list of {names}" if known else "an empty list"
         report.fault(_FIELD, "wrong-type", "must be a list of flags", value, allowed=allowed)
         return None
     seen: set[str] = set()
@@ -39,13 +40,13 @@ def read_trouble_flags(report: Report, found: Mapping[str, Any], model: str | No
         if report.full:
             break
         if not isinstance(flag, str):
-            report.fault(where, "wrong-type", "must be the name of a flag", flag, allowed=allowed)
+            report.fault(where, "wrong-type", "must be the name of a flag", flag, allowed=names or "no flag")
         elif flag in seen:
-            report.fault(where, "repeated", "is given twice", flag, allowed=allowed)
+            report.fault(where, "repeated", "is given twice", flag, allowed=names or "no flag")
         elif model is not None and flag not in known:
-            reason = f"is not a flag of the model {model}{did_you_mean(flag, known)}"
-            message = reason if known else f"{reason}, which has none"
-            report.fault(where, "unknown-name", message, flag, allowed=allowed)
+            message = f"is not a flag of the model {model}{did_you_mean(flag, known)}"
+            message += "" if known else ", which has none"
+            report.fault(where, "unknown-name", message, flag, allowed=names if known else "no flag")
         else:
             seen.add(flag)
     return tuple(flag for flag in value if isinstance(flag, str))

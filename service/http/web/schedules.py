@@ -12,21 +12,23 @@ from zoneinfo import ZoneInfo
 from fastapi import Query
 from starlette.responses import RedirectResponse, Response
 
+from sprag.service.faults import Fault
 from sprag.service.http.context import Context, Ctx
 from sprag.service.http.problems import ApiError
 from sprag.service.http.routers import page_router
 from sprag.service.http.schedule_views import listed
 from sprag.service.http.threads import in_thread
 from sprag.service.http.views import preset_of
-from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.entries import Values
 from sprag.service.http.web.form.values import Form, changed_meanwhile
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended, Work
 from sprag.service.jobs import checks
 from sprag.service.jobs.nights import HOURS, MOST_HOURS, night
-from sprag.service.languages import N_
+from sprag.service.languages import N_, gettext
+from sprag.service.languages.ranges import allowed_text
 from sprag.service.presets import preset_names
+from sprag.service.results.fault_texts import fault_text
 from sprag.service.results.phrases import meanings
 from sprag.service.schedules.fields import ScheduleFields, change_fields
 from sprag.service.schedules.report_to import require_deliverable
@@ -153,7 +155,7 @@ async def _save(context: Context, work: Work, values: Values, schedule_id: str |
     except SpecError as error:
         for fault in error.faults:
             first = fault.where.split("/")[1] if fault.where else ""
-            faults.setdefault(_FIELD_OF.get(first, first), []).append(message(fault))
+            faults.setdefault(_FIELD_OF.get(first, first), []).append(_sentence(fault))
     except (StudyNotFoundError, TooManySchedulesError) as error:
         faults["source"] = [str(error)]
     except ChangedMeanwhileError:
@@ -164,6 +166,13 @@ async def _save(context: Context, work: Work, values: Values, schedule_id: str |
     if faults:
         return await in_thread(_form, context, values, faults, schedule_id, status=422)
     return RedirectResponse("/schedules", status_code=303)
+
+
+def _sentence(fault: Fault) -> str:
+    """A fault beside its field; what is allowed has no units, and the asterisks of cron expressions stay."""
+    if not fault.allowed:
+        return fault_text(fault)
+    return f"{fault_text(fault)}; {gettext('allowed: {allowed}', allowed=allowed_text(fault.allowed))}"
 
 
 def _asked(context: Context, values: Values, schedule_id: str | None) -> tuple[dict[str, Any], ScheduleFields | None]:

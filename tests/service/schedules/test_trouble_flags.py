@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 from dataclasses import replace
@@ -266,8 +267,8 @@ def test_the_form_has_a_box_for_each_flag(service: Service) -> None:
 def test_the_form_says_what_is_wrong_in_the_language_of_the_page(service: Service) -> None:
     shaft = {**FORM, "source": "preset compressor", "trouble_flags/jumped": "on"}
     for language, texts in (
-        ("en", ("is not a flag of the model machine-shaft, which has none; got jumped", "What needs attention")),
-        ("uk", ("; задано jumped; дозволено: ", "Що потребує уваги", "Стрибок")),
+        ("en", ("is not a flag of the model machine-shaft, which has none; allowed: no flag", "What needs attention")),
+        ("uk", ("; дозволено: жодної позначки<", "Що потребує уваги", "Стрибок")),
     ):
         answer = service.http.post(f"/schedules/new?language={language}", data=shaft)
         assert answer.status_code == 422
@@ -279,6 +280,11 @@ def test_the_form_says_what_is_wrong_in_the_language_of_the_page(service: Servic
     usual = {**shaft, "trouble_flags/unsettled": "on", "trouble_flags/not_settled": "on"}
     del usual["trouble_flags/jumped"]
     assert service.http.post("/schedules/new", data=usual).status_code == 303, "the usual ones fit every model"
+
+
+def test_the_example_of_a_cron_expression_keeps_its_asterisks(service: Service) -> None:
+    answer = service.http.post("/schedules/new", data={**FORM, "cron": "never"})
+    assert 'allowed: five fields, such as "0 22 * * 1-5"' in html.unescape(answer.text)
 
 
 def test_the_command_names_flags(run: Run, service: Service, tmp_path: Path) -> None:

@@ -103,7 +103,7 @@ def look_over(
     try:
         finish = finish_at(text, now) if text else None
     except FinishError as error:
-        fault = f"{error}; allowed: {ALLOWED}"
+        fault = message(Fault("/finish_by", error.code, str(error), allowed=ALLOWED))
     left = None if finish is None else (finish - now).total_seconds()
     if "/text" in values:
         checked = check_text(values["/text"], values.get("format", "json"), chunking, known, left)
@@ -147,7 +147,7 @@ def check_form(
                 text = step_of(item.where or "") + message(item)
                 texts += [text] if text not in texts else []
     if values.get(COLUMNS, "").strip() and "axes" in spec:
-        found.faults[COLUMNS] = ["has columns that are not used yet; make axes of them, or empty the field"]
+        found.faults[COLUMNS] = [_("has columns that are not used yet; make axes of them, or empty the field")]
     if found.faults:
         found.parsed = None
     if found.parsed is not None:
@@ -200,7 +200,7 @@ def check_text(
         loaded = load_spec(text, "toml" if form == "toml" else "json")
         found.parsed = parse_spec(loaded)
     except SpecError as error:
-        found.faults["/text"] = [f"{item.where or 'the spec'}: {message(item)}" for item in error.faults]
+        found.faults["/text"] = [f"{item.where or _('the spec')}: {message(item)}" for item in error.faults]
         return found
     found.spec = found.parsed.spec
     found.preview = preview_json(found.parsed, chunking, known(found.parsed.study), left)

@@ -10,6 +10,7 @@ from typing import Final
 from sprag.service.http.web.form.entries import Faults, Values
 from sprag.service.http.web.form.fields import Groups
 from sprag.service.http.web.form.parts import PARTS, count_of, drop
+from sprag.service.languages import ENGLISH, current, gettext
 from sprag.service.spec.numbers import WITHOUT_DOUBT, is_ambiguous, parse_number, question
 from sprag.service.spec.report import did_you_mean
 from sprag.service.spec.table_text import (
@@ -37,19 +38,29 @@ def take_columns(values: Values, choices: Groups) -> Faults:
     try:
         table = split(values.get(COLUMNS, ""), _SEPARATORS)
     except csv.Error as error:
-        return {COLUMNS: [f"is no table: {error}"]}
+        return {COLUMNS: [gettext("is no table: {error}", error=error)]}
     if not table.rows:
-        return {COLUMNS: ["has no columns; paste cells of a spreadsheet, with a line of headings"]}
+        return {COLUMNS: [gettext("has no columns; paste cells of a spreadsheet, with a line of headings")]}
     named = all(map(_is_name, table.rows[0].cells))
     lines = with_units(table.rows) if named else table.rows
     rows = lines[named:]
     width = len(table.rows[0].cells)
     if not rows or len(rows) > _MOST_ROWS or width > _AXES.most:
-        allowed = f"1 to {_MOST_ROWS:,} lines of 1 to {_AXES.most} columns under the headings"
-        return {COLUMNS: [f"has {len(rows):,} lines of {width} columns; allowed: {allowed}"]}
+        message = gettext(
+            "has {lines} lines of {columns} columns; allowed: 1 to {most} lines of 1 to {widest} columns under the "
+            "headings",
+            lines=f"{len(rows):,}",
+            columns=width,
+            most=f"{_MOST_ROWS:,}",
+            widest=_AXES.most,
+        )
+        return {COLUMNS: [message]}
     uneven = next((row.line for row in rows if len(row.cells) != width), None)
     if uneven is not None:
-        return {COLUMNS: [f"line {uneven} has another number of cells than the first one; allowed: {width}"]}
+        message = gettext(
+            "line {line} has another number of cells than the first one; allowed: {width}", line=uneven, width=width
+        )
+        return {COLUMNS: [message]}
     rows, doubt = settled_table(table._replace(rows=rows))
     if doubt is not None:
         return {COLUMNS: [f"line {doubt.line}, {doubt.text}: {question(doubt.text)}; allowed: {WITHOUT_DOUBT}"]}
@@ -73,8 +84,13 @@ def _into_axes(values: Values, columns: list[tuple[str, ...]]) -> Faults:
     """Columns without headings as the values of the axes that there are."""
     paths = [values.get(f"{_AXES.pointer}/{index}/path", "") for index in range(count_of(values, "axes"))]
     if len(paths) != len(columns) or not all(paths):
-        text = f"has {len(columns)} columns without headings; allowed: a column for each of the {len(paths)} axes"
-        return {COLUMNS: [f"{text}, whose parameters are chosen, or headings such as shaft.load [N*m]"]}
+        message = gettext(
+            "has {columns} columns without headings; allowed: a column for each of the {axes} axes, whose parameters "
+            "are chosen, or headings such as shaft.load [N*m]",
+            columns=len(columns),
+            axes=len(paths),
+        )
+        return {COLUMNS: [message]}
     for index, column in enumerate(columns):
         _fill(values, index, column, "")
     _finish(values, len(columns))
@@ -101,7 +117,12 @@ def _is_name(cell: str) -> bool:
 def _named(heading: str, choices: Groups) -> tuple[str, str, str]:
     """Path and unit of a column, and the fault of its heading."""
     if len(heading) > MAX_HEADING:
-        return "", "", f"has a heading of {len(heading):,} characters; allowed: at most {MAX_HEADING}"
+        message = gettext(
+            "has a heading of {count} characters; allowed: at most {most}",
+            count=f"{len(heading):,}",
+            most=MAX_HEADING,
+        )
+        return "", "", message
     known: Mapping[str, str] = {
         name.lower(): choice.path for _, group in choices for choice in group for name in (choice.path, choice.label)
     }
@@ -109,8 +130,9 @@ def _named(heading: str, choices: Groups) -> tuple[str, str, str]:
     if name.lower() in known:
         return known[name.lower()], unit, ""
     paths = [choice.path for _, group in choices for choice in group]
-    return (
-        "",
-        "",
-        f"'{heading}' names no parameter{did_you_mean(heading, paths)}; allowed: a path, its unit in brackets",
+    message = gettext(
+        "'{heading}' names no parameter{hint}; allowed: a path, its unit in brackets",
+        heading=heading,
+        hint=did_you_mean(heading, paths) if current() == ENGLISH else "",
     )
+    return "", "", message

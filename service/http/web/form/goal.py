@@ -18,7 +18,7 @@ from sprag.service.http.web.form.entries import (
     text_of,
 )
 from sprag.service.http.web.form.parts import PARTS, filled
-from sprag.service.languages import N_
+from sprag.service.languages import N_, _
 from sprag.service.spec.plan import goal
 from sprag.service.spec.together import with_last_unit
 
@@ -87,13 +87,18 @@ def _points(values: Mapping[str, str], faults: Faults) -> list[dict[str, Any]]:
         pointer = f"/goal/at/{index}"
         path, column = values.get(f"{pointer}/path", ""), list_of(values.get(f"{pointer}/values", ""))
         if not path or path in columns:
-            faults[f"{pointer}/path"] = ["is a parameter of the points already" if path else "is required"]
+            faults[f"{pointer}/path"] = [_("is a parameter of the points already") if path else _("is required")]
         first = next(iter(columns.values()), column)
         if not column:
-            faults[f"{pointer}/values"] = ["is required; allowed: one value for each operating point"]
+            faults[f"{pointer}/values"] = [_("is required; allowed: one value for each operating point")]
         elif len(column) != len(first):
-            message = f"must have as many values as the first parameter, {len(first)}; got {len(column)}"
-            faults[f"{pointer}/values"] = [f"{message}; allowed: one value for each operating point"]
+            message = _(
+                "must have as many values as the first parameter, {first}; got {count}; allowed: one value for each "
+                "operating point",
+                first=len(first),
+                count=len(column),
+            )
+            faults[f"{pointer}/values"] = [message]
         columns.setdefault(path, column)
     return [dict(zip(columns, point, strict=True)) for point in zip(*columns.values(), strict=False)]
 

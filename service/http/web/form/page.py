@@ -59,6 +59,7 @@ from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.templates import fragment, page, spec_text
 from sprag.service.http.work import Attended, Work
 from sprag.service.jobs.submission import Submission, take_in
+from sprag.service.languages import gettext
 from sprag.service.presets import preset_names
 from sprag.service.results.places import place_text
 from sprag.service.results.reading import Reading
@@ -180,7 +181,9 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
         except SpecError as error:
             reading = Reading(checked.spec["model"])
             text = "; ".join(f"{place_text(item.where or '', reading)}: {message(item)}" for item in error.faults)
-            checked.faults.setdefault("", []).append(f"The laboratory cannot show this machine: {text}")
+            checked.faults.setdefault("", []).append(
+                gettext("The laboratory cannot show this machine: {text}", text=text)
+            )
         else:
             return RedirectResponse(address, status_code=303)
     return await in_thread(form_page, request, values, checked)

@@ -8,12 +8,13 @@ from typing import Any, Final
 
 from sprag.service.http.web.form.entries import Faults, Values, plain, text_of
 from sprag.service.http.web.form.shaft import CONSTANTS, DRIVE, Entry, blocks, owners, parts_of, stages_of
+from sprag.service.languages import N_, _, gettext
 from sprag.service.spec.machine.shaft_drive import MOTOR
 from sprag.service.spec.machine.shaft_parts import MECHANISM_CHOICES
 from sprag.service.spec.together import with_last_unit
 from sprag.service.spec.units import QuantityError, parse_quantity
 
-_STEP: Final = ("from", "to", "value")
+_STEP: Final = (N_("from"), N_("to"), N_("value"))
 _PLACES: Final = {"angle": ("angle", "rad"), "stroke": ("fraction", "1"), "time": ("time", "s")}
 _TEXTS: Final = ("formula", "csv")
 _FORMS: Final = ("value", "steps", "formula", "csv", "gas", "indicator")
@@ -87,7 +88,11 @@ def _constants(text: str, faults: Faults) -> dict[str, Any]:
     for number, line in enumerate(text.splitlines(), start=1):
         name, equals, value = line.partition("=")
         if line.strip() and not equals:
-            message = f"line {number} has no equals sign; got {line.strip()}; allowed: lines such as k = 40"
+            message = _(
+                "line {number} has no equals sign; got {line}; allowed: lines such as k = 40",
+                number=number,
+                line=line.strip(),
+            )
             faults.setdefault(CONSTANTS, []).append(message)
         elif line.strip():
             found[name.strip()] = plain(value)
@@ -111,7 +116,10 @@ def field_of_base(pointer: str, values: Mapping[str, str]) -> str:
 def step_of(pointer: str) -> str:
     """What is at fault within a field of steps, for its message: ``step 2, from: ``; "" elsewhere."""
     found = re.fullmatch(r".*/operation/steps/(\d+)(?:/(\w+))?", pointer)
-    return "" if found is None else f"step {int(found[1]) + 1}{f', {found[2]}' if found[2] else ''}: "
+    if found is None:
+        return ""
+    step = _("step {number}", number=int(found[1]) + 1)
+    return f"{step}, {gettext(found[2])}: " if found[2] else f"{step}: "
 
 
 def values_of_base(base: Mapping[str, Any]) -> Values:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 from sprag.service.http.web.figures.shaft import overridden
 from sprag.service.http.web.form.shaft import part_of
 from sprag.service.http.web.laboratory.sliders import quantity_text
-from sprag.service.languages import N_
+from sprag.service.languages import N_, _, gettext
+from sprag.service.languages.ranges import allowed_text
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.numbers import parse_number
 from sprag.service.spec.report import SpecError
@@ -86,8 +87,10 @@ def _estimate(text: str) -> tuple[float | None, str]:
         return None, ""
     value = parse_number(text)
     if value is None or not 0.0 <= value <= 2.0:
-        what = "must be a number" if value is None else "is out of range"
-        return None, f"{what}; got {text}; allowed: 0 to 2"
+        what = _("must be a number") if value is None else _("is out of range")
+        return None, "; ".join(
+            (what, gettext("got {value}", value=text), gettext("allowed: {allowed}", allowed=allowed_text("0 to 2")))
+        )
     return value, ""
 
 

@@ -8,10 +8,11 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import parse_qsl, urlencode
 
-from sprag.service.faults import shown
+from sprag.service.faults import Fault, shown
 from sprag.service.http.problems import ApiError
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.figures.shaft import overridden
+from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.entries import plain
 from sprag.service.http.web.form.own_machine import case_page, machine_of, read_machine
 from sprag.service.http.web.form.shaft import group_of
@@ -147,9 +148,12 @@ def _angle(text: str, faults: dict[str, list[str]]) -> float:
     try:
         found = float(value) if isinstance(value, int | float) else math.degrees(parse_quantity(value, "rad"))
     except QuantityError as error:
-        faults["angle"] = [f"{error}; got {shown(value)}; allowed: an angle in degrees"]
+        faults["angle"] = [
+            message(Fault("/angle", error.code, str(error), shown(value), allowed="an angle in degrees"))
+        ]
         return 0.0
     if abs(found) > 1e6:
-        faults["angle"] = [f"out of range; got {found:g}; allowed: -1000000 to 1000000 deg"]
+        allowed = "-1000000 to 1000000 deg"
+        faults["angle"] = [message(Fault("/angle", "out-of-range", "out of range", f"{found:g}", allowed=allowed))]
         return 0.0
     return found
