@@ -8,14 +8,14 @@ from typing import Annotated, Any
 import typer
 
 from sprag.service.cli import completion
-from sprag.service.cli.console import say, wrong_option
+from sprag.service.cli.console import say, warning_lines, wrong_option
 from sprag.service.cli.files import decode, read_bytes
 from sprag.service.cli.following import submitted, submitting
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token, Wait, WaitTimeout
 from sprag.service.cli.remote import connection
 from sprag.service.languages import N_, _, ngettext
-from sprag.service.spec.numbers import could_be_one, in_language, parse_number, settled
+from sprag.service.spec.numbers import assumption, could_be_one, in_language, parse_number, settle, settled
 from sprag.service.spec.printed import could_be_values
 from sprag.service.spec.together import with_last_unit
 from sprag.worker.limits import (
@@ -149,14 +149,15 @@ def _addition(axes: list[str], points: str | None) -> dict[str, Any]:
             raise wrong_option(
                 "--axis", "invalid-text", N_("must be PATH=VALUES"), text, allowed=_("such as shaft.load=0.5,0.7")
             )
-        made.append({"path": path.strip(), "values": _values(values)})
+        made.append({"path": path.strip(), "values": _values(values, path.strip())})
     return {"axes": made}
 
 
-def _values(text: str) -> list[float | str]:
+def _values(text: str, path: str = "") -> list[float | str]:
     """The values of a list: semicolons separate them where there are any, otherwise commas.
 
-    A unit at the end holds for the bare numbers before it.
+    A unit at the end holds for the bare numbers before it. A point of a bare number that could separate thousands is
+    decimal, which is said; the service warns of those with units.
     """
     if could_be_one(text):
         raise wrong_option(
@@ -169,7 +170,13 @@ def _values(text: str) -> list[float | str]:
             allowed=_("semicolons between values, or no blanks"),
         )  # fmt: skip
     items = settled([in_language(item) for item in text.split(";")]) if ";" in text else text.split(",")
-    return [_value(item) for item in with_last_unit([item.strip() for item in items])]
+    values = [_value(item) for item in with_last_unit([item.strip() for item in items])]
+    doubt = settle(items).doubt
+    if doubt is not None and not isinstance(values[doubt], str):
+        from sprag.worker.models import WarningText
+
+        say(*warning_lines([WarningText(f"{path}: {assumption(items[doubt])}", "ambiguous-point")]))
+    return values
 
 
 def _value(text: str) -> float | str:

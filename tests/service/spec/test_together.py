@@ -424,3 +424,36 @@ def test_lists_of_goals_measured_values_and_extensions_are_texts_too() -> None:
     study = parsed({"/axes": [{"path": LOAD, "values": "50; 100 N*mm"}]})
     longer = parse_extended(study.spec, study.study, {"axes": [{"path": LOAD, "values": "150; 200 N*mm"}]}).study
     assert longer.columns(range(4))[LOAD].tolist() == pytest.approx([0.05, 0.1, 0.15, 0.2])
+
+
+@pytest.mark.parametrize(
+    ("fields", "told"),
+    [
+        ({"way": "linspace", "from": "1.000", "to": "5.000", "count": "5"}, "from"),
+        ({"way": "range", "from": "0", "to": "5.000", "step": "1"}, "to"),
+        ({"way": "range", "from": "0", "to": "5", "step": "1.000"}, "step"),
+        ({"way": "range", "from": "0", "to": "5.5", "step": "1.000"}, None),
+        ({"way": "linspace", "from": "1", "to": "5", "count": "5"}, None),
+        ({"way": "values", "values": "1; 2", "from": "1.000", "to": "5.000"}, None),  # not shown
+    ],
+)
+def test_points_of_ends_that_could_separate_thousands_are_told(fields: dict[str, str], told: str | None) -> None:
+    checked = check_form(form(**fields), Chunking())
+    assert checked.parsed is not None
+    notes = [note for note in (*checked.notes, *checked.parsed.warnings) if "is read as" in note]
+    assert len(notes) == (told is not None)
+    assert (
+        told is None or f"'{fields[told]}' is read as {float(fields[told]):g}; write {fields[told][0]}000" in notes[0]
+    )
+    with_unit = check_form(form(**{"way": "linspace", "from": "1.000", "to": "5.000 N*mm", "count": "5"}), Chunking())
+    assert with_unit.parsed is not None
+    assert [note for note in (*with_unit.notes, *with_unit.parsed.warnings) if "is read as" in note]
+
+
+@pytest.mark.parametrize("text", ["20.000; 25.000", "20.000,25.000"])
+def test_points_of_an_extension_by_command_are_told(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert _values(text, LOAD) == [20.0, 25.0]
+    assert "warning: shaft.load: '20.000' is read as 20; write 20000" in capsys.readouterr().err
+    assert _values("20.000 N*mm; 25.5 N*mm", LOAD) == ["20.000 N*mm", "25.5 N*mm"]
+    assert _values("0.5,0.7", LOAD) == [0.5, 0.7]
+    assert not capsys.readouterr().err

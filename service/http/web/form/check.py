@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
@@ -10,10 +10,10 @@ from urllib.parse import urlencode
 from sprag.service.faults import Fault
 from sprag.service.http.web.figures.fit import FitChart, fit_chart
 from sprag.service.http.web.form.columns import COLUMNS
-from sprag.service.http.web.form.entries import Faults, items_of, list_of
+from sprag.service.http.web.form.entries import Faults, items_of, list_of, range_of
 from sprag.service.http.web.form.shaft import is_shaft
 from sprag.service.http.web.form.shaft_spec import step_of
-from sprag.service.http.web.form.spec import clutch_pointers, field_of, pendulums_of, spec_of
+from sprag.service.http.web.form.spec import WAYS, clutch_pointers, field_of, pendulums_of, spec_of
 from sprag.service.jobs.preview import preview_json
 from sprag.service.languages import _, gettext
 from sprag.service.languages.ranges import allowed_text
@@ -29,7 +29,7 @@ from sprag.service.spec.derive import with_values
 from sprag.service.spec.document import ParsedSpec, SpecError, load_spec, parse_spec
 from sprag.service.spec.machine.clutch import read_clutch
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
-from sprag.service.spec.numbers import assumption, settle
+from sprag.service.spec.numbers import assumption, in_language, settle, settled
 from sprag.service.spec.report import Report
 from sprag.service.spec.stored import accepted
 from sprag.service.spec.units import QuantityError, parse_quantity
@@ -168,18 +168,28 @@ def _beside(name: str, edited: str) -> str:
 
 
 def _points(values: Mapping[str, str]) -> list[str]:
-    """Points of bare numbers of lists that are taken as decimal; quantities with units have warnings of the spec."""
+    """Points of bare numbers of lists and ranges that are taken as decimal; the spec warns of those with units."""
     notes, reading = [], Reading("machine-shaft" if is_shaft(values) else "vibration-drive")
+    for pointer, names, items, entries in _typed_together(values):
+        doubt = settle(items).doubt
+        if doubt is not None and not isinstance(entries[doubt], str):
+            place = f"{pointer}{names[doubt]} ({values.get(f'{pointer}path', '')})"
+            warning = WarningText(f"{place}: {assumption(items[doubt])}", "ambiguous-point")
+            notes.append(warning_text(warning, reading))
+    return notes
+
+
+def _typed_together(values: Mapping[str, str]) -> Iterator[tuple[str, list[str], list[str], list[Any]]]:
+    """Lists and ranges of the form: where they are, and for each number its field, its text and its entry."""
     for name, text in values.items():
         if name.endswith("/values") and "." in text:
             items = items_of(text)
-            doubt = settle(items).doubt
-            if doubt is not None and not isinstance(list_of(text)[doubt], str):
-                path = values.get(f"{name.removesuffix('values')}path", "")
-                place = f"{name} ({path})"
-                warning = WarningText(f"{place}: {assumption(items[doubt])}", "ambiguous-point")
-                notes.append(warning_text(warning, reading))
-    return notes
+            yield name.removesuffix("values"), ["values"] * len(items), items, list_of(text)
+        way = values.get(f"{name.removesuffix('from')}way", "")
+        if name.endswith("/from") and way != "values":
+            pointer, fields = name.removesuffix("from"), WAYS.get(way, ("from", "to"))
+            items = settled([in_language(values.get(f"{pointer}{field}", "").strip()) for field in fields])
+            yield pointer, list(fields), items, list(range_of(values, pointer, fields).values())
 
 
 def _assumed(text: str) -> list[str]:
