@@ -7,6 +7,7 @@ import os
 import select
 import signal
 import socket
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
@@ -47,9 +48,11 @@ class DispatcherLock:
         except OSError:
             os.close(file)
             return False
-        os.ftruncate(file, 0)
-        os.write(file, f"{os.getpid()} {start_time(os.getpid()) or ''} {socket.gethostname()}\n".encode())
         self._file = file
+        note = f"{os.getpid()} {start_time(os.getpid()) or ''} {socket.gethostname()}\n".encode()
+        with suppress(OSError):  # full disk: the lock holds without its note; an old one has room for it
+            os.pwrite(file, note, 0)
+            os.ftruncate(file, len(note))
         return True
 
     def seize(self) -> None:

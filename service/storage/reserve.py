@@ -1,4 +1,7 @@
-"""The reserve: a file beside the database whose room is given up when a full disk would keep people from making it."""
+"""The reserve: a file beside the database whose room is given up when a full disk would keep people from making it.
+
+Opening a database needs some room, too, for the index of its log; without it nobody could make any after a restart.
+"""
 
 from __future__ import annotations
 
@@ -24,17 +27,19 @@ _P = TypeVar("_P", bound="Part")
 #: Size in bytes of the reserve file, and of what is left of it when studies were held on a full disk.
 RESERVE_FILE_BYTES: Final = 2 * 1024 * 1024
 REST_BYTES: Final = RESERVE_FILE_BYTES // 2
+#: What an opening takes of it at a time: the index of the log has 32 KiB, a first page of the log 16 KiB.
+OPENING_BYTES: Final = 128 * 1024
 
 
-def _place(session: Session) -> Path:
-    return session.path.with_name(f"{session.path.name}.reserve")
+def _place(database: Path) -> Path:
+    return database.with_name(f"{database.name}.reserve")
 
 
 def keep_reserve(session: Session) -> None:
     """Create the reserve file for a full disk; a server has to provide for that itself."""
     if session.on_server:
         return
-    place = _place(session)
+    place = _place(session.path)
     with suppress(OSError):
         if place.stat().st_size >= RESERVE_FILE_BYTES:
             return
@@ -55,12 +60,24 @@ def _renew_log(session: Session) -> None:
 def _spend_share(session: Session) -> None:
     """Give up the share of the reserve that holding studies may use; the rest is left for people who make room."""
     with suppress(OSError):
-        if (place := _place(session)).stat().st_size > REST_BYTES:
+        if (place := _place(session.path)).stat().st_size > REST_BYTES:
             os.truncate(place, REST_BYTES)
 
 
 def _spend(session: Session) -> None:
-    _place(session).unlink(missing_ok=True)
+    _place(session.path).unlink(missing_ok=True)
+
+
+def spend_to_open(database: Path) -> bool:
+    """Give up a part of the reserve for opening a database on a full disk; False where that cannot help."""
+    try:
+        disk = os.statvfs(database.parent)
+        if disk.f_bavail * disk.f_frsize >= OPENING_BYTES or not (size := _place(database).stat().st_size):
+            return False
+        os.truncate(_place(database), max(size - OPENING_BYTES, 0))
+    except OSError:
+        return False
+    return True
 
 
 def holds(method: Callable[Concatenate[_P, _A], _R]) -> Callable[Concatenate[_P, _A], _R]:

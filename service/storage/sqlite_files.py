@@ -14,6 +14,7 @@ import sqlalchemy as sa
 from sprag.service.storage.errors import CREATED_BY, DatabaseBusyError, DatabaseError, DatabaseFullError, busy, in_use
 from sprag.service.storage.one_name import HeldName, hold, linked
 from sprag.service.storage.private_files import PRIVATE_FOLDER_MODE, create_private
+from sprag.service.storage.reserve import spend_to_open
 from sprag.service.storage.rows import tuples
 from sprag.worker.ports import StoreError
 
@@ -117,7 +118,7 @@ class DatabaseFile:
             max_overflow=0 if self._alone else 64,
         )
         sa.event.listen(engine, "do_connect", self._create)
-        sa.event.listen(engine, "connect", self._set_pragmas)
+        sa.event.listen(engine, "connect", self._prepare)
         return engine
 
     def _check_place(self) -> None:
@@ -164,7 +165,18 @@ class DatabaseFile:
         if not self.path.exists():
             raise DatabaseError(f"there is no database {self.path}: {CREATED_BY}", "database-unreachable")
 
-    def _set_pragmas(self, connection: Any, _record: object) -> None:
+    def _prepare(self, connection: Any, _record: object) -> None:
+        """Set a new connection up; on a full disk, with room of the reserve."""
+        while True:
+            try:
+                self._set_pragmas(connection)
+            except sqlite_driver().OperationalError:
+                if not spend_to_open(self.path):
+                    raise
+            else:
+                return
+
+    def _set_pragmas(self, connection: Any) -> None:
         cursor = connection.cursor()
         for pragma in (
             f"busy_timeout = {0 if self._alone else int(self._busy_seconds * 1000)}",

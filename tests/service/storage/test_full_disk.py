@@ -15,10 +15,11 @@ import pytest
 
 from tests.conftest import ROOT
 
-SCRIPT = """
+HEAD = """
 import os, sys
 from pathlib import Path
 from sprag.service.storage.errors import DatabaseFullError
+from sprag.service.storage.lock import DispatcherLock
 from sprag.service.storage.readiness import Readiness
 from sprag.service.storage.store import Store
 from sprag.worker.chunking import Chunking
@@ -36,8 +37,9 @@ def fill_up():
         except OSError:
             pass
     os.close(descriptor)
+"""
 
-
+MAKING_ROOM = """
 with Store.open(f"sqlite:///{place / 'a.sqlite3'}", chunking=Chunking(cases=500)) as store:
     record = store.create_study({}, fakes.study(20_000))
     waiting = store.create_study({}, fakes.study(500))
@@ -75,14 +77,41 @@ with Store.open(f"sqlite:///{place / 'a.sqlite3'}", chunking=Chunking(cases=500)
     print(store.check().problems, flush=True)
 """
 
+OPENED_ON_FULL = """
+url = f"sqlite:///{place / 'a.sqlite3'}"
+with Store.open(url, chunking=Chunking(cases=500)) as store:
+    record = store.create_study({}, fakes.study(20_000))
+    epoch = store.take_over("test")
+    for chunk in store.open_chunks(record.number):
+        store.claim(epoch, [chunk])
+        store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+    store.settle(epoch, record.number)
+    assert store.shortage() is None, "makes the reserve"
+    store.let_go(epoch)
+fill_up()
+for _ in range(3):
+    with Store.open(url) as store:
+        print([study.id == record.id for study in store.list_studies(page_size=10).studies], flush=True)
+    fill_up()
+lock = DispatcherLock(place / "a.sqlite3")
+print(lock.take(), DispatcherLock(place / "a.sqlite3").take(), flush=True)
+lock.release()
+print(DispatcherLock(place / "a.sqlite3").take(), flush=True)
+with Store.open(url) as store:
+    store.delete_study(record.id, at_once=True)
+    store.purge()
+    print(len(store.list_studies(page_size=10).studies), store.room() > 5e6, store.check().problems, flush=True)
+"""
 
-def test_studies_can_be_deleted_on_a_full_disk(tmp_path: Path) -> None:
+
+def on_small_disk(script: str, folder: Path) -> list[str]:
+    """Lines that a script prints in a process for which ``folder`` is a disk of 36 MB."""
     unshare = shutil.which("unshare")
     if unshare is None or subprocess.run([unshare, "-rm", "true"], capture_output=True, check=False).returncode:
         pytest.skip("no disk in memory can be mounted here: unshare of mounts is not allowed")
     inside = 'mount -t tmpfs -o size=36m small "$0" && exec "$1" -c "$2" "$0"'
     done = subprocess.run(
-        [unshare, "-rm", "sh", "-c", inside, tmp_path, sys.executable, SCRIPT],
+        [unshare, "-rm", "sh", "-c", inside, folder, sys.executable, HEAD + script],
         capture_output=True,
         text=True,
         check=False,
@@ -90,7 +119,19 @@ def test_studies_can_be_deleted_on_a_full_disk(tmp_path: Path) -> None:
         env={**os.environ, "PYTHONPATH": str(ROOT)},
     )
     assert done.returncode == 0, done.stderr
-    full, held, room, ready, problems = done.stdout.splitlines()
+    return done.stdout.splitlines()
+
+
+def test_studies_can_be_deleted_on_a_full_disk(tmp_path: Path) -> None:
+    full, held, room, ready, problems = on_small_disk(MAKING_ROOM, tmp_path)
     assert full == "full"
     assert held.startswith("Studies are held: no room: the disk that holds")
     assert (room, ready, problems) == ("room True", "()", "()")
+
+
+def test_a_database_is_opened_on_a_full_disk(tmp_path: Path) -> None:
+    """After a restart nobody could make room otherwise."""
+    *listed, first, second, made = on_small_disk(OPENED_ON_FULL, tmp_path)
+    assert listed == ["[True]"] * 3
+    assert (first, second) == ("True False", "True")
+    assert made == "0 True ()"
