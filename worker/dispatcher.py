@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, assert_never
 from sprag.worker import dispatch
 from sprag.worker.dispatch import Dispatch
 from sprag.worker.opening import Opening
-from sprag.worker.ports import Chunk, EpochLostError, Fate, Finished, KernelError, Outcome, StoreFullError
+from sprag.worker.ports import (
+    Chunk,
+    EpochLostError,
+    Fate,
+    Finished,
+    KernelError,
+    Outcome,
+    StoreFullError,
+    UnreadableStudyError,
+)
 from sprag.worker.reports import Reporter
 from sprag.worker.reuse import no_cases, taken
 from sprag.worker.rounds import PlanError, Rounds
@@ -221,11 +230,11 @@ class Dispatcher:
     def _has_kernel(self, study: ActiveStudy) -> bool:
         """Whether the study can run now; if not, its kernel is being loaded or the study is held."""
         number = study.number
-        if number not in self._studies:
-            self._studies[number] = self._store.study_of(number)
         try:
+            if number not in self._studies:
+                self._studies[number] = self._store.study_of(number)
             return self._opening.loaded(number, self._studies[number], self._executor)
-        except KernelError as error:
+        except (KernelError, UnreadableStudyError) as error:
             self._opening.stop_waiting(number)
             self._handle(dispatch.Broken(number, str(error)))
             return False
@@ -320,7 +329,7 @@ class Dispatcher:
         if study is not None and study.plan is not None:
             try:
                 appended = self._rounds.advance(self._epoch, number, study)
-            except PlanError as error:
+            except (PlanError, UnreadableStudyError) as error:
                 self._hold(number, str(error))
                 return
             if appended is not None:

@@ -122,6 +122,10 @@ class KernelError(Exception):
     """The kernel of a study cannot be loaded; the message states why."""
 
 
+class UnreadableStudyError(Exception):
+    """The store no longer has the study that was submitted; the message states why."""
+
+
 class Store(Protocol):
     """The dispatcher's view of the database. Every write is one short transaction that first checks the epoch.
 

@@ -1,7 +1,9 @@
-"""Single bits of a database file are flipped: each is noticed, or changes no row.
+"""Single bits of a database file are flipped: each is noticed, or changes none of the numbers that are told.
 
 Each flip is made in a copy of the database of two finished studies, with the service stopped. Then the copy is opened,
-looked over as by `sprag db check`, and every row is read. A flip is silent where the rows differ and nobody says so.
+looked over as by `sprag db check`, and what is told is read: every row, the specs, the parameters of the cases, and the
+numbers of cases by ending, regime and flag. A flip is silent where any of this differs and nobody says so. What the
+digests do not cover (names, states, times and reasons of studies) is counted apart.
 """
 
 from __future__ import annotations
@@ -33,10 +35,10 @@ def flips(folder: Path, *, count: int, seed: int, cases: int) -> dict[str, Any]:
         studies = [store.create_study({}, fakes.study(cases, name)).id for name in ("first", "second")]
         for study in studies:
             _finish(store, store.get_study(study), np.random.default_rng(seed))
-        rows = [_rows(store, study) for study in studies]
+        told, rest = [_told(store, study) for study in studies], [_rest(store, study) for study in studies]
     content = whole.read_bytes()
     used = [place for place, byte in enumerate(content) if byte]  # most of the rest is pages of empty tables
-    outcomes = {"noticed": 0, "without effect on rows": 0, "silent": 0}
+    outcomes = {"noticed": 0, "without effect": 0, "other columns": 0, "silent": 0}
     for _ in range(count):
         bit = 8 * draw.choice(used) + draw.randrange(8)
         copy = folder / "flipped.sqlite3"
@@ -44,7 +46,7 @@ def flips(folder: Path, *, count: int, seed: int, cases: int) -> dict[str, Any]:
         with copy.open("r+b") as file:
             file.seek(bit // 8)
             file.write(bytes([content[bit // 8] ^ 1 << bit % 8]))
-        outcomes[_outcome(copy, studies, rows)] += 1
+        outcomes[_outcome(copy, studies, told, rest)] += 1
         for path in folder.glob(f"{copy.name}*"):
             path.unlink()
     assert not outcomes["silent"], outcomes
@@ -63,17 +65,27 @@ def _finish(store: Store, record: StudyRecord, numbers: np.random.Generator) -> 
     store.settle(epoch, record.number)
 
 
-def _rows(store: Store, study: str) -> tuple[Any, ...]:
+def _told(store: Store, study: str) -> tuple[Any, ...]:
+    """The numbers that are told of a study."""
     block = store.case_rows(study, limit=1_000_000)
-    return block.cases.tobytes(), tuple(block.endings), tuple(block.flags), block.values.tobytes()
+    rows = block.cases.tobytes(), tuple(block.endings), tuple(block.flags), block.values.tobytes()
+    record, progress = store.look(study)
+    counts = record.cases, record.done, record.ok, progress.endings, store.kinds(study)
+    return *rows, *counts, store.spec(study), store.study(study).to_json(), record.physics_hash, record.engine_version
 
 
-def _outcome(copy: Path, studies: list[str], rows: list[tuple[Any, ...]]) -> str:
+def _rest(store: Store, study: str) -> tuple[Any, ...]:
+    record, progress = store.look(study)
+    return record, progress.rate, store.origins(study)
+
+
+def _outcome(copy: Path, studies: list[str], told: list[tuple[Any, ...]], rest: list[tuple[Any, ...]]) -> str:
     try:
         with Store.open(f"sqlite:///{copy}") as store:
             if any("pysqlite3" not in problem for problem in store.check().problems):  # the library may be old
                 return "noticed"
-            found = [_rows(store, study) for study in studies]
-    except (StoreError, ValueError, TypeError, OverflowError):
+            if [_told(store, study) for study in studies] != told:
+                return "silent"
+            return "without effect" if [_rest(store, study) for study in studies] == rest else "other columns"
+    except (StoreError, ValueError, TypeError, LookupError, OverflowError):
         return "noticed"
-    return "without effect on rows" if found == rows else "silent"

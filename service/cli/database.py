@@ -206,11 +206,11 @@ def audit(
 
 
 def _tell_damaged(problems: Sequence[str]) -> None:
-    """Name rows that changed since they were stored and end with exit code 3; without any nothing happens."""
+    """Name what changed since it was stored and end with exit code 3; without any nothing happens."""
     for problem in problems:
         say(problem)
     if problems:
-        say(_("the copy has these rows as they are; Sprag finds them there, too, and runs them again"))
+        say(_("the copy has this as it is; Sprag finds it there, too, and runs damaged rows again"))
         raise typer.Exit(ExitCode.TROUBLE)
 
 

@@ -48,8 +48,8 @@ class Scrubbing:
     def _look(self) -> None:
         found = self._store.with_rows_after(self._last)
         self._last = 0 if found is None else found[0]
-        if found is not None:
-            self._store.run_damaged_again(found[1])
+        if found is not None and not self._store.run_damaged_again(found[1]):
+            self._store.count_endings_again(found[1])
 
 
 class Housekeeping(threading.Thread):

@@ -153,7 +153,7 @@ class Maintenance(threading.Thread):
         if not any(due <= when <= now for when, _ in backups(folder)):
             target = folder / f"sprag-{now.astimezone(UTC):{_STAMP}}.sqlite3"
             for problem in self._store.backup(target):
-                _LOG.error("The backup has rows that changed since they were stored: %s.", problem)
+                _LOG.error("In the backup: %s.", problem)
             _LOG.info("Backup: %s (%.3g MB).", target, target.stat().st_size / 1e6)
         if believed:
             # A backup with a future name was made under a wrong clock: it is neither removed nor counted.

@@ -6,6 +6,7 @@ Each finished chunk has the sum of the hashes of its rows (`sprag.service.storag
 from __future__ import annotations
 
 import logging
+from contextlib import suppress
 from dataclasses import dataclass
 from threading import Lock
 from typing import TYPE_CHECKING, Any, Final
@@ -18,8 +19,8 @@ from sprag.service.storage.audit import note
 from sprag.service.storage.cases import conditions
 from sprag.service.storage.columns import as_number, records
 from sprag.service.storage.errors import DatabaseError
-from sprag.service.storage.order import Orders
 from sprag.service.storage.row_hashes import digest_of, row_words
+from sprag.service.storage.study_digests import StudyDigests
 from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES, further_table, results_table
 from sprag.worker import models
 from sprag.worker.ports import Chunk
@@ -63,7 +64,7 @@ class DamagedRows:
         return f"the rows of the study {self.study}, {cases}, are not those that were stored"
 
 
-class Digests(Orders):
+class Digests(StudyDigests):
     """Looking for rows that are not those that were stored, and running them again."""
 
     def __init__(self, session: Session, clock: Clock) -> None:
@@ -187,9 +188,10 @@ class Digests(Orders):
     def damaged_rows(self, study_id: str) -> list[DamagedRows]:
         """The finished chunks of a study whose rows changed since they were stored; raises StudyNotFoundError.
 
-        Chunks from before revision 0036 have no digest and are not looked at.
+        Chunks from before revision 0036 have no digest and are not looked at. Raises DatabaseError as `require_whole`.
         """
         with self.session.read() as connection:
+            self.require_whole(connection, study_id)
             row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.model, STUDIES.c.variant)
             c = CHUNKS.c
             known = connection.execute(
@@ -233,14 +235,15 @@ class Digests(Orders):
             return None
 
     def all_damaged_rows(self) -> Iterator[DamagedRows]:
-        """Those of every study."""
+        """Those of every study whose inputs and chunks are what was stored."""
         with self.session.read() as connection:
             ids = connection.execute(
                 sa.select(STUDIES.c.id).where(STUDIES.c.deleted_at.is_(None)).order_by(STUDIES.c.number)
             ).scalars()
             studies = list(ids)
         for study_id in studies:
-            yield from self.damaged_rows(study_id)
+            with suppress(DatabaseError):  # `broken_studies` has it
+                yield from self.damaged_rows(study_id)
 
     def with_rows_after(self, number: int) -> tuple[int, str] | None:
         """Number and id of the next study with rows; None after the last one."""
@@ -259,9 +262,13 @@ class Digests(Orders):
             return int(connection.execute(without).scalar_one())
 
     def count_endings_again(self, study_id: str) -> None:
-        """Make the numbers of cases by ending those of the rows; raises StudyNotFoundError."""
+        """Make the numbers of cases those of the rows, where they are not; raises StudyNotFoundError."""
+        with self.session.read() as connection:
+            if not self.counts_differ(connection, study_id):
+                return
         with self.session.write() as connection:
             c = STUDIES.c
+            _LOG.error("The numbers of cases of the study %s were not those of its rows: counted again.", study_id)
             _count_again(connection, self._row(connection, study_id, c.number, c.model, c.variant))
 
     def seal(self, connection: sa.Connection, chunk: Chunk) -> None:

@@ -175,10 +175,10 @@ def check(session: Session) -> CheckReport:
         if not session.on_server:
             problems += _look_over_file(session)
         if found == HEAD_REVISION and not problems:
-            problems += damaged_rows(session)
+            problems += changed_on_disk(session)
             unchecked = Digests(session, SystemClock()).undigested()
-    except DatabaseError as error:
-        problems.append(str(error))
+    except (DatabaseError, sa.exc.SQLAlchemyError) as error:
+        problems.append(str(error).splitlines()[0])
     if session.on_server:
         backend, version = "PostgreSQL", _server_version(session)
     else:
@@ -215,7 +215,7 @@ def checkpoint(session: Session) -> None:
 
 
 def backup(session: Session, path: Path) -> tuple[str, ...]:
-    """Write a consistent copy of the database to ``path`` while others continue to work; its damaged rows.
+    """Write a consistent copy of the database to ``path`` while others continue to work; `changed_on_disk`.
 
     Raises DatabaseError when the file exists or cannot be written, or the database is on a server.
     """
@@ -247,11 +247,12 @@ def backup(session: Session, path: Path) -> tuple[str, ...]:
         raise DatabaseError(f"the backup {path} cannot be written: {error.strerror}", "write-failed") from None
     finally:
         part.unlink(missing_ok=True)
-    return damaged_rows(session)
+    return changed_on_disk(session)
 
 
-def damaged_rows(session: Session) -> tuple[str, ...]:
-    """Sentences on the rows that changed since they were stored; none of a database of another revision."""
+def changed_on_disk(session: Session) -> tuple[str, ...]:
+    """Sentences on the studies and rows that are not what was stored; none of a database of another revision."""
     if revision(session) != HEAD_REVISION:
         return ()
-    return tuple(map(str, Digests(session, SystemClock()).all_damaged_rows()))
+    looking = Digests(session, SystemClock())
+    return (*looking.broken_studies(), *map(str, looking.all_damaged_rows()))

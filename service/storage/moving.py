@@ -33,7 +33,7 @@ _NOT_MOVED: Final = frozenset({"alembic_version", "sqlite_sequence"})
 class Moved:
     """Rows of each table of the target after a move, and how many of them were there from an earlier attempt.
 
-    ``problems``: sentences on rows that had changed in the source since they were stored, which are moved as they are.
+    ``problems``: sentences on what had changed in the source since it was stored, which is moved as it is.
     """
 
     rows: dict[str, int]
@@ -56,7 +56,7 @@ def move(source: Session, target: Session, owner: str, say: Callable[[str], None
         _require_known(connection, source)
         # What the target gets is the place of the source: it is a copy until somebody adopts it.
         deployment.settle_in(source, connection)
-        problems = maintenance.damaged_rows(source)
+        problems = maintenance.changed_on_disk(source)
         mark = maintenance.MOVING + hashlib.sha256(name.encode()).hexdigest()[:16]
         resumed = _prepare(target, mark)
         with _unused(target, owner):

@@ -15,9 +15,10 @@ from cachetools import LRUCache
 from sprag.service.storage.case_keys import KEYED, any_below, newest_with
 from sprag.service.storage.cases import conditions
 from sprag.service.storage.digests import Digests
-from sprag.service.storage.errors import StudyNotFoundError
+from sprag.service.storage.errors import DatabaseError, StudyNotFoundError
 from sprag.service.storage.origins import HOSTS_BETWEEN
 from sprag.service.storage.round_table import latest_round
+from sprag.service.storage.study_digests import WITH_DIGEST, is_sound, undecodable
 from sprag.service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, further_table, results_table
 from sprag.service.storage.warning_texts import read_warnings, write_warnings
 from sprag.worker import fingerprint, models
@@ -31,6 +32,8 @@ from sprag.worker.study import Study
 from sprag.worker.sweeps import whole_lines
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from sprag.service.storage.session import Session
@@ -46,13 +49,10 @@ _CASES_A_STUDY: Final = 2_000
 #: Studies whose equal cases are kept in memory.
 _KEPT: Final = 16
 _SOURCE: Final[tuple[sa.ColumnElement[Any], ...]] = (
+    *WITH_DIGEST,
     STUDIES.c.number,
     STUDIES.c.state,
-    STUDIES.c.model,
-    STUDIES.c.variant,
-    STUDIES.c.coarse,
     STUDIES.c.fingerprint,
-    STUDIES.c.study,
 )
 #: Endings that do not result from the case itself; such cases are run anew.
 _NO_RESULT: Final = tuple(ending.value for ending in WorkerEnding)
@@ -128,7 +128,7 @@ class Reuse(Digests):
                     damaged.append(source)
             ids = connection.execute(sa.select(STUDIES.c.id).where(STUDIES.c.number.in_(damaged))).scalars().all()
         for study_id in ids:
-            with suppress(StudyNotFoundError):  # deleted since it was found
+            with suppress(StudyNotFoundError, DatabaseError):  # deleted since, or the housekeeping names it
                 self.run_damaged_again(study_id)
         if ids and study.sweep is not None:
             # A line of which some cases are missing is run as a whole.
@@ -206,14 +206,24 @@ class _Spans:
         missing, growing = [number for number in numbers if number not in spans], set[int]()
         if missing:
             c = STUDIES.c
-            query = sa.select(c.number, c.study, c.most_cases, c.finished_at).where(c.number.in_(missing))
-            for number, text, most_cases, finished_at in connection.execute(query):
-                spans[number] = span(Study.from_text(text))
-                if most_cases is not None and finished_at is None:  # the span grows with each round
-                    growing.add(number)
+            query = sa.select(*WITH_DIGEST, c.number, c.finished_at).where(c.number.in_(missing))
+            row: Any
+            for row in filter(is_sound, _readable(connection, query)):
+                spans[row.number] = span(Study.from_text(row.study))
+                if row.most_cases is not None and row.finished_at is None:  # the span grows with each round
+                    growing.add(row.number)
         with self._lock:
             self._of.update({number: spans[number] for number in spans.keys() - growing})
         return spans
+
+
+def _readable(connection: sa.Connection, query: sa.Select[Any]) -> Iterator[Any]:
+    """The rows of a query; none from one on of which a text cannot be read: `Digests` names it."""
+    try:
+        yield from connection.execute(query)
+    except sa.exc.DBAPIError as error:
+        if not undecodable(error):
+            raise
 
 
 def _find(connection: sa.Connection, spans: _Spans, study: Study, kin: str, number: int) -> _Found | None:
@@ -262,12 +272,9 @@ class _Search:
     def look_in(self, number: int) -> None:
         """Take the cases that this study has, with rows that may be reused, and that no other had before."""
         c = STUDIES.c
-        source = self._connection.execute(
-            sa.select(*_SOURCE).where(
-                c.number == number, c.done > 0, c.deleted_at.is_(None), c.fingerprint.in_([fingerprint.digest(), ""])
-            )
-        ).one_or_none()
-        if source is None:
+        some = (c.number == number, c.done > 0, c.deleted_at.is_(None), c.fingerprint.in_([fingerprint.digest(), ""]))
+        source = next(_readable(self._connection, sa.select(*_SOURCE).where(*some)), None)
+        if source is None or not is_sound(source):
             return
         other = Study.from_text(source.study)
         ours, theirs = shared_cases(self.wanted, other)

@@ -9,16 +9,18 @@ import sqlalchemy as sa
 
 from sprag.service.storage.case_keys import KEYED, add_keys
 from sprag.service.storage.checked_rows import CheckedRows
+from sprag.service.storage.errors import DatabaseError
 from sprag.service.storage.part import add_chunks
 from sprag.service.storage.round_table import add_round, rounds_of
 from sprag.service.storage.studies import Studies
+from sprag.service.storage.study_digests import grown_digest
 from sprag.service.storage.tables import ROUNDS, STUDIES
 from sprag.service.storage.work import Work
 from sprag.worker import models
 from sprag.worker.case_keys import case_keys
 from sprag.worker.chunking import spans
 from sprag.worker.planning.rounds import Rows
-from sprag.worker.ports import Chunk
+from sprag.worker.ports import Chunk, UnreadableStudyError
 from sprag.worker.reuse import taken
 from sprag.worker.states import StudyState
 
@@ -40,7 +42,7 @@ class Rounds(Studies, CheckedRows, Work):
     def rounds_done(self, number: int) -> list[range] | None:
         """The cases of every round of a study that needs its next one; None where it needs none now.
 
-        It needs none while rows of its rounds that changed on the disk are run again.
+        It needs none while rows of its rounds that changed on the disk are run again. Raises UnreadableStudyError.
         """
         with self.session.read() as connection:
             if not _needs_round(connection, number):
@@ -50,7 +52,10 @@ class Rounds(Studies, CheckedRows, Work):
             rounds = [range(first, first + count) for first, count in connection.execute(query)]
             damaged = self.damaged_chunks(connection, number, np.arange(max(cases.stop for cases in rounds)))
             study_id = connection.execute(sa.select(STUDIES.c.id).where(STUDIES.c.number == number)).scalar_one()
-        return None if damaged and self.run_damaged_again(study_id) else rounds
+        try:
+            return None if damaged and self.run_damaged_again(study_id) else rounds
+        except DatabaseError as error:
+            raise UnreadableStudyError(str(error)) from error
 
     def round_rows(self, number: int, study: Study, cases: range, results: Sequence[str]) -> Rows:
         """The rows of one round."""
@@ -82,7 +87,8 @@ class Rounds(Studies, CheckedRows, Work):
             kin = connection.execute(sa.select(STUDIES.c.kin_hash).where(mine)).scalar_one_or_none()
             if kin is not None:
                 add_keys(connection, number, case_keys(added, kin))
-            self._change(connection, number, cases=study.cases, study=text)
+            digest = grown_digest(connection, number, cases=study.cases, study=text)
+            self._change(connection, number, cases=study.cases, study=text, digest=digest)
         self._forget_reuse(number)
         return chunks
 

@@ -270,11 +270,15 @@ class DatabaseFile:
             "unable to open database": DatabaseError(
                 f"the database {self.path} cannot be opened; check the folder's rights", "database-unreachable"
             ),
+            "Could not decode": DatabaseError(
+                f"a text in the database {self.path} changed on the disk; `sprag db check` tells where",
+                "database-damaged",
+            ),
             "file is not a database": DatabaseError(
                 f"{self.path} is not a Sprag database; name another file with --db", "not-a-database"
             ),
         }
-        if "malformed" in text:
+        if any(phrase in text for phrase in ("malformed", "foreign key mismatch", "no such column")):
             return self.damaged()
         return next((explanation for phrase, explanation in known.items() if phrase in text), error)
 

@@ -85,7 +85,10 @@ class Store(
         return maintenance.check(self.session)
 
     def backup(self, path: Path) -> tuple[str, ...]:
-        """Write a consistent copy to ``path`` while others continue to work; its damaged rows. Raises DatabaseError."""
+        """Write a consistent copy to ``path`` while others continue to work; `maintenance.changed_on_disk`.
+
+        Raises DatabaseError.
+        """
         return maintenance.backup(self.session, path)
 
     def checkpoint(self) -> None:

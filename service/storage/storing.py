@@ -225,8 +225,7 @@ class Storing(Reuse, Dispatchers):
             if known is not None:
                 digests[key_of(chunk)] = self.digest_in(connection, chunk)
         self._mark_done(connection, finished, hosts)
-        seals = [{"of": key[0], "at": key[1], "new": digest} for key, digest in digests.items()]
-        connection.execute(_SEAL, seals)
+        _seal(connection, digests)
         _count(connection, gains)
         for number, gain in gains.items():
             more = {"more_done": gain.cases, "more_ok": gain.endings[models.OK], "more_reused": gain.reused}
@@ -279,6 +278,11 @@ class Storing(Reuse, Dispatchers):
         for place, rows in blocks.items():
             self.session.insert_blocks(connection, place, merged(rows))
         return digests
+
+
+def _seal(connection: sa.Connection, digests: Mapping[Key, int]) -> None:
+    """Store the digests of chunks."""
+    connection.execute(_SEAL, [{"of": key[0], "at": key[1], "new": digest} for key, digest in digests.items()])
 
 
 def _words(rows: Block, *, further: bool = False) -> Words:

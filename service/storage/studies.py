@@ -38,6 +38,7 @@ from sprag.service.storage.reserve import makes_room
 from sprag.service.storage.round_table import add_round, latest_round
 from sprag.service.storage.schedule_runs import submit_run
 from sprag.service.storage.searching import search_text
+from sprag.service.storage.study_digests import WITH_DIGEST, digest_of_study, require_as_stored
 from sprag.service.storage.study_row import study_row
 from sprag.service.storage.tables import (
     CHUNKS,
@@ -150,6 +151,7 @@ class Studies(Users, Orders, Dispatchers):
         }
         keys = values.pop("keys", None)
         values["keyed"] = NOT_YET if "keys" not in row else TOO_MANY if keys is None else KEYED
+        values["digest"] = digest_of_study(values)
         with self.session.write() as connection:
             if idempotency_key is not None:
                 earlier = _study_of_key(connection, idempotency_key, body_hash)
@@ -206,7 +208,9 @@ class Studies(Users, Orders, Dispatchers):
     def spec(self, study_id: str) -> dict[str, Any]:
         """The user's spec, verbatim; raises StudyNotFoundError."""
         with self.session.read() as connection:
-            spec: dict[str, Any] = json.loads(self._row(connection, study_id, STUDIES.c.spec).spec)
+            row = self._row(connection, study_id, *WITH_DIGEST)
+        require_as_stored(row)
+        spec: dict[str, Any] = json.loads(row.spec)
         return spec
 
     def study(self, study_id: str) -> Study:
@@ -231,7 +235,8 @@ class Studies(Users, Orders, Dispatchers):
             if study_id in self._studies:
                 return self._studies[study_id]
         with self.session.read() as connection:
-            row = self._row(connection, study_id, STUDIES.c.study, STUDIES.c.name)
+            row = self._row(connection, study_id, *WITH_DIGEST, STUDIES.c.name)
+        require_as_stored(row)
         study = replace(Study.from_text(row.study), name=row.name)
         with self._lock, suppress(ValueError):  # too large for the cache
             self._studies[study_id] = study

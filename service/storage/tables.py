@@ -9,7 +9,7 @@ from sprag.worker import models
 from sprag.worker.states import ChunkState
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0038"
+HEAD_REVISION = "0039"
 
 METADATA = sa.MetaData(
     naming_convention={
@@ -87,6 +87,8 @@ STUDIES = sa.Table(
     sa.Column("search", sa.Text, nullable=False, server_default=""),
     # Epoch of the dispatcher to which it belongs; NULL: to none, so any of them may take it.
     sa.Column("dispatcher", sa.Integer),
+    # Of its inputs (`sprag.service.storage.study_digests`); NULL: from before revision 0039.
+    sa.Column("digest", sa.BigInteger),
     sa.Index("ix_studies_kin_hash_keyed", "kin_hash", "keyed"),
     sqlite_autoincrement=True,
 )
@@ -106,7 +108,7 @@ COARSE_TO_FINE, LINE_BY_LINE = 1, 2
 #: Long texts, and what only the storage needs.
 _BESIDE = frozenset(
     {"spec", "study", "search", "deleted_at", "kin_hash", "fresh", "fingerprint", "estimated_bytes", "dispatcher"}
-    | {"rank", "keyed"}
+    | {"rank", "keyed", "digest"}
 )
 #: The columns of a `StudyRecord`.
 RECORD_COLUMNS = tuple(column for column in STUDIES.c if column.name not in _BESIDE)

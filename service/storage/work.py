@@ -9,10 +9,12 @@ import sqlalchemy as sa
 
 from sprag.service.languages import grouped, recorded
 from sprag.service.storage.dispatchers import WAITING, return_claims
+from sprag.service.storage.errors import DatabaseError
 from sprag.service.storage.part import add_chunks, moment, optional_moment
 from sprag.service.storage.reserve import makes_room
 from sprag.service.storage.round_table import add_round, latest_round
 from sprag.service.storage.storing import Storing, is_chunk
+from sprag.service.storage.study_digests import WITH_DIGEST, readable
 from sprag.service.storage.tables import (
     CHUNKS,
     ENDINGS,
@@ -23,7 +25,7 @@ from sprag.service.storage.tables import (
 )
 from sprag.worker import models
 from sprag.worker.models import ChunkResult
-from sprag.worker.ports import ActiveStudy, Chunk, Finished
+from sprag.worker.ports import ActiveStudy, Chunk, Finished, UnreadableStudyError
 from sprag.worker.states import GOING, TERMINAL, ChunkState, StudyEvent, StudyState
 from sprag.worker.study import Study
 
@@ -75,10 +77,18 @@ class Work(Storing):
         ]
 
     def study_of(self, number: int) -> Study:
-        """The study to compute."""
+        """The study to compute; raises UnreadableStudyError."""
         with self.session.read() as connection:
-            text = connection.execute(sa.select(STUDIES.c.study).where(STUDIES.c.number == number)).scalar_one()
-        return Study.from_text(text)
+            c = STUDIES.c
+            study_id = connection.execute(sa.select(c.id).where(c.number == number)).scalar_one()
+            try:
+                with readable(study_id):
+                    row = connection.execute(sa.select(*WITH_DIGEST, c.number, c.state).where(c.number == number)).one()
+            except DatabaseError as error:
+                raise UnreadableStudyError(str(error)) from error
+            if problem := self.problem_of(connection, row):
+                raise UnreadableStudyError(problem)
+        return Study.from_text(row.study)
 
     def open_chunks(self, number: int) -> list[Chunk]:
         """Unfinished chunks of a study, in the order in which they will run."""
