@@ -6,7 +6,6 @@ import copy
 import json
 from typing import Any
 
-import jsonschema
 import numpy as np
 import pytest
 
@@ -28,8 +27,6 @@ from sprag.service.results.trajectories import span
 from sprag.service.spec.components import faults_of
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.extend import parse_extended
-from sprag.service.spec.report import SpecError
-from sprag.service.spec.schema.document import spec_schema
 from sprag.service.spec.stored import accepted
 from sprag.service.spec.together import question, with_last_unit
 from sprag.worker import models
@@ -366,94 +363,3 @@ def test_points_of_a_list_that_could_separate_thousands_are_told(text: str) -> N
     certain = check_form(form(way="values", values="20.000; 25.5 N*mm"), Chunking())
     assert certain.parsed is not None
     assert not [warning for warning in (*certain.notes, *certain.parsed.warnings) if "is read as" in warning]
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("0; 50; 100; 200 N*mm", [0.0, 0.05, 0.1, 0.2]),
-        ("0, 50, 100 N*mm", [0.0, 0.05, 0.1]),
-        ("0.05 N*m; 100 N*mm", [0.05, 0.1]),
-        ("0,05; 0,1 N*m", [0.05, 0.1]),
-        ("1.000,5; 2.000 N*mm", [1.0005, 2.0]),
-        ("0.1\n0.2 N*m\n", [0.1, 0.2]),
-        ("100 N*mm", [0.1]),
-        ("1 000; 2 000 N*mm;", [1.0, 2.0]),
-    ],
-)
-def test_a_list_of_a_spec_is_one_text(text: str, expected: list[float]) -> None:
-    """Each value of the list and what the form makes of the text are the same."""
-    spec = changed({"/axes": [{"path": LOAD, "values": text}]})
-    study = parse_spec(spec).study
-    assert study.columns(range(study.cases))[LOAD].tolist() == pytest.approx(expected)
-    jsonschema.validate(spec, spec_schema())
-    shown = values_of(spec)
-    assert np.array_equal(parse_spec(spec_of(shown)[0]).study.axes[0].array, study.axes[0].array)
-
-
-@pytest.mark.parametrize(
-    ("text", "asked"),
-    [
-        ("50; 100 N*mm; 0.2", "ambiguous-unit"),
-        ("100,200,300 N*mm", "invalid-text"),
-        ("0,5", "invalid-text"),
-        ("100 200 300 N*mm", "invalid-text"),
-        ("1,234; 5,678 N*mm", "ambiguous-comma"),
-        ("0.1 N*m; much", "not-a-number"),
-        ("0.1; 1e10 N*m", "out-of-range"),
-        ("0.1; 0.2", "missing-unit"),
-        (" ", "empty"),
-        ("", "empty"),
-    ],
-)
-def test_a_text_that_is_unclear_is_refused_where_it_stands(text: str, asked: str) -> None:
-    with pytest.raises(SpecError) as refused:
-        parse_spec(changed({"/axes": [{"path": LOAD, "values": text}]}))
-    assert {(fault.where, fault.code) for fault in refused.value.faults} == {("/axes/0/values", asked)}
-
-
-def test_points_of_a_text_that_could_separate_thousands_are_told() -> None:
-    (warning,) = parsed({"/axes": [{"path": LOAD, "values": "20.000; 25.000 N*mm"}]}).warnings
-    assert warning.startswith("/axes/0/values: '20.000 N*mm' is read as 20; write 20000")
-
-
-def test_lists_of_goals_measured_values_and_extensions_are_texts_too() -> None:
-    drawn: dict[str, Any] = {"sample": "random", "count": 4, "ranges": [{"path": LOAD, "values": "50; 100; 200 N*mm"}]}
-    drawn["ranges"].append({"path": "gravity", "from": 1, "to": 2})
-    assert set(parsed({"/axes": [drawn]}).study.columns(range(4))[LOAD]) <= {0.05, 0.1, 0.2}
-    study = parsed({"/axes": [{"path": LOAD, "values": "50; 100 N*mm"}]})
-    longer = parse_extended(study.spec, study.study, {"axes": [{"path": LOAD, "values": "150; 200 N*mm"}]}).study
-    assert longer.columns(range(4))[LOAD].tolist() == pytest.approx([0.05, 0.1, 0.15, 0.2])
-
-
-@pytest.mark.parametrize(
-    ("fields", "told"),
-    [
-        ({"way": "linspace", "from": "1.000", "to": "5.000", "count": "5"}, "from"),
-        ({"way": "range", "from": "0", "to": "5.000", "step": "1"}, "to"),
-        ({"way": "range", "from": "0", "to": "5", "step": "1.000"}, "step"),
-        ({"way": "range", "from": "0", "to": "5.5", "step": "1.000"}, None),
-        ({"way": "linspace", "from": "1", "to": "5", "count": "5"}, None),
-        ({"way": "values", "values": "1; 2", "from": "1.000", "to": "5.000"}, None),  # not shown
-    ],
-)
-def test_points_of_ends_that_could_separate_thousands_are_told(fields: dict[str, str], told: str | None) -> None:
-    checked = check_form(form(**fields), Chunking())
-    assert checked.parsed is not None
-    notes = [note for note in (*checked.notes, *checked.parsed.warnings) if "is read as" in note]
-    assert len(notes) == (told is not None)
-    assert (
-        told is None or f"'{fields[told]}' is read as {float(fields[told]):g}; write {fields[told][0]}000" in notes[0]
-    )
-    with_unit = check_form(form(**{"way": "linspace", "from": "1.000", "to": "5.000 N*mm", "count": "5"}), Chunking())
-    assert with_unit.parsed is not None
-    assert [note for note in (*with_unit.notes, *with_unit.parsed.warnings) if "is read as" in note]
-
-
-@pytest.mark.parametrize("text", ["20.000; 25.000", "20.000,25.000"])
-def test_points_of_an_extension_by_command_are_told(text: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert _values(text, LOAD) == [20.0, 25.0]
-    assert "warning: shaft.load: '20.000' is read as 20; write 20000" in capsys.readouterr().err
-    assert _values("20.000 N*mm; 25.5 N*mm", LOAD) == ["20.000 N*mm", "25.5 N*mm"]
-    assert _values("0.5,0.7", LOAD) == [0.5, 0.7]
-    assert not capsys.readouterr().err
