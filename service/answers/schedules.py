@@ -148,6 +148,7 @@ class Night(TypedDict):
 
     since: Moment
     until: Moment
+    off: Annotated[str | None, Doc("why none runs from now on: the database is a copy; null where they run")]
     trouble: Annotated[int, Doc("number of due times that need attention")]
     late: Annotated[list[LateRun], Doc("due times at which nothing has run although it should")]
     runs: Annotated[list[NightRun], Doc("first those that need attention, each group latest first")]

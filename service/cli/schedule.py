@@ -168,8 +168,7 @@ def list_schedules(server: Server = DEFAULT_SERVER, token: Token = None, as_json
         window = "-".join(s["window"] or ()) or None
         rows.append((s["id"], _when(s), window, s["finish_by"], _run(s["last_run"]), _next(s), s["name"]))
     show_table("", columns, rows)
-    if found["off"]:
-        say(_known(found["off"]) or "")
+    _say_off(found)
 
 
 @app.command()
@@ -206,7 +205,8 @@ def night(
         rows = [(_clock(r["due_local"]), r["name"], _(r["sentence"]), r["study"]) for r in found["late"]]
         rows += [(_clock(r["due_local"]), r["name"], _(r["outcome"]["sentence"]), r["study"]) for r in found["runs"]]
         show_table("", columns, rows)
-    if found["trouble"] or found["late"]:
+        _say_off(found)
+    if found["trouble"] or found["late"] or found["off"]:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
 
 
@@ -351,6 +351,12 @@ def _run(run: dict[str, Any] | None) -> str | None:
     if run is None:
         return None
     return f"{_clock(run['due_local'])} {run['study'] or _known(run['problem']) or run['state']}"
+
+
+def _say_off(found: dict[str, Any]) -> None:
+    """Say why no schedule runs, where none does."""
+    if found["off"]:
+        say(_known(found["off"]) or "")
 
 
 def _known(text: str | None) -> str | None:

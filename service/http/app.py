@@ -368,6 +368,7 @@ async def _make_ready(checker: ProcessComputer, context: Context) -> None:
             return
         except (ProcessStartError, ProcessDiedError, StoreError) as error:
             _LOG.error("The checking processes do not start (%s); retrying.", error)
+            context.ready.problem = str(error)
             await asyncio.sleep(_AGAIN_SECONDS)
         else:
             context.ready.set()

@@ -47,6 +47,12 @@ CaseNumber = Annotated[
 ]
 
 
+class Ready(Event):
+    """Set when the checking processes accept work; ``problem`` says why they did not at the last try."""
+
+    problem: str = ""
+
+
 @dataclass(frozen=True, slots=True)
 class Context:
     """Settings, store and computer of one service, and the ``files`` of ended studies.
@@ -67,7 +73,7 @@ class Context:
     writer: Computes
     library: Library
     ending: Event = field(default_factory=Event)
-    ready: Event = field(default_factory=Event)
+    ready: Ready = field(default_factory=Ready)
     streams: Semaphore = field(default_factory=lambda: Semaphore(MAX_STREAMS))
     unaffected: Unaffected = field(default_factory=Unaffected)
     compute_shares: Shares = field(default_factory=lambda: Shares(1, MAX_COMPUTATIONS_EACH, MAX_COMPUTATIONS))

@@ -159,9 +159,11 @@ class Guard:
             raise ApiError("bad-request", "Content-Length is not a number.")
         if len(length) > 18 or int(length) > MAX_BODY_BYTES:
             raise body_too_large()
-        coding = headers.get("content-encoding", "").strip()
-        if coding.lower() not in ("", "identity") and (int(length) or "transfer-encoding" in headers):
-            raise encoded_body(coding)
+        # Several headers of the name are one list.
+        codings = [coding.strip() for each in headers.getlist("content-encoding") for coding in each.split(",")]
+        coded = any(coding.lower() not in ("", "identity") for coding in codings)
+        if coded and (int(length) or "transfer-encoding" in headers):
+            raise encoded_body(", ".join(codings))
 
     async def _grant(self, scope: Scope, headers: Headers) -> Grant | None:
         """The grant of the request; ApiError where a token or a role is missing."""

@@ -8,8 +8,7 @@ from sprag.service.answers import filled
 from sprag.service.answers.schedules import ScheduleDetail, ScheduleList, ScheduleRun, ScheduleSummary
 from sprag.service.http.prefix import here
 from sprag.service.http.views import API_PREFIX, study_address
-from sprag.service.jobs.nights import outcome_json
-from sprag.service.languages import recorded
+from sprag.service.jobs.nights import outcome_json, why_off
 from sprag.service.schedules.times import local_time
 
 if TYPE_CHECKING:
@@ -24,8 +23,7 @@ def schedule_address(schedule_id: str) -> str:
 
 def listed(store: Store) -> ScheduleList:
     """Every schedule, newest first, and why none of them runs."""
-    off = recorded.COPY if store.is_copy() else None
-    return {"off": off, "schedules": [summary(record) for record in store.list_schedules()]}
+    return {"off": why_off(store), "schedules": [summary(record) for record in store.list_schedules()]}
 
 
 def summary(record: ScheduleRecord) -> ScheduleSummary:

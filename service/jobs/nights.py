@@ -11,6 +11,7 @@ from sprag.service.answers.schedules import Night, NightRun, RunOutcome, SentRep
 from sprag.service.delivery import origin_of
 from sprag.service.jobs.reports.watchdog import late_json, late_runs
 from sprag.service.json_text import timestamp
+from sprag.service.languages import recorded
 from sprag.service.schedules.times import local_time
 from sprag.service.schedules.trouble import usual_flags
 from sprag.service.storage.errors import StudyNotFoundError
@@ -75,6 +76,11 @@ def report_json(report: ReportRecord) -> SentReport:
     return filled(SentReport, report, target=target)
 
 
+def why_off(store: Store) -> str | None:
+    """Why no schedule runs: the database is a copy; None where they run."""
+    return recorded.COPY if store.has_schedules() and store.is_copy() else None
+
+
 def night(store: Store, hours: float = HOURS) -> Night:
     """The due times of the last ``hours``: first those that need attention, each group latest first."""
     until = store.clock.now()
@@ -95,6 +101,7 @@ def night(store: Store, hours: float = HOURS) -> Night:
     return {
         "since": timestamp(since),
         "until": timestamp(until),
+        "off": why_off(store),
         "trouble": sum(run.outcome.trouble for run in found),
         "late": [late_json(late) for late in late_runs(store)],
         "runs": runs,

@@ -34,11 +34,15 @@ async def readyz(request: Request) -> Any:
 
 def _ready(request: Request) -> Response:
     readiness, context = cast("Readiness", request.app.state.readiness), cast("Context", request.app.state.context)
-    starting = () if context.ready.is_set() else ("The checking processes are starting.",)
+    starting = () if context.ready.is_set() else (_starting(context.ready.problem),)
     if found := (*starting, *readiness.problems()):
         raise ApiError("unavailable", " ".join(found), headers={"Retry-After": "5"})
     warnings = readiness.warnings()
     return json_response({"status": "ok", **({"warnings": list(warnings)} if warnings else {})})
+
+
+def _starting(problem: str) -> str:
+    return f"The checking processes do not start: {problem}." if problem else "The checking processes are starting."
 
 
 @router.get(

@@ -41,7 +41,7 @@ def _schedules(context: Context, _: QueryParams) -> Any:
 
 def _night(context: Context, given: QueryParams) -> Any:
     found = night(context.store, float(given.get("hours", HOURS)))
-    return [found["late"], found["runs"]]  # without the ends of the interval, which move with the clock
+    return [found["off"], found["late"], found["runs"]]  # without the ends of the interval, which move with the clock
 
 
 def _workers(context: Context, _: QueryParams) -> Any:

@@ -130,6 +130,9 @@ def test_the_list_of_a_copied_database_says_that_its_schedules_are_off(
 ) -> None:
     assert run("add", spec_file, "--cron", "@daily")[0] == 0
     assert "is a copy" not in run("list")[2]
+    assert (run("night")[0], "is a copy" in run("night")[2]) == (0, False)
     monkeypatch.setattr(service.store, "is_copy", lambda: True)
     assert "This database is a copy, or was moved: its schedules are off" in run("list")[2]
     assert "This database is a copy" in json.loads(run("list", "--json")[1])["off"]
+    assert run("night")[0] == 1
+    assert "This database is a copy, or was moved: its schedules are off" in run("night")[2]

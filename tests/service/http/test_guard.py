@@ -62,6 +62,9 @@ def test_a_compressed_body_is_refused_as_such(service: Service, coding: str, str
     assert problem["errors"][0]["value"] == coding
     assert "UTF-8" not in json.dumps(problem)
     assert service.http.get("/api/v1/studies", headers=head).status_code == 200
+    parts = [("Content-Encoding", part) for part in ("identity", *coding.split(", "))]
+    answer = service.http.post("/api/v1/studies", content=body, headers=[*parts, ("Content-Type", "application/json")])
+    assert answer.json()["errors"][0]["value"] == f"identity, {coding}"
     plain = {"Content-Encoding": "identity"}
     assert service.http.post("/api/v1/studies", json=SPEC, headers=plain).status_code == 202
 

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import signal
 import threading
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import httpx
 import pytest
 
+from sprag.service.http import app
 from sprag.service.http.server import AddressError, Supervisor, serve
+from sprag.service.storage.errors import DatabaseError
+from sprag.worker.pool.child_pool import JobStoppedError
 from tests.worker.fakes import HandClock
 
 if TYPE_CHECKING:
+    from sprag.service.http.computer import ProcessComputer
     from sprag.service.settings import Settings
     from tests.service.conftest import Service
 
@@ -188,6 +193,27 @@ def test_a_supervisor_that_never_started_can_be_stopped() -> None:
     nursery = Nursery()
     Supervisor(nursery).stop()
     assert nursery.children == []
+
+
+def test_readyz_says_why_the_processes_that_check_do_not_start(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    context, tries = service.app.state.context, []
+
+    class Checker:
+        """Processes that never start, of a service that is ended after the second try."""
+
+        async def ready(self, *_: object) -> None:
+            tries.append(context.ready.problem)
+            raise DatabaseError("the file has 2 names", "unsupported-database") if len(tries) < 2 else JobStoppedError
+
+    context.ready.clear()
+    monkeypatch.setattr(app, "_AGAIN_SECONDS", 0)
+    asyncio.run(app._make_ready(cast("ProcessComputer", Checker()), context))
+    assert tries == ["", "the file has 2 names"]
+    answer = service.http.get("/readyz")
+    assert answer.status_code == 503
+    assert answer.json()["detail"] == "The checking processes do not start: the file has 2 names."
 
 
 def test_readyz_waits_for_the_processes_that_check(service: Service) -> None:

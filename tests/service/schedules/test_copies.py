@@ -136,6 +136,9 @@ def test_a_copy_fires_nothing_until_it_is_adopted_and_the_original_goes_on(
     assert OFF in http.get("/api/v1/schedules").json()["off"]
     assert OFF in http.get("/schedules").text
     assert "копія" in http.get("/schedules", headers={"Accept-Language": "uk"}).text
+    assert OFF in http.get("/api/v1/night").json()["off"]
+    assert OFF in http.get("/night").text
+    assert "копія" in http.get("/night", headers={"Accept-Language": "uk"}).text
     copy.take_over("here:1")
     ready = http.get("/readyz")
     assert ready.status_code == 200
@@ -162,6 +165,8 @@ def test_a_copy_fires_nothing_until_it_is_adopted_and_the_original_goes_on(
     assert len(hook.requests) == 2 * (nights + 1)
     assert http.get("/api/v1/schedules").json()["off"] is None
     assert OFF not in http.get("/schedules").text
+    assert http.get("/api/v1/night").json()["off"] is None
+    assert OFF not in http.get("/night").text
 
 
 def test_a_dump_restored_into_another_database_is_a_copy(
