@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -98,7 +99,9 @@ def test_every_row_of_every_table_is_there_and_back_again(
     said: list[str] = []
     moved = _move(source, target, said.append)
     assert _contents(target) == before == _contents(source)
-    assert moved == Moved(dict.fromkeys(before, ROWS), 0)
+    # Made-up studies fit neither their digests nor their chunks, which a move tells and changes nothing about.
+    assert moved.problems
+    assert replace(moved, problems=()) == Moved(dict.fromkeys(before, ROWS), 0)
     assert said[-1] == f"{ROWS * len(before):,} rows in {len(before)} tables are the same in both databases"
     Store.open(urls[1]).close()
     back = Session(f"sqlite:///{tmp_path / 'back.sqlite3'}")
