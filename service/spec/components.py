@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import Any, Final
 
 from sprag.service.faults import Fault
-from sprag.service.spec.csv_text import read_csv, unescape
+from sprag.service.spec.csv_text import read_csv, refuse_mixed_column, unescape
 from sprag.service.spec.fields import exact, placed, read_object
 from sprag.service.spec.labels import LINES_ALLOWED, printable_lines
 from sprag.service.spec.numbers import parse_number, settled
@@ -226,6 +226,11 @@ def _read_csv(report: Report, text: object) -> list[tuple[str, Component]]:
         if name not in known or names.count(name) > 1:
             message = "is a column twice" if name in known else "has a column that is no field"
             report.fault("/csv", "unknown-field", message, cell, allowed=", ".join(sorted(known)))
+    parameters = {name: one for kind in KINDS for name, one in fields_of(kind).items() if name != COEFFICIENTS}
+    for place, (name, unit) in enumerate(headings):
+        parameter = parameters.get(name)
+        if parameter is not None and not unit:
+            refuse_mixed_column(report, "/csv", rows[1:], (place, name), parameter.unit)
     if report.found:
         return []
     made = []

@@ -6,18 +6,22 @@ Numbers may have decimal commas: always where semicolons separate the columns, o
 from __future__ import annotations
 
 import csv
+import re
 from typing import TYPE_CHECKING, Final
 
 from sprag.service.spec.numbers import WITHOUT_DOUBT, assumption, question
 from sprag.service.spec.table_text import MAX_HEADING, CsvRow, Split, settled_table, split, with_units
+from sprag.service.spec.together import AMBIGUOUS_UNIT, questions
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Sequence
 
     from sprag.service.spec.report import Report
 
 #: Beginnings of text that a spreadsheet would interpret as a formula.
 _FORMULA_STARTS: Final = ("=", "+", "-", "@", "\t", "\r")
+#: A unit behind a number. Of most cells there is none, and reading one as a quantity takes longer.
+_WITH_UNIT: Final = re.compile(r"[0-9.]\s*(?:[^\W\d_eE]|[eE](?![-+0-9])|[^\w\s.,;+-])")
 
 
 def escape(text: str) -> str:
@@ -70,6 +74,32 @@ def read_csv(
         if report.full:
             break
     return None if report.found > before else _settled(report, where, table._replace(rows=rows), texts)
+
+
+def has_units(text: str) -> bool:
+    """Whether a cell, or a line of one that follows the headings of a table, has a unit behind a number."""
+    return _WITH_UNIT.search(text) is not None
+
+
+def refuse_mixed_column(report: Report, where: str, rows: Sequence[CsvRow], column: tuple[int, str], unit: str) -> bool:
+    """Record a fault where bare numbers of a column stand beside quantities in units of another scale.
+
+    ``column`` is its place and its heading, which has no unit, so that a bare number would be in ``unit`` (SI). The
+    value of the fault is the heading, because a unit in it is the answer for all cells.
+    """
+    place, heading = column
+    cells = [row.cells[place].strip() for row in rows]
+    if not any(map(has_units, cells)):
+        return False
+    values = list(dict.fromkeys(cells))
+    asked = next(iter(questions(values, [unit] * len(values))), None)
+    if asked is None:
+        return False
+    line = rows[cells.index(values[asked.place])].line
+    message = f"line {line}, column {heading}: {asked.message}"
+    allowed = f"a unit in the heading, as in {heading} [{unit}], or in each cell"
+    report.fault(where, AMBIGUOUS_UNIT, message, heading, allowed=allowed, unit=unit)
+    return True
 
 
 def _settled(report: Report, where: str, table: Split, texts: Collection[str]) -> list[CsvRow] | None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import copy
 import math
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.spec.csv_text import has_units
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.numbers import has_doubtful_point, with_decimal, with_decimals
 from sprag.service.spec.report import SpecError
@@ -22,15 +24,17 @@ if TYPE_CHECKING:
 
 #: Numbers farther apart than this (relative) were read differently, and not only computed by another version.
 _APART: Final = 1e-3
+#: Fields with the text of a table.
+_TABLES: Final = frozenset({"points", "csv"})
 
 
 def accepted(spec: Mapping[str, Any], study: Study | None = None) -> dict[str, Any]:
     """A spec that was accepted before, without what is asked about now.
 
     Earlier versions read bare numbers beside quantities of another scale as SI, and points that could separate
-    thousands as decimal points, so that is what they are: their unit and a further decimal are written. Beside decimal
-    commas such points separate thousands, unless the ``study`` that is stored with the spec shows that they were
-    decimal.
+    thousands as decimal points, so that is what they are: their unit, in the heading of a column where it is a table,
+    and a further decimal are written. Beside decimal commas such points separate thousands, unless the ``study`` that
+    is stored with the spec shows that they were decimal.
     """
     settled = _settled(spec)
     if study is None or not any(map(has_doubtful_point, _texts(settled))):
@@ -41,24 +45,33 @@ def accepted(spec: Mapping[str, Any], study: Study | None = None) -> dict[str, A
 
 def _settled(spec: Mapping[str, Any]) -> dict[str, Any]:
     settled: dict[str, Any] = dict(spec)
-    while unclear := _unclear(settled):
-        settled = copy.deepcopy(settled)
+    before: dict[str, Any] = {}
+    while settled != before and (unclear := _unclear(settled)):
+        before, settled = settled, copy.deepcopy(settled)
         for fault in unclear:
             *parents, last = (part.replace("~1", "/").replace("~0", "~") for part in (fault.where or "").split("/")[1:])
             place: Any = settled
             for key in parents:
                 place = place[int(key)] if isinstance(place, list) else place[key]
             index: Any = int(last) if isinstance(place, list) else last
-            if fault.code == AMBIGUOUS_UNIT:
+            if fault.code == AMBIGUOUS_UNIT and last in _TABLES:
+                place[index] = _with_heading(place[index], str(fault.value), str(fault.unit))
+            elif fault.code == AMBIGUOUS_UNIT:
                 place[index] = f"{place[index]!r} {fault.unit}"
             else:
                 place[index] = with_decimal(place[index], str(fault.value))
     return settled
 
 
+def _with_heading(table: str, heading: str, unit: str) -> str:
+    """A table with a unit in brackets behind one of its headings."""
+    return re.sub(rf"(?<![\w.]){re.escape(heading)}(?![\w.])", rf"\g<0> [{unit}]", table, count=1)
+
+
 def _unclear(spec: Mapping[str, Any]) -> list[Fault]:
     """The faults of bare numbers beside quantities of another scale, and of points that could separate thousands."""
-    if not _mixed(spec) and not any(map(has_doubtful_point, _texts(spec))):
+    doubtful = any(has_doubtful_point(text) or has_units(text.partition("\n")[2]) for text in _texts(spec))
+    if not _mixed(spec) and not doubtful:
         return []
     try:
         parse_spec(spec)

@@ -9,7 +9,7 @@ import numpy as np
 
 from sprag.service.spec.axes.axes import read_paths
 from sprag.service.spec.axes.blocks import Block
-from sprag.service.spec.csv_text import read_csv
+from sprag.service.spec.csv_text import read_csv, refuse_mixed_column
 from sprag.service.spec.fields import exact, read_object
 from sprag.service.spec.numbers import parse_number
 from sprag.service.spec.report import Report, join, shorten_text
@@ -38,7 +38,12 @@ def read_points(report: Report, pointer: str, data: Mapping[str, Any], machine: 
     known = [heading for heading in headings if heading is not None]
     if len(known) < len(headings):
         return None
-    values = _read_cells(report, where, rows[1:], known)
+    mixed = [
+        refuse_mixed_column(report, where, rows[1:], (place, str(heading)), heading.parameter.unit)
+        for place, heading in enumerate(known)
+        if not heading.unit
+    ]
+    values = None if any(mixed) else _read_cells(report, where, rows[1:], known)
     if values is None:
         return None
     paths = tuple(heading.parameter.path for heading in known)

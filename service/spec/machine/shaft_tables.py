@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from sprag.service.spec.csv_text import read_csv
+from sprag.service.spec.csv_text import read_csv, refuse_mixed_column
 from sprag.service.spec.fields import exact
 from sprag.service.spec.numbers import is_ambiguous, parse_number
 from sprag.service.spec.report import Report
@@ -47,6 +47,9 @@ def read_csv_rows(report: Report, where: str, text: object, *columns: Parameter)
             parse_exact(f"1 {unit}" if unit else 1, column.unit)
         except QuantityError as error:
             report.fault(where, error.code, f"the heading of column {column.path} {error}", unit, unit=column.unit)
+    for place, (unit, column) in enumerate(zip(units, columns, strict=True)):
+        if not unit:
+            refuse_mixed_column(report, where, rows[1:], (place, rows[0].cells[place].strip()), column.unit)
     if report.found > before:
         return []
     found: list[list[float]] = []

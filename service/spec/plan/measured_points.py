@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from sprag.service.spec.catalogue import result_of
-from sprag.service.spec.csv_text import read_csv
+from sprag.service.spec.csv_text import read_csv, refuse_mixed_column
 from sprag.service.spec.fields import exact
 from sprag.service.spec.numbers import parse_number
 from sprag.service.spec.report import Report, did_you_mean, shorten_text
@@ -146,7 +146,9 @@ def _check_unit(report: Report, where: str, column: Column, unit: str) -> bool:
 def _conditions(report: Report, where: str, rows: Sequence[CsvRow], column: Column, machine: Machine) -> list[float]:
     """The values of a parameter; NaN, and a fault recorded, for those that are invalid."""
     entry = machine.parameters[column.name]
-    values = []
+    values: list[float] = []
+    if not column.unit and refuse_mixed_column(report, where, rows, (column.place, column.name), entry.unit):
+        return values
     for row in rows:
         cell = row.cells[column.place].strip()
         try:
@@ -180,11 +182,15 @@ def read_results(
             continue
         if not _check_unit(report, where, column, info.unit):
             continue
+        if not column.unit and refuse_mixed_column(report, where, table.rows, (column.place, column.name), info.unit):
+            continue
         rows = [(row, at) for row, at in zip(table.rows, table.at, strict=True) if row.cells[column.place].strip()]
         values = [_value(report, where, row, column, info.unit) for row, _ in rows]
         if not rows:
             report.fault(where, "empty", f"has no value in the column {column}", allowed="a number")
         deviations: list[float] = []
+        if sigma is not None and not (sigma.unit or column.unit):
+            refuse_mixed_column(report, where, table.rows, (sigma.place, sigma.name), info.unit)
         if sigma is not None:
             pairs = zip(rows, values, strict=True)
             deviations = [

@@ -119,14 +119,14 @@ def test_what_is_wrong_with_points_is_told_of_their_file(
     sprag: Sprag, examples: Path, tmp_path: Path, command: str
 ) -> None:
     points = tmp_path / "points.csv"
-    points.write_text("excitation.frequency [rpm];shaft.load\n1500;0.1\n\n1800;-250 N*mm\n-3;\n")
+    points.write_text("excitation.frequency [rpm];shaft.load [N*m]\n1500;0.1\n\n1800;-250 N*mm\n-3;\n")
     done = sprag(command, examples / "one_pendulum.json", "--points", points)
     assert (done.code, done.out) == (2, "")
     _, load, speed, empty = done.err.splitlines()
-    assert load.startswith(f"  {points}: line 4, column shaft.load: ")
+    assert load.startswith(f"  {points}: line 4, column shaft.load [N*m]: ")
     assert "(got '-250 N*mm'; allowed: >= 0 " in load
     assert "line 5, column excitation.frequency [rpm]: " in speed
-    assert "line 5, column shaft.load: " in empty
+    assert "line 5, column shaft.load [N*m]: " in empty
     told = sprag(command, examples / "one_pendulum.json", "--points", points, "--json").failure["problems"]
     assert [item["code"] for item in told] == ["out-of-range", "out-of-range", "empty"]
     gone = sprag(command, examples / "one_pendulum.json", "--points", tmp_path / "none.csv")
@@ -174,7 +174,7 @@ def test_a_binary_file_is_no_table(sprag: Sprag, examples: Path, tmp_path: Path)
 
 def test_points_take_the_place_of_what_varies(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
     points = tmp_path / "points.csv"
-    points.write_text("excitation.frequency [rpm],shaft.load\n1500,0.1\n1800,250 N*mm\n960,0\n")
+    points.write_text("excitation.frequency [rpm],shaft.load [N*m]\n1500,0.1\n1800,250 N*mm\n960,0\n")
     spec = json.loads((examples / "one_pendulum.json").read_text())
     assert spec["axes"]
     path = tmp_path / "spec.json"

@@ -135,14 +135,14 @@ def test_the_design_for_indices_has_its_blocks() -> None:
 
 
 def test_points_have_units_in_their_header_or_their_cells() -> None:
-    text = "\ufeffexcitation.frequency [rpm],shaft.load\n1500,0.1\n1800, 250 N*mm\n\n"
+    text = "\ufeffexcitation.frequency [rpm],shaft.load [N*m]\n1500,0.1\n1800, 250 N*mm\n\n"
     study = study_of([{"points": text}])
     assert rows(study, "excitation.frequency", "shaft.load") == [(25.0, 0.1), (30.0, 0.25)]
 
 
 @pytest.mark.parametrize("sign", [";", "\t"])
 def test_points_may_be_parted_as_spreadsheets_do(sign: str) -> None:
-    text = "\ufeffexcitation.frequency [rpm],shaft.load\r\n1500,0.1\r\n1800, 250 N*mm\r\n".replace(",", sign)
+    text = "\ufeffexcitation.frequency [rpm],shaft.load [N*m]\r\n1500,0.1\r\n1800, 250 N*mm\r\n".replace(",", sign)
     study = study_of([{"points": text}])
     assert rows(study, "excitation.frequency", "shaft.load") == [(25.0, 0.1), (30.0, 0.25)]
 

@@ -75,7 +75,7 @@ def test_a_calibration_is_read_in_si_and_its_study_is_settled() -> None:
     "text",
     [
         "shaft.load;shaft.speed.mean;sigma [%]\n0,1;20,5;2\n0,2;18;2\n0,3;15;2\n",
-        "shaft.load\tshaft.speed.mean [rad/s]\tsigma\n0,1\t20,5\t0,41\n0.2\t18\t2 %\n300 N*mm\t15\t0.3 rad/s\n",
+        "shaft.load [N*m]\tshaft.speed.mean [rad/s]\tsigma\n0,1\t20,5\t0,41\n0.2\t18\t2 %\n300 N*mm\t15\t0.3 rad/s\n",
         "\ufeffshaft.load,shaft.speed.mean,sigma\r\n0.1,20.5,0.41\r\n0.2,18,0.36\r\n\r\n0.3,15,2%\r\n",
     ],
 )
