@@ -242,18 +242,27 @@ def show_curves(found: Mapping[str, Any], of: str = "") -> None:
     columns = [(heading(x["path"], x["unit"]), True)]
     columns += [(heading(name, result["unit"]), True) for name, result in found["results"].items()]
     settled = all("regime" in drawn for drawn in found["curves"])
-    columns += [(_("regime"), False)] * settled + [(_("ending"), False)]
-    for drawn in found["curves"]:
+    doubts = [_doubts(drawn) for drawn in found["curves"]]
+    flagged = any(map(any, doubts))
+    columns += [(_("regime"), False)] * settled + [(_("flags"), False)] * flagged + [(_("ending"), False)]
+    for drawn, flags in zip(found["curves"], doubts, strict=True):
         place = held_text({**drawn["by"], **drawn["at"]}, found["units"])
         title = ": ".join(filter(None, (of, place)))
         regimes = [drawn["regime"]] if settled else []
-        rows = zip(drawn["x"], *drawn["y"].values(), *regimes, drawn["endings"], strict=True)
+        rows = zip(drawn["x"], *drawn["y"].values(), *regimes, *[flags] * flagged, drawn["endings"], strict=True)
         show_table(title, columns, [(*row[:-1], "" if row[-1] == OK else row[-1]) for row in rows])
         if "error" in drawn:
             say(*_refined(drawn, found["error_asked"], x["unit"]))
         elif "jumps" in drawn:
             places = ((_ends(jump, x["unit"]), _(jump["why"])) for jump in drawn["jumps"])
             say(*(_("jump at {place} ({why})", place=place, why=why) for place, why in places))
+
+
+def _doubts(drawn: Mapping[str, Any]) -> list[str]:
+    """The flags of each point, except for those that its regime says."""
+    regimes = drawn.get("regime") or [None] * len(drawn["x"])
+    points = zip(drawn["flags"], regimes, strict=True)
+    return [", ".join(name for name in flags if name != regime) for flags, regime in points]
 
 
 def _refined(drawn: dict[str, Any], asked: float, unit: str) -> Iterator[str]:

@@ -248,10 +248,10 @@ def _overall(study: Study, answers: Sequence[Answer], by_name: dict[str, ResultI
     regime = models.regime_info(tuple(by_name.values()))
     names = [*(one.result for one in extremes), *kind_columns(regime)[:1]]
     columns = whole(models.with_half_widths(names, by_name))
-    settled = ~models.unsettled(study.model, columns.flags) if columns.flags else True
+    usable = models.usable(study.model, columns.endings, columns.flags)
     for answer in extremes:
         info, values = by_name[answer.result], columns.values[answer.result]
-        kept = np.flatnonzero(np.isfinite(values) & settled)
+        kept = np.flatnonzero(np.isfinite(values) & usable)
         if not kept.size:
             yield Found(answer, info, info.unit, why=_why(values))
             continue

@@ -153,14 +153,17 @@ def _curve(samples: Samples, own: Intervals, index: int, part: slice, jumps: Boo
         ok=samples.ok[index, places],
         values={name: values[:, k] for k, name in enumerate(plan.results)},
         joined={name: ~own.jumps[part][:, k] for k, name in enumerate(plan.results)},
-        errors={name: _largest_of(errors[~jumps[:, k], k], passed) for k, name in enumerate(plan.results)},
+        errors={
+            name: _largest_of(errors[~jumps[:, k], k], passed) if np.isfinite(values[:, k]).any() else None
+            for k, name in enumerate(plan.results)
+        },
         jumps=tuple(merged),
         passed=passed,
     )
 
 
 def _largest_of(errors: Floats, passed: bool) -> float | None:
-    """The largest error; None where it is not known. Where no line is drawn, it has none once all is resolved."""
+    """The largest error; None where it is not known. Points that no line joins have none once all is resolved."""
     if np.isnan(errors).any() or not (errors.size or passed):
         return None
     return float(errors.max(initial=0.0))

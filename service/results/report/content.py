@@ -297,7 +297,8 @@ def _shortened(text: str) -> str:
 def ranges(model: str, infos: Sequence[ResultInfo], blocks: Iterable[RowBlock]) -> tuple[Range, ...]:
     """Least, mean and largest of every result over the rows, with the first case that has the extreme.
 
-    Rows whose motion had not settled are left out.
+    Rows that are not usable (`sprag.worker.models.usable`) are left out: a case that failed keeps what could be
+    computed, and that of an unstable motion is not the machine's.
     """
     columns = [index for index, info in enumerate(infos) if info.kind != "category"]
     every = np.arange(len(columns))
@@ -306,7 +307,7 @@ def ranges(model: str, infos: Sequence[ResultInfo], blocks: Iterable[RowBlock]) 
     value = {np.less: np.full(every.size, np.inf), np.greater: np.full(every.size, -np.inf)}
     case = {better: np.zeros(every.size, dtype=np.int64) for better in value}
     for block in blocks:
-        values = np.where(~models.unsettled(model, block.flags)[:, None], block.values[:, columns], np.nan)
+        values = np.where(models.usable(model, block.endings, block.flags)[:, None], block.values[:, columns], np.nan)
         there = ~np.isnan(values)
         known += there.sum(axis=0)
         total += np.where(there, values, 0.0).sum(axis=0)

@@ -106,9 +106,27 @@ def test_what_is_held_has_its_unit(capsys: pytest.CaptureFixture[str]) -> None:
     axis = {"path": "drive.inertia", "unit": "kg*m^2", "values": [1.0]}
     units = {"mean_speed": "rad/s", "wanted_irregularity": "1"}
     held = {"mean_speed": 6.283185307, "wanted_irregularity": 0.1}
-    drawn = {"by": {}, "at": held, "x": [1.0], "y": {"irregularity": [0.2]}, "endings": ["ok"]}
+    drawn = {"by": {}, "at": held, "x": [1.0], "y": {"irregularity": [0.2]}, "endings": ["ok"], "flags": [[]]}
     show_curves({"x": axis, "units": units, "results": {"irregularity": {"unit": "1"}}, "curves": [drawn]})
     assert "mean_speed = 6.28319 rad/s, wanted_irregularity = 0.1 " in " ".join(capsys.readouterr().out.split())
+
+
+def test_curves_have_the_flags_that_regimes_do_not_say(capsys: pytest.CaptureFixture[str]) -> None:
+    found = {
+        "x": {"path": "shaft.load", "unit": "N*m", "values": [0.0, 1.0]},
+        "units": {},
+        "results": {"efficiency": {"unit": "1"}},
+    }
+    drawn = {"by": {}, "at": {}, "x": [0.0, 1.0], "y": {"efficiency": [0.2, 0.3]}, "endings": ["ok", "ok"]}
+    show_curves({**found, "curves": [{**drawn, "flags": [[], ["not_settled"]]}]})
+    timed = capsys.readouterr().out
+    assert [line.split() for line in timed.splitlines() if "0.3" in line] == [["1", "0.3", "not_settled"]]
+    assert "flags" in timed
+    kinds = {"regime": ["periodic", "unsettled"], "flags": [[], ["unsettled"]]}
+    show_curves({**found, "curves": [{**drawn, **kinds}]})
+    settled = capsys.readouterr().out
+    assert [line.split() for line in settled.splitlines() if "0.3" in line] == [["1", "0.3", "unsettled"]]
+    assert "flags" not in settled
 
 
 def test_what_an_extension_adds_is_told() -> None:

@@ -123,6 +123,20 @@ def test_there_is_no_value_beyond_the_cases_and_where_the_motion_changes(
     assert note_of(answer_facts(here), "N*m")
 
 
+def test_a_case_that_failed_is_no_extreme_among_all(spec: dict[str, Any]) -> None:
+    class Failing(Rows):
+        def whole(self, names: Sequence[str]) -> CaseColumns:
+            columns = super().whole(names)
+            return replace(columns, endings=["unstable_motion" if case == 3 else "ok" for case in range(len(LOADS))])
+
+    study = study_of(spec)
+    overall = {item.answer.name: item for item in found_in(study, Failing(study)).overall}
+    power = np.array(LOADS) * speed(study)
+    power[3] = 0.0
+    assert (overall["largest_power"].case, overall["largest_power"].value) == (int(power.argmax()), power.max())
+    assert overall["largest_power"].cases == len(LOADS) - 1
+
+
 def test_a_case_that_had_not_settled_is_a_missing_value(spec: dict[str, Any]) -> None:
     study = study_of(spec)
     power = only(found_in(study, Rows(study, flags={3: "not_settled"})))["largest_power"]

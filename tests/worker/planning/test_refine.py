@@ -167,8 +167,9 @@ def test_a_study_of_failures_ends() -> None:
     rounds, step = refined(PLAN, lambda points: {"a": points[:, -1], "ok": np.zeros(len(points))})
     assert step.summary["failed"] == sum(len(rows.points) for rows in rounds) == 65
     assert step.summary["error"] is None
-    (jump,) = step.summary["curves"][0]["jumps"]
-    assert jump == {"low": 0.0, "high": 1.6, "why": "failed", "results": ["a"]}
+    (curve,) = step.summary["curves"]
+    assert curve["jumps"] == [{"low": 0.0, "high": 1.6, "why": "failed", "results": ["a"]}]
+    assert curve["errors"] == {"a": None}
 
 
 MANY = replace(

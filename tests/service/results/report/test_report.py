@@ -184,6 +184,8 @@ def test_doubtful_cases_are_in_no_range(service: Service) -> None:
     assert [row.known - kept.known for row, kept in zip(every, sound, strict=True)] == [
         int(np.isfinite(rows.values[0, infos.index(row.info)])) for row in every
     ]
+    failed = [replace(block, endings=["unstable_motion", *block.endings[1:]]) for block in blocks]
+    assert ranges("vibration-drive", infos, failed) == sound
     report = report_of(service.store, study_id)
     assert report.left_out == 0
     (section,) = [s for s in document_of(replace(report, left_out=2), TitleBlock()).sections if "Ranges" in s.title]
