@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -157,8 +158,15 @@ def show_map(found: dict[str, Any]) -> None:
         return
     corner = f"{heading(found['y']['path'], found['y']['unit'])} \\ {heading(found['x']['path'], found['x']['unit'])}"
     columns = [(corner, True), *((cell_text(value), True) for value in found["x"]["values"])]
-    rows = [(y, *row) for y, row in zip(found["y"]["values"], found["z"]["values"], strict=True)]
+    doubtful = found.get("flags") or [[[] for _ in found["x"]["values"]] for _ in found["y"]["values"]]
+    rows = [
+        (y, *(f"{cell_text(value)} *" if flags else value for value, flags in zip(row, own, strict=True)))
+        for y, row, own in zip(found["y"]["values"], found["z"]["values"], doubtful, strict=True)
+    ]
     show_table(title, columns, rows)
+    counts = Counter(name for own in doubtful for flags in own for name in flags)
+    if counts:
+        say(_("* flags: {flags}", flags=", ".join(f"{name} {count}" for name, count in counts.items())))
 
 
 def _show_points(found: dict[str, Any], title: str) -> None:

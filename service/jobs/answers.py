@@ -118,8 +118,16 @@ def map_json(library: Library, study_id: str, query: CurveQuery) -> bytes:
     return to_bytes({"study": study_id, **map_of(library, study_id, query).to_json()})
 
 
+def _flags(drawn: Map) -> list[str]:
+    """The flags of every point of a map, joined by commas."""
+    return [""] * drawn.values.size if drawn.flags is None else list(chain.from_iterable(drawn.flags))
+
+
 def map_csv(library: Library, study_id: str, query: CurveQuery, choice: Choice) -> bytes:
-    """Every point of the map as one row: fixed parameters, y, x, case, result, regime and its order, ending."""
+    """Every point of the map as one row: fixed parameters, y, x, case, result, regime and its order, flags, ending.
+
+    The squares of a refined map are no cases: they have neither regimes nor flags.
+    """
     drawn = map_of(library, study_id, query)
     across, points = len(drawn.x_values), drawn.values.size
     kinds = kind_columns(models.regime_info(models.study_results(library.store.study(study_id))))
@@ -130,9 +138,11 @@ def map_csv(library: Library, study_id: str, query: CurveQuery, choice: Choice) 
         **({} if drawn.refined else {"case": drawn.cases.reshape(-1).tolist()}),
         drawn.result.name: numbers(drawn.values.reshape(-1), drawn.result.kind == "count"),
         **{
-            name: list(chain.from_iterable(rows or ()))
+            name: list(chain.from_iterable(rows))
             for name, rows in zip(kinds, (drawn.regimes, drawn.orders), strict=False)
+            if rows is not None
         },
+        **({} if drawn.refined else {"flags": [" ".join(names) for names in flag_names(_flags(drawn))]}),
         "ending": list(chain.from_iterable(drawn.endings)),
     }
     (x_unit, y_unit), result = drawn.units, drawn.result

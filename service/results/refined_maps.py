@@ -164,7 +164,10 @@ def _sides(plan: RefinePlan, x: str, y: str) -> tuple[int, int]:
 def _described(
     study: Study, plan: RefinePlan, held: dict[str, float], z: str, fetch: Fetch
 ) -> tuple[Described, NDArray[np.float64]]:
-    """What the planner says of the map, and its points: the plan's columns, the result, the case."""
+    """What the planner says of the map, and its points: the plan's columns, the result, the case.
+
+    A result that does not count (`models.usable`) is NaN, as it is for the planner.
+    """
     every = study.points(range(study.cases))
     cases = np.flatnonzero(np.all(every[:, : len(plan.fixed)] == list(held.values()), axis=1)).astype(np.int64)
     columns = fetch(cases, plan.needed)
@@ -175,4 +178,5 @@ def _described(
     points = every[cases]
     number = int(plan.places(points[:1])[0][0])
     own = describe_maps(plan, Rows(points[run], ok[run], values))[number]
-    return own, np.column_stack([points[run], values[z], cases[run]])
+    known = np.where(ok[run], values[z], np.nan)
+    return own, np.column_stack([points[run], known, cases[run]])

@@ -23,7 +23,7 @@ from sprag.service.cli.console import (
     write_json,
 )
 from sprag.service.cli.extend import _what_is_new
-from sprag.service.cli.pictures import show_curves
+from sprag.service.cli.pictures import show_curves, show_map
 from sprag.service.faults import Fault
 
 
@@ -127,6 +127,17 @@ def test_curves_have_the_flags_that_regimes_do_not_say(capsys: pytest.CaptureFix
     settled = capsys.readouterr().out
     assert [line.split() for line in settled.splitlines() if "0.3" in line] == [["1", "0.3", "unsettled"]]
     assert "flags" not in settled
+
+
+def test_points_of_a_map_with_flags_are_marked(capsys: pytest.CaptureFixture[str]) -> None:
+    x, y = ({"path": path, "unit": "1", "values": [1.0, 2.0]} for path in ("a", "b"))
+    z = {"name": "efficiency", "unit": "1", "values": [[0.25, 0.5], [0.75, None]]}
+    show_map({"x": x, "y": y, "z": z, "at": {}, "units": {}, "flags": [[[], ["not_settled"]], [[], ["not_settled"]]]})
+    shown = capsys.readouterr()
+    assert [line.split()[1:] for line in shown.out.splitlines()[-3:-1]] == [["0.25", "0.5", "*"], ["0.75", "-", "*"]]
+    assert shown.err == "* flags: not_settled 2\n"
+    show_map({"x": x, "y": y, "z": z, "at": {}, "units": {}})
+    assert "*" not in capsys.readouterr().out
 
 
 def test_what_an_extension_adds_is_told() -> None:

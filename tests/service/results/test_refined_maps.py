@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -138,6 +139,29 @@ def test_the_pages_and_files_of_a_service(service: Service, capsys: pytest.Captu
     assert "2 % asked" in shown.err
     table = service.http.get(f"{API}/studies/{study_id}/map", params={**query, "format": "csv"}).text
     assert table.splitlines()[0] == f"{MASS},{FREQUENCY},{LOAD},{EFFICIENCY},ending"
+
+
+def test_the_squares_of_a_settled_map_have_no_regimes(service: Service) -> None:
+    study_id = service.submit({**MAP, "run": {"until": "settled"}})
+    query = {"x": LOAD, "y": FREQUENCY, "z": SPEED, "at": f"{MASS}=0.4", "format": "csv"}
+    answer = service.http.get(f"{API}/studies/{study_id}/map", params=query)
+    head, *rows = answer.text.splitlines()
+    assert (answer.status_code, head) == (200, f"{MASS},{FREQUENCY},{LOAD},{SPEED},ending")
+    assert {row.rsplit(",", 1)[1] for row in rows} == {"pending"}
+
+
+def test_points_that_had_not_settled_are_missing_values(study: Study) -> None:
+    fetch = fetched(study)
+
+    def flagged(cases: Any, names: Any) -> Any:
+        columns = fetch(cases, names)
+        return replace(columns, flags=["not_settled" if case % 3 == 0 else "" for case in columns.cases.tolist()])
+
+    found = draw_map(study, models.study_results(study), LOAD, FREQUENCY, SPEED, ((MASS, "0.4"),), flagged)
+    points = found.to_json()["points"]
+    missing = [case for case, value in zip(points["cases"], points["z"], strict=True) if value is None]
+    assert missing
+    assert missing == [case for case in points["cases"] if case % 3 == 0]
 
 
 def test_squares_fill_the_map_to_its_ends(study: Study) -> None:
