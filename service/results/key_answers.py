@@ -228,10 +228,10 @@ def _single(
 
     def one(answer: Answer) -> Found:
         info, value = by_name[answer.result], float(columns.values[answer.result][0])
-        known = math.isfinite(value) and bool(usable[0])
+        known, why = math.isfinite(value) and bool(usable[0]), _why(np.array([value]), columns.endings)
         width = columns.values.get(models.half_width(info.name), np.array([np.nan]))[0]
         return Found(
-            answer, info, info.unit, value if known else None, None if known else _why(np.array([value])),
+            answer, info, info.unit, value if known else None, None if known else why,
             case=0, cases=1,
             flags=_split(columns.flags, [0]),
             half_width=float(width) if known and np.isfinite(width) else None,
@@ -253,7 +253,7 @@ def _overall(study: Study, answers: Sequence[Answer], by_name: dict[str, ResultI
         info, values = by_name[answer.result], columns.values[answer.result]
         kept = np.flatnonzero(np.isfinite(values) & usable)
         if not kept.size:
-            yield Found(answer, info, info.unit, why=_why(values))
+            yield Found(answer, info, info.unit, why=_why(values, columns.endings))
             continue
         place = int(kept[_best(values[kept], answer)])
         width = columns.values.get(models.half_width(info.name), np.full(values.size, np.nan))[place]
@@ -268,9 +268,9 @@ def _overall(study: Study, answers: Sequence[Answer], by_name: dict[str, ResultI
         )  # fmt: skip
 
 
-def _why(values: NDArray[np.float64]) -> Why:
-    """Why none of these results counts."""
-    return "unsettled" if np.isfinite(values).any() else "no-result"
+def _why(values: NDArray[np.float64], endings: Sequence[str | None]) -> Why:
+    """Why none of these results counts: a case that did not end ok has none, whatever could still be computed."""
+    return "unsettled" if np.isfinite(values[np.array(endings) == models.OK]).any() else "no-result"
 
 
 def _best(values: NDArray[np.float64], answer: Answer) -> int:
@@ -335,7 +335,7 @@ class _Reader:
         values = self._curve.known(info.name)
         kept = np.flatnonzero(np.isfinite(values))
         if not kept.size:
-            return Found(answer, info, info.unit, why=_why(self._curve.y[info.name]))
+            return Found(answer, info, info.unit, why=_why(self._curve.y[info.name], self._curve.endings))
         place = int(kept[_best(values[kept], answer)])
         around = np.unique(self._x[np.isfinite(values)]) if np.all(np.diff(self._x) > 0.0) else self._x[[place]]
         own = int(np.searchsorted(around, self._x[place]))
@@ -351,7 +351,7 @@ class _Reader:
         at_rest = np.flatnonzero(values == 0.0)
         count = int(np.isfinite(values).sum())
         if not moving.size:
-            why: Why = "outside" if at_rest.size else _why(self._curve.y[info.name])
+            why: Why = "outside" if at_rest.size else _why(self._curve.y[info.name], self._curve.endings)
             return Found(answer, info, info.unit, why=why, cases=count)
         last = int(moving[np.argmax(self._x[moving])])
         after = at_rest[self._x[at_rest] > self._x[last]]
@@ -377,7 +377,7 @@ class _Reader:
                 kinds = self._curve.regimes
                 return replace(
                     nothing,
-                    why=_why(self._curve.y[info.name][[place]]),
+                    why=_why(self._curve.y[info.name][[place]], [self._curve.endings[place]]),
                     case=int(self._curve.line.cases[place]),
                     regime=None if kinds is None else kinds[place],
                     flags=_split(self._flags, [place]),

@@ -137,6 +137,17 @@ def test_a_case_that_failed_is_no_extreme_among_all(spec: dict[str, Any]) -> Non
     assert overall["largest_power"].cases == len(LOADS) - 1
 
 
+def test_a_case_that_failed_has_no_result(spec: dict[str, Any]) -> None:
+    class Failing(Rows):
+        def __call__(self, cases: NDArray[np.int64], names: Sequence[str]) -> CaseColumns:
+            columns = super().__call__(cases, names)
+            return replace(columns, endings=["unstable_motion" if case == 3 else "ok" for case in cases.tolist()])
+
+    study = study_of(spec)
+    there = only(found_in(study, Failing(study), "0.55"))["shaft.speed.mean"]
+    assert (there.value, there.why, there.case) == (None, "no-result", 3)
+
+
 def test_a_case_that_had_not_settled_is_a_missing_value(spec: dict[str, Any]) -> None:
     study = study_of(spec)
     power = only(found_in(study, Rows(study, flags={3: "not_settled"})))["largest_power"]
