@@ -7,6 +7,10 @@ from typing import Any
 import pytest
 
 from sprag.service.faults import FaultError
+from sprag.service.http.web.form.columns import COLUMNS, take_columns
+from sprag.service.http.web.form.fields import Choice
+from sprag.service.http.web.form.spec import spec_of
+from sprag.service.languages import language
 from sprag.service.spec.components import read_components
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.stored import accepted
@@ -92,6 +96,19 @@ def test_a_mixed_column_of_a_shaft_table_is_asked_about() -> None:
         parse_spec(shaft_changed({"/base/operation": operation}))
     (fault,) = caught.value.faults
     assert (fault.where, fault.code, fault.value) == ("/base/operation/csv", "ambiguous-unit", "angle")
+
+
+def test_pasted_cells_keep_the_unit_of_their_heading() -> None:
+    choices = [("", [Choice(LOAD, "Load", "N*m"), Choice("excitation.frequency", "Frequency", "Hz")])]
+    pasted = "shaft.load [N*mm]\tFrequency [Hz]\n1,125\t20\n2,250\t25\n3,5 N*m\t30\n"
+    for text in (pasted, pasted.replace("3,5 N*m", "3,375")):
+        values = {COLUMNS: text}
+        assert take_columns(values, choices) == {}
+        with language("uk"):
+            spec, _ = spec_of({**values, "/base/shaft/load": "0"})
+        study = parse_spec(changed({"/axes": spec["axes"], "/combine": "zip"})).study
+        last = 3.5 if "N*m\t30" in text else 0.003375
+        assert study.columns(range(study.cases))[LOAD].tolist() == pytest.approx([0.001125, 0.00225, last])
 
 
 def test_a_case_table_without_mixed_units_stays_as_it_is() -> None:

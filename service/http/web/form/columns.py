@@ -11,7 +11,7 @@ from sprag.service.http.web.form.entries import Faults, Values
 from sprag.service.http.web.form.fields import Groups
 from sprag.service.http.web.form.parts import PARTS, count_of, drop
 from sprag.service.languages import ENGLISH, current, gettext
-from sprag.service.spec.numbers import WITHOUT_DOUBT, is_ambiguous, parse_number, question
+from sprag.service.spec.numbers import WITHOUT_DOUBT, is_ambiguous, parse_number, question, settled
 from sprag.service.spec.report import did_you_mean
 from sprag.service.spec.table_text import (
     MAX_HEADING,
@@ -99,7 +99,9 @@ def _into_axes(values: Values, columns: list[tuple[str, ...]]) -> Faults:
 
 def _fill(values: Values, index: int, column: tuple[str, ...], unit: str) -> None:
     pointer = f"{_AXES.pointer}/{index}"
-    cells = [f"{cell.strip()} {unit}" if unit and parse_number(cell) is not None else cell.strip() for cell in column]
+    # A decimal comma that stayed in a cell with a unit would prove that the points of the others separate thousands.
+    cells = [settled([cell.strip()])[0] for cell in column]
+    cells = [f"{cell} {unit}" if unit and _is_bare(cell) else cell for cell in cells]
     values |= {f"{pointer}/way": "values", f"{pointer}/values": "; ".join(cells)}
 
 
@@ -107,6 +109,11 @@ def _finish(values: Values, columns: int) -> None:
     if columns > 1:
         values["/combine"] = "zip"
     values[COLUMNS] = ""
+
+
+def _is_bare(cell: str) -> bool:
+    """Whether a cell is a number without a unit, also one whose comma the list of values has yet to settle."""
+    return parse_number(cell.replace(",", ".") if is_ambiguous(cell) else cell) is not None
 
 
 def _is_name(cell: str) -> bool:
