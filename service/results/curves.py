@@ -16,7 +16,7 @@ from sprag.service.json_text import numbers
 from sprag.service.results.directions import in_words
 from sprag.service.results.refined import jumps_of
 from sprag.worker.codes import PENDING
-from sprag.worker.models import WorkerEnding
+from sprag.worker.models import OK, WorkerEnding
 
 if TYPE_CHECKING:
     from sprag.service.results.refined_maps import RefinedMap
@@ -102,6 +102,11 @@ class Curve:
     def known(self, name: str) -> NDArray[np.float64]:
         """A result of each case; NaN where there is none that counts."""
         return self.y[name] if self.usable is None else np.where(self.usable, self.y[name], np.nan)
+
+    def shown(self, name: str) -> NDArray[np.float64]:
+        """A result of each case in pictures, where motions that had not settled are marked; NaN for failed cases."""
+        ok = np.array([ending == OK for ending in self.endings], dtype=np.bool_)
+        return np.where(ok, self.y[name], np.nan)
 
     def run(self) -> NDArray[np.intp]:
         """Indices of the cases that were run, ascending, which a picture joins; of a coarser study, its own points."""

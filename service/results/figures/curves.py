@@ -128,7 +128,7 @@ def _lines(
             yield Line(
                 values or labels[study],
                 x,
-                curve.y[info.name][run],
+                curve.shown(info.name)[run],
                 colour,
                 style=down if both else study,
                 key=str(index),
@@ -151,11 +151,12 @@ def _further(drawn: Sequence[tuple[str, Curves]], infos: Sequence[ResultInfo], *
     for count, curve in enumerate(curves.further):
         index = own.index(curve.line.by)
         for place, info in enumerate(infos):
-            kept = np.isfinite(curve.y[info.name])
+            values = curve.shown(info.name)
+            kept = np.isfinite(values)
             yield Line(
                 OTHER_MOTIONS,
                 np.asarray(curve.line.x)[kept],
-                curve.y[info.name][kept],
+                values[kept],
                 colours[index],
                 style=place,
                 key=str(index),
@@ -197,7 +198,7 @@ def _not_settled(endings: Sequence[str], usable: NDArray[np.bool_]) -> list[str 
 def _nothing(drawn: Sequence[tuple[str, Curves]]) -> str:
     """Why there is nothing to draw, as a sentence; "" otherwise. Empty axes would have arbitrary scales."""
     curves = [curve for _, found in drawn for curve in found.curves]
-    if any(not np.all(np.isnan(y)) for curve in curves for y in curve.y.values()):
+    if any(not np.all(np.isnan(curve.shown(name))) for curve in curves for name in curve.y):
         return ""
     chosen = drawn[0][1].selection
     at = curves[0].line.at if curves else {}

@@ -47,6 +47,20 @@ def test_both_painters_draw_the_described_lines(spec: dict[str, Any]) -> None:
     assert [trace["name"] for trace in page["data"]] == [str(line.get_label()) for line in drawn]
 
 
+def test_a_failed_case_has_no_place_in_a_figure(spec: dict[str, Any]) -> None:
+    """Its row may have results, such as energies of an unstable motion: they are no values of the machine."""
+    spec["axes"] = [{"path": "shaft.load", "values": [0, 0.1, 1]}]
+    study = parse_spec(spec).study
+
+    def failed(cases: NDArray[np.int64], names: Any) -> CaseColumns:
+        known = fetch(cases, names)
+        return CaseColumns(known.cases, ["ok", "unstable_motion", "ok"], known.values)
+
+    chosen = select(study, models.study_results(study), CurveQuery("shaft.load", (SPEED,)))
+    (panel,) = curves_figure([("", draw(chosen, failed))]).panels
+    assert np.array_equal(panel.lines[0].y, [0.0, np.nan, 2.0], equal_nan=True)
+
+
 def test_a_motion_is_drawn_over_its_states_and_as_a_portrait() -> None:
     times, angle = np.array([0.0, 0.1, 0.2]), "pendulums.0.angle"
     names = (angle, "pendulums.0.speed", "shaft.speed", "pendulums.0.torque", "power.input", "power.useful",
