@@ -4,7 +4,8 @@ PostgreSQL is compared with a text COPY of the same rows by psql into the same t
 with an `executemany` of the same rows into the same table, one commit. Both take turns in one run; what counts is the
 ratio.
 
-What the digests of the chunks cost is measured in the same runs, as a share of the processor time of the dispatcher.
+What the digests of the chunks cost is measured in the same runs, as a share of the processor time of the dispatcher,
+and of the dispatcher and the server that was started.
 
     python -m benchmarks.storing [--rows 100000] [--chunks 1000,20] [--in-flight 64] [--repeats 3] [--db URL]
 
@@ -17,16 +18,19 @@ import argparse
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+import psutil
+import sqlalchemy as sa
 from sqlalchemy.engine import make_url
 
 from benchmarks.at_once import AtOnce
+from sprag.service.storage import rows as rows_module
 from sprag.service.storage import storing
 from sprag.service.storage.part import SystemClock
 from sprag.service.storage.records import StudyRecord
@@ -148,12 +152,22 @@ def measure(server: Server, folder: Path, rows: int, size: int, in_flight: int, 
     ours: list[Spent] = []
     theirs: list[Spent] = []
     shares: list[float] = []
+    of_all: list[float] = []
     with Store.open(server.url, chunking=Chunking(cases=size)) as store:
+        # Statements are compiled once in a process.
+        warming = store.create_study({}, study, fresh=True)
+        with DigestCost():
+            through_the_dispatcher(store, warming, at_once(values, in_flight), meter)
+        store.delete_study(warming.id)
+        store.purge()
         for _ in range(repeats):
             record = store.create_study({}, study, fresh=True)
-            with digests_timed() as steps:
-                ours.append(through_the_dispatcher(store, record, at_once(values, in_flight), meter))
-            shares.append(sum(steps) / ours[-1].processor)
+            at_server = server.processor()
+            with DigestCost() as cost:
+                spent = through_the_dispatcher(store, record, at_once(values, in_flight), meter)
+            ours.append(Spent(spent.elapsed - cost.doubled, spent.processor - cost.doubled))
+            shares.append(cost.total / ours[-1].processor)
+            of_all.append(cost.total / (ours[-1].processor + server.processor() - at_server))
             other = store.create_study({}, study, fresh=True)
             store.cancel_study(other.id)
             store.settle(store.take_over("benchmark"), other.number)
@@ -169,6 +183,8 @@ def measure(server: Server, folder: Path, rows: int, size: int, in_flight: int, 
                     connection.exec_driver_sql("VACUUM vibration_drive_1")
     report(server.rival, rows, size, ours, theirs)
     print(f"    of it for digests {min(shares):.1%} to {max(shares):.1%}", flush=True)
+    if server.data is not None:
+        print(f"    of it and the server's time {min(of_all):.1%} to {max(of_all):.1%}", flush=True)
 
 
 def report(rival: str, rows: int, size: int, ours: list[Spent], theirs: list[Spent]) -> None:
@@ -182,30 +198,64 @@ def report(rival: str, rows: int, size: int, ours: list[Spent], theirs: list[Spe
     )
 
 
-@contextmanager
-def digests_timed() -> Iterator[list[float]]:
-    """Processor time in s of each step that computes or stores digests, while the context lasts."""
-    spent: list[float] = []
+class DigestCost:
+    """Processor time in s of what computes and stores digests, while the context lasts.
 
-    def timed(step: Callable[..., Any]) -> Callable[..., Any]:
+    Digests are stored by the statement that marks chunks done. What they add to it is measured by turns: every other
+    transaction does it without them first, and what that takes is ``doubled``.
+    """
+
+    def __init__(self) -> None:
+        self.computing = self.doubled = 0.0
+        #: Seconds and chunks of marking without digests, and with them.
+        self._marking = [[0.0, 0], [0.0, 0]]
+        self._calls = 0
+
+    @property
+    def total(self) -> float:
+        """With what storing them takes."""
+        without, with_digests = (spent / max(chunks, 1) for spent, chunks in self._marking)
+        return self.computing + (with_digests - without) * sum(chunks for _, chunks in self._marking)
+
+    def __enter__(self) -> Self:
+        self._steps = [
+            (rows_module, "as_kept"),
+            (storing, "_words"),
+            (storing, "_digests"),
+            (storing, "_finish_chunks"),
+        ]
+        self._real = [getattr(module, name) for module, name in self._steps]
+        new = [*map(self._timed, self._real[:-1]), self._mark]
+        for (module, name), step in zip(self._steps, new, strict=True):
+            setattr(module, name, step)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for (module, name), step in zip(self._steps, self._real, strict=True):
+            setattr(module, name, step)
+
+    def _timed(self, step: Callable[..., Any]) -> Callable[..., Any]:
         def run(*values: Any, **named: Any) -> Any:
             began = time.thread_time()
             try:
                 return step(*values, **named)
             finally:
-                spent.append(time.thread_time() - began)
+                self.computing += time.thread_time() - began
 
         return run
 
-    names = ("_words", "digest_of", "_seal")
-    steps = {name: getattr(storing, name) for name in names}
-    for name, step in steps.items():
-        setattr(storing, name, timed(step))
-    try:
-        yield spent
-    finally:
-        for name, step in steps.items():
-            setattr(storing, name, step)
+    def _mark(self, connection: sa.Connection, digests: Mapping[Any, int], values: Mapping[str, Any]) -> None:
+        self._calls += 1
+        turn = self._calls % 2
+        began = time.thread_time()
+        if not turn:
+            storing._change_chunks(connection, digests, values)
+        middle = time.thread_time()
+        self._real[-1](connection, digests, values)
+        end = time.thread_time()
+        self._marking[turn][0] += (end if turn else middle) - began
+        self._marking[turn][1] += len(digests)
+        self.doubled += 0.0 if turn else end - middle
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,6 +264,21 @@ class Server:
 
     url: str
     rival: str
+    data: Path | None = None
+
+    def processor(self) -> float:
+        """Processor time in s of the processes of the server so far; 0 where they are not known."""
+        if self.data is None:
+            return 0.0
+        main = psutil.Process(int((self.data / "postmaster.pid").read_text().split()[0]))
+        own = main.cpu_times()
+        ended = own.children_user + own.children_system
+        spent = ended + own.user + own.system
+        for child in main.children(recursive=True):
+            with suppress(psutil.NoSuchProcess):  # it has just ended
+                times = child.cpu_times()
+                spent += times.user + times.system
+        return spent
 
 
 @contextmanager
@@ -223,7 +288,7 @@ def on_server(url: str) -> Iterator[Server]:
         yield Server(url, "psql")
         return
     with postgres.running(**_SERVER) as started:
-        yield Server(started.url(started.new_database()), "psql")
+        yield Server(started.url(started.new_database()), "psql", started.data)
 
 
 def main() -> None:

@@ -19,7 +19,7 @@ from sprag.service.storage.audit import note
 from sprag.service.storage.cases import conditions
 from sprag.service.storage.columns import as_number, records
 from sprag.service.storage.errors import DatabaseError
-from sprag.service.storage.row_hashes import digest_of, row_words
+from sprag.service.storage.row_hashes import as_kept, digest_of, row_words
 from sprag.service.storage.study_digests import StudyDigests
 from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES, further_table, results_table
 from sprag.worker import models
@@ -331,7 +331,7 @@ def _stored_words(
         values = np.array([part[f"value{index}"] for index in range(len(infos))]).reshape(len(infos), -1).T
         yield (
             part["case"].copy(),
-            row_words(part["case"], part["ending"].tolist(), part["flags"].tolist(), values, further=further),
+            row_words(part["case"], part["ending"].tolist(), part["flags"].tolist(), as_kept(values), further=further),
         )
         # Cases may have several further rows, which a part may divide.
         end = int(part["case"][-1])

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 _MIX_A: Final = np.uint64(0xFF51AFD7ED558CCD)
 _MIX_B: Final = np.uint64(0xC4CEB9FE1A85EC53)
+#: Patterns of 64 bits as numbers with a sign; that of a negative zero is the least.
+_NEGATIVE_ZERO: Final = -(2**63)
+_NAN: Final = 0x7FF8000000000000
 _FURTHER: Final = np.uint64(0x9E3779B97F4A7C15)
 
 
@@ -44,6 +47,20 @@ def _text_words(endings: Sequence[str], flags: Sequence[str]) -> Words:
     return np.array([_text_word(*pair) for pair in pairs], dtype=np.uint64)
 
 
+def as_kept(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Numbers as databases keep them, C-contiguous: infinities are missing, zeros have no sign, NaN has one pattern.
+
+    Not copied where they are so already: to write another 300 kB takes longer than to hash them.
+    """
+    kept = np.ascontiguousarray(values, dtype=np.float64)
+    bits, finite = kept.view(np.int64), np.isfinite(kept)
+    if bits.min(initial=0) != _NEGATIVE_ZERO and (finite.all() or (bits[~finite] == _NAN).all()):
+        return kept
+    kept = kept + 0.0
+    kept[~finite] = np.nan
+    return kept
+
+
 def row_words(
     cases: NDArray[np.int64],
     endings: Sequence[str],
@@ -52,17 +69,13 @@ def row_words(
     *,
     further: bool = False,
 ) -> Words:
-    """A hash of each row, uint64 array of shape (rows,); ``values`` has shape (rows, results).
+    """A hash of each row, uint64 array of shape (rows,); ``values``, shape (rows, results), are as from `as_kept`.
 
-    Numbers count as the database keeps them: infinities as missing, and zeros without a sign. ``further``: the rows are
-    those beside the first ones of their cases.
+    ``further``: the rows are those beside the first ones of their cases.
     """
-    kept = np.ascontiguousarray(values, dtype=np.float64) + 0.0
-    finite = np.isfinite(kept)
-    if not finite.all():
-        kept[~finite] = np.nan  # one pattern for all of them
-    factors = _factors(kept.shape[1] + 2)
-    words: Words = kept.view(np.uint64) @ factors[2:]
+    factors = _factors(values.shape[1] + 2)
+    # Half the time of the product of a matrix and a vector, for which numpy has no fast code with integers.
+    words: Words = np.einsum("ij,j->i", values.view(np.uint64), factors[2:])
     words += cases.astype(np.uint64) * factors[0]
     words += _text_words(endings, flags) * factors[1]
     if further:
@@ -77,5 +90,16 @@ def row_words(
 
 def digest_of(*parts: Words) -> int:
     """The digest of rows with those hashes, as the database keeps it: a signed number of 64 bits."""
-    total = sum(int(words.sum(dtype=np.uint64)) for words in parts) % 2**64
-    return total - 2**64 if total >= 2**63 else total
+    return signed(sum(int(words.sum(dtype=np.uint64)) for words in parts))
+
+
+def digests_of(words: Words, counts: Sequence[int]) -> list[int]:
+    """The digests of chunks with ``counts`` rows each, none of them 0, whose rows follow one another."""
+    starts = np.cumsum([0, *counts[:-1]])
+    digests: list[int] = np.add.reduceat(words, starts).view(np.int64).tolist()
+    return digests
+
+
+def signed(total: int) -> int:
+    """The number of 64 bits with a sign that has the last 64 bits of ``total``."""
+    return (total + 2**63) % 2**64 - 2**63

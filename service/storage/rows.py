@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.storage.row_hashes import as_kept
 from sprag.service.storage.tables import KEY_COLUMNS, further_table, results_table
 from sprag.worker import models
 
@@ -89,7 +90,10 @@ def further_block(study: int, cases: NDArray[np.int64], result: ChunkResult) -> 
 
 
 def merged(blocks: Iterable[Block]) -> Iterator[Block]:
-    """The same rows in the same order, in blocks of at least `MERGED_ROWS` rows except for the last."""
+    """The same rows in the same order, in blocks of at least `MERGED_ROWS` rows except for the last.
+
+    Their values are as from `as_kept`.
+    """
     waiting: list[Block] = []
     count = 0
     for part in blocks:
@@ -104,13 +108,14 @@ def merged(blocks: Iterable[Block]) -> Iterator[Block]:
 
 def _one(blocks: Sequence[Block]) -> Block:
     if len(blocks) == 1:
-        return blocks[0]
+        (one,) = blocks
+        return Block(one.studies, one.cases, one.endings, one.flags, as_kept(one.values))
     return Block(
         np.concatenate([one.studies for one in blocks]),
         np.concatenate([one.cases for one in blocks]),
         list(chain.from_iterable(one.endings for one in blocks)),
         list(chain.from_iterable(one.flags for one in blocks)),
-        np.concatenate([one.values for one in blocks]),
+        as_kept(np.concatenate([one.values for one in blocks])),
     )
 
 
@@ -125,8 +130,5 @@ def tuples(rows: Block) -> Iterator[tuple[Any, ...]]:
 def _tuples(rows: Block, first: int) -> Iterator[tuple[Any, ...]]:
     """Some of the rows. They are put together of columns, because a loop over rows would take as long as SQLite."""
     part = slice(first, first + TUPLE_ROWS)
-    values = rows.values[part]
-    if np.isinf(values).any():
-        values = np.where(np.isinf(values), np.nan, values)
     keys = rows.studies[part].tolist(), rows.cases[part].tolist(), rows.endings[part], rows.flags[part]
-    return zip(*keys, *values.T.tolist(), strict=True)
+    return zip(*keys, *rows.values[part].T.tolist(), strict=True)

@@ -9,13 +9,14 @@ from itertools import groupby
 from operator import attrgetter, itemgetter
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import sqlalchemy as sa
 from sqlalchemy.dialects import postgresql, sqlite
 
 from sprag.service.storage.dispatchers import WAITING, Dispatchers
 from sprag.service.storage.origins import names_of
 from sprag.service.storage.reuse import Reuse, copy_rows, endings_of, mark_origin
-from sprag.service.storage.row_hashes import digest_of, row_words
+from sprag.service.storage.row_hashes import digests_of, row_words, signed
 from sprag.service.storage.rows import Block, Target, block, further_block, further_target, merged, target
 from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES
 from sprag.worker import fingerprint, models
@@ -80,6 +81,23 @@ def _changing(dialect: str, *columns: str) -> sa.Update:
     return sa.update(CHUNKS).where(_these(dialect)).values({name: sa.bindparam(f"new_{name}") for name in columns})
 
 
+@cache
+def _finishing(dialect: str, *columns: str) -> sa.Update:
+    """`_changing` that gives each chunk its digest, too; ``digests`` belong to ``firsts``, see `_finish_chunks`.
+
+    A statement for each chunk takes longer than computing its digest.
+    """
+    first, changing = CHUNKS.c["first"], _changing(dialect, *columns)
+    if dialect == "postgresql":
+        firsts = sa.bindparam("firsts", type_=postgresql.ARRAY(sa.Integer))
+        digests = sa.bindparam("digests", type_=postgresql.ARRAY(sa.BigInteger))
+        listed = sa.func.unnest(firsts, digests).table_valued("place", "digest").render_derived(name="listed")
+        return changing.where(first == listed.c.place).values(digest=listed.c.digest)
+    # Not joined with `json_each`: SQLite may go through all chunks of the study for it.
+    path = sa.literal("$.").concat(sa.cast(first, sa.Text))
+    return changing.values(digest=sa.func.json_extract(sa.bindparam("digests", type_=sa.JSON), path))
+
+
 #: The parameters of these are the numbers of studies, ``numbers``.
 _AMONG = STUDIES.c.number.in_(sa.bindparam("numbers", expanding=True))
 _KINDS = sa.select(STUDIES.c.number, STUDIES.c.model, STUDIES.c.variant, STUDIES.c.fingerprint).where(_AMONG)
@@ -96,13 +114,6 @@ _GAINED = (
         {name: STUDIES.c[name] + sa.bindparam(f"more_{name}", type_=sa.Integer) for name in ("done", "ok", "reused")}
         | {"revision": STUDIES.c.revision + 1}
     )
-)
-
-
-_SEAL = (
-    sa.update(CHUNKS)
-    .where(CHUNKS.c.study == sa.bindparam("of"), CHUNKS.c["first"] == sa.bindparam("at"))
-    .values(digest=sa.bindparam("new", type_=sa.BigInteger))
 )
 
 
@@ -140,6 +151,17 @@ def _change_chunks(connection: sa.Connection, keys: Iterable[Key], values: Mappi
     new = {f"new_{name}": value for name, value in values.items()}
     for these in _by_study(keys):
         connection.execute(statement, {**these, **new})
+
+
+def _finish_chunks(connection: sa.Connection, digests: Mapping[Key, int], values: Mapping[str, Any]) -> None:
+    """Put ``values`` and their digests into the rows of those chunks."""
+    dialect = connection.dialect.name
+    statement = _finishing(dialect, *values)
+    new = {f"new_{name}": value for name, value in values.items()}
+    for number, group in groupby(sorted(digests.items()), key=lambda item: item[0][0]):
+        of_first = {first: digest for (_, first, _), digest in group}
+        listed = list(of_first.values()) if dialect == "postgresql" else of_first
+        connection.execute(statement, {"of": number, "firsts": list(of_first), "digests": listed, **new})
 
 
 class Storing(Reuse, Dispatchers):
@@ -224,26 +246,29 @@ class Storing(Reuse, Dispatchers):
                 hosts[key_of(chunk)] = self._hosts_of(connection, known)
             if known is not None:
                 digests[key_of(chunk)] = self.digest_in(connection, chunk)
-        self._mark_done(connection, finished, hosts)
-        _seal(connection, digests)
+        self._mark_done(connection, finished, hosts, digests)
         _count(connection, gains)
         for number, gain in gains.items():
             more = {"more_done": gain.cases, "more_ok": gain.endings[models.OK], "more_reused": gain.reused}
             connection.execute(_GAINED, {"of": number, **more})
 
     def _mark_done(
-        self, connection: sa.Connection, finished: Sequence[Finished], copied_from: Mapping[Key, set[str]]
+        self,
+        connection: sa.Connection,
+        finished: Sequence[Finished],
+        copied_from: Mapping[Key, set[str]],
+        digests: Mapping[Key, int],
     ) -> None:
-        """Mark chunks done, with where their rows come from: the hosts that ran them, and those of copied rows."""
+        """Mark chunks done, with their digests and the hosts that ran them, or ran the rows that were copied."""
         done = {"state": ChunkState.DONE, "finished_at": self._now(), "detail": None}
         origin = {"fingerprint": fingerprint.digest()}
-        by_host: dict[str | None, list[Key]] = {}
+        by_host: dict[str | None, dict[Key, int]] = {}
         for item in finished:
             key = key_of(item.chunk)
             hosts = names_of({*filter(None, [item.host]), *copied_from.get(key, ())})
-            by_host.setdefault(hosts, []).append(key)
-        for host, keys in by_host.items():
-            _change_chunks(connection, keys, {**done, **origin, "host": host})
+            by_host.setdefault(hosts, {})[key] = digests[key]
+        for host, of_host in by_host.items():
+            _finish_chunks(connection, of_host, {**done, **origin, "host": host})
 
     @staticmethod
     def _kinds(connection: sa.Connection, numbers: Iterable[int]) -> dict[int, tuple[str, str]]:
@@ -258,35 +283,39 @@ class Storing(Reuse, Dispatchers):
         self, connection: sa.Connection, finished: Sequence[Finished], kinds: Mapping[int, tuple[str, str]]
     ) -> dict[Key, int]:
         """Insert the rows of chunks, those of one table together and in the order of their key; their digests."""
-        digests: dict[Key, int] = {}
-        blocks: dict[Target, list[Block]] = {}
+        digests = {key_of(item.chunk): 0 for item in finished}
+        chunks: dict[tuple[Target, bool], dict[Key, Block]] = {}
         for item in sorted(finished, key=attrgetter("chunk.study", "chunk.first")):
             if not item.result.count:
-                digests[key_of(item.chunk)] = 0
                 continue
             chunk, kind = item.chunk, kinds[item.chunk.study]
             cases = self._cases(chunk, connection) if item.known is None else item.known.missing
             own = block(chunk.study, cases, item.result)
-            blocks.setdefault(target(*kind), []).append(own)
-            words = [_words(own)]
+            chunks.setdefault((target(*kind), False), {})[key_of(chunk)] = own
             # In the same transaction: a case has all of its rows or none.
             more, place = further_block(chunk.study, cases, item.result), further_target(*kind)
             if more is not None and place is not None:
-                blocks.setdefault(place, []).append(more)
-                words.append(_words(more, further=True))
-            digests[key_of(chunk)] = digest_of(*words)
-        for place, rows in blocks.items():
-            self.session.insert_blocks(connection, place, merged(rows))
+                chunks.setdefault((place, True), {})[key_of(chunk)] = more
+        for (place, further), blocks in chunks.items():
+            rows: list[Block] = []
+            words: list[Words] = []
+            # Before they are inserted: in turn with it, nothing would be in the processor's cache.
+            for some in merged(blocks.values()):
+                rows.append(some)
+                words.append(_words(some, further=further))
+            for key, digest in zip(blocks, _digests(words, blocks.values()), strict=True):
+                digests[key] = signed(digests[key] + digest)
+            self.session.insert_blocks(connection, place, rows)
         return digests
 
 
-def _seal(connection: sa.Connection, digests: Mapping[Key, int]) -> None:
-    """Store the digests of chunks."""
-    connection.execute(_SEAL, [{"of": key[0], "at": key[1], "new": digest} for key, digest in digests.items()])
-
-
-def _words(rows: Block, *, further: bool = False) -> Words:
+def _words(rows: Block, *, further: bool) -> Words:
     return row_words(rows.cases, rows.endings, rows.flags, rows.values, further=further)
+
+
+def _digests(words: Sequence[Words], blocks: Iterable[Block]) -> list[int]:
+    """The digests of chunks from the hashes of the rows of all of them."""
+    return digests_of(np.concatenate(words), [len(rows.cases) for rows in blocks])
 
 
 def is_chunk(chunk: Chunk) -> sa.ColumnElement[bool]:

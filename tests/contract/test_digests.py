@@ -11,7 +11,7 @@ import sqlalchemy as sa
 from sprag.service.jobs.housekeeping import Scrubbing
 from sprag.service.storage import digests
 from sprag.service.storage.errors import DatabaseError, NothingToRetryError
-from sprag.service.storage.row_hashes import digest_of, row_words
+from sprag.service.storage.row_hashes import as_kept, digest_of, digests_of, row_words
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import CHUNKS, ENDINGS, results_table
 from sprag.worker import models
@@ -259,14 +259,41 @@ def test_chunks_without_a_digest_are_said_to_be_unchecked(store: Store) -> None:
     assert (damaged(store), report.unchecked) == ([], 3)
 
 
+def test_numbers_are_copied_only_where_the_database_keeps_them_otherwise() -> None:
+    values = np.random.default_rng(2).standard_normal((30, 4))
+    values[0, 0], values[1, 1] = np.nan, 0.0
+    assert as_kept(values) is values
+    for number, bits in ((-0.0, 0), (np.inf, 0x7FF8 << 48), (-np.inf, 0x7FF8 << 48), (-np.nan, 0x7FF8 << 48)):
+        other = values.copy()
+        other[7, 2] = number
+        kept = as_kept(other)
+        assert kept is not other
+        assert kept.view(np.int64)[7, 2] == bits
+        kept[7, 2] = other[7, 2] = 1.0
+        np.testing.assert_array_equal(kept.view(np.int64), other.view(np.int64))
+
+
+def test_chunks_that_are_stored_together_have_the_digests_of_their_own_rows(store: Store) -> None:
+    record = create(store, 47)
+    finish(store, record)
+    with store.session.read() as connection:
+        stored = {row.first: row.digest for row in connection.execute(sa.select(CHUNKS.c["first"], CHUNKS.c.digest))}
+        found = {
+            first: store.digest_in(connection, Chunk(record.number, first, min(10, 47 - first))) for first in stored
+        }
+    assert stored == found
+    assert len({*stored.values()}) == len(stored) == 5
+
+
 def test_the_digest_of_rows_is_that_of_what_a_database_keeps_in_any_order() -> None:
     draw = np.random.default_rng(1)
     cases, values = np.arange(40), draw.standard_normal((40, 5))
     values[3, 2], values[4, 1], values[5, 0] = np.nan, np.inf, -0.0
     kept = np.where(np.isinf(values), np.nan, values) + 0.0
     endings, flags = ["ok"] * 39 + ["diverged"], [""] * 40
-    words = row_words(cases, endings, flags, values)
+    words = row_words(cases, endings, flags, as_kept(values))
     assert digest_of(words) == digest_of(words[::-1]) == digest_of(row_words(cases, endings, flags, kept))
+    assert digests_of(words, [1, 36, 3]) == [digest_of(words[part]) for part in (slice(1), slice(1, 37), slice(37, 40))]
     assert digest_of(words) == digest_of(words[:7], words[7:])
     seen = {digest_of(words)}
     for row in range(40):
