@@ -64,10 +64,10 @@ def test_points_of_a_file_are_run_here_and_by_the_service(running: Service, tmp_
     submitted = sprag("submit", SPEC, "--points", points, "--wait", "--json", *at)
     assert submitted.code == 0
     assert sprag("export", submitted.data["id"], "--json", *at).data["rows"] == rows
-    points.write_text("shaft.load;excitation.frequency [rpm]\n250 N*mm;1500\n-1;1560\n")
+    points.write_text("shaft.load;excitation.frequency [rpm]\n250 N*mm;1500\n-1 N*m;1560\n")
     refused = sprag("submit", SPEC, "--points", points, *at)
     assert refused.code == 2
-    assert f"{points}: line 3, column shaft.load: is out of range (got '-1'; allowed: >= 0 N*m" in refused.err
+    assert f"{points}: line 3, column shaft.load: is out of range (got '-1 N*m'; allowed: >= 0 N*m" in refused.err
 
 
 def test_the_same_key_submits_once(running: Service, sprag: Sprag) -> None:
