@@ -269,7 +269,8 @@ def show_curves(found: Mapping[str, Any], of: str = "") -> None:
 def _doubts(drawn: Mapping[str, Any]) -> list[str]:
     """The flags of each point, except for those that its regime says."""
     regimes = drawn.get("regime") or [None] * len(drawn["x"])
-    points = zip(drawn["flags"], regimes, strict=True)
+    # A service of an earlier version does not tell them.
+    points = zip(drawn.get("flags") or [()] * len(regimes), regimes, strict=True)
     return [", ".join(name for name in flags if name != regime) for flags, regime in points]
 
 
