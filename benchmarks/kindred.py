@@ -116,7 +116,7 @@ def fill(store: Store, count: int, cases: int, random: np.random.Generator) -> N
         connection.execute(sa.update(STUDIES).values(keyed=1))
         row = dict(connection.execute(sa.select(STUDIES).order_by(STUDIES.c.number).limit(1)).mappings().one())
         there = connection.execute(sa.select(sa.func.max(STUDIES.c.number))).scalar_one()
-    row |= {"done": cases, "state": "finished", "fingerprint": fingerprint.digest()}
+    row |= {"done": cases, "state": "finished", "fingerprint": fingerprint.digest(), "digest": None}
     for first in range(there + 1, count + 1, _AT_ONCE):
         with store.session.write() as connection:
             for number in range(first, min(first + _AT_ONCE, count + 1)):

@@ -35,7 +35,14 @@ def fill(store: Store, studies: int) -> None:
         for number in range(2, studies + 1):
             name, tag = f"{drawn.choice(_WORDS)} {drawn.choice(_WORDS)} {number}", drawn.choice(_WORDS)
             notes = " ".join(drawn.choices(_WORDS, k=60))
-            own = {"number": number, "id": f"st_{number:016x}", "name": name, "notes": notes, "tags": f"\n{tag}\n"}
+            own = {
+                "number": number,
+                "id": f"st_{number:016x}",
+                "name": name,
+                "notes": notes,
+                "tags": f"\n{tag}\n",
+                "digest": None,
+            }
             search = search_text(name, (tag,), notes)
             rows.append({**one, **own, "search": search, "cases": drawn.randint(1, 10**6)})
         connection.execute(sa.insert(STUDIES), rows)

@@ -76,6 +76,7 @@ def many_more(store: Store, like: StudyRecord, studies: list[Study], *, keyed: b
                     "id": f"st_more{index}",
                     "study": json.dumps(study.to_json()),
                     "keyed": int(keyed),
+                    "digest": None,
                 }
                 for index, study in enumerate(studies)
             ],
