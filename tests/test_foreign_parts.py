@@ -54,7 +54,7 @@ USED = {
 #: How the file says it, where not by the attribute's own name.
 SAID = {"UnitsContainer.items": "._units.items()", "RequestResponseCycle": "self.cycle.response_complete"}
 #: Private attributes that their owners document.
-DOCUMENTED = {"_fields", "_replace", "_exit"}
+DOCUMENTED = {"_asdict", "_fields", "_replace", "_exit"}
 
 
 @pytest.mark.parametrize("used", USED, ids=lambda used: ".".join(used[1:]))

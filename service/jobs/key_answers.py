@@ -5,8 +5,6 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from sprag.service.jobs.answers import FEW
 from sprag.service.jobs.reading import reading_of
 from sprag.service.json_text import to_bytes
@@ -46,8 +44,8 @@ def answers_of(library: Library, study_id: str, chosen: CurveQuery | None, point
 def _whole(library: Library, study_id: str, names: Sequence[str]) -> CaseColumns:
     """Results of all finished cases."""
     rows = library.columns.of(study_id, names)
-    flags = np.array([flags for _, flags in rows.kinds], dtype=object)[rows.kind].tolist() if len(rows.cases) else []
-    return CaseColumns(rows.cases, [None] * len(rows.cases), rows.values, flags)
+    kinds = [rows.kinds[kind] for kind in rows.kind.tolist()]
+    return CaseColumns(rows.cases, [ending for ending, _ in kinds], rows.values, [flags for _, flags in kinds])
 
 
 def answers_as_json(library: Library, study_id: str, chosen: CurveQuery | None, point: str | None) -> bytes:

@@ -41,7 +41,7 @@ def digest_of_study(values: Mapping[str, Any]) -> int:
 
 def is_sound(row: Any) -> bool:
     """Whether a study is as it was stored; of its row `WITH_DIGEST`. One from before revision 0039 counts as sound."""
-    return row.digest is None or bool(digest_of_study(row._mapping) == row.digest)
+    return row.digest is None or bool(digest_of_study(row._asdict()) == row.digest)
 
 
 def require_as_stored(row: Any) -> None:
@@ -80,7 +80,7 @@ def grown_digest(connection: sa.Connection, number: int, **values: object) -> in
     if row.digest is None or not is_sound(row):
         kept: int | None = row.digest
         return kept
-    return digest_of_study({**row._mapping, **values})
+    return digest_of_study({**row._asdict(), **values})
 
 
 class StudyDigests(Orders):

@@ -329,6 +329,7 @@ def test_a_database_of_before_is_the_deployment_after_its_upgrade_without_a_word
     with store.session.write() as connection:
         connection.exec_driver_sql("DROP TABLE deployment")
         connection.exec_driver_sql("ALTER TABLE schedules DROP COLUMN trouble_flags")
+        connection.exec_driver_sql("ALTER TABLE studies DROP COLUMN digest")
         connection.exec_driver_sql("UPDATE alembic_version SET version_num = '0036'")
     store.close()
     assert execute(["db", "upgrade", "--no-backup", "--db", settings.database]) == 0

@@ -133,7 +133,9 @@ def test_a_session_that_ends_leaves_the_locks_of_another_one_of_its_process_alon
             assert said == "database-in-use"
         moved.rename(file)
         store.create_study({}, fakes.study(1))
-    assert not one_name._OPENED
+        opened = file.stat().st_dev, file.stat().st_ino
+        assert opened in one_name._OPENED
+    assert opened not in one_name._OPENED
 
 
 def test_workers_that_take_a_database_from_each_other_are_told(file: Path) -> None:
