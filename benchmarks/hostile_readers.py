@@ -134,7 +134,7 @@ def streams(place: Place, seconds: float) -> Counter[str]:
     api = httpx.Client(base_url=f"http://127.0.0.1:{place.port}/api/v1", timeout=PATIENCE, trust_env=False)
     with api:
         api.headers["Authorization"] = f"Bearer {place.writer}"
-        submitted = api.post("/studies", json=spec(100_000))
+        submitted = api.post("/studies", json=spec(1_000_000))
         assert submitted.status_code == 202, submitted.text
         study = f"/studies/{submitted.json()['id']}"
         until(lambda: api.get(study).json()["state"] == "running", "the study is running")

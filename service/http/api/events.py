@@ -13,7 +13,7 @@ from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.looks import Seen
 from sprag.service.http.routers import api_router
 from sprag.service.http.streams import MEDIA_TYPE, event_stream
-from sprag.service.http.threads import in_thread
+from sprag.service.http.threads import Threads, in_thread
 
 router = api_router("studies")
 
@@ -33,7 +33,7 @@ LastEventId = Annotated[
 )
 async def get_events(context: Ctx, study_id: StudyId, last_event_id: LastEventId = None) -> Response:
     """The live progress of a study. Each event has the complete state, so a missed one does not matter."""
-    record = await in_thread(context.store.get_study, study_id)
+    record = await in_thread(context.store.get_study, study_id, threads=Threads.STREAMS)
     if record.state.terminal and last_event_id == str(record.revision):
         return Response(status_code=204)
 

@@ -17,7 +17,7 @@ from sprag.service.http.problems import ApiError
 from sprag.service.http.routers import page_router
 from sprag.service.http.schedule_views import summary
 from sprag.service.http.streams import event_stream
-from sprag.service.http.threads import in_thread
+from sprag.service.http.threads import Threads, in_thread
 from sprag.service.http.web.study_list import listed
 from sprag.service.jobs.nights import HOURS, MOST_HOURS, night
 from sprag.service.jobs.workers import worker_list
@@ -75,7 +75,7 @@ async def live(
         listed_now = to_bytes(_LISTS[name](context, request.query_params))
         return Seen(hashlib.blake2b(listed_now, digest_size=8).hexdigest(), {})
 
-    await in_thread(look)  # refuses what the address asks wrongly
+    await in_thread(look, threads=Threads.STREAMS)  # refuses what the address asks wrongly
     grant = ASKING.get()
     key = name, request.url.query, languages.current(), None if grant is None else grant.share
     return await event_stream(context, key, look, last_event_id, streams.LIST_SECONDS)

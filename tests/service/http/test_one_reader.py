@@ -16,7 +16,7 @@ from sprag.service.formats import FORMATS
 from sprag.service.http import guard, looks, work
 from sprag.service.http.api import curves
 from sprag.service.http.problems import ApiError
-from sprag.service.http.threads import ThreadedRoute
+from sprag.service.http.threads import _NUMBERS, ThreadedRoute, Threads
 from sprag.service.jobs import row_files
 from sprag.service.storage.scopes import TokenScope
 from sprag.worker.limits import FILE_PROCESSES, MAX_FILES_EACH, MAX_STREAMS_EACH, SENDING_PROCESSES, WRITING_THREADS
@@ -389,6 +389,36 @@ def test_one_look_serves_all_streams_of_a_study(
 
     portal.call(follow)
     assert len(seen) < STREAMS
+
+
+def test_opening_streams_takes_no_thread_of_readers(
+    service: Service, tokens: dict[str, str], portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A crowd of them would each run Python in a thread, and /livez would wait for its turn among them."""
+    study_id, asked, go_on = service.submit(), list[int](), threading.Event()
+
+    def slowly(real: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*args: Any, **options: Any) -> Any:
+            asked.append(1)
+            assert go_on.wait(600)
+            return real(*args, **options)
+
+        return call
+
+    for name in ("get_study", "list_schedules"):
+        monkeypatch.setattr(service.store, name, slowly(getattr(service.store, name)))
+
+    async def open_many() -> None:
+        paths = (f"{API}/studies/{study_id}/events", "/live/schedules")
+        opened = [asyncio.ensure_future(ask(service, paths[number % 2], tokens["one"])) for number in range(STREAMS)]
+        await until(lambda: len(asked) == _NUMBERS[Threads.STREAMS])
+        assert threads_taken() == 0
+        for stream in opened:
+            stream.cancel()
+        go_on.set()
+        await asyncio.gather(*opened, return_exceptions=True)
+
+    portal.call(open_many)
 
 
 @pytest.mark.parametrize("needed", [True, False], ids=["tokens", "no tokens"])
