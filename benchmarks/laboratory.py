@@ -19,7 +19,7 @@ import numpy as np
 from sprag.service.http.web.figures.drive import drive_case
 from sprag.service.http.web.laboratory.drive_setting import machines, setting
 from sprag.service.json_text import to_bytes
-from sprag.service.results.reading import Reading
+from sprag.service.reading.reader import Reading
 from sprag.worker import models
 
 if TYPE_CHECKING:

@@ -29,7 +29,7 @@ TESTS = (
     "tests/engine/vibration_drive/test_balances.py",
     "tests/service/http",
     "tests/service/results/exports",
-    "tests/service/spec/test_units.py",
+    "tests/service/reading/test_units.py",
     "tests/service/storage",
     "tests/worker/executors",
 )

@@ -23,7 +23,7 @@ from sprag.service.http.web.script_texts import script_texts
 from sprag.service.http.web.templates import _templates
 from sprag.service.languages.catalogue import Catalogue, Entry, Key, read, written
 from sprag.service.presets import ABOUT
-from sprag.service.results.wording import NOUNS
+from sprag.service.reading.wording import NOUNS
 
 ROOT: Final = Path(__file__).parent.parent
 #: Where texts stand. The worker and the engine know no languages: what they say is in `VOCABULARIES`.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from sprag.service.results.wording import words
+from sprag.service.reading.wording import words
 from sprag.service.spec.components import CHARACTERISTIC, CHARACTERISTICS
 from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN
 from sprag.service.spec.draws.described import DISTRIBUTION, DRAWS

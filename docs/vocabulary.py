@@ -17,8 +17,8 @@ from sprag.service.http.web.laboratory.drive_setting import machines as drives
 from sprag.service.http.web.laboratory.drive_setting import title_of
 from sprag.service.http.web.laboratory.setting import machines
 from sprag.service.presets import preset_names
-from sprag.service.results.phrases import part_label
-from sprag.service.results.quantities import KINDS
+from sprag.service.reading.phrases import part_label
+from sprag.service.reading.quantities import KINDS
 from sprag.service.schedules.outcomes import Result
 from sprag.service.spec.machine.shaft_parts import MECHANISM_CHOICES
 from sprag.service.spec.saved_views import PAGES

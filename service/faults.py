@@ -276,6 +276,27 @@ def parameter_error(name: str, code: Code, message: str, value: Any = None, allo
     return FaultError("invalid-parameter", f"{name}: {message}", (fault,))
 
 
+class SelectionError(FaultError):
+    """The selection of cases is ambiguous or impossible; ``faults`` names each parameter at fault."""
+
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        faults = tuple(faults)
+        super().__init__("invalid-selection", "; ".join(f"{item.where}: {item.message}" for item in faults), faults)
+
+
+def refused(
+    parameter: str,
+    code: Code,
+    message: str,
+    value: object = None,
+    *,
+    allowed: str | None = None,
+    unit: str | None = None,
+) -> SelectionError:
+    """What is wrong with one parameter of a selection."""
+    return SelectionError([ParameterFault(parameter, code, message, shown(value), allowed, unit)])
+
+
 def choice_of(name: str, value: str, choices: Iterable[Choice]) -> Choice:
     """``value`` as one of ``choices``; FaultError about the parameter ``name`` when it is none of them."""
     known = list(choices)

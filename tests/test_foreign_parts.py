@@ -29,7 +29,9 @@ USED = {
         "the parameters that a route takes", "service/http/requests.py",
     ),
     ("fastapi", "fastapi.routing", "iter_route_contexts"): ("the methods of a path", "service/http/handlers.py"),
-    ("pint", "pint.util", "UnitsContainer.items"): ("the root units of a unit, Unit._units", "service/spec/units.py"),
+    ("pint", "pint.util", "UnitsContainer.items"): (
+        "the root units of a unit, Unit._units", "service/reading/units.py",
+    ),
     ("starlette", "starlette.applications", "Starlette.build_middleware_stack"): (
         "the guard is outside of all layers", "service/http/app.py",
     ),

@@ -66,8 +66,8 @@ def branch(
 
 def _report(made: CaseBranch, study: Study, asked: Along, case: int) -> None:
     """Say on standard error what has been found."""
+    from sprag.service.reading.catalogue import unit_of
     from sprag.service.results.figures.branch import special_text
-    from sprag.service.spec.catalogue import unit_of
 
     if made.note:
         say(_("case {case} has no branch: {why}", case=case, why=_(made.note)))

@@ -110,11 +110,11 @@ def _run(parsed: ParsedSpec, db: str | None, processes: int | None) -> tuple[Cal
 
 
 def _content(found: Calibration, form: str, title: str) -> bytes:
+    from sprag.service.reading.reader import Reading
     from sprag.service.results.calibration import calibration_csv
     from sprag.service.results.figures.calibration import calibration_figure
     from sprag.service.results.figures.read import read_figure
     from sprag.service.results.pictures.curves import draw_figure
-    from sprag.service.results.reading import Reading
 
     if form == "csv":
         return calibration_csv(found)

@@ -15,9 +15,9 @@ from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token, Wait, WaitTimeout
 from sprag.service.cli.remote import connection
 from sprag.service.languages import N_, _, ngettext
-from sprag.service.spec.numbers import assumption, could_be_one, in_language, parse_number, settle, settled
-from sprag.service.spec.printed import could_be_values
-from sprag.service.spec.together import with_last_unit
+from sprag.service.reading.numbers import assumption, could_be_one, in_language, parse_number, settle, settled
+from sprag.service.reading.printed import could_be_values
+from sprag.service.reading.together import with_last_unit
 from sprag.worker.limits import (
     MAX_BODY_BYTES,
     MAX_NARROW_STEPS,

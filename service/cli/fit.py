@@ -22,8 +22,8 @@ from sprag.service.cli.files import MAX_DATA_BYTES, decode, read_bytes
 from sprag.service.cli.options import JsonFlag
 from sprag.service.faults import Fault, warned
 from sprag.service.languages import N_, _
-from sprag.service.spec.numbers import parse_number
-from sprag.service.spec.report import shorten
+from sprag.service.reading.numbers import parse_number
+from sprag.service.reading.texts import shorten
 
 if TYPE_CHECKING:
     from sprag.service.spec.measured import MeasuredData
@@ -89,7 +89,7 @@ def fit(
 
 def _quantity(option: str, text: str, unit: str) -> float:
     """The SI number of an option: a plain number in ``unit`` or a text with its own unit."""
-    from sprag.service.spec.units import QuantityError, parse_quantity
+    from sprag.service.reading.units import QuantityError, parse_quantity
 
     number = parse_number(text)
     try:
@@ -99,8 +99,8 @@ def _quantity(option: str, text: str, unit: str) -> float:
 
 
 def _measured(path: str) -> MeasuredData:
+    from sprag.service.reading.units import parse_quantity
     from sprag.service.spec.measured import MeasuredDataError, parse_measured
-    from sprag.service.spec.units import parse_quantity
 
     try:
         return parse_measured(decode(path, read_bytes(path, MAX_DATA_BYTES)), parse_quantity)

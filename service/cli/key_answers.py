@@ -29,7 +29,7 @@ from sprag.service.languages import _
 
 if TYPE_CHECKING:
     from sprag.service.answers.key import AnswerValue
-    from sprag.service.results.reading import Reading
+    from sprag.service.reading.reader import Reading
 
 _FORMATS = ("csv", "svg", "png", "pdf")
 
@@ -77,7 +77,7 @@ def answers(
     if as_json:
         write_json(found)
     else:
-        from sprag.service.results.reading import Reading  # knows the models
+        from sprag.service.reading.reader import Reading  # knows the models
 
         _show(found, Reading(record["model"]))
     if file is not None:

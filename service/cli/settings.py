@@ -11,7 +11,7 @@ from sprag.service.cli.console import WrongInputError, show_table, write_json
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag
 from sprag.service.faults import Fault
 from sprag.service.languages import N_, _
-from sprag.service.spec.report import shorten
+from sprag.service.reading.texts import shorten
 
 if TYPE_CHECKING:
     from sprag.service.settings import Settings

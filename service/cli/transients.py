@@ -121,7 +121,7 @@ def completed(course: Course) -> str:
 
 def _report(made: Transient, case: int) -> None:
     """Write the end and its cause, and the results, to standard error."""
-    from sprag.service.results.wording import number, unit_text
+    from sprag.service.reading.wording import number, unit_text
     from sprag.worker.models.transients import RESULTS
 
     say(_("case {case}: {text}", case=case, text=f"{made.outcome}. {_(made.cause)}"))

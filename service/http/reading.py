@@ -9,10 +9,10 @@ from urllib.parse import quote, unquote, urlencode, urlsplit
 
 from fastapi import Depends, Query, Request
 
+from sprag.service.faults import SelectionError
 from sprag.service.http.language import language_pairs
-from sprag.service.results.quantities import SI, TYPED, UNITS_PATTERN, read_units
-from sprag.service.results.reading import CAPTIONS, CODES, Choice
-from sprag.service.results.selection import SelectionError
+from sprag.service.reading.quantities import SI, TYPED, UNITS_PATTERN, read_units
+from sprag.service.reading.reader import CAPTIONS, CODES, Choice
 
 if TYPE_CHECKING:
     from starlette.responses import Response

@@ -13,7 +13,8 @@ from werkzeug.http import parse_etags
 
 from sprag.service.faults import ParameterFault, shown
 from sprag.service.http.problems import ApiError
-from sprag.service.spec.report import SpecError, did_you_mean
+from sprag.service.reading.texts import did_you_mean
+from sprag.service.spec.report import SpecError
 
 BodyFormat = Literal["json", "toml"]
 _FORMATS: dict[str, BodyFormat] = {"application/json": "json", "application/toml": "toml"}

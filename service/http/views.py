@@ -13,9 +13,9 @@ from sprag.service.faults import warned
 from sprag.service.http.prefix import here
 from sprag.service.http.respond import edition_tag
 from sprag.service.presets import ABOUT, preset_text
+from sprag.service.reading.catalogue import axes_json
 from sprag.service.results.fronts import goal_units
 from sprag.service.results.rounds import rounds_json
-from sprag.service.spec.catalogue import axes_json
 from sprag.service.spec.document import format_of, load_spec
 
 if TYPE_CHECKING:

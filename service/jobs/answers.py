@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
     from sprag.service.answers.calibration import CalibrationReport
     from sprag.service.jobs.checks import Library
+    from sprag.service.reading.reader import Choice
     from sprag.service.results.curves import Curve, CurveQuery, Curves, Map
-    from sprag.service.results.reading import Choice
 
 #: Numbers of curves or a map that are read and written in about ten milliseconds.
 FEW: Final = 20_000

@@ -18,10 +18,10 @@ from sprag.service.jobs.preview import preview_json
 from sprag.service.jobs.start_from import with_start
 from sprag.service.jobs.submission import Submission, hash_of, submission
 from sprag.service.json_text import to_bytes
+from sprag.service.reading import units
 from sprag.service.results.fits import fit_json, read_fit
 from sprag.service.results.selection import locate_axes
 from sprag.service.schedules.fields import ScheduleFields, change_fields, read_fields
-from sprag.service.spec import units
 from sprag.service.spec.components import Component, read_components
 from sprag.service.spec.document import load_spec, parse_spec
 from sprag.service.spec.extend import parse_extended

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from cachetools import LRUCache
 
+from sprag.service.faults import refused
 from sprag.service.jobs.column_files import ColumnFiles, default_folder
 from sprag.service.jobs.reading import reading_of
 from sprag.service.json_text import to_bytes
@@ -16,7 +17,6 @@ from sprag.service.results.explore import ExploreQuery, explore, explored_csv, e
 from sprag.service.results.figures.explore import explore_figure
 from sprag.service.results.figures.read import read_figure
 from sprag.service.results.pictures import curves as pictures
-from sprag.service.results.selection import refused
 from sprag.service.spec.design import points_spec
 from sprag.service.spec.stored import accepted
 
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from sprag.service.jobs.checks import Library
+    from sprag.service.reading.reader import Choice
     from sprag.service.results.explore import Explored
-    from sprag.service.results.reading import Choice
     from sprag.service.storage.columns import RowColumns
     from sprag.service.storage.records import StudyRecord
     from sprag.service.storage.store import Store

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
+from sprag.service.faults import refused
 from sprag.service.jobs.answers import FEW
 from sprag.service.jobs.reading import reading_of
 from sprag.service.json_text import to_bytes
@@ -13,7 +14,6 @@ from sprag.service.results.figures.read import read_figure
 from sprag.service.results.key_answer_words import answers_csv, report
 from sprag.service.results.key_answers import answers_query, find_answers
 from sprag.service.results.pictures import curves as pictures
-from sprag.service.results.selection import refused
 from sprag.service.storage.records import CaseColumns
 from sprag.worker import models
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from sprag.service.jobs.checks import Library
+    from sprag.service.reading.reader import Choice
     from sprag.service.results.curves import CurveQuery
     from sprag.service.results.key_answers import StudyAnswers
-    from sprag.service.results.reading import Choice
 
 
 def answers_of(library: Library, study_id: str, chosen: CurveQuery | None, point: str | None) -> StudyAnswers:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sprag.service.faults import warned
+from sprag.service.reading.catalogue import axes_json
 from sprag.service.results.fits import fit_json
 from sprag.service.schedules.deadline import finish_warnings
-from sprag.service.spec.catalogue import axes_json
 from sprag.worker import models
 from sprag.worker.chunking import work_of
 from sprag.worker.planning import most_cases, planner_of

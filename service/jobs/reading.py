@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.service.results.reading import Choice, Reading, reading_for
+from sprag.service.reading.reader import Choice, Reading, reading_for
 
 if TYPE_CHECKING:
     from sprag.service.storage.store import Store

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from sprag.service.answers.results import ResultSensitivity
     from sprag.service.jobs.checks import Library
+    from sprag.service.reading.reader import Choice, Reading
     from sprag.service.results.pictures.curves import Picture
-    from sprag.service.results.reading import Choice, Reading
 
 
 def sensitivities_of(library: Library, study_id: str, names: Sequence[str]) -> list[Sensitivity]:

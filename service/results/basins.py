@@ -11,11 +11,11 @@ import numpy as np
 from sprag.service.answers.results import BasinData, RegimeRow
 from sprag.service.faults import FaultError, parameter_error
 from sprag.service.json_text import to_bytes
+from sprag.service.reading.texts import quantity_text
+from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.service.results.exports import table_csv
 from sprag.service.results.selection import ends_of_range
 from sprag.service.results.start_states import refuse_impossible
-from sprag.service.spec.report import quantity_text
-from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
 from sprag.worker.models.common import case_machine
 from sprag.worker.models.starts import STARTS, has_starts

@@ -11,12 +11,12 @@ from sprag.service.answers import filled
 from sprag.service.answers.results import Branch, BranchContact
 from sprag.service.faults import choice_of, parameter_error
 from sprag.service.json_text import numbers, to_bytes
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.service.results.directions import case_values
 from sprag.service.results.exports import table_csv
 from sprag.service.results.portraits import require_strobes
 from sprag.service.results.selection import ends_of_range
-from sprag.service.spec.catalogue import unit_of
-from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
 from sprag.worker.models.branches import Along, allowed_values, branch_results, run_branch
 from sprag.worker.models.common import NO_PARAMETERS, case_machine

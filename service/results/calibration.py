@@ -9,9 +9,9 @@ import numpy as np
 
 from sprag.service.faults import Fault, FaultError
 from sprag.service.json_text import numbers
+from sprag.service.reading.catalogue import unit_of
 from sprag.service.results import exports
 from sprag.service.results.calibration_words import sentences
-from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 from sprag.worker.models import WorkerEnding
 from sprag.worker.planning.calibrate import CalibratePlan, CalibratePlanner

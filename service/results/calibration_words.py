@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.results.phrases import Amount, Name, Part, Phrase, joined, plural
-from sprag.service.spec.catalogue import unit_of
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.phrases import Amount, Name, Part, Phrase, joined, plural
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -9,6 +9,8 @@ from urllib.parse import parse_qsl
 
 import numpy as np
 
+from sprag.service.faults import refused
+from sprag.service.reading.catalogue import unit_of
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import (
     MOST_CHOICES,
@@ -21,8 +23,7 @@ from sprag.service.results.defaults import (
 )
 from sprag.service.results.refined import curve_plan, families, plan_along
 from sprag.service.results.refined_maps import map_plan
-from sprag.service.results.selection import locate_axes, refused, value_of
-from sprag.service.spec.catalogue import unit_of
+from sprag.service.results.selection import locate_axes, value_of
 from sprag.worker import models
 from sprag.worker.sweeps import SWEEP
 

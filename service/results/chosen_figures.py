@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from sprag.service.faults import SelectionError, refused
 from sprag.service.languages import _
+from sprag.service.reading.phrases import lower_first
+from sprag.service.reading.reader import Choice, reading_for
 from sprag.service.results.choice import Address, MapQuery, curve_query, map_query
 from sprag.service.results.curve_cases import select
 from sprag.service.results.curves import CurveQuery, Map
 from sprag.service.results.defaults import caption, drawn_numbers
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.read import read_figure, read_map
-from sprag.service.results.phrases import lower_first
 from sprag.service.results.pictures.curves import MAX_PICTURE_POINTS, check_size, draw_figure, require_drawable
 from sprag.service.results.pictures.maps import draw_map
-from sprag.service.results.reading import Choice, reading_for
-from sprag.service.results.selection import SelectionError, refused
 from sprag.service.results.stored_curves import drawn_curves, stored_map
 from sprag.worker import models
 

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.faults import ParameterFault
+from sprag.service.faults import ParameterFault, SelectionError, refused
+from sprag.service.reading.catalogue import unit_of
 from sprag.service.results.curves import Curve, CurveQuery, Curves, Fetch, Line, Map, Selection, not_run
 from sprag.service.results.listed_cases import cases_with, left_open, machines
 from sprag.service.results.refined import families, plan_along, refined_curves
@@ -22,19 +23,16 @@ from sprag.service.results.refined_maps import draw_refined_map, map_plan
 from sprag.service.results.regimes import kind_columns, kinds_of
 from sprag.service.results.selection import (
     Fixed,
-    SelectionError,
     axis_name,
     held_texts,
     listed,
     locate_axes,
     locate_values,
     numeric_results,
-    refused,
     require_axis,
     with_nominal,
 )
 from sprag.service.results.sweeps import jumps_of_line, swept_along
-from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 from sprag.worker.codes import PENDING
 from sprag.worker.limits import MAX_CURVE_VALUES

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.service.faults import refused
 from sprag.service.languages import N_
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.phrases import Name, Part, Phrase, joined, lower_first, plural
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.listed_cases import MOST_CURVES, cases_with, left_open, longest, open_axes, usual_machine
-from sprag.service.results.phrases import Name, Part, Phrase, joined, lower_first, plural
 from sprag.service.results.refined import curve_plan, families
 from sprag.service.results.refined_maps import map_plan, squares
-from sprag.service.results.selection import axis_name, held_text, locate_axes, refused, value_of
-from sprag.service.spec.catalogue import unit_of
+from sprag.service.results.selection import axis_name, held_text, locate_axes, value_of
 from sprag.worker import models
 from sprag.worker.models import NO_PARAMETERS
 from sprag.worker.spread import DRIVE

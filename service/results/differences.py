@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from sprag.service.reading.reader import Reading
     from sprag.service.results.curves import Curve, Curves
-    from sprag.service.results.reading import Reading
 
 #: Curves of studies with their labels.
 Drawn = list[tuple[str, "Curves"]]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.spec.catalogue import unit_of
+from sprag.service.reading.catalogue import unit_of
 from sprag.worker import models
 from sprag.worker.sweeps import SWEEP, direction
 

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.languages import gettext
-from sprag.service.results.phrases import Amount, Phrase, plural
-from sprag.service.results.wording import number
-from sprag.service.spec.catalogue import shown_values, unit_of
+from sprag.service.reading.catalogue import shown_values, unit_of
+from sprag.service.reading.phrases import Amount, Phrase, plural
+from sprag.service.reading.wording import number
 from sprag.worker.models import NO_PARAMETERS, SETTLED
 
 if TYPE_CHECKING:
     from sprag.service.answers.studies import Preview
-    from sprag.service.results.reading import Reading
+    from sprag.service.reading.reader import Reading
     from sprag.worker.study import Axis, Study
 
 #: Axes that are described one by one; of more only the number is stated.

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.answers.explore import Exploration, ExploredCase, Histogram
+from sprag.service.faults import refused
+from sprag.service.reading.catalogue import result_of, unit_of
+from sprag.service.reading.texts import did_you_mean
+from sprag.service.reading.units import plain_signs
 from sprag.service.results import exports
 from sprag.service.results.directions import case_values
 from sprag.service.results.regimes import kind_columns
-from sprag.service.results.selection import listed, locate_axes, own_paths, refuse_mixed_texts, refused, value_of
-from sprag.service.spec.catalogue import result_of, unit_of
-from sprag.service.spec.report import did_you_mean
-from sprag.service.spec.units import plain_signs
+from sprag.service.results.selection import listed, locate_axes, own_paths, refuse_mixed_texts, value_of
 from sprag.worker import models
 from sprag.worker.codes import FLAG_MASKS
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from sprag.service.results.reading import Reading
+    from sprag.service.reading.reader import Reading
     from sprag.service.storage.columns import RowColumns
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study

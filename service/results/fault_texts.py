@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Final
 from sprag.service.fault_meanings import MEANINGS, WARNING_MEANINGS
 from sprag.service.languages import ENGLISH, _, current, decimal, gettext
 from sprag.service.languages.ranges import NUMBER
-from sprag.service.results.phrases import lower_first
+from sprag.service.reading.phrases import lower_first
+from sprag.service.reading.quantities import KINDS
+from sprag.service.reading.wording import unit_text
 from sprag.service.results.places import place_text
-from sprag.service.results.quantities import KINDS
-from sprag.service.results.wording import unit_text
 
 if TYPE_CHECKING:
     from sprag.service.faults import Fault
-    from sprag.service.results.reading import Reading
+    from sprag.service.reading.reader import Reading
 
 _SI: Final = {kind.unit for kind in KINDS} | {"N*m/rad"}
 _UNITS: Final = sorted(_SI | {unit for kind in KINDS for unit in kind.others}, key=len, reverse=True)

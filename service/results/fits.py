@@ -8,10 +8,11 @@ from sprag.service.answers import filled
 from sprag.service.answers.studies import ClutchFitReport, FitDegree
 from sprag.service.faults import warned
 from sprag.service.spec.described import FIT
-from sprag.service.spec.fields import placed, read_number, read_object
+from sprag.service.spec.fields import read_number, read_object
 from sprag.service.spec.machine.clutch import read_clutch
 from sprag.service.spec.report import Report
 from sprag.worker import models
+from sprag.worker.models.parameters import placed
 
 if TYPE_CHECKING:
     from sprag.worker.models import ClutchFit

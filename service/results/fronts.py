@@ -11,9 +11,9 @@ import numpy as np
 from sprag.service.answers.goals import Design, DesignGoal, DesignLimit, DesignVariable, FrontReport, Generation
 from sprag.service.faults import Fault, FaultError
 from sprag.service.json_text import numbers
+from sprag.service.reading.catalogue import unit_of
 from sprag.service.results import exports
 from sprag.service.results.regimes import kind_columns
-from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 from sprag.worker.models import WorkerEnding
 from sprag.worker.planning.goals import GoalPlan, front

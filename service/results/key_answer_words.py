@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.answers.key import AnswerFacts, AnswerReport, AnswerValue, CurveAnswer, OverallAnswer
 from sprag.service.languages import available, language
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.phrases import Amount, Name, Phrase, joined, plural, shown, term
+from sprag.service.reading.wording import percent
 from sprag.service.results import exports
 from sprag.service.results.directions import case_values, in_words
-from sprag.service.results.phrases import Amount, Name, Phrase, joined, plural, shown, term
 from sprag.service.results.selection import axis_name
-from sprag.service.results.wording import percent
-from sprag.service.spec.catalogue import unit_of
 from sprag.worker.sweeps import SWEEP, direction
 
 if TYPE_CHECKING:
+    from sprag.service.reading.reader import Reading
     from sprag.service.results.key_answers import CurveAnswers, Found, StudyAnswers
-    from sprag.service.results.reading import Reading
     from sprag.worker.study import Study
 
 _EXTREMES: Final = ("largest", "smallest")

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sprag.service.languages import _
-from sprag.service.results.phrases import lower_first
-from sprag.service.results.reading import CODES
+from sprag.service.reading.phrases import lower_first
+from sprag.service.reading.reader import CODES
 from sprag.service.results.shown_inputs import part_name, run_name
 from sprag.worker.models.vocabulary import has_caption
 
 if TYPE_CHECKING:
-    from sprag.service.results.reading import Reading
+    from sprag.service.reading.reader import Reading
 
 
 def place_text(pointer: str, reading: Reading) -> str:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sprag.service.languages import N_
-from sprag.service.results.phrases import Name, Phrase, joined, plural
-from sprag.service.results.wording import percent
+from sprag.service.reading.phrases import Name, Phrase, joined, plural
+from sprag.service.reading.wording import percent
 from sprag.worker import models
 from sprag.worker.planning.refine import Curve as Refined
 from sprag.worker.planning.refine import describe

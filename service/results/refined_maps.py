@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.service.faults import refused
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.phrases import Phrase
+from sprag.service.reading.wording import percent
 from sprag.service.results.curves import Fetch, Map, not_run
-from sprag.service.results.phrases import Phrase
 from sprag.service.results.refined import reached, refine_plan
-from sprag.service.results.selection import axis_name, held_texts, listed, locate_axes, numeric_results, refused
-from sprag.service.results.wording import percent
-from sprag.service.spec.catalogue import unit_of
+from sprag.service.results.selection import axis_name, held_texts, listed, locate_axes, numeric_results
 from sprag.worker import models
 from sprag.worker.codes import PENDING
 from sprag.worker.planning.refine import describe_maps

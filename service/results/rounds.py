@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.languages import N_, decimal
-from sprag.service.results.phrases import Amount, Phrase, joined, plural
-from sprag.service.results.wording import percent
+from sprag.service.reading.phrases import Amount, Phrase, joined, plural
+from sprag.service.reading.wording import percent
 from sprag.worker.planning.calibrate.plan import CALIBRATE
 from sprag.worker.planning.goals.plan import GOAL
 from sprag.worker.states import StudyState

@@ -9,14 +9,14 @@ import numpy as np
 
 from sprag.service.faults import choice_of, parameter_error
 from sprag.service.json_text import numbers, to_bytes
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.numbers import in_language
+from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.service.results.branches import range_of
 from sprag.service.results.directions import case_values
 from sprag.service.results.exports import table_csv
 from sprag.service.results.portraits import require_strobes
 from sprag.service.results.start_states import refuse_impossible
-from sprag.service.spec.catalogue import unit_of
-from sprag.service.spec.numbers import in_language
-from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker.models.common import case_machine
 from sprag.worker.models.sections import Sampling, run_sections
 from sprag.worker.models.starts import motion_of

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.service.faults import Code, Fault, FaultError, ParameterFault, parameter_error, shown
-from sprag.service.results.phrases import Amount, Name, Phrase, term
-from sprag.service.spec.catalogue import result_of, unit_of, unknown_result
-from sprag.service.spec.numbers import in_language
-from sprag.service.spec.report import did_you_mean, quantity_text
-from sprag.service.spec.together import AMBIGUOUS_UNIT, question, with_unit_of_end
-from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
+from sprag.service.faults import Fault, ParameterFault, SelectionError, parameter_error, refused, shown
+from sprag.service.reading.catalogue import result_of, unit_of, unknown_result
+from sprag.service.reading.numbers import in_language
+from sprag.service.reading.phrases import Amount, Name, Phrase, term
+from sprag.service.reading.texts import did_you_mean, quantity_text
+from sprag.service.reading.together import AMBIGUOUS_UNIT, question, with_unit_of_end
+from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
 from sprag.worker.spread import DRIVE
 from sprag.worker.study import SAME_VALUE
@@ -28,27 +28,6 @@ if TYPE_CHECKING:
 Fixed = dict[int, tuple[str, int]]
 
 _LISTED = 24
-
-
-class SelectionError(FaultError):
-    """The selection of cases is ambiguous or impossible; ``faults`` names each parameter at fault."""
-
-    def __init__(self, faults: Iterable[Fault]) -> None:
-        faults = tuple(faults)
-        super().__init__("invalid-selection", "; ".join(f"{item.where}: {item.message}" for item in faults), faults)
-
-
-def refused(
-    parameter: str,
-    code: Code,
-    message: str,
-    value: object = None,
-    *,
-    allowed: str | None = None,
-    unit: str | None = None,
-) -> SelectionError:
-    """What is wrong with one parameter of a selection."""
-    return SelectionError([ParameterFault(parameter, code, message, shown(value), allowed, unit)])
 
 
 def numeric_results(infos: Sequence[ResultInfo], parameter: str, names: Sequence[str]) -> tuple[ResultInfo, ...]:

@@ -18,12 +18,13 @@ import numpy as np
 
 from sprag.service.answers import filled
 from sprag.service.answers.results import AxisEffect, PairEffect, ResultSensitivity
-from sprag.service.faults import Fault
+from sprag.service.faults import Fault, SelectionError, refused
 from sprag.service.json_text import numbers
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.phrases import Phrase, plural
 from sprag.service.results.curves import Fetch
-from sprag.service.results.phrases import Phrase, plural
 from sprag.service.results.regimes import counted, kind_columns, kinds_of, left_out
-from sprag.service.results.selection import SelectionError, axis_name, numeric_results, refused
+from sprag.service.results.selection import axis_name, numeric_results
 from sprag.service.results.sensitivity_design import (
     factorial_table,
     going_together,
@@ -43,7 +44,6 @@ from sprag.service.results.sensitivity_indices import (
     sample_indices,
 )
 from sprag.service.results.tolerances.nominal import nominal_only
-from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.draws.unit import LEVELS, cases_of
 from sprag.worker import models
 

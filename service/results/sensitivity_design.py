@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.results.phrases import Name, Phrase
+from sprag.service.reading.phrases import Name, Phrase
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

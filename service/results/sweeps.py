@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.results.phrases import Amount, Name, Part, Phrase, joined, plural, term
-from sprag.service.results.wording import percent
+from sprag.service.reading.phrases import Amount, Name, Part, Phrase, joined, plural, term
+from sprag.service.reading.wording import percent
 from sprag.worker.models import JUMPED
 from sprag.worker.sweeps import DOWN, SWEEP, direction
 

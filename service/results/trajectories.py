@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 from sprag.service.faults import parameter_error
 from sprag.service.json_text import numbers, to_bytes
+from sprag.service.reading.quantities import Units
+from sprag.service.reading.units import PERIOD_NAMES, QuantityError, parse_quantity, split_quantity, to_float
 from sprag.service.results.directions import case_values
 from sprag.service.results.exports import read_table
-from sprag.service.results.quantities import Units
 from sprag.service.results.selection import ends_of_range
-from sprag.service.spec.units import PERIOD_NAMES, QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
 from sprag.worker.models.starts import motion_of
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Final
 
 from sprag.service.faults import FaultError, choice_of, parameter_error
 from sprag.service.json_text import to_bytes
+from sprag.service.reading.numbers import in_language
+from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.service.results.trajectories import timed_values, trajectory_csv
-from sprag.service.spec.numbers import in_language
-from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
 from sprag.worker.limits import MIN_TRAJECTORY_POINTS
 from sprag.worker.models.transients import KINDS, RESULTS, Course, has_motor, has_transients, run_transient

@@ -6,8 +6,8 @@ from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Final
 
 from sprag.service.faults import Code
+from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity
 from sprag.service.schedules.times import TimingError, next_time_of_day, read_time_of_day
-from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity
 from sprag.worker.limits import MAX_FINISH_DAYS
 from sprag.worker.models import WarningText
 from sprag.worker.order import coverage, order_of

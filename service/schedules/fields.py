@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.service.reading.texts import did_you_mean
 from sprag.service.schedules.deadline import ALLOWED_OF_RUNS, FinishError, check_run_finish, run_finish_at
 from sprag.service.schedules.policies import GRACE_ALLOWED, CatchUp, Overlap, Policies, check_grace
 from sprag.service.schedules.report_to import ReportTo, ReportWhen, read_report_to
@@ -22,7 +23,7 @@ from sprag.service.schedules.trouble import read_trouble_flags
 from sprag.service.spec.described import Described, choice, named
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.fields import read_object
-from sprag.service.spec.report import Report, SpecError, did_you_mean
+from sprag.service.spec.report import Report, SpecError
 from sprag.service.zones import zones
 from sprag.worker.limits import MAX_NAME_LENGTH, MAX_PRIORITY
 

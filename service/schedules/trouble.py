@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.service.spec.report import Report, did_you_mean
+from sprag.service.reading.texts import did_you_mean
+from sprag.service.spec.report import Report
 from sprag.worker import models
 
 if TYPE_CHECKING:

@@ -12,17 +12,18 @@ from functools import lru_cache
 from typing import Any, Final
 
 from sprag.service.faults import Fault
+from sprag.service.reading.numbers import parse_number, settled
+from sprag.service.reading.printed import could_be_several
+from sprag.service.reading.together import AMBIGUOUS_UNIT, questions
+from sprag.service.reading.units import QuantityError
 from sprag.service.spec.csv_text import read_csv, refuse_mixed_column, unescape
-from sprag.service.spec.fields import exact, placed, read_object
+from sprag.service.spec.fields import exact, read_object
 from sprag.service.spec.labels import LINES_ALLOWED, printable_lines
-from sprag.service.spec.numbers import parse_number, settled
-from sprag.service.spec.printed import could_be_several
 from sprag.service.spec.report import Report, SpecError, join
 from sprag.service.spec.table_text import heading_of
-from sprag.service.spec.together import AMBIGUOUS_UNIT, questions
-from sprag.service.spec.units import QuantityError
 from sprag.worker import models
 from sprag.worker.limits import MAX_COMPONENTS, MAX_NAME_LENGTH, MAX_NOTES_LENGTH
+from sprag.worker.models.parameters import placed
 
 SPRING, CLUTCH, MOTOR = "spring", "clutch", "motor"
 KINDS: Final = (SPRING, CLUTCH, MOTOR)

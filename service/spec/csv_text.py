@@ -9,9 +9,9 @@ import csv
 import re
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.spec.numbers import WITHOUT_DOUBT, assumption, question
+from sprag.service.reading.numbers import WITHOUT_DOUBT, assumption, question
+from sprag.service.reading.together import AMBIGUOUS_UNIT, questions
 from sprag.service.spec.table_text import MAX_HEADING, CsvRow, Split, settled_table, split, with_units
-from sprag.service.spec.together import AMBIGUOUS_UNIT, questions
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence

@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.reading.texts import did_you_mean, quantity_text
 from sprag.service.spec.draws.unit import unit_sample
 from sprag.service.spec.formulas import Formula, FormulaError, UnknownNameError, read_formula
-from sprag.service.spec.report import Report, did_you_mean, join, quantity_text
+from sprag.service.spec.report import Report, join
 from sprag.worker.derived import blocks, involved
 from sprag.worker.limits import MAX_DERIVED
 from sprag.worker.models.formulas import MAX_LENGTH, CircularError, evaluate, evaluation_order

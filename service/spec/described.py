@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from sprag.service.reading.numbers import WITHOUT_DOUBT, assumption, question, settle
 from sprag.service.spec.fields import read_choice, read_flag, read_number, read_periods, read_plain, read_whole
-from sprag.service.spec.numbers import WITHOUT_DOUBT, assumption, question, settle
+from sprag.service.spec.lists import refuse_mixed
 from sprag.service.spec.report import Report, join
-from sprag.service.spec.together import refuse_mixed
 from sprag.worker.limits import (
     MAX_ORBIT_PERIODS,
     MAX_SETTLED,

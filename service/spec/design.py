@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.spec.catalogue import unit_of
+from sprag.service.reading.catalogue import unit_of
 from sprag.service.spec.derive import with_values
 from sprag.service.spec.fields import TOLERANCE_FIELDS, WHICH_CASES
 from sprag.worker.limits import MAX_NAME_LENGTH

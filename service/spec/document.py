@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.service.reading.texts import did_you_mean
 from sprag.service.spec.axes.design import read_design
 from sprag.service.spec.axes.sweep import read_sweep, with_sweep
 from sprag.service.spec.derive import check_derived, layout, read_machine
@@ -18,7 +19,7 @@ from sprag.service.spec.draws.tolerances import read_tolerances, warn_of_invalid
 from sprag.service.spec.fields import TOLERANCE_FIELDS, read_object
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.plan.outline import Outline, chooses, first_round, read_outline
-from sprag.service.spec.report import Report, SpecError, did_you_mean
+from sprag.service.spec.report import Report, SpecError
 from sprag.service.spec.starts import read_starts
 from sprag.service.spec.text import Format, load_spec
 from sprag.worker import models

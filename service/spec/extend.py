@@ -10,13 +10,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.faults import Fault
+from sprag.service.reading.texts import quantity_text
 from sprag.service.spec.axes.axes import axis_values
 from sprag.service.spec.axes.sweep import sweep_of
 from sprag.service.spec.derive import read_machine
 from sprag.service.spec.document import ParsedSpec, parse_spec
 from sprag.service.spec.fields import TOLERANCE_FIELDS, WHICH_CASES, read_object
 from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.report import Report, SpecError, join, quantity_text
+from sprag.service.spec.report import Report, SpecError, join
 from sprag.worker.spread import without_drives
 from sprag.worker.sweeps import SWEEP
 

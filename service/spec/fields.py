@@ -3,29 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from fractions import Fraction
 from typing import Any, Final
 
-from sprag.service.spec.report import Report, did_you_mean, join
-from sprag.service.spec.units import PERIOD_NAMES, QuantityError, example, parse_exact, split_quantity, to_float
+from sprag.service.reading.texts import did_you_mean
+from sprag.service.reading.units import PERIOD_NAMES, QuantityError, example, parse_exact, split_quantity, to_float
+from sprag.service.spec.report import Report, join
 from sprag.worker.models import Parameter
 
 #: Fields of a spec about tolerances.
 TOLERANCE_FIELDS: Final = ("tolerances", "drives", "seed", "draws", "correlations")
 #: Fields of a spec that say which cases a study has.
 WHICH_CASES: Final = frozenset({"axes", "combine", "exclude", "refine", "goal", "calibrate", *TOLERANCE_FIELDS})
-
-
-def coefficient_unit(index: int) -> str:
-    """Unit of the clutch coefficient at ``index`` (0 is c_1): "N*m", "N*m/rad", "N*m/rad^2", .."""
-    return "N*m" + ("" if index == 0 else "/rad" if index == 1 else f"/rad^{index}")
-
-
-def placed(parameter: Parameter, path: str) -> Parameter:
-    """The catalogue's ``parameter`` at the flat ``path``, with indices filled in, also in its unit."""
-    unit = coefficient_unit(int(path.rsplit(".", 1)[-1])) if parameter.unit.endswith("^K") else parameter.unit
-    return replace(parameter, path=path, unit=unit)
 
 
 def exact(value: object, parameter: Parameter) -> Fraction:

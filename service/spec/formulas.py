@@ -15,8 +15,8 @@ from fractions import Fraction
 from typing import Final
 
 from sprag.service.faults import Code
-from sprag.service.spec.cyrillic import latin
-from sprag.service.spec.units import QuantityError, is_unit, measure, plain_signs, to_float
+from sprag.service.reading.cyrillic import latin
+from sprag.service.reading.units import QuantityError, is_unit, measure, plain_signs, to_float
 from sprag.worker.models.formulas import MAX_LENGTH, RESERVED, Expression, ExpressionError, Node
 
 #: Powers of gram, meter, second and radian, of hertz ("cycle") and of the number pi; None for the number 0, which has

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.service.faults import Fault, FaultError
-from sprag.service.spec.numbers import WITHOUT_DOUBT, assumption, is_ambiguous, parse_number, question
+from sprag.service.reading.numbers import WITHOUT_DOUBT, assumption, is_ambiguous, parse_number, question
 from sprag.service.spec.table_text import (
     CsvRow,
     Split,

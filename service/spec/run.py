@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.service.reading.units import PERIOD_NAMES, QuantityError, exact_number, parse_exact, split_quantity, to_float
 from sprag.service.spec.described import ANY_RUN, SETTLED_RUN
 from sprag.service.spec.fields import read_object
+from sprag.service.spec.lists import refuse_mixed
 from sprag.service.spec.report import Report, join
-from sprag.service.spec.together import refuse_mixed
-from sprag.service.spec.units import PERIOD_NAMES, QuantityError, exact_number, parse_exact, split_quantity, to_float
 from sprag.worker.limits import MAX_RUN_PERIODS
 from sprag.worker.models import MEANS_FROM_PERIODS
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from sprag.service.reading.units import QuantityError, split_quantity, to_float
 from sprag.service.spec.report import Report
-from sprag.service.spec.units import QuantityError, split_quantity, to_float
 
 
 def read_share(report: Report, pointer: str, value: object, low: float, high: float) -> float | None:

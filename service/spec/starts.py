@@ -12,9 +12,9 @@ from sprag.service.spec.described import Described, named, schemas
 from sprag.service.spec.draws.tolerances import expanded
 from sprag.service.spec.draws.unit import unit_sample
 from sprag.service.spec.fields import read_number, read_object
+from sprag.service.spec.lists import refuse_mixed
 from sprag.service.spec.report import Report, join
 from sprag.service.spec.schema.quantity import QUANTITY, Schema, object_schema
-from sprag.service.spec.together import refuse_mixed
 from sprag.worker.limits import MAX_START_RANGES, MAX_STARTS
 from sprag.worker.models import START_STATES, is_settled
 from sprag.worker.models.start_states import LOCKED, is_initial

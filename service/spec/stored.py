@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.reading.numbers import has_doubtful_point, with_decimal, with_decimals
+from sprag.service.reading.together import AMBIGUOUS_UNIT
 from sprag.service.spec.csv_text import has_units
 from sprag.service.spec.document import parse_spec
-from sprag.service.spec.numbers import has_doubtful_point, with_decimal, with_decimals
 from sprag.service.spec.report import SpecError
-from sprag.service.spec.together import AMBIGUOUS_UNIT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from sprag.service.faults import SelectionError
 from sprag.service.http.web.form.page import EMPTY_FORM
 from sprag.service.http.web.form.spec import values_of
-from sprag.service.results.selection import SelectionError, value_of
+from sprag.service.results.selection import value_of
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

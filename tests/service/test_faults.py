@@ -11,9 +11,8 @@ import pytest
 from sprag.engine import Ending
 from sprag.engine.machine_shaft import problems
 from sprag.service import faults
-from sprag.service.faults import Code, Fault, FaultError, Kind, ParameterFault, WarningCode
+from sprag.service.faults import Code, Fault, FaultError, Kind, ParameterFault, SelectionError, WarningCode
 from sprag.service.http.problems import PROBLEM_TYPES
-from sprag.service.results.selection import SelectionError
 from sprag.service.spec.report import SpecError
 from sprag.service.storage import errors as storage
 from sprag.service.storage.warning_texts import read_warnings, write_warnings

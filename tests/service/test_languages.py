@@ -15,7 +15,7 @@ from babel.numbers import format_decimal
 from docs import catalogues
 from sprag.service import languages
 from sprag.service.languages.catalogue import CatalogueError, Entry, Key, read, written
-from sprag.service.results.wording import number
+from sprag.service.reading.wording import number
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

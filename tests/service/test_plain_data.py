@@ -18,8 +18,8 @@ import pytest
 
 import sprag
 from sprag.service.plain_data import plain
+from sprag.service.reading.units import parse_quantity
 from sprag.service.spec.report import SpecError
-from sprag.service.spec.units import parse_quantity
 from tests.sprag.test_library import SPEC
 
 if TYPE_CHECKING:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -39,6 +40,17 @@ def parameter_of(study: Study, path: str) -> Parameter | None:
     """The parameter at a flat path of a spec, for the machine of ``study``; None when there is none."""
     own = model_of(study.model).parameters_of(study)
     return own.get(path) if own else model_parameter(study.model, path)
+
+
+def coefficient_unit(index: int) -> str:
+    """Unit of the clutch coefficient at ``index`` (0 is c_1): "N*m", "N*m/rad", "N*m/rad^2", .."""
+    return "N*m" + ("" if index == 0 else "/rad" if index == 1 else f"/rad^{index}")
+
+
+def placed(parameter: Parameter, path: str) -> Parameter:
+    """The catalogue's ``parameter`` at the flat ``path``, with indices filled in, also in its unit."""
+    unit = coefficient_unit(int(path.rsplit(".", 1)[-1])) if parameter.unit.endswith("^K") else parameter.unit
+    return replace(parameter, path=path, unit=unit)
 
 
 def in_range(values: NDArray[np.float64], parameter: Parameter) -> NDArray[np.bool_]:

@@ -13,9 +13,9 @@ from sprag.service.http.drawing import DRAWN_FORMATS, picture
 from sprag.service.http.drawing import table as written
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import Attended
+from sprag.service.reading.reader import Reading
 from sprag.service.results import basins
 from sprag.service.results.pictures.curves import draw_basin
-from sprag.service.results.reading import Reading
 
 router = api_router("cases", "/studies/{study_id:study}/cases")
 

@@ -27,7 +27,7 @@ from sprag.service.results.tolerances.ribbons import MOST_QUANTILES, QUANTILES
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from sprag.service.results.reading import Choice
+    from sprag.service.reading.reader import Choice
     from sprag.service.storage.records import StudyRecord
 
 router = api_router("results", "/studies/{study_id:study}")

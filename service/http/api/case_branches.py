@@ -16,12 +16,12 @@ from sprag.service.http.drawing import DRAWN_FORMATS, picture
 from sprag.service.http.drawing import table as written
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import Attended, Work
+from sprag.service.reading.reader import Reading
 from sprag.service.results import branches, sections
 from sprag.service.results.figures.branch import branch_figure
 from sprag.service.results.figures.read import read_figure
 from sprag.service.results.figures.sections import diagram_figure, section_figure
 from sprag.service.results.pictures.curves import draw_figure
-from sprag.service.results.reading import Reading
 from sprag.worker.models.branches import run_branch
 from sprag.worker.models.sections import run_sections
 from sprag.worker.models.starts import motion_of

@@ -17,9 +17,9 @@ from sprag.service.http.drawing import table as written
 from sprag.service.http.respond import choose_format
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import Attended
+from sprag.service.reading.reader import Reading
 from sprag.service.results import engagements, portraits
 from sprag.service.results.pictures.curves import draw_portrait
-from sprag.service.results.reading import Reading
 from sprag.worker import models
 from sprag.worker.models.starts import motion_of
 

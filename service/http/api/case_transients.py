@@ -14,11 +14,11 @@ from sprag.service.http.context import CaseNumber, StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, picture, table
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import Attended
+from sprag.service.reading.reader import Reading
 from sprag.service.results import transients
 from sprag.service.results.figures.read import read_figure
 from sprag.service.results.figures.transient import transient_figure
 from sprag.service.results.pictures.curves import draw_figure
-from sprag.service.results.reading import Reading
 from sprag.worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 from sprag.worker.models.transients import KINDS, run_transient, shape_of_transients
 

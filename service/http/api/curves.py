@@ -26,12 +26,12 @@ from sprag.service.http.routers import api_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
 from sprag.service.jobs import answers, row_files
+from sprag.service.reading.quantities import SI
 from sprag.service.results import report
 from sprag.service.results.choice import held
 from sprag.service.results.chosen_figures import CONTOUR
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import completed
-from sprag.service.results.quantities import SI
 from sprag.service.results.report.content import report_of
 from sprag.service.results.report.document import TitleBlock, today
 from sprag.worker import models
@@ -39,7 +39,7 @@ from sprag.worker.limits import MAX_STARTS
 
 if TYPE_CHECKING:
     from sprag.service.jobs.checks import Library
-    from sprag.service.results.reading import Choice
+    from sprag.service.reading.reader import Choice
     from sprag.service.storage.records import StudyRecord
     from sprag.worker.study import Study
 

@@ -20,8 +20,8 @@ from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
-from sprag.service.results.reading import Reading
-from sprag.service.spec.catalogue import unit_of
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.reader import Reading
 from sprag.service.spec.fields import WHICH_CASES
 from sprag.service.spec.stored import accepted
 from sprag.worker import models

@@ -19,7 +19,7 @@ from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.jobs import answers
-from sprag.service.spec.catalogue import unit_of
+from sprag.service.reading.catalogue import unit_of
 from sprag.worker import models
 
 if TYPE_CHECKING:

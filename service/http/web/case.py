@@ -22,17 +22,17 @@ from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.jobs.reading import reading_of
 from sprag.service.languages import _
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.phrases import meanings, shown
+from sprag.service.reading.wording import number
 from sprag.service.results import trajectories
 from sprag.service.results.defaults import main_results
-from sprag.service.results.phrases import meanings, shown
 from sprag.service.results.pictures.curves import draw_motion
 from sprag.service.results.portraits import require_strobes
 from sprag.service.results.regimes import ORDER, motion_sentence
 from sprag.service.results.selection import axis_name, own_paths
 from sprag.service.results.start_states import check_start
 from sprag.service.results.sweeps import direction_texts
-from sprag.service.results.wording import number
-from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 from sprag.worker.codes import PENDING
 from sprag.worker.models.starts import motion_of

@@ -11,6 +11,7 @@ from fastapi import Request
 from starlette.responses import Response
 
 from sprag.service.answers.differing import MOST_COMPARED, common_axes, unique_names
+from sprag.service.faults import SelectionError, refused
 from sprag.service.formats import MEDIA_TYPES
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx
@@ -24,6 +25,8 @@ from sprag.service.http.web.saved_views import saved_here
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended, Work
 from sprag.service.jobs.reading import reading_of
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.reader import reading_for
 from sprag.service.results.choice import held
 from sprag.service.results.curve_cases import draw, select
 from sprag.service.results.curves import CurveQuery, Curves
@@ -34,9 +37,6 @@ from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.read import read_figure
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.pictures.curves import draw_compare
-from sprag.service.results.reading import reading_for
-from sprag.service.results.selection import SelectionError, refused
-from sprag.service.spec.catalogue import unit_of
 from sprag.service.storage.errors import StudyNotFoundError
 from sprag.service.storage.listing import StudyFilter
 from sprag.worker import models
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
     from starlette.datastructures import QueryParams
 
-    from sprag.service.results.reading import Choice, Reading
+    from sprag.service.reading.reader import Choice, Reading
     from sprag.service.storage.records import StudyRecord
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study

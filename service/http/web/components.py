@@ -21,7 +21,8 @@ from sprag.service.http.work import Attended
 from sprag.service.jobs import checks
 from sprag.service.json_text import to_bytes
 from sprag.service.languages import N_
-from sprag.service.results.wording import words
+from sprag.service.reading.units import example
+from sprag.service.reading.wording import words
 from sprag.service.spec.components import (
     CHARACTERISTICS,
     COEFFICIENTS,
@@ -31,7 +32,6 @@ from sprag.service.spec.components import (
     needed,
     require_component,
 )
-from sprag.service.spec.units import example
 from sprag.service.storage.errors import ComponentNotFoundError
 from sprag.worker.limits import MAX_COMPONENTS
 

@@ -9,6 +9,7 @@ from urllib.parse import urlencode
 from fastapi import Request
 from starlette.responses import RedirectResponse, Response
 
+from sprag.service.faults import SelectionError, refused
 from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.drawing import Drawing, conditional
@@ -27,7 +28,6 @@ from sprag.service.jobs.batch_answers import RibbonQuery, YieldQuery
 from sprag.service.jobs.reading import reading_of
 from sprag.service.results.choice import held
 from sprag.service.results.defaults import drawn_results, main_query
-from sprag.service.results.selection import SelectionError, refused
 from sprag.service.results.tolerances.batch import Asked
 from sprag.service.results.tolerances.conditions import first_condition
 from sprag.service.results.tolerances.ribbons import MOST_QUANTILES, QUANTILES
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from starlette.datastructures import QueryParams
 
     from sprag.service.answers.tolerances import RibbonReport, YieldReport
-    from sprag.service.results.reading import Choice
+    from sprag.service.reading.reader import Choice
     from sprag.service.storage.records import StudyRecord
     from sprag.worker.study import Study
 

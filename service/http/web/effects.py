@@ -8,6 +8,7 @@ from urllib.parse import urlencode
 from fastapi import Query, Request
 from starlette.responses import RedirectResponse, Response
 
+from sprag.service.faults import SelectionError
 from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.drawing import Drawing, conditional, picture
@@ -21,7 +22,6 @@ from sprag.service.jobs import sensitivities
 from sprag.service.languages import N_
 from sprag.service.results.defaults import drawn_results, varying_axes
 from sprag.service.results.pictures.sensitivity import MOST_RESULTS
-from sprag.service.results.selection import SelectionError
 from sprag.worker import models
 
 if TYPE_CHECKING:

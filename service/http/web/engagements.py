@@ -10,8 +10,8 @@ from sprag.service.http.threads import in_thread
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
+from sprag.service.reading.phrases import meanings
 from sprag.service.results.engagements import require_clutches
-from sprag.service.results.phrases import meanings
 from sprag.worker import models
 from sprag.worker.models.starts import motion_of
 

@@ -9,7 +9,7 @@ from urllib.parse import urlencode
 from starlette.datastructures import QueryParams
 from starlette.responses import Response
 
-from sprag.service.faults import ParameterFault, shown
+from sprag.service.faults import ParameterFault, SelectionError, shown
 from sprag.service.http import views
 from sprag.service.http.context import Context, StudyId
 from sprag.service.http.drawing import Drawing, conditional
@@ -28,13 +28,13 @@ from sprag.service.jobs.answers import FEW
 from sprag.service.jobs.explore import explored, selection_spec
 from sprag.service.jobs.reading import reading_of
 from sprag.service.languages import _
+from sprag.service.reading.numbers import parse_number
+from sprag.service.reading.phrases import meanings
+from sprag.service.reading.reader import Choice, Reading
+from sprag.service.reading.together import with_last_unit
 from sprag.service.results.explore import ROWS, ExploreQuery, explored_json, plan_of, quantities
 from sprag.service.results.figures.explore import chosen_pair
-from sprag.service.results.phrases import meanings
-from sprag.service.results.reading import Choice, Reading
-from sprag.service.results.selection import SelectionError, own_paths
-from sprag.service.spec.numbers import parse_number
-from sprag.service.spec.together import with_last_unit
+from sprag.service.results.selection import own_paths
 from sprag.worker import models
 from sprag.worker.limits import MAX_SELECTED
 

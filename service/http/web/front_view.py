@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.service.faults import SelectionError
 from sprag.service.results.figures.front import chosen, quantities
 from sprag.service.results.fronts import design_json, front_json
-from sprag.service.results.selection import SelectionError
 from sprag.worker import models
 
 if TYPE_CHECKING:

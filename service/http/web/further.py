@@ -20,7 +20,7 @@ from sprag.service.http.web.study import shown_study
 from sprag.service.http.work import Attended
 from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
-from sprag.service.spec.numbers import parse_number
+from sprag.service.reading.numbers import parse_number
 from sprag.worker.limits import MAX_PRIORITY
 
 if TYPE_CHECKING:

@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 from starlette.datastructures import QueryParams
 
+from sprag.service.faults import SelectionError
+from sprag.service.reading.catalogue import unit_of
 from sprag.service.results.defaults import MOST_CHOICES
-from sprag.service.results.selection import SelectionError, value_of
-from sprag.service.spec.catalogue import unit_of
+from sprag.service.results.selection import value_of
 from sprag.worker.sweeps import DIRECTIONS, SWEEP
 
 if TYPE_CHECKING:
-    from sprag.service.results.reading import Reading
+    from sprag.service.reading.reader import Reading
     from sprag.worker.study import Study
 
 #: Beginning of the name of a field with the value of an axis that has too many to choose from.

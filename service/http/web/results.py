@@ -8,6 +8,7 @@ from urllib.parse import urlencode
 from fastapi import Query, Request
 from starlette.responses import RedirectResponse, Response
 
+from sprag.service.faults import SelectionError
 from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.drawing import Columns, Drawing, conditional, placed
@@ -23,6 +24,7 @@ from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.jobs.answers import FEW
 from sprag.service.languages import N_, _
+from sprag.service.reading.catalogue import unit_of
 from sprag.service.results.choice import (
     Address,
     MapQuery,
@@ -37,8 +39,6 @@ from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import varying_axes
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.refined_maps import map_plan
-from sprag.service.results.selection import SelectionError
-from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 from sprag.worker.models.starts import has_starts
 

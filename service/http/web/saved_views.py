@@ -9,7 +9,7 @@ from urllib.parse import urlencode
 
 from starlette.responses import RedirectResponse, Response
 
-from sprag.service.faults import choice_of
+from sprag.service.faults import SelectionError, choice_of
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx
 from sprag.service.http.language import language_pairs
@@ -20,7 +20,6 @@ from sprag.service.jobs.saved_views import change_view, save_view
 from sprag.service.languages import N_, _
 from sprag.service.results.choice import Address, MapQuery, pairs_of
 from sprag.service.results.chosen_figures import figure_query
-from sprag.service.results.selection import SelectionError
 from sprag.service.spec.saved_views import FIGURES, read_view, read_view_change
 from sprag.worker.limits import MAX_NAME_LENGTH, MAX_REPORT_FIGURES
 

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Final
 from fastapi import Request
 from starlette.responses import Response
 
+from sprag.service.faults import SelectionError, refused
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.numbers import parse_number
 from sprag.service.results.directions import case_values
-from sprag.service.results.selection import SelectionError, own_paths, refused
-from sprag.service.spec.catalogue import unit_of
-from sprag.service.spec.numbers import parse_number
+from sprag.service.results.selection import own_paths
 from sprag.worker import models
 
 if TYPE_CHECKING:

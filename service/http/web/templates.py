@@ -25,10 +25,10 @@ from sprag.service.http.web.explained import explained
 from sprag.service.http.web.script_texts import translated_texts
 from sprag.service.languages import N_, recorded
 from sprag.service.languages.ranges import allowed_text
+from sprag.service.reading.phrases import Phrase, model_title, shown, titled, word
+from sprag.service.reading.reader import CLUTCH
+from sprag.service.reading.wording import counted, duration, number, symbol, typed_text, unit_text
 from sprag.service.results.fault_texts import fault_text, warning_text
-from sprag.service.results.phrases import Phrase, model_title, shown, titled, word
-from sprag.service.results.reading import CLUTCH
-from sprag.service.results.wording import counted, duration, number, symbol, typed_text, unit_text
 from sprag.service.schedules.times import wall_clock
 from sprag.worker.models import WarningText
 

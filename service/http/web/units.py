@@ -12,8 +12,8 @@ from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.templates import page
 from sprag.service.http.web.way_in import within
 from sprag.service.languages import N_
-from sprag.service.results.quantities import KINDS, SI, TYPED, read_units
-from sprag.service.results.reading import CAPTIONS, CODES, Choice
+from sprag.service.reading.quantities import KINDS, SI, TYPED, read_units
+from sprag.service.reading.reader import CAPTIONS, CODES, Choice
 
 router = page_router()
 

@@ -17,7 +17,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from sprag.service.json_text import timestamp, to_bytes
 from sprag.service.languages import ENGLISH, N_, _, current, grouped, language, ngettext
 from sprag.service.languages.recorded import said
-from sprag.service.results.phrases import shown, term
+from sprag.service.reading.phrases import shown, term
 from sprag.service.schedules.outcomes import Outcome
 from sprag.service.schedules.times import wall_clock
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 from sprag.service.answers import filled
 from sprag.service.answers.schedules import LateRun as LateRunAnswer
 from sprag.service.languages import recorded
-from sprag.service.results.phrases import Phrase
+from sprag.service.reading.phrases import Phrase
 from sprag.service.schedules.times import local_time, wall_clock
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from sprag.service.languages import N_
-from sprag.service.spec.catalogue import unit_of
+from sprag.service.reading.catalogue import unit_of
 from sprag.service.spec.machine.registry import part_of
 from sprag.worker.models.parameters import parameter_of
 from sprag.worker.spread import DRIVE

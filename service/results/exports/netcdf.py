@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag.service.formats import NAME_ATTRIBUTE
+from sprag.service.reading.catalogue import unit_of
 from sprag.service.results.exports.inputs import column_description, description_of
 from sprag.service.results.exports.source import machine
 from sprag.service.results.exports.spool import require_room, spooled
-from sprag.service.spec.catalogue import unit_of
 from sprag.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, flags_mask
 from sprag.worker.derived import blocks
 from sprag.worker.sweeps import DIRECTIONS, DOWN, SWEEP, UP

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.quantities import SI, Units, units_for
 from sprag.service.results.directions import value_columns
 from sprag.service.results.exports.inputs import choices, defaults
-from sprag.service.results.quantities import SI, Units, units_for
-from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.fields import TOLERANCE_FIELDS
 from sprag.worker import models
 from sprag.worker.ports import StoreError

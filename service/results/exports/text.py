@@ -8,16 +8,16 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from sprag.service.json_text import to_bytes
+from sprag.service.reading.catalogue import unit_of
 from sprag.service.results.directions import value_columns
 from sprag.service.results.exports.source import machine
-from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.csv_text import escape
 
 if TYPE_CHECKING:
     from sprag.service.answers import Value
     from sprag.service.answers.results import Case
+    from sprag.service.reading.quantities import Units
     from sprag.service.results.exports.source import Source
-    from sprag.service.results.quantities import Units
     from sprag.service.storage.records import CaseRow, RowBlock
     from sprag.worker.study import Study
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from sprag.service.reading.phrases import Amount, Phrase
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.figure import Figure, Note, NoteKind, Panel
-from sprag.service.results.phrases import Amount, Phrase
 
 if TYPE_CHECKING:
     from sprag.service.results.key_answers import Found, StudyAnswers

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sprag.service.reading.phrases import Amount, Phrase, joined, plural
+from sprag.service.reading.wording import number
 from sprag.service.results.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.results.phrases import Amount, Phrase, joined, plural
-from sprag.service.results.wording import number
 
 if TYPE_CHECKING:
     from sprag.worker.models import Basin

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.phrases import Amount, Phrase, joined, plural, term
 from sprag.service.results.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.results.phrases import Amount, Phrase, joined, plural, term
 from sprag.service.results.selection import axis_name
-from sprag.service.spec.catalogue import unit_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.phrases import Phrase, joined
+from sprag.service.reading.wording import number
 from sprag.service.results.figures.figure import Figure, Line, Panel, Quantity, line_colours
-from sprag.service.results.phrases import Phrase, joined
-from sprag.service.results.wording import number
-from sprag.service.spec.catalogue import unit_of
 from sprag.worker.planning.calibrate.candidates import along, groups
 
 if TYPE_CHECKING:

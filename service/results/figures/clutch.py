@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.reading.phrases import Phrase
+from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.results.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.results.phrases import Phrase
-from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker import models
 
 if TYPE_CHECKING:

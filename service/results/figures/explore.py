@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.service.faults import refused
+from sprag.service.reading.phrases import Phrase, plural
 from sprag.service.results.explore import quantities
 from sprag.service.results.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.results.phrases import Phrase, plural
-from sprag.service.results.selection import listed, refused
+from sprag.service.results.selection import listed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.service.faults import refused
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.phrases import Name, Phrase, plural
 from sprag.service.results.figures.figure import PALETTE, Figure, Line, Panel, Quantity
 from sprag.service.results.fronts import history
-from sprag.service.results.phrases import Name, Phrase, plural
-from sprag.service.results.selection import refused
-from sprag.service.spec.catalogue import unit_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.languages import gettext
-from sprag.service.results.phrases import titled
-from sprag.service.results.wording import symbol
+from sprag.service.reading.phrases import titled
+from sprag.service.reading.wording import symbol
 from sprag.worker.models import machine_shaft
 
 if TYPE_CHECKING:

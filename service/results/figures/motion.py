@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.service.reading.phrases import Phrase, joined, part_label
+from sprag.service.reading.wording import words
 from sprag.service.results.figures.figure import NEUTRAL, PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.results.phrases import Phrase, joined, part_label
-from sprag.service.results.wording import words
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

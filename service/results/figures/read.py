@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from sprag.service.results.figures.figure import Quantity
 
 if TYPE_CHECKING:
+    from sprag.service.reading.reader import Reading
     from sprag.service.results.curves import Map
     from sprag.service.results.figures.figure import Band, Figure, Fill, Line, Marks, Note, Panel
-    from sprag.service.results.reading import Reading
 
 
 def read_figure(figure: Figure, reading: Reading) -> Figure:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.service.faults import refused
+from sprag.service.reading.phrases import Name, Phrase, joined, plural
 from sprag.service.results.curves import Map
 from sprag.service.results.figures.figure import Figure, Fill, Line, Panel, Quantity, line_colours
-from sprag.service.results.phrases import Name, Phrase, joined, plural
-from sprag.service.results.selection import refused
 from sprag.service.results.sweeps import values_text
 from sprag.service.results.tolerances.written import percent
 from sprag.worker.models import ResultInfo

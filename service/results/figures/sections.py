@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.phrases import Name, Phrase, joined, part_label, term
+from sprag.service.reading.wording import number
 from sprag.service.results.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.results.phrases import Name, Phrase, joined, part_label, term
 from sprag.service.results.regimes import MARKS
 from sprag.service.results.selection import axis_name
-from sprag.service.results.wording import number
-from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 
 if TYPE_CHECKING:

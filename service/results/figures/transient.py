@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.service.reading.phrases import Phrase
 from sprag.service.results.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.results.phrases import Phrase
 
 if TYPE_CHECKING:
     from sprag.worker.models.transients import Transient

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
+from sprag.service.reading.phrases import Phrase
 from sprag.service.results.figures.figure import Figure, Line, Panel, Quantity
 from sprag.service.results.figures.motion import motion_figure
-from sprag.service.results.phrases import Phrase
 
 if TYPE_CHECKING:
     from sprag.worker.models import Presentation, Trajectory

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 
+from sprag.service.faults import refused
 from sprag.service.results.figures.basin import basin_figure
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.motion import motion_figure
@@ -37,16 +38,15 @@ from sprag.service.results.pictures.text import (
     writer_of,
 )
 from sprag.service.results.regimes import MARKS
-from sprag.service.results.selection import refused
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from sprag.service.reading.reader import Reading
     from sprag.service.results.curves import Curves
     from sprag.service.results.figures.figure import Figure as Described
     from sprag.service.results.figures.figure import Line, Marks, Panel
-    from sprag.service.results.reading import Reading
     from sprag.worker.models import Basin, Portrait, Presentation, Trajectory
 
 Picture = Literal["svg", "png", "pdf"]

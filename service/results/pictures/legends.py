@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Literal
 
+from sprag.service.reading.phrases import shown
 from sprag.service.results.figures.figure import BANDS, NOTES, PALETTE, shortened
 from sprag.service.results.figures.orders import motion_text
-from sprag.service.results.phrases import shown
 from sprag.service.results.pictures.text import quantity_label, writable
 from sprag.service.results.regimes import MARKS
 

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.reading.phrases import Phrase, plural, shown
 from sprag.service.results.figures.curves import doubtful_marks, map_quantities
 from sprag.service.results.figures.orders import TITLE, OrderMap, map_edges, motion_text, order_map
-from sprag.service.results.phrases import Phrase, plural, shown
 from sprag.service.results.pictures.curves import (
     MAX_PICTURE_POINTS,
     Picture,

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.languages import _
+from sprag.service.reading.wording import number
 from sprag.service.results.pictures.curves import Picture, check_size, head, legend_above, render
 from sprag.service.results.pictures.text import axis_label, wrapped
-from sprag.service.results.wording import number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from sprag.service.results.reading import Reading
+    from sprag.service.reading.reader import Reading
     from sprag.service.results.sensitivity import Sensitivity
     from sprag.service.results.sensitivity_indices import Pair
 

@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Final, Literal
 
 from sprag.service.languages import decimal, gettext
-from sprag.service.results.wording import unit_text
+from sprag.service.reading.wording import unit_text
 from sprag.worker.pool.child_process import uncounted
 
 if TYPE_CHECKING:

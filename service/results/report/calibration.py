@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.phrases import Amount, Name, Phrase, joined
 from sprag.service.results.calibration import calibration_of
 from sprag.service.results.figures.calibration import calibration_figure
-from sprag.service.results.phrases import Amount, Name, Phrase, joined
 from sprag.service.results.report.drives import DrivesPart
-from sprag.service.spec.catalogue import unit_of
 from sprag.worker.planning.calibrate.plan import CALIBRATE
 
 if TYPE_CHECKING:

@@ -10,7 +10,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.faults import SelectionError
 from sprag.service.languages import _
+from sprag.service.reading.catalogue import axes_json
+from sprag.service.reading.phrases import model_title, shown
+from sprag.service.reading.quantities import TYPED
+from sprag.service.reading.reader import Choice, Reading, reading_for
 from sprag.service.results.chosen_figures import ChosenFigure, chosen_figures
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import Curves, Fetch, Map
@@ -23,11 +28,8 @@ from sprag.service.results.figures.clutch import clutch_figure
 from sprag.service.results.fronts import goal_units
 from sprag.service.results.key_answer_words import answer_facts, curve_name, note_of, said_title
 from sprag.service.results.key_answers import answers_query, find_answers
-from sprag.service.results.phrases import model_title, shown
 from sprag.service.results.pictures.curves import require_drawable
 from sprag.service.results.pictures.sensitivity import MOST_RESULTS
-from sprag.service.results.quantities import TYPED
-from sprag.service.results.reading import Choice, Reading, reading_for
 from sprag.service.results.refined import curve_plan
 from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.regimes import counted
@@ -35,10 +37,8 @@ from sprag.service.results.report.calibration import calibration_part
 from sprag.service.results.report.drives import DrivesPart, drives_part
 from sprag.service.results.report.facts import facts_of
 from sprag.service.results.rounds import sentence
-from sprag.service.results.selection import SelectionError
 from sprag.service.results.sensitivity import Sensitivity, sensitivity
 from sprag.service.results.shown_inputs import run_settings
-from sprag.service.spec.catalogue import axes_json
 from sprag.worker import models
 
 if TYPE_CHECKING:

@@ -9,17 +9,17 @@ from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from sprag.service.languages import N_, _, date_format, pgettext
+from sprag.service.reading.phrases import lower_first, shown, term, titled, upper_first
+from sprag.service.reading.wording import number, unit_text
 from sprag.service.results.fault_texts import warning_text
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.read import read_figure, read_map
-from sprag.service.results.phrases import lower_first, shown, term, titled, upper_first
 from sprag.service.results.pictures.curves import draw_figure
 from sprag.service.results.pictures.maps import draw_map
 from sprag.service.results.pictures.sensitivity import draw_sensitivity
 from sprag.service.results.regimes import left_out
 from sprag.service.results.report.sketch import sketches
 from sprag.service.results.shown_inputs import choice_name, in_words
-from sprag.service.results.wording import number, unit_text
 
 if TYPE_CHECKING:
     from sprag.service.results.exports.inputs import Input

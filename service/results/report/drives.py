@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from sprag.service.faults import SelectionError
 from sprag.service.languages import decimal
+from sprag.service.reading.phrases import Amount, Name, Phrase, joined, plural
 from sprag.service.results.defaults import drawn_results
 from sprag.service.results.figures.ribbons import ribbon_figure
-from sprag.service.results.phrases import Amount, Name, Phrase, joined, plural
-from sprag.service.results.selection import SelectionError
 from sprag.service.results.tolerances.batch import Asked
 from sprag.service.results.tolerances.conditions import first_condition
 from sprag.service.results.tolerances.ribbons import QUANTILES, ribbon

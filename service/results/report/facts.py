@@ -9,8 +9,8 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from sprag.service.languages import _, date_format
-from sprag.service.results.phrases import model_title
-from sprag.service.results.wording import number
+from sprag.service.reading.phrases import model_title
+from sprag.service.reading.wording import number
 
 if TYPE_CHECKING:
     from datetime import datetime

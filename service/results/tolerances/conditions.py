@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from sprag.service.results.phrases import Amount, Name, Phrase, term
-from sprag.service.results.selection import listed, numeric_results, refuse_mixed_texts, refused
-from sprag.service.spec.catalogue import result_of
-from sprag.service.spec.numbers import in_language
-from sprag.service.spec.units import QuantityError, parse_quantity, plain_signs, split_quantity, to_float
+from sprag.service.faults import refused
+from sprag.service.reading.catalogue import result_of
+from sprag.service.reading.numbers import in_language
+from sprag.service.reading.phrases import Amount, Name, Phrase, term
+from sprag.service.reading.units import QuantityError, parse_quantity, plain_signs, split_quantity, to_float
+from sprag.service.results.selection import listed, numeric_results, refuse_mixed_texts
 from sprag.worker import models
 from sprag.worker.models.usable import against
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.service.faults import refused
 from sprag.service.results.curves import Fetch, Line
-from sprag.service.results.selection import numeric_results, refused
+from sprag.service.results.selection import numeric_results
 from sprag.service.results.tolerances.batch import Asked, Places, Rows, places_of, read
 from sprag.service.results.tolerances.causes import Causes, Matrix, causes_of
 from sprag.service.results.tolerances.quantiles import Quantiles, quantiles

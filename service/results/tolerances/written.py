@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from sprag.service.answers import filled
 from sprag.service.answers.results import ResultMeaning
 from sprag.service.json_text import numbers
+from sprag.service.reading.catalogue import unit_of
 from sprag.service.results import exports
-from sprag.service.spec.catalogue import unit_of
 
 if TYPE_CHECKING:
     from sprag.service.answers.tolerances import (

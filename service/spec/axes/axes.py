@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sprag.service.reading.texts import quantity_text
 from sprag.service.spec.axes.blocks import first_rows
 from sprag.service.spec.axes.values import PLANS, Plan, count_text
 from sprag.service.spec.described import Listed
 from sprag.service.spec.fields import read_object, read_one
 from sprag.service.spec.machine.machine import Machine
-from sprag.service.spec.report import Report, join, quantity_text
+from sprag.service.spec.report import Report, join
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_TIED_PATHS
 from sprag.worker.models import Parameter
 from sprag.worker.models.parameters import in_range

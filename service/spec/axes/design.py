@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 
+from sprag.service.reading.texts import quantity_text
 from sprag.service.spec.axes.axes import check_paths, expand, read_axes, read_axis
 from sprag.service.spec.axes.blocks import (
     Block,
@@ -31,7 +32,7 @@ from sprag.service.spec.axes.sample import read_sample
 from sprag.service.spec.axes.values import count_text
 from sprag.service.spec.described import Listed, choice
 from sprag.service.spec.fields import read_object
-from sprag.service.spec.report import Report, join, quantity_text
+from sprag.service.spec.report import Report, join
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_COLUMNS
 from sprag.worker.models.formulas import evaluate
 

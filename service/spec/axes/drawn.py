@@ -11,8 +11,8 @@ from sprag.service.spec.axes.axes import read_paths
 from sprag.service.spec.draws.described import DISTRIBUTION, read_measured, read_plus_minus
 from sprag.service.spec.draws.distributions import Distribution
 from sprag.service.spec.fields import read_number, read_object
+from sprag.service.spec.lists import refuse_mixed
 from sprag.service.spec.report import Report, join
-from sprag.service.spec.together import refuse_mixed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

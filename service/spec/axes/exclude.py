@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag.service.spec.fields import read_number, read_object
+from sprag.service.spec.lists import refuse_mixed
 from sprag.service.spec.report import Report, join
-from sprag.service.spec.together import refuse_mixed
 from sprag.worker.limits import MAX_AXIS_VALUES
 from sprag.worker.study import SAME_VALUE
 

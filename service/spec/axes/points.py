@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
+from sprag.service.reading.numbers import parse_number
+from sprag.service.reading.texts import shorten_text
+from sprag.service.reading.units import QuantityError, to_float
 from sprag.service.spec.axes.axes import read_paths
 from sprag.service.spec.axes.blocks import Block
 from sprag.service.spec.csv_text import read_csv, refuse_mixed_column
 from sprag.service.spec.fields import exact, read_object
-from sprag.service.spec.numbers import parse_number
-from sprag.service.spec.report import Report, join, shorten_text
+from sprag.service.spec.report import Report, join
 from sprag.service.spec.table_text import CsvRow, heading_of
-from sprag.service.spec.units import QuantityError, to_float
 from sprag.worker.limits import MAX_AXIS_VALUES, MAX_COLUMNS
 
 if TYPE_CHECKING:

@@ -18,8 +18,8 @@ from sprag.service.spec.described import Described, Listed, choice, named
 from sprag.service.spec.draws.correlations import read_correlations
 from sprag.service.spec.draws.unit import cases_of, correlated, unit_sample
 from sprag.service.spec.fields import read_number, read_object
+from sprag.service.spec.lists import refuse_mixed
 from sprag.service.spec.report import Report, join
-from sprag.service.spec.together import refuse_mixed
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES
 from sprag.worker.planning.goals.draws import exponential, logarithm
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.reading.units import QuantityError, parse_exact, to_float
 from sprag.service.spec.fields import read_exact, read_number, read_whole
+from sprag.service.spec.lists import read_list_text, read_together
 from sprag.service.spec.report import Report, join
-from sprag.service.spec.together import read_list_text, read_together
-from sprag.service.spec.units import QuantityError, parse_exact, to_float
 from sprag.worker.limits import MAX_AXIS_VALUES
 from sprag.worker.models import Parameter
 from sprag.worker.models.parameters import in_range

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.service.reading.together import split_list
+from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.spec.described import Described, Listed, choice, named
 from sprag.service.spec.draws.distributions import SIGMAS
 from sprag.service.spec.fields import read_number
+from sprag.service.spec.lists import read_list_text, read_together
 from sprag.service.spec.report import Report, join
 from sprag.service.spec.shares import in_percent
-from sprag.service.spec.together import read_list_text, read_together, split_list
-from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker.limits import MAX_CORRELATIONS, MAX_DRIVES, MAX_TOLERANCES
 
 if TYPE_CHECKING:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.reading.together import AMBIGUOUS_UNIT, question
 from sprag.service.spec.draws.correlations import read_correlations
 from sprag.service.spec.draws.described import (
     DISTRIBUTION,
@@ -24,7 +25,6 @@ from sprag.service.spec.draws.distributions import Distribution
 from sprag.service.spec.draws.unit import correlated, unit_sample
 from sprag.service.spec.fields import TOLERANCE_FIELDS, read_object
 from sprag.service.spec.report import Report, join
-from sprag.service.spec.together import AMBIGUOUS_UNIT, question
 from sprag.worker.derived import blocks, involved
 from sprag.worker.limits import MAX_AXIS_VALUES, MAX_CASES, MAX_TOLERANCES
 from sprag.worker.models.parameters import in_range, parameter_of

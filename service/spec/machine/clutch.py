@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sprag.service.reading.texts import quantity_text
 from sprag.service.spec.described import FIT, Listed
-from sprag.service.spec.fields import missing, placed, read_number, read_object
-from sprag.service.spec.report import Report, join, quantity_text
-from sprag.service.spec.together import read_together
+from sprag.service.spec.fields import missing, read_number, read_object
+from sprag.service.spec.lists import read_together
+from sprag.service.spec.report import Report, join
 from sprag.worker import models
 from sprag.worker.limits import MAX_CLUTCH_LAWS, MAX_CLUTCH_ROWS
 from sprag.worker.models import CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, Parameter
+from sprag.worker.models.parameters import placed
 
 if TYPE_CHECKING:
     from sprag.worker.models import ClutchFit

@@ -7,11 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from sprag.service.reading.texts import did_you_mean
 from sprag.service.spec.described import Listed
-from sprag.service.spec.fields import placed, read_number, read_object, read_parameters
+from sprag.service.spec.fields import read_number, read_object, read_parameters
 from sprag.service.spec.machine.clutch import Clutch, read_clutch
 from sprag.service.spec.machine.machine import Machine
-from sprag.service.spec.report import Report, did_you_mean, join
+from sprag.service.spec.report import Report, join
 from sprag.worker.models import (
     MAX_COEFFICIENTS,
     MAX_PENDULUMS,
@@ -20,6 +21,7 @@ from sprag.worker.models import (
     Parameter,
     parameter_catalogue,
 )
+from sprag.worker.models.parameters import placed
 
 if TYPE_CHECKING:
     from sprag.worker.models import ClutchFit

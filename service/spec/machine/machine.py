@@ -10,8 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from sprag.service.reading.texts import did_you_mean
 from sprag.service.spec.fields import missing, read_number, read_object
-from sprag.service.spec.report import Report, did_you_mean, join
+from sprag.service.spec.report import Report, join
 
 if TYPE_CHECKING:
     from sprag.worker.models import ClutchFit, Parameter

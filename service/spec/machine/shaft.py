@@ -10,8 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from sprag.service.reading.texts import did_you_mean
 from sprag.service.spec.described import choice
 from sprag.service.spec.fields import read_object
+from sprag.service.spec.lists import refuse_mixed
 from sprag.service.spec.machine.machine import Machine, read_numbers
 from sprag.service.spec.machine.shaft_check import check_machine
 from sprag.service.spec.machine.shaft_drive import read_balance, read_drive
@@ -23,8 +25,7 @@ from sprag.service.spec.machine.shaft_parts import (
     read_operation,
     read_parts,
 )
-from sprag.service.spec.report import Report, did_you_mean, join
-from sprag.service.spec.together import refuse_mixed
+from sprag.service.spec.report import Report, join
 from sprag.worker import models
 from sprag.worker.models import machine_shaft
 from sprag.worker.models.parameters import model_parameter

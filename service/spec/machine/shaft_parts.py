@@ -7,11 +7,11 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.spec.described import Described, Listed, choice, named
 from sprag.service.spec.fields import read_number, read_object, read_one
 from sprag.service.spec.machine.shaft_tables import read_csv_rows
 from sprag.service.spec.report import Report, join
-from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker import models
 from sprag.worker.models import Parameter, machine_shaft
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from typing import Final
 
+from sprag.service.reading.numbers import is_ambiguous, parse_number
+from sprag.service.reading.units import AmbiguousCommaError, QuantityError, has_unit, parse_exact, to_float
 from sprag.service.spec.csv_text import read_csv, refuse_mixed_column
 from sprag.service.spec.fields import exact
-from sprag.service.spec.numbers import is_ambiguous, parse_number
 from sprag.service.spec.report import Report
 from sprag.service.spec.table_text import heading_of
-from sprag.service.spec.units import AmbiguousCommaError, QuantityError, has_unit, parse_exact, to_float
 from sprag.worker.models import Parameter, machine_shaft
 
 #: The end of a heading that may be a unit: ``angle_deg``, ``angle deg``, ``angle / deg``.

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from sprag.service.reading.catalogue import result_of, unknown_result
+from sprag.service.reading.texts import quantity_text
+from sprag.service.reading.units import QuantityError, example, parse_quantity
 from sprag.service.spec.axes.axes import read_paths
-from sprag.service.spec.catalogue import result_of, unknown_result
 from sprag.service.spec.fields import read_number
-from sprag.service.spec.report import Report, join, quantity_text
-from sprag.service.spec.together import refuse_mixed
-from sprag.service.spec.units import QuantityError, example, parse_quantity
+from sprag.service.spec.lists import refuse_mixed
+from sprag.service.spec.report import Report, join
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

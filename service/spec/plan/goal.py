@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.service.reading.texts import did_you_mean
 from sprag.service.spec.axes.axes import check_paths, expand
 from sprag.service.spec.axes.values import plan_values
 from sprag.service.spec.described import Described, Listed, choice, named
 from sprag.service.spec.fields import read_number, read_object, read_one
+from sprag.service.spec.lists import refuse_mixed
 from sprag.service.spec.plan.fields import read_ends, read_path_of, read_result, read_value
 from sprag.service.spec.plan.robust import ROBUST, YIELD, check_drives, read_quantile, refuse_beside_yield
-from sprag.service.spec.report import Report, did_you_mean, join
+from sprag.service.spec.report import Report, join
 from sprag.service.spec.shares import in_percent, read_share
-from sprag.service.spec.together import refuse_mixed
 from sprag.worker.limits import MAX_PLANNED_CASES
 
 if TYPE_CHECKING:

@@ -7,13 +7,14 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from sprag.service.spec.catalogue import result_of
+from sprag.service.reading.catalogue import result_of
+from sprag.service.reading.numbers import parse_number
+from sprag.service.reading.texts import did_you_mean, shorten_text
+from sprag.service.reading.units import QuantityError, parse_quantity, to_float
 from sprag.service.spec.csv_text import read_csv, refuse_mixed_column
 from sprag.service.spec.fields import exact
-from sprag.service.spec.numbers import parse_number
-from sprag.service.spec.report import Report, did_you_mean, shorten_text
+from sprag.service.spec.report import Report
 from sprag.service.spec.table_text import CsvRow, heading_of
-from sprag.service.spec.units import QuantityError, parse_quantity, to_float
 from sprag.worker.planning.calibrate.plan import MOST_MEASURED, Measured
 
 if TYPE_CHECKING:

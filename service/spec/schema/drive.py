@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN, schemas
-from sprag.service.spec.fields import placed
 from sprag.service.spec.machine.clutch import ACCURACY, COEFFICIENTS, ROWS
 from sprag.service.spec.machine.drive import PENDULUMS, START
 from sprag.service.spec.run import SETTLED_FIELDS, TIMED_FIELDS
@@ -19,6 +18,7 @@ from sprag.service.spec.schema.quantity import (
 )
 from sprag.worker import models
 from sprag.worker.models import CLUTCH_WINDUP_LIMIT, Parameter
+from sprag.worker.models.parameters import placed
 
 
 def drive_schema() -> Schema:

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
+from sprag.service.reading.units import example
 from sprag.service.spec.described import Listed
-from sprag.service.spec.units import example
 from sprag.worker.limits import MAX_QUANTITY_LENGTH
 from sprag.worker.models import Parameter
 

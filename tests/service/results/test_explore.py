@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sprag.service.faults import SelectionError
 from sprag.service.http.web.figures.linked import GRID, HEIGHT, TOP, linked
 from sprag.service.results.explore import ExploreQuery, explore, explored_json, histogram, plan_of
 from sprag.service.results.figures.explore import explore_figure
-from sprag.service.results.selection import SelectionError
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage.columns import RowColumns
 from sprag.worker import models

@@ -15,17 +15,17 @@ from sprag.service.faults import Fault
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.languages.elsewhere import speak
 from sprag.service.languages.ranges import allowed_text
+from sprag.service.reading.phrases import Amount, Phrase, joined, part_label, plural, shown, term, titled
+from sprag.service.reading.reader import CODES, Reading
+from sprag.service.reading.wording import typed_text, unit_text
 from sprag.service.results.fault_texts import fault_text, warning_text
 from sprag.service.results.figures.branch import special_text
 from sprag.service.results.figures.figure import Figure, Line, Note, Panel, Quantity
 from sprag.service.results.figures.orders import motion_text
 from sprag.service.results.figures.read import read_figure
 from sprag.service.results.key_answer_words import curve_named
-from sprag.service.results.phrases import Amount, Phrase, joined, part_label, plural, shown, term, titled
 from sprag.service.results.pictures.curves import draw_figure
-from sprag.service.results.reading import CODES, Reading
 from sprag.service.results.tolerances.conditions import read_conditions
-from sprag.service.results.wording import typed_text, unit_text
 from sprag.worker.models import ResultInfo, WarningText
 from sprag.worker.models.branches import BranchContact, SpecialPoint
 

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from sprag.service.faults import SelectionError
 from sprag.service.results.choice import Address, characteristic, curve_query, held
 from sprag.service.results.curve_cases import draw, select
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import completed, main_query, no_curves
 from sprag.service.results.key_answers import answers_query, find_answers
-from sprag.service.results.selection import SelectionError
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage.records import CaseColumns
 from sprag.worker import models

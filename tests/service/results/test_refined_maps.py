@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from sprag.service.cli.pictures import show_map
+from sprag.service.faults import SelectionError
 from sprag.service.http.web.figures.maps import map_figure
 from sprag.service.results.curve_cases import draw_map
 from sprag.service.results.curves import Map
@@ -18,7 +19,6 @@ from sprag.service.results.pictures.maps import draw_map as paint_map
 from sprag.service.results.report import write_report
 from sprag.service.results.report.content import report_of
 from sprag.service.results.report.document import TitleBlock
-from sprag.service.results.selection import SelectionError
 from sprag.worker import models
 from sprag.worker.study import Study
 from tests.service.conftest import API, Service

@@ -14,11 +14,11 @@ from SALib.sample import morris as morris_sample
 
 from sprag.service.answers import results
 from sprag.service.cli.pictures import _show_effects
+from sprag.service.faults import SelectionError
+from sprag.service.reading.wording import number as number_text
 from sprag.service.results.curves import Fetch
-from sprag.service.results.selection import SelectionError
 from sprag.service.results.sensitivity import sensitivity
 from sprag.service.results.unaffected import unaffected
-from sprag.service.results.wording import number as number_text
 from sprag.service.spec.draws.unit import LEVELS
 from sprag.service.storage.records import CaseColumns
 from sprag.worker import models

@@ -11,10 +11,10 @@ import pytest
 from sprag.service.cli.console import WrongInputError
 from sprag.service.cli.extend import _values
 from sprag.service.http.web.form.entries import list_of, plain
-from sprag.service.results.quantities import KINDS, read_units
+from sprag.service.reading.numbers import parse_number, settled
+from sprag.service.reading.quantities import KINDS, read_units
+from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
-from sprag.service.spec.numbers import parse_number, settled
-from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity
 from sprag.worker.models import model_names, parameter_catalogue
 from tests.service.spec_sample import parsed, problems
 

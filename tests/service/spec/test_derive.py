@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sprag.service.reading.units import parse_quantity
 from sprag.service.spec.document import SpecError, load_spec, parse_spec
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.longer import longer_spec
-from sprag.service.spec.units import parse_quantity
 from sprag.worker.models import machine_shaft
 from sprag.worker.study import Study
 from tests.service.spec_sample import changed, parsed, problems

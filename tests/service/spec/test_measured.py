@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from sprag.service.reading.units import parse_quantity
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
-from sprag.service.spec.units import parse_quantity
 
 
 def rows(text: str) -> list[list[float]]:

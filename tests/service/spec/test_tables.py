@@ -11,12 +11,12 @@ import pytest
 from sprag.service.faults import Fault
 from sprag.service.http.web.form.columns import COLUMNS, take_columns
 from sprag.service.http.web.form.fields import Choice
+from sprag.service.reading.units import parse_quantity
 from sprag.service.spec.components import list_text, read_components
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
 from sprag.service.spec.report import SpecError
 from sprag.service.spec.stored import accepted
-from sprag.service.spec.units import parse_quantity
 from tests.service.spec.machine.test_shaft import changed
 from tests.service.spec_sample import changed as drive_changed
 from tests.service.spec_sample import parsed

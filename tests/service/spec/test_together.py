@@ -17,10 +17,11 @@ from sprag.service.http.web.form.entries import list_of
 from sprag.service.http.web.form.shaft_spec import base_of
 from sprag.service.http.web.form.spec import spec_of, values_of
 from sprag.service.languages import language
+from sprag.service.reading.reader import Reading
+from sprag.service.reading.together import question, with_last_unit
 from sprag.service.results.branches import range_of
 from sprag.service.results.explore import ExploreQuery, plan_of
 from sprag.service.results.fault_texts import fault_text, warning_text
-from sprag.service.results.reading import Reading
 from sprag.service.results.selection import locate_values
 from sprag.service.results.tolerances.conditions import read_conditions
 from sprag.service.results.trajectories import span
@@ -28,7 +29,6 @@ from sprag.service.spec.components import faults_of
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.stored import accepted
-from sprag.service.spec.together import question, with_last_unit
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
 from tests.service.spec_sample import SPEC, changed, parsed, problems

@@ -23,17 +23,17 @@ from sprag.service.http.web.form.fields import Field, pendulum, refine_fields, r
 from sprag.service.http.web.form.spec import spec_of
 from sprag.service.languages import language
 from sprag.service.presets import preset_names, preset_text
-from sprag.service.results.quantities import KINDS
-from sprag.service.results.reading import Reading
-from sprag.service.results.wording import number, typed_text, unit_text
-from sprag.service.spec import units
+from sprag.service.reading import units
+from sprag.service.reading.numbers import in_language, parse_number
+from sprag.service.reading.quantities import KINDS
+from sprag.service.reading.reader import Reading
+from sprag.service.reading.units import QuantityError, measure, parse_quantity, split_quantity
+from sprag.service.reading.wording import number, typed_text, unit_text
 from sprag.service.spec.components import KINDS as COMPONENT_KINDS
 from sprag.service.spec.components import faults_of, fields_of
 from sprag.service.spec.document import format_of, load_spec
 from sprag.service.spec.machine.shaft_drive import MOTOR, STAGE
 from sprag.service.spec.machine.shaft_parts import MECHANISM_CHOICES
-from sprag.service.spec.numbers import in_language, parse_number
-from sprag.service.spec.units import QuantityError, measure, parse_quantity, split_quantity
 from sprag.worker import models
 from tests.service.spec_sample import changed
 

@@ -13,6 +13,7 @@ from sprag.service.jobs.key_answers import answers_of
 from sprag.service.jobs.reading import reading_of
 from sprag.service.json_text import to_bytes
 from sprag.service.languages import gettext
+from sprag.service.reading.wording import number
 from sprag.service.results.basins import basin_of, units_of
 from sprag.service.results.figures.answers import answers_figure
 from sprag.service.results.figures.basin import basin_figure
@@ -26,17 +27,16 @@ from sprag.service.results.figures.portrait import portrait_figure
 from sprag.service.results.figures.read import read_figure, read_map
 from sprag.service.results.figures.ribbons import ribbon_figure, yield_figure
 from sprag.service.results.key_answer_words import curve_name, curve_named
-from sprag.service.results.wording import number
 from sprag.worker import models
 
 if TYPE_CHECKING:
     from sprag.service.jobs.batch_answers import RibbonQuery, YieldQuery
     from sprag.service.jobs.checks import Library
+    from sprag.service.reading.reader import Choice, Reading
     from sprag.service.results.basins import BasinQuery
     from sprag.service.results.curves import CurveQuery
     from sprag.service.results.explore import ExploreQuery
     from sprag.service.results.figures.figure import Figure
-    from sprag.service.results.reading import Choice, Reading
     from sprag.worker.study import Study
 
 #: Times at which a motion is sampled for a picture.

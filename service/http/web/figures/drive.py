@@ -14,9 +14,9 @@ from sprag.worker import models
 from sprag.worker.models.turns import CaseTurn, case_turn
 
 if TYPE_CHECKING:
+    from sprag.service.reading.quantities import Units
+    from sprag.service.reading.reader import Reading
     from sprag.service.results.figures.figure import Figure
-    from sprag.service.results.quantities import Units
-    from sprag.service.results.reading import Reading
     from sprag.worker.models import Trajectory
     from sprag.worker.study import Study
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.results.wording import number
-from sprag.service.spec.units import parse_quantity
+from sprag.service.reading.units import parse_quantity
+from sprag.service.reading.wording import number
 from sprag.worker import models
 
 if TYPE_CHECKING:

@@ -16,10 +16,10 @@ from sprag.service.http.web.figures.plotly import (
 )
 from sprag.service.json_text import numbers
 from sprag.service.languages import gettext
+from sprag.service.reading.phrases import shown
+from sprag.service.reading.wording import unit_text
 from sprag.service.results.figures.curves import doubtful_marks, map_quantities
 from sprag.service.results.figures.orders import TITLE, OrderMap, map_edges, motion_text, order_map
-from sprag.service.results.phrases import shown
-from sprag.service.results.wording import unit_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -11,11 +11,11 @@ import numpy as np
 from sprag.service.http.web.figures.thinning import thin
 from sprag.service.json_text import numbers
 from sprag.service.languages import decimal, gettext
+from sprag.service.reading.phrases import shown
+from sprag.service.reading.wording import unit_text
 from sprag.service.results.figures.figure import BANDS, NEUTRAL, NOTES, PALETTE, shortened
 from sprag.service.results.figures.orders import motion_text
-from sprag.service.results.phrases import shown
 from sprag.service.results.regimes import MARKS
-from sprag.service.results.wording import unit_text
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -15,7 +15,7 @@ from sprag.worker import models
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from sprag.service.results.reading import Reading
+    from sprag.service.reading.reader import Reading
     from sprag.worker.models import Trajectory
     from sprag.worker.study import Study
 

@@ -17,22 +17,22 @@ from sprag.service.http.web.form.spec import WAYS, clutch_pointers, field_of, pe
 from sprag.service.jobs.preview import preview_json
 from sprag.service.languages import _, gettext
 from sprag.service.languages.ranges import allowed_text
+from sprag.service.reading.numbers import assumption, in_language, settle, settled
+from sprag.service.reading.quantities import TYPED
+from sprag.service.reading.reader import CLUTCH, Choice, Reading, reading_for
+from sprag.service.reading.units import QuantityError, parse_quantity
+from sprag.service.reading.wording import duration, unit_text
 from sprag.service.results.draft_words import draft_words
 from sprag.service.results.fault_texts import fault_text, warning_text
 from sprag.service.results.figures.linkage import Drawing, drawings
 from sprag.service.results.fits import fit_json
-from sprag.service.results.quantities import TYPED
-from sprag.service.results.reading import CLUTCH, Choice, Reading, reading_for
-from sprag.service.results.wording import duration, unit_text
 from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
 from sprag.service.spec.derive import with_values
 from sprag.service.spec.document import ParsedSpec, SpecError, load_spec, parse_spec
 from sprag.service.spec.machine.clutch import read_clutch
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
-from sprag.service.spec.numbers import assumption, in_language, settle, settled
 from sprag.service.spec.report import Report
 from sprag.service.spec.stored import accepted
-from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker.models import WarningText
 
 if TYPE_CHECKING:

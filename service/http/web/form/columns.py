@@ -11,8 +11,8 @@ from sprag.service.http.web.form.entries import Faults, Values
 from sprag.service.http.web.form.fields import Groups
 from sprag.service.http.web.form.parts import PARTS, count_of, drop
 from sprag.service.languages import ENGLISH, current, gettext
-from sprag.service.spec.numbers import WITHOUT_DOUBT, is_ambiguous, parse_number, question, settled
-from sprag.service.spec.report import did_you_mean
+from sprag.service.reading.numbers import WITHOUT_DOUBT, is_ambiguous, parse_number, question, settled
+from sprag.service.reading.texts import did_you_mean
 from sprag.service.spec.table_text import (
     MAX_HEADING,
     heading_of,

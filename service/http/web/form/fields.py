@@ -11,14 +11,14 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from sprag.service.languages import ENGLISH, N_, _, current
-from sprag.service.results.reading import Reading
-from sprag.service.results.wording import number, words
+from sprag.service.reading.reader import Reading
+from sprag.service.reading.units import example
+from sprag.service.reading.wording import number, words
 from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN, Described
-from sprag.service.spec.fields import placed
 from sprag.service.spec.plan import goal, refine
-from sprag.service.spec.units import example
 from sprag.worker import models
 from sprag.worker.models import Parameter
+from sprag.worker.models.parameters import placed
 
 #: The model that the form describes unless another is chosen.
 FORM_MODEL: Final = "vibration-drive"

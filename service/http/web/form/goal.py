@@ -19,8 +19,8 @@ from sprag.service.http.web.form.entries import (
 )
 from sprag.service.http.web.form.parts import PARTS, filled
 from sprag.service.languages import N_, _
+from sprag.service.reading.together import with_last_unit
 from sprag.service.spec.plan import goal
-from sprag.service.spec.together import with_last_unit
 
 #: What a search asks for in a form that was not about one.
 GOAL_DEFAULTS: Final[Values] = {

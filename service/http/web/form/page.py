@@ -61,8 +61,8 @@ from sprag.service.http.work import Attended, Work
 from sprag.service.jobs.submission import Submission, take_in
 from sprag.service.languages import gettext
 from sprag.service.presets import preset_names
+from sprag.service.reading.reader import Reading
 from sprag.service.results.places import place_text
-from sprag.service.results.reading import Reading
 from sprag.service.spec.design import design_spec
 from sprag.service.spec.document import UNNAMED
 from sprag.service.spec.report import SpecError

@@ -14,8 +14,8 @@ from typing import Any, Final
 from sprag.service.http.web.form.entries import count_in
 from sprag.service.http.web.form.fields import Choice, Field, Groups, described, field_for
 from sprag.service.languages import ENGLISH, N_, _, current
-from sprag.service.results.reading import Reading
-from sprag.service.results.wording import words
+from sprag.service.reading.reader import Reading
+from sprag.service.reading.wording import words
 from sprag.service.spec.described import Described
 from sprag.service.spec.machine.shaft import MEAN_SPEED_IS, read_shaft
 from sprag.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, FLYWHEEL, MOTOR, STAGE

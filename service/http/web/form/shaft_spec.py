@@ -9,10 +9,10 @@ from typing import Any, Final
 from sprag.service.http.web.form.entries import Faults, Values, plain, text_of
 from sprag.service.http.web.form.shaft import CONSTANTS, DRIVE, Entry, blocks, owners, parts_of, stages_of
 from sprag.service.languages import N_, _, gettext
+from sprag.service.reading.together import with_last_unit
+from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.spec.machine.shaft_drive import MOTOR
 from sprag.service.spec.machine.shaft_parts import MECHANISM_CHOICES
-from sprag.service.spec.together import with_last_unit
-from sprag.service.spec.units import QuantityError, parse_quantity
 
 _STEP: Final = (N_("from"), N_("to"), N_("value"))
 _PLACES: Final = {"angle": ("angle", "rad"), "stroke": ("fraction", "1"), "time": ("time", "s")}

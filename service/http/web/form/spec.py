@@ -38,14 +38,14 @@ from sprag.service.http.web.form.shaft_spec import base_of, field_of_base, value
 from sprag.service.http.web.form.tolerances import FIELDS as TOLERANT
 from sprag.service.http.web.form.tolerances import field_of_tolerance, tolerance_values, tolerances_of
 from sprag.service.languages import _
+from sprag.service.reading.printed import could_be_several
+from sprag.service.reading.together import with_last_unit
+from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.spec.axes.sweep import SWEPT
 from sprag.service.spec.derive import formulas_of, with_values
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
 from sprag.service.spec.plan import refine
-from sprag.service.spec.printed import could_be_several
 from sprag.service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
-from sprag.service.spec.together import with_last_unit
-from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker.models import MACHINE_SHAFT, MAX_PENDULUMS, SETTLED
 
 #: Fields of an axis for each way of giving its values.

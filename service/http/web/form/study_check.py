@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from datetime import datetime
 
-    from sprag.service.results.reading import Choice
+    from sprag.service.reading.reader import Choice
 
 
 def form(library: Library, values: Mapping[str, str], now: datetime, choice: Choice) -> Checked:

@@ -11,7 +11,7 @@ from sprag.service.http.web.form.entries import Values, count_in, list_of, list_
 from sprag.service.http.web.form.fields import Field, described, pendulum, sections
 from sprag.service.http.web.form.shaft import blocks, is_shaft
 from sprag.service.languages import _
-from sprag.service.results.wording import words
+from sprag.service.reading.wording import words
 from sprag.service.spec.draws.described import DISTRIBUTION, DRAWS
 from sprag.worker.models import MAX_PENDULUMS
 

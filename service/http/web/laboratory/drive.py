@@ -19,19 +19,19 @@ from sprag.service.http.web.laboratory.sliders import position
 from sprag.service.http.web.templates import fragment, page
 from sprag.service.http.work import Attended, Work
 from sprag.service.languages import N_
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.phrases import meanings, shown, term
+from sprag.service.reading.reader import Reading, reading_for
+from sprag.service.reading.wording import number
 from sprag.service.results.figures.read import read_figure
-from sprag.service.results.phrases import meanings, shown, term
 from sprag.service.results.pictures.curves import draw_figure
-from sprag.service.results.reading import Reading, reading_for
 from sprag.service.results.regimes import motion_sentence
-from sprag.service.results.wording import number
-from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from sprag.service.results.reading import Choice
+    from sprag.service.reading.reader import Choice
     from sprag.worker.study import Study
 
 router = page_router()

@@ -16,19 +16,18 @@ from sprag.service.http.web.form.own_machine import OWN, case_page, machine_of, 
 from sprag.service.http.web.laboratory.sliders import Slider, faults_by_field, is_own, quantity_text, scale, value_of
 from sprag.service.languages import N_, _
 from sprag.service.presets import preset_names
-from sprag.service.results.quantities import TYPED
-from sprag.service.results.reading import Choice, reading_for
-from sprag.service.results.wording import words
+from sprag.service.reading.quantities import TYPED
+from sprag.service.reading.reader import Choice, reading_for
+from sprag.service.reading.wording import words
 from sprag.service.spec.document import parse_spec
-from sprag.service.spec.fields import coefficient_unit
 from sprag.service.spec.report import SpecError
 from sprag.worker import models
-from sprag.worker.models.parameters import parameter_of
+from sprag.worker.models.parameters import coefficient_unit, parameter_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from sprag.service.results.reading import Reading
+    from sprag.service.reading.reader import Reading
     from sprag.worker.study import Study
 
 _PENDULUM: Final = re.compile(r"pendulums\.(\d+)\.")

@@ -23,11 +23,11 @@ from sprag.service.http.web.laboratory.setting import MOST_HELD, held_settings, 
 from sprag.service.http.web.laboratory.sliders import position
 from sprag.service.http.web.templates import fragment, page
 from sprag.service.http.work import Attended, Work
-from sprag.service.results.phrases import meanings
+from sprag.service.reading.phrases import meanings
+from sprag.service.reading.reader import Reading, reading_for
+from sprag.service.reading.wording import number
 from sprag.service.results.pictures.curves import draw_motion
-from sprag.service.results.reading import Reading, reading_for
 from sprag.service.results.trajectories import trajectory_csv
-from sprag.service.results.wording import number
 from sprag.worker import models
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from sprag.service.http.web.form.shaft import part_of
 from sprag.service.http.web.laboratory.sliders import quantity_text
 from sprag.service.languages import N_, _, gettext
 from sprag.service.languages.ranges import allowed_text
+from sprag.service.reading.numbers import parse_number
 from sprag.service.spec.document import parse_spec
-from sprag.service.spec.numbers import parse_number
 from sprag.service.spec.report import SpecError
 from sprag.worker.models.parameters import parameter_of
 

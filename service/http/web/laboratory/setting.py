@@ -18,12 +18,12 @@ from sprag.service.http.web.form.own_machine import case_page, machine_of, read_
 from sprag.service.http.web.form.shaft import group_of
 from sprag.service.http.web.laboratory.sliders import Slider, faults_by_field, in_order, is_own, slider_of
 from sprag.service.presets import preset_names
+from sprag.service.reading.quantities import TYPED
+from sprag.service.reading.reader import Choice, reading_for
+from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.results.figures.linkage import Drawing, drawings
-from sprag.service.results.quantities import TYPED
-from sprag.service.results.reading import Choice, reading_for
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.report import SpecError
-from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker import models
 from sprag.worker.models.parameters import parameter_of
 

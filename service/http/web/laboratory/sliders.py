@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Final
 from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.shaft import part_of
 from sprag.service.languages import N_, _
-from sprag.service.results.quantities import read_units
-from sprag.service.results.wording import words
-from sprag.service.spec.numbers import in_language, parse_number
-from sprag.service.spec.units import QuantityError, has_unit, parse_quantity, split_quantity
+from sprag.service.reading.numbers import in_language, parse_number
+from sprag.service.reading.quantities import read_units
+from sprag.service.reading.units import QuantityError, has_unit, parse_quantity, split_quantity
+from sprag.service.reading.wording import words
 from sprag.worker.models.parameters import parameter_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from sprag.service.results.reading import Choice, Reading
+    from sprag.service.reading.reader import Choice, Reading
     from sprag.service.spec.report import SpecError
     from sprag.worker.study import Study
 

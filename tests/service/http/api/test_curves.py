@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from sprag.service.answers import results
+from sprag.service.faults import SelectionError
 from sprag.service.http import respond
 from sprag.service.results.curve_cases import select
 from sprag.service.results.curves import CurveQuery
-from sprag.service.results.selection import SelectionError
 from sprag.worker import models
 from tests.service.shapes import fits
 

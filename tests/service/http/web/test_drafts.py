@@ -14,7 +14,7 @@ from sprag.service.http.web.form.page import reshape
 from sprag.service.http.web.form.spec import spec_of, values_of
 from sprag.service.http.web.form.undo import history_of, remember, undo
 from sprag.service.presets import preset_text
-from sprag.service.results.reading import Choice
+from sprag.service.reading.reader import Choice
 from sprag.service.spec.document import format_of, load_spec, parse_spec
 from sprag.worker.chunking import Chunking
 from tests.service.spec_sample import SPEC

@@ -21,8 +21,8 @@ from sprag.service.http.web.form.page import EMPTY_FORM, reshape, share_clutches
 from sprag.service.http.web.form.spec import field_of, spec_of, values_of, with_clutch_defaults
 from sprag.service.http.web.templates import duration, fragment, time_left
 from sprag.service.presets import preset_names, preset_text
-from sprag.service.results.reading import Reading
-from sprag.service.results.wording import number, symbol, unit_text
+from sprag.service.reading.reader import Reading
+from sprag.service.reading.wording import number, symbol, unit_text
 from sprag.service.spec.document import format_of, load_spec, parse_spec
 from sprag.worker import models
 from sprag.worker.chunking import Chunking

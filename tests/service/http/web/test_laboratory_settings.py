@@ -17,7 +17,7 @@ from sprag.service.http.web.figures.shaft import irregularities, machine_case
 from sprag.service.http.web.laboratory.drive_setting import setting as drive_setting
 from sprag.service.http.web.laboratory.questions import estimates, question_spec
 from sprag.service.http.web.laboratory.setting import MOST_HELD, held_settings, machines, setting
-from sprag.service.results.reading import Choice, Reading
+from sprag.service.reading.reader import Choice, Reading
 from sprag.service.spec.document import parse_spec
 from sprag.worker import models
 

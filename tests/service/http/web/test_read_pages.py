@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from sprag.service.results.wording import number
+from sprag.service.reading.wording import number
 from sprag.worker.models.vocabulary import caption
 from tests.service.calibrating import calibration
 from tests.service.conftest import Service

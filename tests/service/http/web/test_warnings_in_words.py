@@ -12,7 +12,7 @@ import pytest
 from sprag.service.faults import WarningCode
 from sprag.service.http.views import preset_of
 from sprag.service.languages import language
-from sprag.service.results.reading import Choice
+from sprag.service.reading.reader import Choice
 from sprag.service.results.report.content import report_of
 from sprag.service.results.report.document import TitleBlock, document_of
 from sprag.service.spec.document import parse_spec

@@ -10,13 +10,13 @@ from matplotlib.figure import Figure
 
 from sprag.service import languages
 from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.reading.phrases import shown as shown_text
 from sprag.service.results.curve_cases import draw, select
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.figure import PALETTE
 from sprag.service.results.figures.motion import motion_figure, phase_figure
 from sprag.service.results.figures.portrait import portrait_figure
-from sprag.service.results.phrases import shown as shown_text
 from sprag.service.results.pictures.curves import paint_figure, painting
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage.records import CaseColumns

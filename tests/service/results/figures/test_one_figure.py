@@ -16,9 +16,9 @@ from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.jobs import answers, key_answers
 from sprag.service.jobs.checks import Library
 from sprag.service.presets import preset_text
+from sprag.service.reading.reader import Choice
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.pictures.legends import MARKERS
-from sprag.service.results.reading import Choice
 from sprag.worker import models
 from tests.service.searching import search
 from tests.service.spec_sample import changed

@@ -11,6 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from sprag.service.reading.reader import Reading
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.figures.curves import curves_figure
@@ -18,7 +19,6 @@ from sprag.service.results.figures.figure import Quantity
 from sprag.service.results.figures.read import read_map
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.pictures import maps
-from sprag.service.results.reading import Reading
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage.records import CaseColumns
 from sprag.worker import models

@@ -15,13 +15,13 @@ import pytest
 
 from sprag.service.faults import FaultError
 from sprag.service.presets import preset_text
-from sprag.service.results.reading import Choice
+from sprag.service.reading.reader import Choice
+from sprag.service.reading.wording import number
 from sprag.service.results.report import write_report
 from sprag.service.results.report.content import ranges, report_of
 from sprag.service.results.report.document import Document, Image, Section, Table, Text, TitleBlock, document_of
 from sprag.service.results.report.pdf import pdf_report
 from sprag.service.results.report.sketch import sketches
-from sprag.service.results.wording import number
 from sprag.service.spec.document import load_spec, parse_spec
 from sprag.worker import models
 

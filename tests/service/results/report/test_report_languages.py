@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from sprag.service import languages
-from sprag.service.results.reading import Choice, reading_for
+from sprag.service.reading.reader import Choice, reading_for
 from sprag.service.results.shown_inputs import run_settings
 from sprag.service.spec.document import load_spec, parse_spec
 from tests.service.conftest import API

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
+from sprag.service.reading.units import parse_quantity
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.draws.unit import LEVELS, unit_sample
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
 from sprag.service.spec.report import SpecError
 from sprag.service.spec.schema.document import spec_schema
-from sprag.service.spec.units import parse_quantity
 from sprag.worker import models
 from sprag.worker.study import Study
 from tests.service.spec_sample import SPEC, changed, parsed, problems

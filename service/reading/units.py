@@ -20,10 +20,10 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from sprag.service.faults import Code
-from sprag.service.spec.cyrillic import latin
-from sprag.service.spec.numbers import is_ambiguous, with_point
-from sprag.service.spec.printed import keyboard
-from sprag.service.spec.unit_names import DEFINITIONS, TWO_PI, refusal, resolved
+from sprag.service.reading.cyrillic import latin
+from sprag.service.reading.numbers import is_ambiguous, with_point
+from sprag.service.reading.printed import keyboard
+from sprag.service.reading.unit_names import DEFINITIONS, TWO_PI, refusal, resolved
 from sprag.worker.limits import MAX_QUANTITY_LENGTH
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
 from sprag.service.languages import decimal
-from sprag.service.spec.printed import keyboard
+from sprag.service.reading.printed import keyboard
 
 #: A number at the beginning of a text: its digits with all their points and commas, and whether an exponent follows.
 _NUMBER: Final = re.compile(r"\s*[+\-\u2212]?([.,]?[0-9][0-9.,]*)([eE][+\-\u2212]?[0-9])?")

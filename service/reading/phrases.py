@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sprag.service.languages import ENGLISH, gettext, language, ngettext
-from sprag.service.results.wording import number, unit_text
+from sprag.service.reading.wording import number, unit_text
 from sprag.worker.models.model import model_of
 
 if TYPE_CHECKING:
-    from sprag.service.results.reading import Reading
+    from sprag.service.reading.reader import Reading
 
 
 @dataclass(frozen=True, slots=True)

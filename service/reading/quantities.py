@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.results.selection import refused
-from sprag.service.spec.catalogue import result_of, unit_of
-from sprag.service.spec.cyrillic import latin
-from sprag.service.spec.units import QuantityError, parse_quantity, plain_signs, split_quantity
+from sprag.service.faults import refused
+from sprag.service.reading.catalogue import result_of, unit_of
+from sprag.service.reading.cyrillic import latin
+from sprag.service.reading.units import QuantityError, parse_quantity, plain_signs, split_quantity
 from sprag.worker import models
 
 if TYPE_CHECKING:

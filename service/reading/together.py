@@ -8,19 +8,14 @@ the SI unit: beside quantities in units of another scale it is never guessed but
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from sprag.service.faults import Code
-from sprag.service.spec.cyrillic import latin
-from sprag.service.spec.numbers import assumption, settle, settled
-from sprag.service.spec.printed import could_be_values
-from sprag.service.spec.units import PERIOD_NAMES, QuantityError, measure, parse_exact, split_typed
-
-if TYPE_CHECKING:
-    from sprag.service.spec.report import Report
+from sprag.service.reading.cyrillic import latin
+from sprag.service.reading.units import PERIOD_NAMES, QuantityError, measure, parse_exact, split_typed
 
 #: Code of a bare number that could be in several units.
 AMBIGUOUS_UNIT: Final[Code] = "ambiguous-unit"
@@ -100,56 +95,6 @@ def questions(values: Sequence[object], units: Sequence[str]) -> list[Question]:
             message = f"has no unit beside values that have one: {number} {choice}?"
             asked.append(Question(place, message, ", ".join(f"{number} {name}" for name in names)))
     return asked
-
-
-def refuse_mixed(report: Report, items: Iterable[tuple[str, object]], unit: str | Sequence[str]) -> bool:
-    """Record a fault for each bare number beside quantities in units of another scale; whether there is one.
-
-    ``items`` are JSON Pointers with their values, ``unit`` is their SI unit, or that of each.
-    """
-    pairs = list(items)
-    units = [unit] * len(pairs) if isinstance(unit, str) else unit
-    asked = questions([value for _, value in pairs], units)
-    for one in asked:
-        pointer, value = pairs[one.place]
-        report.fault(pointer, AMBIGUOUS_UNIT, one.message, value, allowed=one.allowed, unit=units[one.place])
-    return bool(asked)
-
-
-def read_together(
-    report: Report, items: Sequence[tuple[str, object]], unit: str | Sequence[str]
-) -> list[object] | None:
-    """The items of one list or range, their texts with decimal points; None, and faults recorded, where one is unclear.
-
-    ``items`` are JSON Pointers with their values, ``unit`` is their SI unit, or that of each. Points that could
-    separate thousands and that no other item settles are decimal, with a warning.
-    """
-    if len(items) == 1 and isinstance(items[0][1], str) and could_be_values(items[0][1]):
-        message = "could be one value or several"
-        report.fault(items[0][0], "invalid-text", message, items[0][1], allowed="separate values, or no blanks")
-        return None
-    written = [(pointer, value) for pointer, value in items if isinstance(value, str)]
-    texts, doubt = settle([text for _, text in written])
-    rest = iter(texts)
-    pairs = [(pointer, next(rest) if isinstance(value, str) else value) for pointer, value in items]
-    if refuse_mixed(report, pairs, unit):
-        return None
-    if doubt is not None:
-        pointer, text = written[doubt]
-        report.warn("ambiguous-point", f"{pointer}: {assumption(text)}")
-    return [value for _, value in pairs]
-
-
-def read_list_text(report: Report, pointer: str, text: str, unit: str) -> list[object] | None:
-    """The items of a list that is one text, such as ``0; 50; 100 N*mm``; None, and faults recorded, where unclear."""
-    typed = split_list(text)
-    if len(typed) == 1 and "," in typed[0]:
-        report.fault(
-            pointer, "invalid-text", "could be one value or several", text,
-            allowed="values separated by semicolons, or a list of them",
-        )  # fmt: skip
-        return None
-    return read_together(report, [(pointer, item) for item in with_last_unit(settled(typed))], unit)
 
 
 def _carried(name: str, unit: str, wanted: str) -> str:

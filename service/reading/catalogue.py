@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.service.spec.fields import placed
-from sprag.service.spec.report import did_you_mean
+from sprag.service.reading.texts import did_you_mean
 from sprag.worker.models import ResultInfo
-from sprag.worker.models.parameters import parameter_of
+from sprag.worker.models.parameters import parameter_of, placed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

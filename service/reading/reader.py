@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 from markupsafe import Markup
 
+from sprag.service.faults import refused
 from sprag.service.languages import gettext
-from sprag.service.results.phrases import Name, Phrase, lower_first
-from sprag.service.results.quantities import SI, Units, units_for
-from sprag.service.results.selection import refused
-from sprag.service.results.wording import number, unit_text
-from sprag.service.spec.numbers import in_language
-from sprag.service.spec.units import has_unit
+from sprag.service.reading.numbers import in_language
+from sprag.service.reading.phrases import Name, Phrase, lower_first
+from sprag.service.reading.quantities import SI, Units, units_for
+from sprag.service.reading.units import has_unit
+from sprag.service.reading.wording import number, unit_text
 from sprag.worker.models.vocabulary import caption, letter
 
 if TYPE_CHECKING:

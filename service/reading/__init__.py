@@ -1,0 +1,1 @@
+"""What people read and type: numbers, quantities and their units, words and sentences."""
