@@ -198,24 +198,61 @@ def report(rival: str, rows: int, size: int, ours: list[Spent], theirs: list[Spe
     )
 
 
+class Turns:
+    """Processor time of a step with digests, less that of what the step was without them.
+
+    The two take turns: every other call does what it was without digests first, then the step, whose time is
+    ``doubled`` then. So that neither finds in the processor's cache what the other has read.
+    """
+
+    def __init__(self, step: Callable[..., Any], without: Callable[..., Any]) -> None:
+        self._step, self._without = step, without
+        self._calls = 0
+        self.doubled = 0.0
+        #: Seconds and amounts of work of the two.
+        self._spent = [[0.0, 0], [0.0, 0]]
+
+    @property
+    def cost(self) -> float:
+        """What digests add, in s."""
+        without, with_digests = (spent / max(amount, 1) for spent, amount in self._spent)
+        return (with_digests - without) * sum(amount for _, amount in self._spent)
+
+    def run(self, amount: int, *values: Any) -> Any:
+        """Run the step on so much work."""
+        self._calls += 1
+        turn = self._calls % 2
+        began = time.thread_time()
+        if not turn:
+            self._without(*values)
+        middle = time.thread_time()
+        answer = self._step(*values)
+        end = time.thread_time()
+        self._spent[turn][0] += (end if turn else middle) - began
+        self._spent[turn][1] += amount
+        self.doubled += 0.0 if turn else end - middle
+        return answer
+
+
 class DigestCost:
     """Processor time in s of what computes and stores digests, while the context lasts.
 
-    Digests are stored by the statement that marks chunks done. What they add to it is measured by turns: every other
-    transaction does it without them first, and what that takes is ``doubled``.
+    Digests are stored by the statement that marks chunks done, and numbers are brought into the form that the database
+    keeps where they were looked through for infinities only: of these steps what digests add counts.
     """
 
     def __init__(self) -> None:
-        self.computing = self.doubled = 0.0
-        #: Seconds and chunks of marking without digests, and with them.
-        self._marking = [[0.0, 0], [0.0, 0]]
-        self._calls = 0
+        self.computing = 0.0
 
     @property
     def total(self) -> float:
         """With what storing them takes."""
-        without, with_digests = (spent / max(chunks, 1) for spent, chunks in self._marking)
-        return self.computing + (with_digests - without) * sum(chunks for _, chunks in self._marking)
+        return self.computing + self._keeping.cost + self._marking.cost
+
+    @property
+    def doubled(self) -> float:
+        """Time of steps that were run for this measurement only."""
+        return self._keeping.doubled + self._marking.doubled
 
     def __enter__(self) -> Self:
         self._steps = [
@@ -224,8 +261,10 @@ class DigestCost:
             (storing, "_digests"),
             (storing, "_finish_chunks"),
         ]
-        self._real = [getattr(module, name) for module, name in self._steps]
-        new = [*map(self._timed, self._real[:-1]), self._mark]
+        keep, words, digests, mark = self._real = [getattr(module, name) for module, name in self._steps]
+        self._keeping = Turns(keep, lambda values: np.isinf(values).any())
+        self._marking = Turns(mark, storing._change_chunks)
+        new = [self._keep, self._timed(words), self._timed(digests), self._mark]
         for (module, name), step in zip(self._steps, new, strict=True):
             setattr(module, name, step)
         return self
@@ -244,18 +283,11 @@ class DigestCost:
 
         return run
 
+    def _keep(self, values: np.ndarray[Any, Any]) -> Any:
+        return self._keeping.run(values.size, values)
+
     def _mark(self, connection: sa.Connection, digests: Mapping[Any, int], values: Mapping[str, Any]) -> None:
-        self._calls += 1
-        turn = self._calls % 2
-        began = time.thread_time()
-        if not turn:
-            storing._change_chunks(connection, digests, values)
-        middle = time.thread_time()
-        self._real[-1](connection, digests, values)
-        end = time.thread_time()
-        self._marking[turn][0] += (end if turn else middle) - began
-        self._marking[turn][1] += len(digests)
-        self.doubled += 0.0 if turn else end - middle
+        self._marking.run(len(digests), connection, digests, values)
 
 
 @dataclass(frozen=True, slots=True)
