@@ -164,12 +164,12 @@ def _values(text: str, path: str = "") -> list[float | str]:
             "--axis", "ambiguous-comma", N_("could be one value or two"), text,
             allowed=_("semicolons between values, or a decimal point"),
         )  # fmt: skip
-    if could_be_values(text):
+    items = settled([in_language(item) for item in text.split(";")]) if ";" in text else text.split(",")
+    if could_be_values([item.strip() for item in items]) is not None:
         raise wrong_option(
             "--axis", "invalid-text", N_("could be one value or several"), text,
             allowed=_("semicolons between values, or no blanks"),
         )  # fmt: skip
-    items = settled([in_language(item) for item in text.split(";")]) if ";" in text else text.split(",")
     values = [_value(item) for item in with_last_unit([item.strip() for item in items])]
     doubt = settle(items).doubt
     if doubt is not None and not isinstance(values[doubt], str):

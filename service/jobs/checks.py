@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from sprag.service.results.explore import ExploreQuery
     from sprag.service.spec.text import Format
     from sprag.worker.chunking import Chunking
+    from sprag.worker.models import WarningText
 
 #: Fields of a schedule by which it is paused and resumed, and the most bytes of a body with them.
 _PAUSING: Final = frozenset({"enabled", "paused_until"})
@@ -125,11 +126,16 @@ def extended_study(
     finish: datetime | None,
     now: datetime,
     given: Mapping[str, object],
+    warnings: Sequence[WarningText] = (),
 ) -> Submission:
-    """A study extended by the body of a request; raises SpecError and StudyNotFoundError."""
+    """A study extended by the body of a request, with ``warnings`` about how that was written.
+
+    Raises SpecError and StudyNotFoundError.
+    """
     store = library.store
     study = store.study(study_id)
     parsed = parse_extended(accepted(store.spec(study_id), study), study, load_spec(content, form))
+    parsed = replace(parsed, warnings=(*warnings, *parsed.warnings))
     return submission(parsed, store, now, finish_by=finish, given=given)
 
 

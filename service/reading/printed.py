@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Final
 
 _BLANKS: Final = " \u00a0\u2007\u2009\u202f"
@@ -36,12 +37,14 @@ def keyboard(text: str) -> str:
     return f"{power[1]}{power[2]}{power[3] or 1}e{exponent}{text[power.end() :]}"
 
 
-def could_be_values(text: str) -> bool:
-    """Whether the only item of a list, such as ``100 200 300 N*mm``, could also be several values between blanks.
+def could_be_values(items: Sequence[str]) -> int | None:
+    """The place of the first item of a list that could be several values between blanks, such as ``100 200 N*mm``.
 
-    A value does not begin with a zero, as the groups of ``20 000`` do, and pages print narrower blanks.
+    A value does not begin with a zero, as the groups of ``20 000`` do, and pages print narrower blanks: one number with
+    either proves for the whole list that its blanks separate thousands.
     """
-    return _VALUES.match(text) is not None
+    place = next((place for place, item in enumerate(items) if _VALUES.match(item)), None)
+    return None if place is None or any(_GROUPED.match(item) and not _VALUES.match(item) for item in items) else place
 
 
 def could_be_several(text: str) -> bool:

@@ -33,6 +33,9 @@ _LINE: Final = re.compile(r"line (\d+): ")
 #: The place at the beginning of a fault of a table.
 _CELL: Final = re.compile(r"line (\d+)(?:, column ([^:]+):)? ")
 
+#: A number whose point is taken as decimal.
+_READ_AS: Final = re.compile(r"'(.*)' is read as (\S+); write (\S+) if its point separates thousands")
+
 
 def fault_text(fault: Fault) -> str:
     """What is wrong, without its place and value: the sentence of the fault, in other languages that of its code.
@@ -63,6 +66,12 @@ def warning_text(text: str, reading: Reading) -> str:
     if (line := _LINE.match(sentence)) is not None:
         beginning += f"{_('line {line}', line=line[1])}: "
         sentence = sentence[line.end() :]
+    if (read := _READ_AS.search(sentence)) is not None and current() != ENGLISH:
+        text, small, large = read.groups()
+        return beginning + _(
+            "'{text}' is read as {small}; write {large} if its point separates thousands",
+            text=unit_text(text), small=decimal(small), large=large,
+        )  # fmt: skip
     if current() == ENGLISH or meaning is None:
         return beginning + _QUANTITY.sub(lambda found: _quantity(found[1], found[2], reading), sentence)
     numbers = [_quantity(number, unit, reading) for number, unit in _QUANTITY.findall(sentence)]

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from sprag.service.faults import Fault
 from sprag.service.reading.numbers import parse_number, settled
-from sprag.service.reading.printed import could_be_several
+from sprag.service.reading.printed import could_be_several, could_be_values
 from sprag.service.reading.together import AMBIGUOUS_UNIT, questions
 from sprag.service.reading.units import QuantityError
 from sprag.service.spec.csv_text import read_csv, refuse_mixed_column, unescape
@@ -193,7 +193,7 @@ def _faults_of_field(kind: str, name: str, text: str) -> list[Fault]:
     assert parameter is not None
     if name != COEFFICIENTS:
         pairs = [(text, parameter)]
-    elif could_be_several(text):
+    elif could_be_several(text) or could_be_values(list_text(text)) is not None:
         message = "could be one coefficient or several"
         return [Fault(name, "invalid-text", message, text, "semicolons between coefficients, or no blanks")]
     else:

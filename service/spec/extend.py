@@ -30,8 +30,9 @@ FIELDS: Final = ("axes", "cases", "name")
 
 def parse_extended(spec: Mapping[str, Any], study: Study, addition: object) -> ParsedSpec:
     """Check and return the study of `extended_spec`; pointers of faults in ``addition`` refer to ``addition``."""
+    report = Report(addition)
     try:
-        made = parse_spec(extended_spec(spec, study, addition))
+        made = parse_spec(extended_spec(spec, study, addition, report))
     except SpecError as error:
         if not (isinstance(addition, Mapping) and "cases" in addition):
             raise
@@ -39,7 +40,8 @@ def parse_extended(spec: Mapping[str, Any], study: Study, addition: object) -> P
         before = 1 if study.axes else 0
         raise SpecError([_moved(fault, before) for fault in error.faults]) from error
     # Further values stand behind those of the study, whatever their size.
-    return replace(made, warnings=tuple(text for text in made.warnings if getattr(text, "code", "") != "not-monotonic"))
+    kept = (text for text in made.warnings if getattr(text, "code", "") != "not-monotonic")
+    return replace(made, warnings=(*report.warnings, *kept))
 
 
 def _moved(fault: Fault, before: int) -> Fault:
@@ -50,7 +52,9 @@ def _moved(fault: Fault, before: int) -> Fault:
     return replace(fault, where=f"/cases/{int(head) - before}" + (f"/{rest}" if rest else ""))
 
 
-def extended_spec(spec: Mapping[str, Any], study: Study, addition: object) -> dict[str, Any]:
+def extended_spec(
+    spec: Mapping[str, Any], study: Study, addition: object, report: Report | None = None
+) -> dict[str, Any]:
     """The spec of a study with the cases of ``study`` and those of ``addition``.
 
     Parameters
@@ -59,13 +63,14 @@ def extended_spec(spec: Mapping[str, Any], study: Study, addition: object) -> di
     study : the same in SI numbers
     addition : plain JSON data: ``axes``, values for old or new axes of a grid; or ``cases``, axes, samples, points and
         groups as in a spec, whose cases come after those of the study; and a ``name``
+    report : where faults of ``addition``, and warnings about further values, are recorded
 
     Raises
     ------
     SpecError
         With every fault of ``addition``; pointers refer to it.
     """
-    report = Report(addition)
+    report = Report(addition) if report is None else report
     found = dict(read_object(report, "", addition, FIELDS) or {})
     report.raise_if_any()
     given = [name for name in ("axes", "cases") if name in found]

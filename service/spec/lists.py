@@ -27,18 +27,38 @@ def refuse_mixed(report: Report, items: Iterable[tuple[str, object]], unit: str 
     return bool(asked)
 
 
+def refuse_blanks(report: Report, items: Iterable[tuple[str, object]]) -> bool:
+    """Record a fault where an item of a list could also be several values between blanks; whether there is one.
+
+    ``items`` are JSON Pointers with their values.
+    """
+    written = [(pointer, value) for pointer, value in items if isinstance(value, str)]
+    place = could_be_values([text for _, text in written])
+    if place is None:
+        return False
+    pointer, text = written[place]
+    report.fault(
+        pointer, "invalid-text", "could be one value or several", text, allowed="separate values, or no blanks"
+    )
+    return True
+
+
+def read_list(
+    report: Report, items: Sequence[tuple[str, object]], unit: str | Sequence[str], about: str = ""
+) -> list[object] | None:
+    """As `read_together`, of a list, whose items could also be several values between blanks."""
+    return None if refuse_blanks(report, items) else read_together(report, items, unit, about)
+
+
 def read_together(
-    report: Report, items: Sequence[tuple[str, object]], unit: str | Sequence[str]
+    report: Report, items: Sequence[tuple[str, object]], unit: str | Sequence[str], about: str = ""
 ) -> list[object] | None:
     """The items of one list or range, their texts with decimal points; None, and faults recorded, where one is unclear.
 
-    ``items`` are JSON Pointers with their values, ``unit`` is their SI unit, or that of each. Points that could
-    separate thousands and that no other item settles are decimal, with a warning.
+    ``items`` are JSON Pointers with their values, ``unit`` is their SI unit, or that of each, and ``about`` is the path
+    that varies, where the pointers do not say it. Points that could separate thousands and that no other item settles
+    are decimal, with a warning.
     """
-    if len(items) == 1 and isinstance(items[0][1], str) and could_be_values(items[0][1]):
-        message = "could be one value or several"
-        report.fault(items[0][0], "invalid-text", message, items[0][1], allowed="separate values, or no blanks")
-        return None
     written = [(pointer, value) for pointer, value in items if isinstance(value, str)]
     texts, doubt = settle([text for _, text in written])
     rest = iter(texts)
@@ -47,11 +67,12 @@ def read_together(
         return None
     if doubt is not None:
         pointer, text = written[doubt]
-        report.warn("ambiguous-point", f"{pointer}: {assumption(text)}")
+        place = f"{pointer} ({about})" if about else pointer
+        report.warn("ambiguous-point", f"{place}: {assumption(text)}")
     return [value for _, value in pairs]
 
 
-def read_list_text(report: Report, pointer: str, text: str, unit: str) -> list[object] | None:
+def read_list_text(report: Report, pointer: str, text: str, unit: str, about: str = "") -> list[object] | None:
     """The items of a list that is one text, such as ``0; 50; 100 N*mm``; None, and faults recorded, where unclear."""
     typed = split_list(text)
     if len(typed) == 1 and "," in typed[0]:
@@ -60,4 +81,4 @@ def read_list_text(report: Report, pointer: str, text: str, unit: str) -> list[o
             allowed="values separated by semicolons, or a list of them",
         )  # fmt: skip
         return None
-    return read_together(report, [(pointer, item) for item in with_last_unit(settled(typed))], unit)
+    return read_list(report, [(pointer, item) for item in with_last_unit(settled(typed))], unit, about)

@@ -14,14 +14,15 @@ from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.web.form.check import message
-from sprag.service.http.web.form.entries import Faults, Values, list_of
+from sprag.service.http.web.form.entries import Faults, Values, items_of, list_of
 from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.study import shown_study
 from sprag.service.http.work import Attended
 from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
-from sprag.service.reading.numbers import parse_number
+from sprag.service.reading.numbers import assumption, parse_number, settle
 from sprag.worker.limits import MAX_PRIORITY
+from sprag.worker.models import WarningText
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -52,7 +53,9 @@ async def extend(context: Ctx, work: Attended, study_id: StudyId, values: Form) 
     now = context.store.clock.now()
     try:
         content = json.dumps(_addition(values), sort_keys=True).encode()
-        made = await work.check(checks.extended_study, context.library, study_id, content, "json", None, now, {})
+        made = await work.check(
+            checks.extended_study, context.library, study_id, content, "json", None, now, {}, _doubts(values)
+        )
     except FaultError as error:
         if not error.faults:
             raise
@@ -92,6 +95,18 @@ def _axes(values: Values) -> list[dict[str, Any]]:
         for name, text in values.items()
         if name.startswith("axis:") and (entries := list_of(text))
     ]
+
+
+def _doubts(values: Values) -> list[WarningText]:
+    """Points of bare numbers that are taken as decimal; the spec warns of those with units."""
+    found = []
+    for name, text in values.items():
+        items = items_of(text) if name.startswith("axis:") else []
+        doubt = settle(items).doubt
+        if doubt is not None and parse_number(items[doubt]) is not None:
+            place = f"/axes ({name.removeprefix('axis:')})"
+            found.append(WarningText(f"{place}: {assumption(items[doubt])}", "ambiguous-point"))
+    return found
 
 
 def _addition(values: Values) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag.service.spec.fields import read_number, read_object
-from sprag.service.spec.lists import refuse_mixed
+from sprag.service.spec.lists import refuse_blanks, refuse_mixed
 from sprag.service.spec.report import Report, join
 from sprag.worker.limits import MAX_AXIS_VALUES
 from sprag.worker.study import SAME_VALUE
@@ -64,6 +64,9 @@ def _parts(report: Report, pointer: str, path: str, data: object, machine: Machi
     if not found:
         report.fault(pointer, "required", "has no condition", data, allowed="one of " + ", ".join(FIELDS))
     if refuse_mixed(report, _quantities(pointer, found), parameter.unit):
+        return []
+    listed = found.get("is")
+    if isinstance(listed, list) and refuse_blanks(report, _quantities(pointer, {"is": listed})):
         return []
     parts: list[tuple[str, float]] = []
     for name in FIELDS:

@@ -12,7 +12,7 @@ import numpy as np
 
 from sprag.service.reading.units import QuantityError, parse_exact, to_float
 from sprag.service.spec.fields import read_exact, read_number, read_whole
-from sprag.service.spec.lists import read_list_text, read_together
+from sprag.service.spec.lists import read_list, read_list_text, read_together
 from sprag.service.spec.report import Report, join
 from sprag.worker.limits import MAX_AXIS_VALUES
 from sprag.worker.models import Parameter
@@ -64,9 +64,9 @@ def plan_values(report: Report, pointer: str, data: object, parameter: Parameter
     if plain is not None and in_range(plain, parameter).all():
         return Plan(pointer, plain.size, lambda: plain, listed=True)
     if isinstance(data, str):
-        items = read_list_text(report, pointer, data, parameter.unit)
+        items = read_list_text(report, pointer, data, parameter.unit, parameter.path)
     else:
-        items = _together(report, pointer, data, parameter)
+        items = read_list(report, _placed(pointer, data), parameter.unit, parameter.path)
     if items is None:
         return None
     places = [pointer if isinstance(data, str) else join(pointer, index) for index in range(len(items))]
@@ -87,9 +87,14 @@ def _plain_numbers(data: list[Any]) -> Values | None:
         return None
 
 
+def _placed(pointer: str, items: Sequence[Any]) -> list[tuple[str, object]]:
+    """The items of a list, each with its JSON Pointer."""
+    return [(join(pointer, index), item) for index, item in enumerate(items)]
+
+
 def _together(report: Report, pointer: str, items: Sequence[Any], parameter: Parameter) -> list[Any] | None:
-    """Items that are typed together, with decimal points; None, and faults recorded, where one is unclear."""
-    return read_together(report, [(join(pointer, index), item) for index, item in enumerate(items)], parameter.unit)
+    """The ends and the step of a range, with decimal points; None, and faults recorded, where one is unclear."""
+    return read_together(report, _placed(pointer, items), parameter.unit, parameter.path)
 
 
 def plan_linspace(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:

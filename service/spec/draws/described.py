@@ -10,7 +10,7 @@ from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.spec.described import Described, Listed, choice, named
 from sprag.service.spec.draws.distributions import SIGMAS
 from sprag.service.spec.fields import read_number
-from sprag.service.spec.lists import read_list_text, read_together
+from sprag.service.spec.lists import read_list, read_list_text
 from sprag.service.spec.report import Report, join
 from sprag.service.spec.shares import in_percent
 from sprag.worker.limits import MAX_CORRELATIONS, MAX_DRIVES, MAX_TOLERANCES
@@ -93,9 +93,11 @@ def read_measured(report: Report, pointer: str, data: object, parameters: Sequen
     if listed is None:
         return None
     if isinstance(data, str):
-        items = read_list_text(report, pointer, data, unit)
+        items = read_list_text(report, pointer, data, unit, parameters[0].path)
     else:
-        items = read_together(report, [(join(pointer, index), item) for index, item in enumerate(listed)], unit)
+        items = read_list(
+            report, [(join(pointer, index), item) for index, item in enumerate(listed)], unit, parameters[0].path
+        )
     if items is None:
         return None
     places = [pointer if isinstance(data, str) else join(pointer, index) for index in range(len(items))]

@@ -12,7 +12,7 @@ import numpy as np
 from sprag.service.reading.texts import quantity_text
 from sprag.service.spec.described import FIT, Listed
 from sprag.service.spec.fields import missing, read_number, read_object
-from sprag.service.spec.lists import read_together
+from sprag.service.spec.lists import read_list
 from sprag.service.spec.report import Report, join
 from sprag.worker import models
 from sprag.worker.limits import MAX_CLUTCH_LAWS, MAX_CLUTCH_ROWS
@@ -117,7 +117,7 @@ def _given(report: Report, pointer: str, data: Mapping[str, Any], prefix: str) -
         return None
     own = [placed(CLUTCH_COEFFICIENT, f"{prefix}coefficients.{k}") for k in range(len(items))]
     given = [(join(where, k), item) for k, item in enumerate(items)]
-    read = read_together(report, given, [entry.unit for entry in own])
+    read = read_list(report, given, [entry.unit for entry in own])
     if read is None:
         return None
     numbers = [read_number(report, join(where, k), item, own[k]) for k, item in enumerate(read)]

@@ -41,12 +41,21 @@ def test_a_study_is_extended_by_values_and_by_cases(service: Service) -> None:
     assert service.get(table.headers["location"])["cases"] == old["cases"] + 1
 
 
+def test_a_study_extended_by_doubtful_points_says_how_they_were_read(service: Service) -> None:
+    study_id = service.submit()
+    made = service.http.post(f"/studies/{study_id}/extend", data={"axis:shaft.load": "20.000; 25.000"})
+    new = service.get(made.headers["location"])
+    assert new["warning_codes"][0] == "ambiguous-point"
+    assert "Load torque: &#39;20.000&#39; is read as 20; write 20000" in service.http.get(made.headers["location"]).text
+
+
 @pytest.mark.parametrize(
     ("fields", "wrong"),
     [
         ({"points": " "}, ""),
         ({"axis:shaft.load": "0.7", "points": "shaft.load\n0.9"}, ""),
         ({"axis:shaft.load": "heavy"}, "axis:shaft.load"),
+        ({"axis:shaft.load": "100 200; 300 400"}, "axis:shaft.load"),
         ({"points": "what\n1"}, "points"),
     ],
 )

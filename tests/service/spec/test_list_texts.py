@@ -9,14 +9,18 @@ import numpy as np
 import pytest
 
 from sprag.service.cli.extend import _values
+from sprag.service.faults import FaultError
 from sprag.service.http.web.form.check import check_form
 from sprag.service.http.web.form.spec import spec_of, values_of
+from sprag.service.languages import language
+from sprag.service.reading.reader import Reading
+from sprag.service.results.fault_texts import warning_text
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.report import SpecError
 from sprag.service.spec.schema.document import spec_schema
 from sprag.worker.chunking import Chunking
-from tests.service.spec.test_together import LOAD, form
+from tests.service.spec.test_together import LOAD, form, goal
 from tests.service.spec_sample import changed, parsed
 
 
@@ -31,6 +35,9 @@ from tests.service.spec_sample import changed, parsed
         ("0.1\n0.2 N*m\n", [0.1, 0.2]),
         ("100 N*mm", [0.1]),
         ("1 000; 2 000 N*mm;", [1.0, 2.0]),
+        ("100 000; 200 000 N*mm", [100.0, 200.0]),
+        ("500; 1 000; 1 500 N*mm", [0.5, 1.0, 1.5]),  # the second shows what blanks are
+        ("1\N{NARROW NO-BREAK SPACE}250; 2\N{NARROW NO-BREAK SPACE}500 N*mm", [1.25, 2.5]),
     ],
 )
 def test_a_list_of_a_spec_is_one_text(text: str, expected: list[float]) -> None:
@@ -50,6 +57,9 @@ def test_a_list_of_a_spec_is_one_text(text: str, expected: list[float]) -> None:
         ("100,200,300 N*mm", "invalid-text"),
         ("0,5", "invalid-text"),
         ("100 200 300 N*mm", "invalid-text"),
+        ("100 200; 300 400 N*mm", "invalid-text"),
+        ("100 200; 300 400", "invalid-text"),
+        ("0; 100 200 N*mm", "invalid-text"),
         ("1,234; 5,678 N*mm", "ambiguous-comma"),
         ("0.1 N*m; much", "not-a-number"),
         ("0.1; 1e10 N*m", "out-of-range"),
@@ -64,9 +74,65 @@ def test_a_text_that_is_unclear_is_refused_where_it_stands(text: str, asked: str
     assert {(fault.where, fault.code) for fault in refused.value.faults} == {("/axes/0/values", asked)}
 
 
+LISTS: tuple[dict[str, str], ...] = (
+    {"/axes/0/way": "values", "/axes/0/values": "TEXT"},
+    {"exclude": "1", "/exclude/0/path": LOAD, "/exclude/0/kind": "is", "/exclude/0/value": "TEXT"},
+    {
+        "batch": "on",
+        "/tolerances/pendulums/0/damping/plus_minus": "TEXT",
+        "/tolerances/pendulums/0/damping/distribution": "values",
+    },
+    {"/base/clutch/coefficients": "TEXT"},
+)
+
+
+@pytest.mark.parametrize("fields", LISTS)
+@pytest.mark.parametrize("text", ["100 200; 300 400", "100 200", "100 200; 300"])
+def test_blanks_within_values_of_a_field_are_asked_about(fields: dict[str, str], text: str) -> None:
+    typed = {name: text if value == "TEXT" else value for name, value in fields.items()}
+    checked = check_form(form() | typed, Chunking())
+    (name,) = (name for name, value in fields.items() if value == "TEXT")
+    assert [name for name, found in checked.faults.items() if "could be one" in found[0]] == [name]
+    assert checked.parsed is None
+
+
+def test_blanks_within_operating_points_are_asked_about() -> None:
+    points = {"/goal/at/0/values": "100 200; 300 400 N*mm"}
+    assert (
+        "could be one value or several"
+        in check_form(values_of(goal()) | points, Chunking()).faults["/goal/at/0/values"][0]
+    )
+    thousands = check_form(values_of(goal()) | {"/goal/at/0/values": "1 000; 2 000 N*mm"}, Chunking())
+    assert thousands.spec["goal"]["at"] == [{LOAD: "1 000 N*mm"}, {LOAD: "2 000 N*mm"}]
+
+
+def test_ends_of_a_range_have_blanks_between_thousands() -> None:
+    """A field for one value cannot have several."""
+    checked = check_form(form(**{"way": "linspace", "from": "1 250", "to": "2 750 N*mm", "count": "3"}), Chunking())
+    assert checked.parsed is not None
+    assert checked.parsed.study.axes[0].array.tolist() == pytest.approx([1.25, 2.0, 2.75])
+
+
+def test_blanks_of_an_extension_by_command_are_asked_about() -> None:
+    with pytest.raises(FaultError, match="invalid option"):
+        _values("100 200; 300 400 N*mm", LOAD)
+    assert _values("1 000; 2 500", LOAD) == [1000.0, 2500.0]
+
+
 def test_points_of_a_text_that_could_separate_thousands_are_told() -> None:
     (warning,) = parsed({"/axes": [{"path": LOAD, "values": "20.000; 25.000 N*mm"}]}).warnings
-    assert warning.startswith("/axes/0/values: '20.000 N*mm' is read as 20; write 20000")
+    assert warning.startswith("/axes/0/values (shaft.load): '20.000 N*mm' is read as 20; write 20000")
+    reading = Reading("vibration-drive")
+    assert warning_text(warning, reading).startswith("Load torque: '20.000 N·mm' is read as 20; write 20000")
+    with language("uk"):
+        assert warning_text(warning, reading).startswith("Момент навантаження: «20.000 Н·мм» прочитано як 20; якщо")
+
+
+def test_points_of_further_values_are_told() -> None:
+    study = parsed({"/axes": [{"path": LOAD, "values": "50; 100 N*mm"}]})
+    added = {"axes": [{"path": LOAD, "values": ["20.000 N*mm", "25.000 N*mm"]}]}
+    (warning,) = parse_extended(study.spec, study.study, added).warnings
+    assert warning.startswith("/axes/0/values/0 (shaft.load): '20.000 N*mm' is read as 20; write 20000")
 
 
 def test_lists_of_goals_measured_values_and_extensions_are_texts_too() -> None:

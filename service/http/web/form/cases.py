@@ -6,7 +6,17 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from sprag.service.http.web.form.entries import Faults, Values, list_of, path_values, paths_of, plain, range_of, text_of
+from sprag.service.http.web.form.entries import (
+    Faults,
+    Values,
+    list_of,
+    path_values,
+    paths_of,
+    plain,
+    range_of,
+    text_of,
+    unclear,
+)
 from sprag.service.http.web.form.parts import PARTS, filled
 from sprag.service.languages import N_, _
 from sprag.service.spec.axes.exclude import FIELDS as KINDS
@@ -91,7 +101,8 @@ def _condition(values: Mapping[str, str], index: int) -> dict[str, Any]:
     for part in _parts(values, index):
         kind, text = values.get(f"{part}kind", KINDS[0]), values.get(f"{part}value", "")
         items = list_of(text) if kind == "is" else []
-        found.setdefault(values.get(f"{part}path", ""), {})[kind] = items if len(items) > 1 else plain(text)
+        several = len(items) > 1 or unclear(items)
+        found.setdefault(values.get(f"{part}path", ""), {})[kind] = items if several else plain(text)
     return found
 
 

@@ -29,11 +29,20 @@ def plain(text: str) -> Any:
 def list_of(text: str) -> list[Any]:
     """The entries of a list, whose commas are decimal for all of them where one settles it.
 
-    A unit at the end holds for the bare numbers before it. One item that could also be several values between blanks
-    stays a text, about which the reader of the spec asks.
+    A unit at the end holds for the bare numbers before it. Items of which one could also be several values between
+    blanks stay texts, about which the reader of the spec asks.
     """
-    items = with_last_unit(items_of(text))
-    return items if len(items) == 1 and could_be_values(items[0]) else [plain(item) for item in items]
+    return entries_of(with_last_unit(items_of(text)))
+
+
+def entries_of(items: Sequence[str]) -> list[Any]:
+    """The entries for the items of a list, which stay texts where one could also be several values between blanks."""
+    return [plain(item) for item in items] if could_be_values(items) is None else list(items)
+
+
+def unclear(entries: Sequence[Any]) -> bool:
+    """Whether one of the entries of `list_of` could also be several values between blanks."""
+    return could_be_values([entry for entry in entries if isinstance(entry, str)]) is not None
 
 
 def items_of(text: str) -> list[str]:

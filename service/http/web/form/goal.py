@@ -16,6 +16,7 @@ from sprag.service.http.web.form.entries import (
     plain,
     range_of,
     text_of,
+    unclear,
 )
 from sprag.service.http.web.form.parts import PARTS, filled
 from sprag.service.languages import N_, _
@@ -91,6 +92,10 @@ def _points(values: Mapping[str, str], faults: Faults) -> list[dict[str, Any]]:
         first = next(iter(columns.values()), column)
         if not column:
             faults[f"{pointer}/values"] = [_("is required; allowed: one value for each operating point")]
+        elif unclear(column):
+            faults[f"{pointer}/values"] = [
+                _("could be one value or several; allowed: semicolons between values, or no blanks")
+            ]
         elif len(column) != len(first):
             message = _(
                 "must have as many values as the first parameter, {first}; got {count}; allowed: one value for each "

@@ -20,6 +20,7 @@ from sprag.service.http.web.form.entries import (
     Faults,
     Values,
     count_in,
+    entries_of,
     items_of,
     list_of,
     list_text,
@@ -202,7 +203,7 @@ def _clutch(values: Mapping[str, str], pointer: str, faults: Faults) -> dict[str
             coefficients = "; ".join(coefficients.split())
         return {
             # Each coefficient has a unit of its own: that of the last one holds for no other.
-            **({"coefficients": [plain(item) for item in items_of(coefficients)]} if coefficients.strip() else {}),
+            **({"coefficients": entries_of(items_of(coefficients))} if coefficients.strip() else {}),
             **_given(values, f"{pointer}/windup_limit", "windup_limit"),
         }
     found: dict[str, Any] = {"data": None}
