@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
-from sprag.service.languages import decimal
+from sprag.service.languages import N_, decimal
 from sprag.service.reading.printed import keyboard
 
 #: A number at the beginning of a text: its digits with all their points and commas, and whether an exponent follows.
@@ -24,7 +24,9 @@ _DOUBTFUL: Final = re.compile(r"(?<![0-9.,])[1-9][0-9]{0,2}\.[0-9]{3}(?![0-9.,])
 _GROUPS: Final = re.compile(r"[1-9][0-9]{0,2}(?:\.[0-9]{3})+|[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 
 #: What settles the points of a table.
-WITHOUT_DOUBT: Final = "numbers without separators of thousands, one of them with another number of decimals than three"
+WITHOUT_DOUBT: Final = N_(
+    "numbers without separators of thousands, one of them with another number of decimals than three"
+)
 
 
 class _Marks(NamedTuple):

@@ -6,6 +6,7 @@ from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Final
 
 from sprag.service.faults import Code
+from sprag.service.languages import N_
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity
 from sprag.service.schedules.times import TimingError, next_time_of_day, read_time_of_day
 from sprag.worker.limits import MAX_FINISH_DAYS
@@ -25,13 +26,14 @@ _CLOCK_UNITS: Final[dict[str, float]] = {
     **dict.fromkeys(("d", "day", "days", "д", "дн", "день", "дні", "днів", "доба", "доби", "діб"), 86400.0),
     **dict.fromkeys(("w", "wk", "week", "weeks", "тиж", "тиждень", "тижні", "тижнів"), 604800.0),
 }
-ALLOWED: Final = (
+# The days of these texts are `MAX_FINISH_DAYS`.
+ALLOWED: Final = N_(
     'a future time with its offset, such as "2027-01-31T06:00+01:00", or a duration from the submission, such as '
-    f'"8 h" or "2 days"; 1 s to {MAX_FINISH_DAYS} days ahead'
+    '"8 h" or "2 days"; 1 s to 366 days ahead'
 )
-ALLOWED_OF_RUNS: Final = (
+ALLOWED_OF_RUNS: Final = N_(
     'a time of day, such as "06:00", or a duration from the beginning of the run, such as "8 h" or "2 days"; 1 s to '
-    f"{MAX_FINISH_DAYS} days"
+    "366 days"
 )
 
 

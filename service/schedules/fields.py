@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.service.languages import N_
 from sprag.service.reading.texts import did_you_mean
 from sprag.service.schedules.deadline import ALLOWED_OF_RUNS, FinishError, check_run_finish, run_finish_at
 from sprag.service.schedules.policies import GRACE_ALLOWED, CatchUp, Overlap, Policies, check_grace
@@ -60,9 +61,15 @@ FIELDS: Final = (
     *("name", "spec", "cron", "at", "zone", "window", "finish_by", *PLAIN, "misfire_grace", "paused_until"),
     *("trouble_flags", "report_email", "report_webhook"),
 )
-_CRON_ALLOWED: Final = 'five fields, such as "0 22 * * 1-5": at 22:00 from Monday to Friday; or "@daily" and the like'
-_AT_ALLOWED: Final = 'a future time, such as "2027-01-31T22:00"'
-_WINDOW_ALLOWED: Final = 'two different times of day, such as ["22:00", "06:00"]'
+_CRON_ALLOWED: Final = N_(
+    'five fields, such as "0 22 * * 1-5": at 22:00 from Monday to Friday; or "@daily" and the like'
+)
+_AT_ALLOWED: Final = N_('a future time, such as "2027-01-31T22:00"')
+_WHEN_ALLOWED: Final = N_(
+    'either `cron`, five fields, such as "0 22 * * 1-5": at 22:00 from Monday to Friday; or "@daily" and the like; or '
+    '`at`, a future time, such as "2027-01-31T22:00"'
+)
+_WINDOW_ALLOWED: Final = N_('two different times of day, such as ["22:00", "06:00"]')
 _LONGEST_CRON: Final = 200
 #: Runs of a new schedule whose window is compared with their deadline.
 _RUNS_LOOKED_AT: Final = 7
@@ -242,9 +249,7 @@ def _read_timing(
     cron, at = found.get("cron"), found.get("at")
     if (cron is None) == (at is None):
         message = "is required: the time to run" if cron is None else "is given beside `at`"
-        report.fault(
-            "/cron", "exactly-one", message, cron, allowed=f"either `cron`, {_CRON_ALLOWED}; or `at`, {_AT_ALLOWED}"
-        )
+        report.fault("/cron", "exactly-one", message, cron, allowed=_WHEN_ALLOWED)
         return None
     if cron is not None:
         try:

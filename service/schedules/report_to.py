@@ -7,6 +7,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.delivery import is_mail_address, origin_of
+from sprag.service.languages import N_
 from sprag.service.spec.report import Report
 
 if TYPE_CHECKING:
@@ -16,8 +17,9 @@ if TYPE_CHECKING:
 
 MOST_RECIPIENTS: Final = 10
 LONGEST_WEBHOOK: Final = 500
-EMAIL_ALLOWED: Final = f'a list of at most {MOST_RECIPIENTS} different addresses, such as ["dora@example.com"]'
-WEBHOOK_ALLOWED: Final = f"an address of http or https without user and fragment, at most {LONGEST_WEBHOOK} characters"
+# Their numbers are `MOST_RECIPIENTS` and `LONGEST_WEBHOOK`.
+EMAIL_ALLOWED: Final = N_('a list of at most 10 different addresses, such as ["dora@example.com"]')
+WEBHOOK_ALLOWED: Final = N_("an address of http or https without user and fragment, at most 500 characters")
 
 
 class ReportWhen(StrEnum):

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.service.faults import Fault, FaultError
+from sprag.service.languages import N_
 from sprag.service.reading.numbers import WITHOUT_DOUBT, assumption, is_ambiguous, parse_number, question
 from sprag.service.spec.table_text import (
     CsvRow,
@@ -33,9 +34,10 @@ from sprag.worker.models import WarningText
 #: Most faults reported for one file; a file of another kind would have one in every line.
 _MAX_PROBLEMS = 20
 _QUANTITIES = (("angle", "rad"), ("torque", "N*m"))
+_UNITS = {"rad": N_("a unit of rad"), "N*m": N_("a unit of N*m")}
 #: Accepted headings without a unit, by column.
 _WORDS = (
-    frozenset({"angle", "windup", "twist", "rotation", "phi", "xi", "u", "угол"}),
+    frozenset({"angle", "windup", "twist", "rotation", "phi", "xi", "u", "угол", "кут"}),
     frozenset({"torque", "moment", "m", "t", "момент"}),
 )
 #: Larger angles without a unit are probably degrees, not rad.
@@ -91,7 +93,7 @@ def parse_measured(text: str, convert: Callable[[str, str], float]) -> MeasuredD
         raise MeasuredDataError([Fault("data", "unreadable", f"is not CSV: {error}")]) from None
     rows = [CsvRow(row.line, [_unquoted(cell) for cell in row.cells]) for row in table.rows]
     if not rows:
-        raise MeasuredDataError([Fault("line 1", "empty", "there are no data", None, "rows of angle and torque")])
+        raise MeasuredDataError([Fault("line 1", "empty", "there are no data", allowed="rows of angle and torque")])
     factors: tuple[float | None, float | None] = (None, None)
     if _is_header(rows[0].cells):
         rows = with_units(rows)
@@ -127,7 +129,7 @@ def _factors(row: CsvRow, convert: Callable[[str, str], float]) -> tuple[float |
     if len(row.cells) != len(_QUANTITIES):
         text = "the header does not have two columns"
         given = ", ".join(row.cells)[:80]
-        raise MeasuredDataError([Fault(f"line {row.line}", "unequal-lengths", text, given, "angle, torque")])
+        raise MeasuredDataError([Fault(f"line {row.line}", "unequal-lengths", text, given, allowed="angle, torque")])
     factors: list[float | None] = []
     problems = []
     for cell, (name, unit), words in zip(row.cells, _QUANTITIES, _WORDS, strict=True):
@@ -135,7 +137,7 @@ def _factors(row: CsvRow, convert: Callable[[str, str], float]) -> tuple[float |
             factors.append(_factor(cell, unit, words, convert))
         except ValueError as error:
             where = f"line {row.line}"
-            problems.append(Fault(where, "wrong-unit", f"column {name}: {error}", cell, f"a unit of {unit}"))
+            problems.append(Fault(where, "wrong-unit", f"column {name}: {error}", cell, allowed=_UNITS[unit]))
     if problems:
         raise MeasuredDataError(problems)
     return factors[0], factors[1]
@@ -171,7 +173,9 @@ def _numbers(table: Split, factors: tuple[float | None, float | None]) -> Measur
     rows, doubt = settled_table(table)
     problems = list(itertools.islice(_wrong_rows(table, rows), _MAX_PROBLEMS))
     if doubt is not None and not doubt.likely:
-        problems.append(Fault(f"line {doubt.line}", "ambiguous-point", question(doubt.text), doubt.text, WITHOUT_DOUBT))
+        problems.append(
+            Fault(f"line {doubt.line}", "ambiguous-point", question(doubt.text), doubt.text, allowed=WITHOUT_DOUBT)
+        )
     if problems:
         raise MeasuredDataError(problems)
     if not 1 <= len(rows) <= MAX_CLUTCH_ROWS:
@@ -191,17 +195,24 @@ def _wrong_rows(written: Split, rows: Sequence[CsvRow]) -> Iterator[Fault]:
     for given, (number, cells) in zip(written.rows, rows, strict=True):
         if len(cells) != 2:
             few = f"{len(cells)} column" + ("" if len(cells) == 1 else "s")
-            allowed = (
-                "two columns: angle, torque; decimal commas only where tabs, semicolons or quotes separate the columns"
-            )
-            yield Fault(f"line {number}", "unequal-lengths", few, written.separator.join(given.cells)[:80], allowed)
+            yield Fault(
+                f"line {number}", "unequal-lengths", few, written.separator.join(given.cells)[:80],
+                allowed="two columns: angle, torque; decimal commas only where tabs, semicolons or quotes separate the "
+                "columns",
+            )  # fmt: skip
             continue
         for cell, (name, _) in zip(cells, _QUANTITIES, strict=True):
             value = parse_number(cell)
             if is_ambiguous(cell):
                 message = f"the comma of the {name} could be decimal or separate thousands"
-                yield Fault(f"line {number}", "ambiguous-comma", message, cell[:80], "a decimal point, or no comma")
+                yield Fault(
+                    f"line {number}", "ambiguous-comma", message, cell[:80], allowed="a decimal point, or no comma"
+                )
             elif value is None:
-                yield Fault(f"line {number}", "not-a-number", f"the {name} is not a number", cell[:80], "a number")
+                yield Fault(
+                    f"line {number}", "not-a-number", f"the {name} is not a number", cell[:80], allowed="a number"
+                )
             elif not math.isfinite(value):
-                yield Fault(f"line {number}", "not-finite", f"the {name} is not finite", cell[:80], "a finite number")
+                yield Fault(
+                    f"line {number}", "not-finite", f"the {name} is not finite", cell[:80], allowed="a finite number"
+                )

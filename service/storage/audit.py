@@ -15,6 +15,7 @@ import sqlalchemy as sa
 
 from sprag.service.actor import acting
 from sprag.service.faults import parameter_error
+from sprag.service.languages import N_
 from sprag.service.storage.errors import NotOwnerError, PageTokenError
 from sprag.service.storage.part import MAX_INTEGER, Part, micros_of, moment
 from sprag.service.storage.user_tables import AUDIT_LOG
@@ -26,7 +27,7 @@ _A = AUDIT_LOG.c
 #: Rows read at a time for a file of the whole log.
 _BLOCK: Final = 1000
 _LONGEST: Final = 200
-TIME_ALLOWED: Final = "a date or time such as 2027-01-31 or 2027-01-31T06:00+01:00; without an offset it is UTC"
+TIME_ALLOWED: Final = N_("a date or time such as 2027-01-31 or 2027-01-31T06:00+01:00; without an offset it is UTC")
 
 
 @dataclass(frozen=True, slots=True)

@@ -198,7 +198,7 @@ def _assumed(text: str) -> list[str]:
         notes = parse_measured(text, parse_quantity).warnings
     except MeasuredDataError:
         return []
-    return [_("Measured data: {text}.", text=warning_text(note, CLUTCH)) for note in notes]
+    return [_("Measured data: {text}.", text=warning_text(note, CLUTCH).removesuffix(".")) for note in notes]
 
 
 def check_text(

@@ -38,10 +38,14 @@ from sprag.service.http.web.form.shaft import is_shaft
 from sprag.service.http.web.form.shaft_spec import base_of, field_of_base, values_of_base
 from sprag.service.http.web.form.tolerances import FIELDS as TOLERANT
 from sprag.service.http.web.form.tolerances import field_of_tolerance, tolerance_values, tolerances_of
-from sprag.service.languages import _
+from sprag.service.languages import _, gettext
+from sprag.service.languages.ranges import allowed_text
+from sprag.service.reading.phrases import lower_first
 from sprag.service.reading.printed import could_be_several
 from sprag.service.reading.together import with_last_unit
 from sprag.service.reading.units import QuantityError, parse_quantity
+from sprag.service.reading.wording import unit_text
+from sprag.service.results.fault_texts import fault_text
 from sprag.service.spec.axes.sweep import SWEPT
 from sprag.service.spec.derive import formulas_of, with_values
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
@@ -223,8 +227,14 @@ def _clutch(values: Mapping[str, str], pointer: str, faults: Faults) -> dict[str
 
 def _fault_text(fault: Fault) -> str:
     """A fault of measured data as a sentence: the line, the fault, the value, what is allowed."""
-    parts = [f"{fault.where}: {fault.message}", *([] if fault.value is None else [f"got {fault.value}"])]
-    return "; ".join([*parts, *([f"allowed: {fault.allowed}"] if fault.allowed else [])])
+    line = re.fullmatch(r"line (\d+)", fault.where or "")
+    place = _("line {line}", line=line[1]) if line else _("the table")
+    parts = [f"{place}: {lower_first(fault_text(fault))}"]
+    if fault.value is not None:
+        parts.append(gettext("got {value}", value=fault.value))
+    if fault.allowed:
+        parts.append(gettext("allowed: {allowed}", allowed=unit_text(allowed_text(fault.allowed))))
+    return "; ".join(parts)
 
 
 def _run(values: Mapping[str, str]) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from datetime import UTC, datetime
 from typing import Any
 
 import pytest
@@ -17,7 +18,14 @@ from sprag.service.http.web.form.shaft_spec import step_of
 from sprag.service.http.web.form.spec import spec_of, values_of
 from sprag.service.http.web.laboratory.questions import _estimate
 from sprag.service.http.web.laboratory.setting import _angle
+from sprag.service.languages.ranges import allowed_text
+from sprag.service.schedules.deadline import ALLOWED, ALLOWED_OF_RUNS
+from sprag.service.schedules.fields import read_fields
+from sprag.service.schedules.policies import GRACE_ALLOWED
+from sprag.service.schedules.report_to import EMAIL_ALLOWED, LONGEST_WEBHOOK, MOST_RECIPIENTS, WEBHOOK_ALLOWED
+from sprag.service.spec.report import SpecError
 from sprag.worker.chunking import Chunking
+from sprag.worker.limits import MAX_FINISH_DAYS
 from tests.service.spec_sample import SPEC
 
 STEPS = "/base/operation/steps"
@@ -104,3 +112,33 @@ def test_an_estimate_out_of_range() -> None:
     with languages.language("uk"):
         assert not words(_estimate("3")[1])
         assert not words(_estimate("?")[1])
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["1 deg\t2\n2\t?", "1;2;3", "angle [kg];M [s]\n1;2", "20.000;1.000\n25.000;2.000", '"1;2', "a", "1,234 5\n2 1e999"],
+)
+def test_pasted_clutch_data_are_refused_in_the_language_of_the_page(text: str) -> None:
+    values = values_of(SPEC) | {"/base/clutch/kind": "data", "/base/clutch/data": text}
+    with languages.language("uk"):
+        faults = spec_of(values)[1]["/base/clutch/data"]
+    for fault in faults:
+        said = re.sub("задано [^;]*(?:;[0-9;]*)*", "", fault)
+        assert not words(said.replace("rad", "")), said
+
+
+@pytest.mark.parametrize("given", [{}, {"at": "soon"}, {"cron": "x"}, {"at": "2026-02-01T06:00", "window": ["6", "6"]}])
+def test_times_of_schedules_are_refused_in_the_language_of_the_page(given: dict[str, Any]) -> None:
+    with pytest.raises(SpecError) as refused:
+        read_fields({"spec": SPEC, "finish_by": "x", "misfire_grace": "x", **given}, datetime(2026, 1, 1, tzinfo=UTC))
+    with languages.language("uk"):
+        for fault in refused.value.faults:
+            said = allowed_text(fault.allowed)
+            assert re.search("[а-я]{3}", said)
+            assert not words(re.sub('`[a-z]+`|"@daily"', "", said)), said
+
+
+def test_what_is_allowed_names_the_limits_that_hold() -> None:
+    assert all(f"1 s to {MAX_FINISH_DAYS} days" in text for text in (ALLOWED, ALLOWED_OF_RUNS, GRACE_ALLOWED))
+    assert f"at most {MOST_RECIPIENTS} " in EMAIL_ALLOWED
+    assert f"at most {LONGEST_WEBHOOK} " in WEBHOOK_ALLOWED
