@@ -16,7 +16,7 @@ from pathlib import Path
 import typer
 
 from docs import manual
-from sprag.engine.machine_shaft.expressions import MAX_LENGTH
+from sprag.engine.formulas.expressions import MAX_LENGTH
 from sprag.engine.vibration_drive.engagements import MAX_PERIODS
 from sprag.service.cli.app import app
 from sprag.service.cli.console import ExitCode

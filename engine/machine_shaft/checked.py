@@ -11,7 +11,6 @@ from sprag.engine.machine_shaft.machine import Machine, check_structure
 from sprag.engine.machine_shaft.problems import (
     AssemblyError,
     InsufficientInertiaError,
-    MachineError,
     MotorOverrunError,
     MotorStalledError,
     NearSingularError,
@@ -23,6 +22,7 @@ from sprag.engine.machine_shaft.relations import check_relations
 from sprag.engine.machine_shaft.results import result_infos
 from sprag.engine.machine_shaft.simulate import simulate
 from sprag.engine.machine_shaft.spec import MachineSpec
+from sprag.engine.problems import MachineError
 
 _NAMES = tuple(info.name for info in result_infos())
 

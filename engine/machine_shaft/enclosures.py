@@ -10,8 +10,8 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from sprag.engine.compile.jit import compiled, part
+from sprag.engine.formulas.expressions import Expression, Node
 from sprag.engine.machine_shaft import intervals as iv
-from sprag.engine.machine_shaft.expressions import Expression, Node
 from sprag.engine.machine_shaft.intervals import ORDERS
 from sprag.engine.machine_shaft.panels import POSITIONS, WEIGHTS, apply
 

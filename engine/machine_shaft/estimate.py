@@ -1,6 +1,6 @@
 """Estimated time of a case from the structure of its machine (measured by benchmarks/machine_shaft.py)."""
 
-from sprag.engine.machine_shaft.expressions import TIME, Expression, Node, names_of
+from sprag.engine.formulas.expressions import TIME, Expression, Node, names_of
 from sprag.engine.machine_shaft.simulate import PANELS
 from sprag.engine.machine_shaft.spec import MachineSpec
 

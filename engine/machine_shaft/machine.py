@@ -6,16 +6,16 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine.formulas.expressions import RESERVED, Expression, ExpressionError
 from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.drive_train import Train
-from sprag.engine.machine_shaft.expressions import RESERVED, Expression
 from sprag.engine.machine_shaft.mechanisms import RodMechanism
 from sprag.engine.machine_shaft.motor import characteristic, free_speed
 from sprag.engine.machine_shaft.operations import SpeedLaw, formula_breaks
 from sprag.engine.machine_shaft.parameters import parameters
 from sprag.engine.machine_shaft.parts import Jumps, ShaftPart, mechanism_of
 from sprag.engine.machine_shaft.pieces import Formula
-from sprag.engine.machine_shaft.problems import ExpressionError, StructureError
+from sprag.engine.machine_shaft.problems import StructureError
 from sprag.engine.machine_shaft.spec import (
     LINKED,
     MAX_CONSTANTS,

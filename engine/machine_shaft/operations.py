@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine import elementary
-from sprag.engine.machine_shaft.expressions import MEAN_SPEED, Expression
+from sprag.engine.formulas.expressions import MEAN_SPEED, Expression
 from sprag.engine.machine_shaft.mechanisms import Values
 from sprag.engine.machine_shaft.roots import switches
 from sprag.engine.machine_shaft.spec import OperationChoice

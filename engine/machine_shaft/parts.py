@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine import elementary
+from sprag.engine.formulas.expressions import MEAN_SPEED, Expression
 from sprag.engine.machine_shaft.bearings import JointForces, joint_forces
 from sprag.engine.machine_shaft.cams import Cam
 from sprag.engine.machine_shaft.columns import Columns
-from sprag.engine.machine_shaft.expressions import MEAN_SPEED, Expression
 from sprag.engine.machine_shaft.four_bars import FourBar, ParallelCrank
 from sprag.engine.machine_shaft.linkages import CrankShaper, ScotchYoke, SliderCrank, Whitworth
 from sprag.engine.machine_shaft.linked_rams import DragLink, Toggle

@@ -3,22 +3,7 @@
 import math
 
 from sprag.engine.endings import Ending
-
-
-class MachineError(ValueError):
-    """A fault of a machine; ``str`` is a sentence for users.
-
-    Attributes
-    ----------
-    ending : Ending or None
-        Ending of a case of a grid with the same fault; None for faults that no numeric parameter can remove.
-    found, allowed : str or None
-        What the machine has and what it must have, with units where they are known.
-    """
-
-    ending: Ending | None = None
-    found: str | None = None
-    allowed: str | None = None
+from sprag.engine.problems import MachineError
 
 
 class StructureError(MachineError):
@@ -32,23 +17,6 @@ class TableError(MachineError):
         super().__init__(message)
         self.found = found if isinstance(found, str) else f"{found:g}"
         self.allowed = allowed
-
-
-class ExpressionError(MachineError):
-    """A formula cannot be read, or its value is not a number.
-
-    Attributes
-    ----------
-    position : int or None
-        Position in the text, from 0; None where there is no single position.
-    part : str
-        "mechanism", "drive", "operation", or of one of several parts "parts.0.mechanism" and so on; "" where only
-        the text was checked.
-    """
-
-    def __init__(self, message: str, position: int | None, part: str = "") -> None:
-        super().__init__(message if position is None else f"{message} (at character {position + 1})")
-        self.position, self.part = position, part
 
 
 class RelationError(MachineError):

@@ -44,7 +44,7 @@ def branch(
 ) -> None:
     """Follow the periodic motion of one case along a parameter: stable and unstable, folds, doublings, grazings."""
     from sprag.service.results.branches import along_of, branch_csv, branch_json
-    from sprag.worker.models.branches import run_branch
+    from sprag.worker.models.abilities import run_branch
     from sprag.worker.models.starts import motion_of
 
     written = value_format(form, file, as_json)

@@ -66,7 +66,7 @@ def transient(
     """Compute the run-up from rest of a machine shaft, a step of its load, or its coasting, over time."""
     from sprag.service.results.trajectories import trajectory_csv
     from sprag.service.results.transients import course_of, results_json, transient_json
-    from sprag.worker.models.transients import run_transient
+    from sprag.worker.models.abilities import run_transient
 
     written = value_format(form, file, as_json)
     study = read_study(spec, files=tables).study

@@ -17,8 +17,9 @@ from sprag.service.results.directions import case_values
 from sprag.service.results.exports import table_csv
 from sprag.service.results.portraits import require_strobes
 from sprag.service.results.start_states import refuse_impossible
+from sprag.worker.models.abilities import run_sections
 from sprag.worker.models.common import case_machine
-from sprag.worker.models.sections import Sampling, run_sections
+from sprag.worker.models.sections import Sampling
 from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:

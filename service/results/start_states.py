@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sprag.service.faults import parameter_error
-from sprag.worker.models.start_states import impossible_starts, is_state
 from sprag.worker.models.starts import count_of
+from sprag.worker.models.vibration_drive.start_states import impossible_starts, is_state
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

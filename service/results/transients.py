@@ -12,7 +12,8 @@ from sprag.service.reading.units import QuantityError, parse_quantity, split_qua
 from sprag.service.results.trajectories import timed_values, trajectory_csv
 from sprag.worker import models
 from sprag.worker.limits import MIN_TRAJECTORY_POINTS
-from sprag.worker.models.transients import KINDS, RESULTS, Course, has_motor, has_transients, run_transient
+from sprag.worker.models.abilities import has_motor, has_transients, run_transient
+from sprag.worker.models.transients import KINDS, RESULTS, Course
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

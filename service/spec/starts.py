@@ -17,7 +17,7 @@ from sprag.service.spec.report import Report, join
 from sprag.service.spec.schema.quantity import QUANTITY, Schema, object_schema
 from sprag.worker.limits import MAX_START_RANGES, MAX_STARTS
 from sprag.worker.models import START_STATES, is_settled
-from sprag.worker.models.start_states import LOCKED, is_initial
+from sprag.worker.models.vibration_drive.start_states import LOCKED, is_initial
 
 if TYPE_CHECKING:
     from sprag.service.spec.machine.machine import Machine

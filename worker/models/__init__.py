@@ -12,14 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from sprag.engine import ENGINE_VERSION, Ending, Run, Span
 from sprag.engine.catalogue import Parameter, ResultInfo
-from sprag.engine.machine_shaft.problems import (
-    AssemblyError,
-    ExpressionError,
-    InsufficientInertiaError,
-    MachineError,
-    TableError,
-)
+from sprag.engine.formulas.expressions import ExpressionError
+from sprag.engine.machine_shaft.problems import AssemblyError, InsufficientInertiaError, TableError
 from sprag.engine.outcome import Basin, Engagements, Portrait, Trajectory
+from sprag.engine.problems import MachineError
 from sprag.engine.run import MEANS_FROM_PERIODS
 from sprag.engine.sources import engine_folder, source_hash
 from sprag.engine.vibration_drive.clutch import (
@@ -41,6 +37,14 @@ from sprag.engine.vibration_drive.parameters import (
 )
 from sprag.engine.warning_text import WarningText
 from sprag.worker.models import machine_shaft, vibration_drive
+from sprag.worker.models.abilities import (
+    has_clutches,
+    has_strobes,
+    run_basin,
+    run_end_state,
+    run_engagements,
+    run_portrait,
+)
 from sprag.worker.models.common import (
     NO_PARAMETERS,
     ChunkResult,
@@ -52,13 +56,6 @@ from sprag.worker.models.common import (
 )
 from sprag.worker.models.model import Model, all_models, model_names, model_of, register, unregister
 from sprag.worker.models.presentation import Panel, Presentation, Reference
-from sprag.worker.models.settled import (
-    JUMPED,
-    REGIME_SENTENCES,
-    SETTLED,
-    is_settled,
-    settled_study,
-)
 from sprag.worker.models.tasks import chunk_task, run_chunk, run_task
 from sprag.worker.models.usable import half_width, unsettled, usable, with_half_widths
 from sprag.worker.models.vibration_drive import (
@@ -69,12 +66,18 @@ from sprag.worker.models.vibration_drive import (
     kernel_source,
     run_of,
 )
+from sprag.worker.models.vibration_drive.settled import (
+    JUMPED,
+    REGIME_SENTENCES,
+    SETTLED,
+    is_settled,
+    settled_study,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from sprag.worker.models.model import Floats
     from sprag.worker.study import Study
 
 __all__ = [
@@ -300,36 +303,6 @@ def run_trajectory(study: Study, case: int, start: float, end: float, points: in
 def can_sweep(model: str, run: Mapping[str, Any]) -> bool:
     """Whether cases of ``model`` with that run can start from the settled motion of their neighbours."""
     return model_of(model).sweeps(run)
-
-
-def has_clutches(study: Study) -> bool:
-    """Whether the machine of ``study`` has clutches."""
-    return model_of(study.model).has_clutches
-
-
-def run_engagements(study: Study, case: int) -> Engagements:
-    """Engagements of the clutches of one case; ValueError where its machine has none."""
-    return model_of(study.model).engagements(study, case)
-
-
-def has_strobes(study: Study) -> bool:
-    """Whether the cases of ``study`` have a `run_portrait`."""
-    return model_of(study.model).has_strobes
-
-
-def run_portrait(study: Study, case: int) -> Portrait:
-    """How one case approaches its motion, strobe by strobe; ValueError where its machine has no strobes."""
-    return model_of(study.model).portrait(study, case)
-
-
-def run_end_state(study: Study, case: int) -> dict[str, float] | None:
-    """Initial values (SI) that go on from the end of one case, which is run for this; None where it does not end ok."""
-    return model_of(study.model).end_state(study, case)
-
-
-def run_basin(study: Study, case: int, paths: tuple[str, str], x: Floats, y: Floats) -> Basin:
-    """The regimes to which one case of a settled study comes from a grid of initial values (SI) of two ``paths``."""
-    return model_of(study.model).basin(study, case, paths, x, y)
 
 
 def lanes_per_case(study: Study) -> int:

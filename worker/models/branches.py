@@ -1,4 +1,4 @@
-"""Branches of a case's motion along a parameter: what is asked for, what is answered, and the vibration drive's."""
+"""Branches of a case's motion along a parameter: what is asked for, and what is answered."""
 
 from __future__ import annotations
 
@@ -7,21 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.engine.vibration_drive.cases import pendulum_count
-from sprag.engine.vibration_drive.results import orbit_infos
 from sprag.worker.models.common import case_machine
 from sprag.worker.models.formulas import evaluate
-from sprag.worker.models.model import model_of
 from sprag.worker.models.parameters import parameter_of
-from sprag.worker.models.settled import settings_of, settled_study
-from sprag.worker.models.swept import start_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from numpy.typing import ArrayLike, NDArray
 
-    from sprag.engine.continuation.problem import Special
     from sprag.worker.study import Study
 
 
@@ -113,55 +107,3 @@ def allowed_values(study: Study, paths: tuple[str, ...]) -> tuple[float, float]:
     lows = [entry.low for entry in entries if entry is not None]
     highs = [entry.high for entry in entries if entry is not None]
     return max(lows, default=-np.inf), min(highs, default=np.inf)
-
-
-def run_branch(study: Study, case: int, along: Along) -> CaseBranch:
-    """The branch through the settled motion of one case; ValueError where its machine has no strobes."""
-    return model_of(study.model).branch(study, case, along)
-
-
-def branch_results(study: Study) -> tuple[str, ...]:
-    """Names of the results of a branch of a vibration drive."""
-    return tuple(info.name for info in orbit_infos(pendulum_count(case_machine(study, 0))))
-
-
-def drive_branch(study: Study, case: int, along: Along) -> CaseBranch:
-    """The branch of a vibration drive; a study of runs of a given time is settled for it."""
-    from sprag.engine.continuation.follow import Range
-    from sprag.engine.vibration_drive.branches import NoOrbitError, branch
-
-    own = case_machine(study, case)
-    value = own[along.paths[0]]
-    infos = orbit_infos(pendulum_count(own))
-    names, units = tuple(info.name for info in infos), tuple(info.unit for info in infos)
-    settings = settings_of(settled_study(study).run)
-    bounds = allowed_values(study, along.paths)
-    try:
-        made = branch(
-            machines_along(study, case, along.paths), value, settings, Range(along.low, along.high), bounds,
-            start_of(study, case),
-        )  # fmt: skip
-    except NoOrbitError as error:
-        nothing = np.empty(0)
-        return CaseBranch(
-            value, 0, nothing, nothing, np.empty(0, dtype=np.bool_), names, units, np.empty((0, len(names))), (),
-            ("", ""), str(error),
-        )  # fmt: skip
-    return CaseBranch(
-        value,
-        made.order,
-        np.array([point.parameter for point in made.points]),
-        np.array([point.multiplier for point in made.points]),
-        np.array([point.stable for point in made.points]),
-        names,
-        units,
-        made.values,
-        tuple(map(_special, made.specials)),
-        (made.ends[0].sentence, made.ends[1].sentence),
-    )
-
-
-def _special(found: Special) -> SpecialPoint:
-    contacts = tuple(BranchContact(one.part, one.state, one.before, one.after) for one in found.contacts)
-    kind, meaning = found.kind.value, found.kind.sentence
-    return SpecialPoint(kind, meaning, found.parameter, found.index, found.multipliers, contacts)

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.engine.machine_shaft.expressions import CONSTANTS, MAX_LENGTH, RESERVED, Expression, Node
-from sprag.engine.machine_shaft.problems import ExpressionError
+from sprag.engine.formulas.expressions import CONSTANTS, MAX_LENGTH, RESERVED, Expression, ExpressionError, Node
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

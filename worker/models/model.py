@@ -15,12 +15,9 @@ if TYPE_CHECKING:
 
     from sprag.engine import Ending
     from sprag.engine.catalogue import Parameter, ResultInfo
-    from sprag.engine.machine_shaft.transient_course import Course, Transient
-    from sprag.engine.outcome import Basin, Engagements, Portrait, Trajectory
-    from sprag.worker.models.branches import Along, CaseBranch
+    from sprag.engine.outcome import Trajectory
+    from sprag.worker.models.abilities import Clutches, Strobes, Transients
     from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
-    from sprag.worker.models.sections import CaseSections, Sampling
-    from sprag.worker.models.turns import CaseTurn
     from sprag.worker.study import Study
 
     Floats = NDArray[np.float64]
@@ -117,63 +114,23 @@ class Model(Protocol):
         ...
 
     @property
-    def has_clutches(self) -> bool:
-        """Whether its machines have clutches, and therefore `engagements`."""
-        return False
-
-    def engagements(self, study: Study, case: int) -> Engagements:
-        """Engagements of the clutches of one case; ValueError where there are none."""
-        raise ValueError(f"a machine of model {self.name} has no clutches")
+    def clutches(self) -> Clutches | None:
+        """The clutches of its machines; None where they have none."""
+        return None
 
     @property
-    def has_strobes(self) -> bool:
-        """Whether its cases have strobes, one state per excitation period, and therefore a `portrait`."""
-        return False
+    def strobes(self) -> Strobes | None:
+        """The strobes and initial values of its cases; None where they have none."""
+        return None
 
-    def portrait(self, study: Study, case: int) -> Portrait:
-        """How one case approaches its motion; ValueError where there are no strobes."""
-        raise ValueError(f"a machine of model {self.name} has no strobes")
-
-    def basin(
-        self, study: Study, case: int, paths: tuple[str, str], x: NDArray[np.float64], y: NDArray[np.float64]
-    ) -> Basin:
-        """The regimes to which one case comes from a grid of the initial values ``x`` and ``y`` (SI) of two ``paths``.
-
-        ValueError where its machines have no initial values.
-        """
-        raise ValueError(f"a machine of model {self.name} has no initial values")
-
-    def end_state(self, study: Study, case: int) -> dict[str, float] | None:
-        """Initial values (SI) by path that go on from the end of one case; None where it does not end ok.
-
-        ValueError where its machines have no initial values.
-        """
-        raise ValueError(f"a machine of model {self.name} has no initial values")
-
-    def turn(self, study: Study, case: int, points: int) -> CaseTurn:
-        """The settled motion of a case of a settled study; ValueError where there are no strobes."""
-        raise ValueError(f"a machine of model {self.name} has no strobes")
+    @property
+    def transients(self) -> Transients | None:
+        """The transients of its machines; None where they have none."""
+        return None
 
     def lanes_per_case(self, study: Study) -> int:
         """Runs of the engine that one case of the study takes side by side."""
         return 1
-
-    def branch(self, study: Study, case: int, along: Along) -> CaseBranch:
-        """The branch through the settled motion of a case; ValueError where there are no strobes."""
-        raise ValueError(f"a machine of model {self.name} has no strobes")
-
-    def sections(self, study: Study, case: int, asked: Sampling) -> CaseSections:
-        """Strobes of settled motions along a parameter of a case; ValueError where there are no strobes."""
-        raise ValueError(f"a machine of model {self.name} has no strobes")
-
-    @property
-    def has_transients(self) -> bool:
-        """Whether its machines run up, are loaded anew and coast over time, beside their cases."""
-        return False
-
-    def transient(self, study: Study, case: int, course: Course, points: int) -> Transient:
-        """A transient of a case with ``points`` equally spaced times; ValueError where there are none."""
-        raise ValueError(f"a machine of model {self.name} has no transients")
 
     def estimate_seconds_per_case(self, study: Study) -> float:
         """Rough time of one case on one core, in s."""

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.worker.models.settled import IRREGULAR
 from sprag.worker.models.usable import half_width
+from sprag.worker.models.vibration_drive.settled import IRREGULAR
 from sprag.worker.planning.refine_plan import MULTIPLIER, ORDER, REGIME, SETTLED_AFTER
 from sprag.worker.planning.transients import settling
 

@@ -22,8 +22,7 @@ from sprag.service.results.figures.branch import branch_figure
 from sprag.service.results.figures.read import read_figure
 from sprag.service.results.figures.sections import diagram_figure, section_figure
 from sprag.service.results.pictures.curves import draw_figure
-from sprag.worker.models.branches import run_branch
-from sprag.worker.models.sections import run_sections
+from sprag.worker.models.abilities import run_branch, run_sections
 from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:

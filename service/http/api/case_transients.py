@@ -20,7 +20,8 @@ from sprag.service.results.figures.read import read_figure
 from sprag.service.results.figures.transient import transient_figure
 from sprag.service.results.pictures.curves import draw_figure
 from sprag.worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
-from sprag.worker.models.transients import KINDS, run_transient, shape_of_transients
+from sprag.worker.models.abilities import run_transient, shape_of_transients
+from sprag.worker.models.transients import KINDS
 
 if TYPE_CHECKING:
     from sprag.worker.models.transients import Course

@@ -28,7 +28,7 @@ from sprag.service.storage.records import CaseRow
 from sprag.worker import models
 from sprag.worker.codes import FLAG_MASKS, PENDING
 from sprag.worker.limits import MAX_PAGE_SIZE, MAX_PAGE_TOKEN, MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
-from sprag.worker.models.transients import has_transients
+from sprag.worker.models.abilities import has_transients
 
 if TYPE_CHECKING:
     from sprag.service.http.context import Context

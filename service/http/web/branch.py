@@ -24,7 +24,7 @@ from sprag.service.results.figures.branch import OwnCases, branch_figure
 from sprag.service.results.figures.read import read_figure
 from sprag.service.results.portraits import require_strobes
 from sprag.service.results.start_states import check_start
-from sprag.worker.models.branches import branch_results, run_branch
+from sprag.worker.models.abilities import branch_results, run_branch
 from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:

@@ -35,8 +35,8 @@ from sprag.service.results.start_states import check_start
 from sprag.service.results.sweeps import direction_texts
 from sprag.worker import models
 from sprag.worker.codes import PENDING
+from sprag.worker.models.abilities import has_transients
 from sprag.worker.models.starts import motion_of
-from sprag.worker.models.transients import has_transients
 
 if TYPE_CHECKING:
     from sprag.service.http.context import Context

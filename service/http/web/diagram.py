@@ -26,7 +26,7 @@ from sprag.service.results.figures.sections import diagram_figure, section_figur
 from sprag.service.results.portraits import require_strobes
 from sprag.service.results.sections import diagram_of, section_of, variable_of, variables
 from sprag.service.results.start_states import check_start
-from sprag.worker.models.sections import run_sections
+from sprag.worker.models.abilities import run_sections
 from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:

@@ -23,7 +23,8 @@ from sprag.service.languages import N_
 from sprag.service.results.figures.read import read_figure
 from sprag.service.results.figures.transient import transient_figure
 from sprag.service.results.transients import course_of, require_transients
-from sprag.worker.models.transients import RESULTS, has_motor, run_transient, shape_of_transients
+from sprag.worker.models.abilities import has_motor, run_transient, shape_of_transients
+from sprag.worker.models.transients import RESULTS
 
 if TYPE_CHECKING:
     from sprag.worker.models.transients import Course

@@ -11,7 +11,7 @@ from sprag.service.spec.plan.outline import chooses
 from sprag.service.spec.report import Report, join
 from sprag.worker import models
 from sprag.worker.limits import MAX_CASES
-from sprag.worker.models.start_states import is_initial
+from sprag.worker.models.vibration_drive.start_states import is_initial
 from sprag.worker.study import Axis
 from sprag.worker.sweeps import DOWN, SWEEP, UP
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from sprag.service.spec.derive import layout
 from sprag.worker.derived import blocks, involved
-from sprag.worker.models.start_states import impossible_starts
+from sprag.worker.models.vibration_drive.start_states import impossible_starts
 
 if TYPE_CHECKING:
     from sprag.service.spec.machine.machine import Machine

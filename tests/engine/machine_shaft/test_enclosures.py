@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.polynomial import chebyshev
 
+from sprag.engine.formulas.expressions import Expression
 from sprag.engine.machine_shaft.enclosures import Program
-from sprag.engine.machine_shaft.expressions import Expression
 from sprag.engine.machine_shaft.intervals import ORDERS
 
 _PLACES = np.cos(np.linspace(0.0, np.pi, 60))

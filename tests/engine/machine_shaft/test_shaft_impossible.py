@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from sprag.engine.endings import ENDINGS, Ending
+from sprag.engine.formulas.expressions import ExpressionError
 from sprag.engine.machine_shaft.checked import check
-from sprag.engine.machine_shaft.problems import AssemblyError, ExpressionError, RelationError, TableError
+from sprag.engine.machine_shaft.problems import AssemblyError, RelationError, TableError
 from sprag.engine.machine_shaft.simulate import simulate
 from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
 from sprag.engine.machine_shaft.tables import Table

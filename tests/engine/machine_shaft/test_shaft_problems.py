@@ -11,14 +11,13 @@ import numpy as np
 import pytest
 
 from sprag.engine.endings import ENDINGS, Ending
+from sprag.engine.formulas.expressions import ExpressionError
 from sprag.engine.machine_shaft.checked import check
 from sprag.engine.machine_shaft.estimate import estimate_seconds
 from sprag.engine.machine_shaft.parameters import parameters
 from sprag.engine.machine_shaft.problems import (
     AssemblyError,
-    ExpressionError,
     InsufficientInertiaError,
-    MachineError,
     MotorStalledError,
     NegativeInertiaError,
     QuadratureError,
@@ -31,6 +30,7 @@ from sprag.engine.machine_shaft.simulate import simulate
 from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
 from sprag.engine.machine_shaft.tables import Table
 from sprag.engine.machine_shaft.trajectory import trajectory
+from sprag.engine.problems import MachineError
 from tests.engine.machine_shaft.machines import NAMES, PRESS, PRESS_NUMBERS, RPM
 
 FLAT: dict[str, Any] = {"mean_speed": 10.0, "drive.inertia": 2.0}

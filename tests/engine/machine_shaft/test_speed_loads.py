@@ -10,8 +10,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from sprag.engine.endings import Ending
+from sprag.engine.formulas.expressions import ExpressionError
 from sprag.engine.machine_shaft.checked import check
-from sprag.engine.machine_shaft.problems import ExpressionError, InsufficientInertiaError, QuadratureError
+from sprag.engine.machine_shaft.problems import InsufficientInertiaError, QuadratureError
 from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice, PartChoice
 from sprag.engine.machine_shaft.trajectory import trajectory
 from tests.engine.machine_shaft.machines import ending_of, one

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.models.settled import IRREGULAR
+from sprag.worker.models.vibration_drive.settled import IRREGULAR
 from sprag.worker.planning.refine import describe, refiner
 from sprag.worker.planning.refine_plan import AdaptiveAxis, RefinePlan
 from sprag.worker.planning.rounds import Rows, Step

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from sprag.worker.models.settled import IRREGULAR
+from sprag.worker.models.vibration_drive.settled import IRREGULAR
 from sprag.worker.planning.refine import MapRefiner, describe_maps, refiner
 from sprag.worker.planning.refine_plan import AdaptiveAxis, FixedAxis, RefinePlan
 from sprag.worker.planning.rounds import Rows, Step

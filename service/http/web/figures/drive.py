@@ -11,7 +11,8 @@ from sprag.service.results.figures.read import read_figure
 from sprag.service.results.figures.turn import turn_figure
 from sprag.service.results.trajectories import trajectory_csv
 from sprag.worker import models
-from sprag.worker.models.turns import CaseTurn, case_turn
+from sprag.worker.models.abilities import case_turn
+from sprag.worker.models.turns import CaseTurn
 
 if TYPE_CHECKING:
     from sprag.service.reading.quantities import Units

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from sprag.worker.models.drive_words import CAPTIONS, LETTERS
 from sprag.worker.models.presentation import Answer, Panel, Presentation
+from sprag.worker.models.vibration_drive.words import CAPTIONS, LETTERS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine import elementary
-from sprag.engine.machine_shaft.problems import ExpressionError
+from sprag.engine.problems import MachineError
 
 Floats = NDArray[np.float64]
 Value = Floats | float
@@ -34,6 +34,24 @@ MAX_NODES = 500
 MAX_DEPTH = 40
 
 CONSTANTS: Mapping[str, float] = {"pi": float(np.pi), "deg": float(np.pi) / 180.0}
+
+
+class ExpressionError(MachineError):
+    """A formula cannot be read, or its value is not a number.
+
+    Attributes
+    ----------
+    position : int or None
+        Position in the text, from 0; None where there is no single position.
+    part : str
+        "mechanism", "drive", "operation", or of one of several parts "parts.0.mechanism" and so on; "" where only
+        the text was checked.
+    """
+
+    def __init__(self, message: str, position: int | None, part: str = "") -> None:
+        super().__init__(message if position is None else f"{message} (at character {position + 1})")
+        self.position, self.part = position, part
+
 
 _TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"

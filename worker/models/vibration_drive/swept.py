@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sprag.worker.models.common import NO_PARAMETERS, ChunkResult, ChunkTask, chunk_result
-from sprag.worker.models.settled import ARBITRARY_START, JUMPED, RESTARTED, settings_of
+from sprag.worker.models.vibration_drive.settled import ARBITRARY_START, JUMPED, RESTARTED, settings_of
 from sprag.worker.sweeps import line_to
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.worker.models.machine_shaft.words import CAPTIONS, LETTERS
 from sprag.worker.models.presentation import Answer, Panel, Presentation, Reference
-from sprag.worker.models.shaft_words import CAPTIONS, LETTERS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -21,7 +21,6 @@ from sprag.engine.vibration_drive.parameters import (
 from sprag.engine.vibration_drive.regimes import Regime, depends_on_history, settled_infos
 from sprag.engine.vibration_drive.results import result_infos
 from sprag.engine.vibration_drive.start_results import NUMBER, started_infos
-from sprag.worker.models.branches import Along, CaseBranch, drive_branch
 from sprag.worker.models.common import (
     ChunkResult,
     ChunkTask,
@@ -31,10 +30,12 @@ from sprag.worker.models.common import (
     case_machine,
     chunk_result,
 )
-from sprag.worker.models.drive_presentation import PRESENTATION
 from sprag.worker.models.model import Model
-from sprag.worker.models.sections import CaseSections, Sampling, drive_sections
-from sprag.worker.models.settled import (
+from sprag.worker.models.starts import count_of, further_starts, has_starts
+from sprag.worker.models.vibration_drive.branches import branch_of, branch_results
+from sprag.worker.models.vibration_drive.presentation import PRESENTATION
+from sprag.worker.models.vibration_drive.sections import sections_of
+from sprag.worker.models.vibration_drive.settled import (
     HISTORY_DEPENDENT,
     HISTORY_FLAGS,
     REGIME_FLAGS,
@@ -44,9 +45,8 @@ from sprag.worker.models.settled import (
     mean_periods,
     settings_of,
 )
-from sprag.worker.models.starts import count_of, further_starts, has_starts
-from sprag.worker.models.swept import start_of, swept
-from sprag.worker.models.turns import CaseTurn, drive_turn
+from sprag.worker.models.vibration_drive.swept import start_of, swept
+from sprag.worker.models.vibration_drive.turns import turn_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -56,6 +56,10 @@ if TYPE_CHECKING:
     from sprag.engine.catalogue import Parameter
     from sprag.engine.outcome import Basin, Engagements, Portrait, Trajectory
     from sprag.engine.run import Reset, Unit
+    from sprag.worker.models.abilities import Clutches, Strobes
+    from sprag.worker.models.branches import Along, CaseBranch
+    from sprag.worker.models.sections import CaseSections, Sampling
+    from sprag.worker.models.turns import CaseTurn
     from sprag.worker.study import Study
 
 MODEL = "vibration-drive"
@@ -277,54 +281,15 @@ class VibrationDrive(Model):
         return trajectory(columns, run_of(study.run), np.linspace(start, end, points), start_of(study, case))
 
     @property
-    def has_clutches(self) -> bool:
-        return True
-
-    def engagements(self, study: Study, case: int) -> Engagements:
-        """Those of one turn of the settled motion for a settled study, otherwise those in the window."""
-        from sprag.engine.vibration_drive.engagements import engagements, settled_engagements
-
-        columns = case_machine(study, case)
-        if is_settled(study.run):
-            return settled_engagements(columns, settings_of(study.run), start_of(study, case))
-        return engagements(columns, run_of(study.run))
+    def clutches(self) -> Clutches:
+        return _Clutches()
 
     @property
-    def has_strobes(self) -> bool:
-        return True
-
-    def portrait(self, study: Study, case: int) -> Portrait:
-        from sprag.engine.vibration_drive.portrait import portrait, settled_portrait
-
-        columns = case_machine(study, case)
-        if is_settled(study.run):
-            return settled_portrait(columns, settings_of(study.run), start_of(study, case))
-        return portrait(columns, run_of(study.run))
-
-    def basin(
-        self, study: Study, case: int, paths: tuple[str, str], x: NDArray[np.float64], y: NDArray[np.float64]
-    ) -> Basin:
-        from sprag.engine.vibration_drive.starts import basin
-
-        return basin(case_machine(study, case), settings_of(study.run), paths, x, y)
-
-    def end_state(self, study: Study, case: int) -> dict[str, float] | None:
-        from sprag.engine.vibration_drive.start_states import end_state
-
-        settings = settings_of(study.run) if is_settled(study.run) else run_of(study.run)
-        return end_state(case_machine(study, case), settings, start_of(study, case))
-
-    def turn(self, study: Study, case: int, points: int) -> CaseTurn:
-        return drive_turn(study, case, points, _flags)
+    def strobes(self) -> Strobes:
+        return _Strobes()
 
     def lanes_per_case(self, study: Study) -> int:
         return count_of(study.run)
-
-    def branch(self, study: Study, case: int, along: Along) -> CaseBranch:
-        return drive_branch(study, case, along)
-
-    def sections(self, study: Study, case: int, asked: Sampling) -> CaseSections:
-        return drive_sections(study, case, asked)
 
     def estimate_seconds_per_case(self, study: Study) -> float:
         from sprag.engine.vibration_drive.simulate import estimate_seconds
@@ -354,6 +319,52 @@ class VibrationDrive(Model):
         columns |= {f"clutch.coefficients.{k}": 200.0 for k in range(max(1, coefficients))}
         run = Run(duration=Span(20.0, "periods"), tolerance=tolerance)
         return simulate(columns, run, cases=1).values.tobytes()
+
+
+class _Clutches:
+    def engagements(self, study: Study, case: int) -> Engagements:
+        """Those of one turn of the settled motion for a settled study, otherwise those in the window."""
+        from sprag.engine.vibration_drive.engagements import engagements, settled_engagements
+
+        columns = case_machine(study, case)
+        if is_settled(study.run):
+            return settled_engagements(columns, settings_of(study.run), start_of(study, case))
+        return engagements(columns, run_of(study.run))
+
+
+class _Strobes:
+    def portrait(self, study: Study, case: int) -> Portrait:
+        from sprag.engine.vibration_drive.portrait import portrait, settled_portrait
+
+        columns = case_machine(study, case)
+        if is_settled(study.run):
+            return settled_portrait(columns, settings_of(study.run), start_of(study, case))
+        return portrait(columns, run_of(study.run))
+
+    def turn(self, study: Study, case: int, points: int) -> CaseTurn:
+        return turn_of(study, case, points, _flags)
+
+    def branch(self, study: Study, case: int, along: Along) -> CaseBranch:
+        return branch_of(study, case, along)
+
+    def branch_results(self, study: Study) -> tuple[str, ...]:
+        return branch_results(study)
+
+    def sections(self, study: Study, case: int, asked: Sampling) -> CaseSections:
+        return sections_of(study, case, asked)
+
+    def basin(
+        self, study: Study, case: int, paths: tuple[str, str], x: NDArray[np.float64], y: NDArray[np.float64]
+    ) -> Basin:
+        from sprag.engine.vibration_drive.starts import basin
+
+        return basin(case_machine(study, case), settings_of(study.run), paths, x, y)
+
+    def end_state(self, study: Study, case: int) -> dict[str, float] | None:
+        from sprag.engine.vibration_drive.start_states import end_state
+
+        settings = settings_of(study.run) if is_settled(study.run) else run_of(study.run)
+        return end_state(case_machine(study, case), settings, start_of(study, case))
 
 
 def _run_starts(task: ChunkTask, number: int) -> ChunkResult:

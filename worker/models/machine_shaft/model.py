@@ -13,15 +13,9 @@ import numpy as np
 
 from sprag.engine import Ending
 from sprag.engine.machine_shaft.parameters import parameters as _engine_parameters
-from sprag.engine.machine_shaft.problems import ExpressionError, MachineError, RelationError
 from sprag.engine.machine_shaft.results import result_infos
-from sprag.engine.machine_shaft.sketch import Sketch
 from sprag.engine.machine_shaft.spec import (
     LINKED,
-    MAX_CONSTANTS,
-    MAX_PARTS,
-    MAX_STAGES,
-    MAX_STEPS,
     REVOLUTIONS,
     Drive,
     MachineSpec,
@@ -31,10 +25,9 @@ from sprag.engine.machine_shaft.spec import (
     PartChoice,
     Stage,
 )
-from sprag.engine.machine_shaft.tables import MAX_ROWS
 from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, case_machine, chunk_result
+from sprag.worker.models.machine_shaft.presentation import PRESENTATION, presentation_of
 from sprag.worker.models.model import Model
-from sprag.worker.models.shaft_presentation import PRESENTATION, presentation_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -42,31 +35,12 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from sprag.engine.catalogue import Parameter, ResultInfo
+    from sprag.engine.machine_shaft.sketch import Sketch
     from sprag.engine.machine_shaft.transient_course import Course, Transient
     from sprag.engine.outcome import Trajectory
+    from sprag.worker.models.abilities import Transients
     from sprag.worker.models.presentation import Presentation
     from sprag.worker.study import Study
-
-__all__ = [
-    "LINKED",
-    "MAX_CONSTANTS",
-    "MAX_PARTS",
-    "MAX_ROWS",
-    "MAX_STAGES",
-    "MAX_STEPS",
-    "REVOLUTIONS",
-    "STAGE_KINDS",
-    "ExpressionError",
-    "MachineError",
-    "RelationError",
-    "Sketch",
-    "base_results",
-    "check",
-    "check_structure",
-    "parameters_of",
-    "reachable_pressure",
-    "sketches_of",
-]
 
 MODEL = "machine-shaft"
 STAGE_KINDS: tuple[str, ...] = get_args(Stage)
@@ -240,13 +214,8 @@ class MachineShaft(Model):
         return trajectory(spec_of(study.structure), columns, np.linspace(start, end, points))
 
     @property
-    def has_transients(self) -> bool:
-        return True
-
-    def transient(self, study: Study, case: int, course: Course, points: int) -> Transient:
-        from sprag.engine.machine_shaft.transients import transient
-
-        return transient(spec_of(study.structure), case_machine(study, case), course, points)
+    def transients(self) -> Transients:
+        return _Transients()
 
     def estimate_seconds_per_case(self, study: Study) -> float:
         from sprag.engine.machine_shaft.estimate import estimate_seconds
@@ -268,6 +237,19 @@ class MachineShaft(Model):
 
     def known_answers(self, shape: KernelShape) -> bytes:
         return _run_a_transient() if shape.key else _run_each_kind()
+
+
+class _Transients:
+    def has_motor(self, study: Study) -> bool:
+        return (study.structure or {}).get("balance") == "motor"
+
+    def shape(self, study: Study) -> KernelShape:
+        return KernelShape(study.model, ("transient",))
+
+    def run(self, study: Study, case: int, course: Course, points: int) -> Transient:
+        from sprag.engine.machine_shaft.transients import transient
+
+        return transient(spec_of(study.structure), case_machine(study, case), course, points)
 
 
 def _run_each_kind() -> bytes:

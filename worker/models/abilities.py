@@ -1,0 +1,175 @@
+"""What only some models can do, each an object of its model, or None: clutches, strobes, transients.
+
+Every function is a module's own, so that another process can run it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+from sprag.worker.models.model import model_of
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from sprag.engine.machine_shaft.transient_course import Course, Transient
+    from sprag.engine.outcome import Basin, Engagements, Portrait
+    from sprag.worker.models.branches import Along, CaseBranch
+    from sprag.worker.models.common import KernelShape
+    from sprag.worker.models.sections import CaseSections, Sampling
+    from sprag.worker.models.turns import CaseTurn
+    from sprag.worker.study import Study
+
+    Floats = NDArray[np.float64]
+
+Ability = TypeVar("Ability")
+
+
+class Clutches(Protocol):
+    """The machines of a model have clutches."""
+
+    def engagements(self, study: Study, case: int) -> Engagements:
+        """Engagements of the clutches of one case."""
+        ...
+
+
+class Strobes(Protocol):
+    """The cases of a model have strobes, one state per excitation period, and begin with initial values."""
+
+    def portrait(self, study: Study, case: int) -> Portrait:
+        """How one case approaches its motion."""
+        ...
+
+    def turn(self, study: Study, case: int, points: int) -> CaseTurn:
+        """The settled motion of a case of a settled study."""
+        ...
+
+    def branch(self, study: Study, case: int, along: Along) -> CaseBranch:
+        """The branch through the settled motion of a case."""
+        ...
+
+    def branch_results(self, study: Study) -> tuple[str, ...]:
+        """Names of the results of a branch."""
+        ...
+
+    def sections(self, study: Study, case: int, asked: Sampling) -> CaseSections:
+        """Strobes of settled motions along a parameter of a case."""
+        ...
+
+    def basin(self, study: Study, case: int, paths: tuple[str, str], x: Floats, y: Floats) -> Basin:
+        """The regimes to which one case comes from a grid of the initial values ``x`` and ``y`` (SI) of two paths."""
+        ...
+
+    def end_state(self, study: Study, case: int) -> dict[str, float] | None:
+        """Initial values (SI) by path that go on from the end of one case; None where it does not end ok."""
+        ...
+
+
+class Transients(Protocol):
+    """The machines of a model run up, are loaded anew and coast over time, beside their cases."""
+
+    def has_motor(self, study: Study) -> bool:
+        """Whether a motor drives the machine, whose torque follows the speed."""
+        ...
+
+    def shape(self, study: Study) -> KernelShape:
+        """The kernel of transients, which is compiled apart from that of the cases."""
+        ...
+
+    def run(self, study: Study, case: int, course: Course, points: int) -> Transient:
+        """A transient of a case with ``points`` equally spaced times."""
+        ...
+
+
+def has_clutches(study: Study) -> bool:
+    """Whether the machine of ``study`` has clutches."""
+    return model_of(study.model).clutches is not None
+
+
+def has_strobes(study: Study) -> bool:
+    """Whether the cases of ``study`` have a `run_portrait`."""
+    return model_of(study.model).strobes is not None
+
+
+def has_transients(study: Study) -> bool:
+    """Whether the machine of the study has transients."""
+    return model_of(study.model).transients is not None
+
+
+def run_engagements(study: Study, case: int) -> Engagements:
+    """Engagements of the clutches of one case; ValueError where its machine has none."""
+    return _of(study, model_of(study.model).clutches, "clutches").engagements(study, case)
+
+
+def run_portrait(study: Study, case: int) -> Portrait:
+    """How one case approaches its motion, strobe by strobe; ValueError where its machine has no strobes."""
+    return _strobes(study).portrait(study, case)
+
+
+def case_turn(study: Study, case: int, points: int) -> CaseTurn:
+    """The settled motion of a case of a settled study, with approximately so many samples.
+
+    ValueError where its machine has no strobes. The case is run here.
+    """
+    return _strobes(study).turn(study, case, points)
+
+
+def run_branch(study: Study, case: int, along: Along) -> CaseBranch:
+    """The branch through the settled motion of one case; ValueError where its machine has no strobes."""
+    return _strobes(study).branch(study, case, along)
+
+
+def branch_results(study: Study) -> tuple[str, ...]:
+    """Names of the results of a branch; ValueError where the machine has no strobes."""
+    return _strobes(study).branch_results(study)
+
+
+def run_sections(study: Study, case: int, asked: Sampling) -> CaseSections:
+    """Settle one case for each value of a parameter; ValueError where its machine has no strobes."""
+    return _strobes(study).sections(study, case, asked)
+
+
+def run_end_state(study: Study, case: int) -> dict[str, float] | None:
+    """Initial values (SI) that go on from the end of one case, which is run for this; None where it does not end ok.
+
+    ValueError where its machine has no initial values.
+    """
+    return _of(study, model_of(study.model).strobes, "initial values").end_state(study, case)
+
+
+def run_basin(study: Study, case: int, paths: tuple[str, str], x: Floats, y: Floats) -> Basin:
+    """The regimes to which one case of a settled study comes from a grid of initial values (SI) of two ``paths``.
+
+    ValueError where its machine has no initial values.
+    """
+    return _of(study, model_of(study.model).strobes, "initial values").basin(study, case, paths, x, y)
+
+
+def has_motor(study: Study) -> bool:
+    """Whether a motor drives the machine, whose torque follows the speed; ValueError where it has no transients."""
+    return _transients(study).has_motor(study)
+
+
+def shape_of_transients(study: Study) -> KernelShape:
+    """The kernel of transients, which is compiled apart from that of the cases; ValueError where there are none."""
+    return _transients(study).shape(study)
+
+
+def run_transient(study: Study, case: int, course: Course, points: int) -> Transient:
+    """A transient of one case, with ``points`` equally spaced times; ValueError where its model has none."""
+    return _transients(study).run(study, case, course, points)
+
+
+def _strobes(study: Study) -> Strobes:
+    return _of(study, model_of(study.model).strobes, "strobes")
+
+
+def _transients(study: Study) -> Transients:
+    return _of(study, model_of(study.model).transients, "transients")
+
+
+def _of(study: Study, ability: Ability | None, name: str) -> Ability:
+    if ability is None:
+        raise ValueError(f"a machine of model {study.model} has no {name}")
+    return ability

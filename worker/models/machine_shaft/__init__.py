@@ -1,0 +1,48 @@
+"""The model of machine shafts: a drive turns a shaft steadily against mechanisms and their resistance."""
+
+from sprag.engine.formulas.expressions import ExpressionError
+from sprag.engine.machine_shaft.problems import RelationError
+from sprag.engine.machine_shaft.sketch import Sketch
+from sprag.engine.machine_shaft.spec import LINKED, MAX_CONSTANTS, MAX_PARTS, MAX_STAGES, MAX_STEPS, REVOLUTIONS
+from sprag.engine.machine_shaft.tables import MAX_ROWS
+from sprag.engine.problems import MachineError
+from sprag.worker.models.machine_shaft.model import (
+    MODEL,
+    REMARKS,
+    SHAPE,
+    STAGE_KINDS,
+    MachineShaft,
+    base_results,
+    check,
+    check_structure,
+    parameters_of,
+    reachable_pressure,
+    sketches_of,
+    spec_of,
+)
+
+__all__ = [
+    "LINKED",
+    "MAX_CONSTANTS",
+    "MAX_PARTS",
+    "MAX_ROWS",
+    "MAX_STAGES",
+    "MAX_STEPS",
+    "MODEL",
+    "REMARKS",
+    "REVOLUTIONS",
+    "SHAPE",
+    "STAGE_KINDS",
+    "ExpressionError",
+    "MachineError",
+    "MachineShaft",
+    "RelationError",
+    "Sketch",
+    "base_results",
+    "check",
+    "check_structure",
+    "parameters_of",
+    "reachable_pressure",
+    "sketches_of",
+    "spec_of",
+]
