@@ -60,8 +60,9 @@ _SENTENCES = {
     ),
     Ending.NEGATIVE_INERTIA: "The reduced inertia is not positive at every angle of the shaft.",
     Ending.MOTOR_STALLED: (
-        "The motor has no steady cycle with this load: the resistance stalls it. Choose a stronger motor, or more "
-        "inertia where the mean resistance is below the motor's largest torque."
+        "The motor has no steady cycle with this load: the resistance stalls it, or holds it at a speed at which the "
+        "torque of the load jumps or rises very steeply. Choose a stronger motor, or more inertia where the mean "
+        "resistance is below the motor's largest torque, or let a load that follows the speed rise less steeply."
     ),
     Ending.QUADRATURE_NOT_REACHED: (
         "A torque or the inertia changes too abruptly to be integrated to 1e-10: split a formula where it "

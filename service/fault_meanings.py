@@ -26,7 +26,7 @@ MEANINGS: Final[dict[Code, str]] = {
     "invalid-time": "The text is not a time, or the time never occurs.",
     "missing-unit": "A text needs a unit.",
     "motor-overrun": "The load drives the shaft harder than the motor can brake it.",
-    "motor-stalled": "The load stalls the motor.",
+    "motor-stalled": "The load stalls the motor, or holds it at a speed at which its torque jumps.",
     "near-singular": "The mechanism passes too close to a singular position.",
     "negative-inertia": "The reduced inertia is not positive at every angle.",
     "no-clutch-law": "The coefficients are not a clutch law, or no law fits the measured data.",

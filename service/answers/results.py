@@ -159,7 +159,13 @@ class Curve(TypedDict):
         Annotated[list[Jump], Doc("of a refined curve: where it is not interpolated; of a sweep: jumps")]
     ]
     passed: NotRequired[
-        Annotated[bool, Doc("of a refined curve: whether no more points are needed for the requested error")]
+        Annotated[
+            bool,
+            Doc(
+                "of a refined curve: whether no more points are needed for the requested error, "
+                "also where no case has a result"
+            ),
+        ]
     ]
 
 
@@ -227,7 +233,13 @@ class MapData(TypedDict):
     ]
     jumps_share: NotRequired[Annotated[float, Doc("of a refined map: share of its area that is not interpolated")]]
     passed: NotRequired[
-        Annotated[bool, Doc("of a refined map: whether no more points are needed for the requested error")]
+        Annotated[
+            bool,
+            Doc(
+                "of a refined map: whether no more points are needed for the requested error, "
+                "also where no case has a result"
+            ),
+        ]
     ]
 
 

@@ -187,7 +187,7 @@ def _show_points(found: dict[str, Any], title: str) -> None:
 
 
 def _error(error: float | None) -> str:
-    return _("not known yet") if error is None else _("{share} of the range", share=_percent(error))
+    return _("not known") if error is None else _("{share} of the range", share=_percent(error))
 
 
 def _percent(share: float) -> str:

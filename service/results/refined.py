@@ -135,15 +135,28 @@ def sentence(plan: RefinePlan, curves: Sequence[Refined], names: Iterable[str]) 
     every = [curve.errors[name] for curve in curves for name in asked if np.isfinite(curve.values[name]).any()]
     error = None if None in every or not every else max(error for error in every if error is not None)
     passed = all(curve.passed for curve in curves)
-    text = reached(plan.error, error, outside, passed=passed)
+    without = sum(len(curve.x) > 0 and not _has_result(curve, asked) for curve in curves)
+    text = reached(plan.error, error, outside, passed=passed, failed=without == len(curves) > 0)
+    if 0 < without < len(curves):
+        missing = plural("{count} curve has no result.", "{count} curves have no result.", without)
+        text = Phrase("{text} {missing}", text=text, missing=missing)
     others = [name for name in drawn if name not in asked]
     names = joined(", ", (Name(name, within=True) for name in others))
     return Phrase("{text} No error was asked for {names}.", text=text, names=names) if others else text
 
 
-def reached(asked: float, error: float | None, outside: Phrase, *, passed: bool) -> Phrase:
-    """Whether a requested error is reached, for people; ``outside`` is "outside 2 jumps", or "" without jumps."""
+def _has_result(curve: Refined, names: Iterable[str]) -> bool:
+    return any(bool(np.isfinite(curve.values[name]).any()) for name in names)
+
+
+def reached(asked: float, error: float | None, outside: Phrase, *, passed: bool, failed: bool) -> Phrase:
+    """Whether a requested error is reached, for people; ``outside`` is "outside 2 jumps", or "" without jumps.
+
+    ``failed`` says that cases were run and none of them has a result.
+    """
     wanted = percent(asked)
+    if failed:
+        return Phrase("No case has a result, so that there is no error; {asked} of the range is asked.", asked=wanted)
     if error is None:
         return Phrase("The error is not known yet; {asked} of the range is asked.", asked=wanted)
     now = percent(error)

@@ -61,11 +61,16 @@ class RefinedMap:
     cases: NDArray[np.int64]
 
     @property
+    def failed(self) -> bool:
+        """Whether cases were run and none of them has a result."""
+        return len(self.values) > 0 and not bool(np.isfinite(self.values).any())
+
+    @property
     def sentence(self) -> Phrase:
         """How right the map is, for people."""
         share = percent(self.jumps_share)
         outside = Phrase("outside jumps ({share} of the map)", share=share) if self.jumps_share else Phrase("")
-        return reached(self.asked, self.error, outside, passed=self.passed)
+        return reached(self.asked, self.error, outside, passed=self.passed, failed=self.failed)
 
 
 def map_plan(study: Study) -> RefinePlan | None:

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from sprag.engine.endings import Ending
 from sprag.engine.formulas.expressions import ExpressionError
 from sprag.engine.machine_shaft.checked import check
-from sprag.engine.machine_shaft.problems import InsufficientInertiaError, QuadratureError
+from sprag.engine.machine_shaft.problems import InsufficientInertiaError, MotorStalledError, QuadratureError
 from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice, PartChoice
 from sprag.engine.machine_shaft.trajectory import trajectory
 from tests.engine.machine_shaft.machines import ending_of, one
@@ -156,3 +156,22 @@ def test_a_constant_of_that_name_stays_what_it_was() -> None:
     spec = machine("2*omega", constants=("omega",))
     got = one(spec, YOKE | {"mean_speed": 20.0, "constants.omega": 5.0})
     assert got["drive_torque.mean"] == pytest.approx(10.0, rel=1e-13)
+
+
+@pytest.mark.parametrize("jump", ["30*step(omega - 8)", "if(omega > 8, 30, 0)"])
+def test_a_motor_that_a_jump_of_the_load_holds_is_not_said_to_stop(jump: str) -> None:
+    """The motor has 20 N*m at 8 rad/s, the load 10 below and 40 above: the shaft keeps that speed."""
+    motor = {"no_load_speed": 10.0, "stall_torque": 100.0}
+    numbers = {"drive.inertia": 1.0} | {f"drive.motor.{name}": value for name, value in motor.items()}
+    held = MachineSpec(
+        drive=Drive(motor="linear"),
+        balance="motor",
+        operation=OperationChoice("torque", "formula", formula=f"10 + {jump}"),
+    )
+    run = solve_ivp(
+        lambda _, omega: 100.0 * (1.0 - omega / 10.0) - 10.0 - 30.0 * (omega >= 8.0), (0.0, 5.0), [10.0], max_step=1e-3
+    )
+    assert run.y[0, -1] == pytest.approx(8.0, abs=0.05)
+    assert ending_of(held, numbers) is Ending.MOTOR_STALLED
+    with pytest.raises(MotorStalledError, match="holds it at a speed at which the torque of the load jumps"):
+        check(held, numbers)

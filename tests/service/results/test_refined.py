@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.reading.quantities import Units
@@ -23,7 +26,7 @@ from sprag.service.results.figures.figure import BANDS, Figure, Line
 from sprag.service.results.pictures.curves import paint_figure, painting
 from sprag.service.results.report.content import report_of
 from sprag.service.results.rounds import sentence
-from sprag.service.storage.records import RoundProgress, RoundRecord
+from sprag.service.storage.records import CaseColumns, RoundProgress, RoundRecord
 from sprag.worker import models
 from sprag.worker.states import StudyState
 from sprag.worker.study import Study
@@ -251,3 +254,23 @@ def test_a_queued_study_waits_for_its_round() -> None:
         sentence(RoundProgress(third, 5, 9), StudyState.QUEUED)
         == "waiting for round 3 of at most 5, error now 2.1 %, asked 1 %"
     )
+
+
+def test_curves_without_a_result_are_not_told_to_be_within_the_error(study: Study) -> None:
+    def failing(cases: NDArray[np.int64], names: Sequence[str], lost: float = np.inf) -> CaseColumns:
+        found = fetched(study)(cases, names)
+        bad = study.columns(cases)["excitation.frequency"] < lost
+        endings = ["diverged" if one else models.OK for one in bad.tolist()]
+        return replace(found, endings=endings, values={n: np.where(bad, np.nan, v) for n, v in found.values.items()})
+
+    infos = models.study_results(study)
+    query = main_query(study, infos)
+    assert query is not None
+    none = draw(select(study, infos, query), failing)
+    assert [curve["passed"] for curve in none.to_json()["curves"]] == [True, True]  # nothing is left to refine
+    told = curves_figure([("", none)]).below
+    assert told == "No case has a result, so that there is no error; 1 % of the range is asked."
+    one = draw(select(study, infos, query), partial(failing, lost=22.5))
+    told = curves_figure([("", one)]).below
+    assert told.startswith("Within 1 % of the range, as asked")
+    assert told.endswith(" 1 curve has no result.")

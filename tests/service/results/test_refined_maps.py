@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from sprag.service.cli.pictures import show_map
 from sprag.service.faults import SelectionError
@@ -19,6 +21,7 @@ from sprag.service.results.pictures.maps import draw_map as paint_map
 from sprag.service.results.report import write_report
 from sprag.service.results.report.content import report_of
 from sprag.service.results.report.document import TitleBlock
+from sprag.service.storage.records import CaseColumns
 from sprag.worker import models
 from sprag.worker.study import Study
 from tests.service.conftest import API, Service
@@ -94,6 +97,15 @@ def test_before_the_first_rows_nothing_is_known(study: Study) -> None:
     assert np.isnan(found.values).all()
     assert found.refined is not None
     assert found.refined.sentence == "The error is not known yet; 2 % of the range is asked."
+
+
+def test_a_map_without_a_result_has_no_error(study: Study) -> None:
+    def failing(cases: NDArray[np.int64], names: Sequence[str]) -> CaseColumns:
+        return replace(fetched(study)(cases, names), endings=["diverged"] * len(cases))
+
+    found = draw_map(study, models.study_results(study), LOAD, FREQUENCY, SPEED, ((MASS, "0.4"),), failing)
+    assert found.refined is not None
+    assert found.refined.sentence == "No case has a result, so that there is no error; 2 % of the range is asked."
 
 
 @pytest.mark.parametrize(
