@@ -138,7 +138,7 @@ def _read_window(report: Report, data: object) -> list[Time] | None:
             "wrong-type",
             "must be a list of its start and its end",
             data,
-            allowed=f"two times in {_TIME}",
+            allowed='a list of two times in seconds or excitation periods, such as ["20 periods", "40 periods"]',
         )
         return None
     if refuse_mixed(report, [(join("/run/window", index), item) for index, item in enumerate(data)], "s"):

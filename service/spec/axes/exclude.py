@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.reading.together import split_list
 from sprag.service.spec.fields import read_number, read_object
-from sprag.service.spec.lists import refuse_blanks, refuse_mixed
+from sprag.service.spec.lists import read_list_text, refuse_blanks, refuse_mixed
 from sprag.service.spec.report import Report, join
 from sprag.worker.limits import MAX_AXIS_VALUES
 from sprag.worker.study import SAME_VALUE
@@ -73,7 +74,11 @@ def _parts(report: Report, pointer: str, path: str, data: object, machine: Machi
         if name not in found:
             continue
         given = found[name]
-        if isinstance(given, list):
+        where = join(pointer, name)
+        if name == "is" and isinstance(given, str) and len(split_list(given)) > 1:
+            items = read_list_text(report, where, given, parameter.unit, path) or []
+            values = [read_number(report, where, item, parameter) for item in items]
+        elif isinstance(given, list):
             if name != "is" or not 1 <= len(given) <= MAX_AXIS_VALUES:
                 allowed = "one quantity" if name != "is" else "1 value or more"
                 report.fault(join(pointer, name), "wrong-type", "must be a quantity", given, allowed=allowed)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.languages import N_
 from sprag.service.reading.units import QuantityError, parse_exact, to_float
 from sprag.service.spec.fields import read_exact, read_number, read_whole
 from sprag.service.spec.lists import read_list, read_list_text, read_together
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 
 #: How far a step range may exceed its end, in steps, to allow for the rounding of computed ends.
 _STEP_ROUNDING: Final = Fraction(1, 10**9)
+#: What ranges are written as.
+_DIVIDED: Final = N_('a list of both ends and the count, such as ["2 mm", "5 mm", 4]')
+_STEPPED: Final = N_('a list of both ends and the step, such as ["2 mm", "5 mm", "0.5 mm"]')
 #: Integers up to this are exact as doubles.
 _EXACT: Final = 2**53
 
@@ -121,7 +125,7 @@ def plan_geomspace(report: Report, pointer: str, data: object, parameter: Parame
 
 def plan_range(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:
     """The plan of ``[from, to, step]``; ``to`` is included when a whole number of steps reaches it."""
-    three = _three(report, pointer, data, "[from, to, step]")
+    three = _three(report, pointer, data, _STEPPED)
     items = None if three is None else _together(report, pointer, three, parameter)
     if items is None:
         return None
@@ -168,7 +172,7 @@ def _three(report: Report, pointer: str, data: object, allowed: str) -> Sequence
 def _division(
     report: Report, pointer: str, data: object, parameter: Parameter
 ) -> tuple[Fraction, Fraction, int] | None:
-    three = _three(report, pointer, data, "[from, to, count]")
+    three = _three(report, pointer, data, _DIVIDED)
     ends = None if three is None else _together(report, pointer, three[:2], parameter)
     if three is None or ends is None:
         return None

@@ -107,7 +107,10 @@ def _adaptive(report: Report, pointer: str, item: object, machine: Machine) -> A
     paths = read_path_of(report, pointer, found.get("path"), machine)
     where, ends = join(pointer, "adaptive"), found.get("adaptive")
     if not isinstance(ends, list) or len(ends) != 2:
-        report.fault(where, "wrong-type", "must be a list of two values", ends, allowed="[from, to]")
+        report.fault(
+            where, "wrong-type", "must be a list of two values", ends,
+            allowed='a list of both ends, such as ["2 mm", "5 mm"]',
+        )  # fmt: skip
         return None
     if paths is None:
         return None

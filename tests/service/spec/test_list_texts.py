@@ -13,6 +13,7 @@ from sprag.service.faults import FaultError
 from sprag.service.http.web.form.check import check_form
 from sprag.service.http.web.form.spec import spec_of, values_of
 from sprag.service.languages import language
+from sprag.service.languages.ranges import allowed_text
 from sprag.service.reading.reader import Reading
 from sprag.service.results.fault_texts import warning_text
 from sprag.service.spec.document import parse_spec
@@ -175,3 +176,40 @@ def test_points_of_an_extension_by_command_are_told(text: str, capsys: pytest.Ca
     assert _values("20.000 N*mm; 25.5 N*mm", LOAD) == ["20.000 N*mm", "25.5 N*mm"]
     assert _values("0.5,0.7", LOAD) == [0.5, 0.7]
     assert not capsys.readouterr().err
+
+
+def test_the_values_of_a_condition_are_one_text() -> None:
+    spec = changed(
+        {"/axes": [{"path": LOAD, "values": "0; 50; 100; 150 N*mm"}], "/exclude": [{LOAD: {"is": "50; 150 N*mm"}}]}
+    )
+    jsonschema.validate(spec, spec_schema())
+    study = parse_spec(spec).study
+    assert study.columns(range(study.cases))[LOAD].tolist() == pytest.approx([0.0, 0.1])
+    assert spec_of(values_of(spec))[0]["exclude"] == [{LOAD: {"is": ["50 N*mm", "150 N*mm"]}}]
+    with pytest.raises(SpecError, match="could be one value or several"):
+        parse_spec(changed({"/exclude": [{LOAD: {"is": "100 200; 300 N*mm"}}]}))
+
+
+@pytest.mark.parametrize(
+    ("changes", "example"),
+    [
+        ({"/axes": [{"path": LOAD, "linspace": "0; 100 N*mm; 5"}]}, '["2 mm", "5 mm", 4]'),
+        ({"/axes": [{"path": LOAD, "geomspace": "1; 100 N*mm; 5"}]}, '["2 mm", "5 mm", 4]'),
+        ({"/axes": [{"path": LOAD, "range": "0; 100; 20 N*mm"}]}, '["2 mm", "5 mm", "0.5 mm"]'),
+        (
+            {"/axes": [{"path": LOAD, "adaptive": "0; 1 N*m"}], "/refine": {"results": ["efficiency"]}},
+            '["2 mm", "5 mm"]',
+        ),
+        ({"/run/window": "20; 40 periods"}, '["20 periods", "40 periods"]'),
+    ],
+)
+def test_a_range_as_one_text_is_refused_with_what_to_write(changes: dict[str, Any], example: str) -> None:
+    with pytest.raises(SpecError) as refused:
+        parsed(changes)
+    (allowed,) = (fault.allowed for fault in refused.value.faults if fault.code == "wrong-type")
+    assert allowed is not None
+    assert allowed.startswith("a list of ")
+    assert allowed.endswith(example)
+    with language("uk"):
+        assert allowed_text(allowed).startswith("список ")
+        assert allowed_text(allowed).endswith(example)
