@@ -10,6 +10,7 @@ Everything is loaded on first use. Where an extra is missing, `MissingExtraError
 """
 
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
@@ -79,6 +80,16 @@ __all__ = [
     "simulate",
     "with_units",
 ]
+
+
+#: In a checkout, a symbolic link to the folder beside this package; in what is installed, a folder.
+_ENGINE: Final = Path(__file__).with_name("engine")
+if _ENGINE.is_file():
+    raise ImportError(
+        f"{_ENGINE} is a text file, not a symbolic link to the folder of that name: this checkout was made without "
+        "symbolic links. Check it out again where git makes them (git config core.symlinks true; on Windows in its "
+        "developer mode), or install Sprag from a wheel."
+    )
 
 
 def __getattr__(name: str) -> Any:
