@@ -26,11 +26,11 @@ from sprag.service.presets import ABOUT
 from sprag.service.reading.wording import NOUNS
 
 ROOT: Final = Path(__file__).parent.parent
-#: Where texts stand. The worker and the engine know no languages: what they say is in `VOCABULARIES`.
-CODE: Final = ("service", "sprag")
+#: Where texts stand. What else the worker and the engine say, which know no languages, is in `vocabularies`.
+CODE: Final = ("service", "worker", "engine", "sprag")
 #: Functions that take a text, and the names of their constant arguments.
 _FUNCTIONS: Final = {
-    **dict.fromkeys(("_", "gettext", "N_", "Phrase"), ("text",)),
+    **dict.fromkeys(("_", "gettext", "N_", "Phrase", "Sentence"), ("text",)),
     **dict.fromkeys(("ngettext", "plural"), ("text", "many")),
     "pgettext": ("context", "text"),
 }

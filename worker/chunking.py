@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from sprag.sentences import Amount, Sentence, WarningText
 from sprag.worker import models
 from sprag.worker.sweeps import line_length
 
@@ -74,12 +75,21 @@ class Chunking:
         seconds = models.estimate_seconds_per_case(study) / lanes * work_of(lanes) * length
         if seconds <= self.timeout:
             return ()
-        what = "case" if length == 1 else "line of the sweep"
+        times = {"time": Amount(seconds, "s", 3), "limit": Amount(self.timeout, "s", 6)}
         text = (
-            f"One {what} takes about {seconds:.3g} s, and {self.timeout:g} s are allowed (SPRAG_CHUNK_TIMEOUT): cases "
-            "will probably be stopped as timed out."
+            Sentence(
+                "One case takes about {time}, and {limit} are allowed (SPRAG_CHUNK_TIMEOUT): cases will probably be "
+                "stopped as timed out.",
+                **times,
+            )
+            if length == 1
+            else Sentence(
+                "One line of the sweep takes about {time}, and {limit} are allowed (SPRAG_CHUNK_TIMEOUT): cases will "
+                "probably be stopped as timed out.",
+                **times,
+            )
         )
-        return (models.WarningText(text, "exceeds-chunk-timeout"),)
+        return (WarningText(text, "exceeds-chunk-timeout"),)
 
 
 def work_of(cases: float) -> float:

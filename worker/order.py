@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from sprag.sentences import Sentence, plural
 from sprag.worker.sweeps import LineOrder
 
 if TYPE_CHECKING:
@@ -72,10 +73,28 @@ class Coverage:
     values: tuple[int, ...]
 
     def __str__(self) -> str:
+        return str(self.sentence)
+
+    @property
+    def sentence(self) -> Sentence:
+        """What is complete."""
         if not self.complete:
-            return f"no pass of {self.total} is complete"
-        grid = f"a grid of {' x '.join(map(str, self.values))} values" if self.values else f"{self.cases:,} cases"
-        return f"pass {self.complete} of {self.total} is complete, {grid}"
+            return Sentence("no pass of {total} is complete", total=self.total)
+        if self.values:
+            values = " x ".join(map(str, self.values))
+            return Sentence(
+                "pass {complete} of {total} is complete, a grid of {values} values",
+                complete=self.complete,
+                total=self.total,
+                values=values,
+            )
+        return plural(
+            "pass {complete} of {total} is complete, {count} cases",
+            "pass {complete} of {total} is complete, {count} cases",
+            self.cases,
+            complete=self.complete,
+            total=self.total,
+        )
 
 
 def coverage(order: Order, reached: int) -> Coverage:

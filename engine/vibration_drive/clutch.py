@@ -21,7 +21,7 @@ from sprag.engine.vibration_drive.clutch_report import (
     DegreeReport,
 )
 from sprag.engine.vibration_drive.singular_values import singular_values
-from sprag.engine.warning_text import WarningText
+from sprag.sentences import Amount, Sentence, WarningText
 
 __all__ = [
     "HIGHEST_DEGREE",
@@ -219,24 +219,30 @@ def _data_warnings(
 ) -> tuple[WarningText, ...]:
     warnings = []
     if backlash_rows:
-        text = (
-            f"{len(backlash_rows)} of {rows.windup.size} rows lie within the backlash and were left out of the fit; "
-            "their residuals compare them with no torque"
+        text = Sentence(
+            "{count} of {rows} rows lie within the backlash and were left out of the fit; their residuals compare them "
+            "with no torque",
+            count=len(backlash_rows),
+            rows=rows.windup.size,
         )
         warnings.append(WarningText(text, "rows-in-backlash"))
     if report.rank == rows.distinct:
-        text = (
-            f"degree {report.degree} has as many unknowns as the data has different windups, so the small residuals "
-            "prove nothing; measure more rows"
+        text = Sentence(
+            "degree {degree} has as many unknowns as the data has different windups, so the small residuals prove "
+            "nothing; measure more rows",
+            degree=report.degree,
         )
         warnings.append(WarningText(text, "too-few-rows"))
     terms = float(np.abs(law * rows.limit ** np.arange(law.size)).sum())
     cancellation = terms / float(np.abs(rows.torque[rows.fitted]).max())
     if cancellation > _MAX_CANCELLATION:
-        text = (
-            f"the terms of the law of degree {report.degree} are together {cancellation:.0f} times as large as the "
-            f"largest torque and all but cancel (condition number {report.condition_number:.2g}), so they follow the "
-            "scatter of the rows; check the backlash and the units, or allow a larger residual"
+        text = Sentence(
+            "the terms of the law of degree {degree} are together {factor} times as large as the largest torque and "
+            "all but cancel (condition number {condition}), so they follow the scatter of the rows; check the backlash "
+            "and the units, or allow a larger residual",
+            degree=report.degree,
+            factor=Amount(cancellation, digits=3, form=".0f"),
+            condition=Amount(report.condition_number, digits=2),
         )
         warnings.append(WarningText(text, "terms-cancel"))
     return tuple(warnings)

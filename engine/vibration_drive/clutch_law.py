@@ -18,7 +18,7 @@ from sprag.engine.taylor.straight import horner, integral, slope
 from sprag.engine.vibration_drive.clutch_report import ClutchLaw, ClutchLawError
 from sprag.engine.vibration_drive.formulas import beyond
 from sprag.engine.vibration_drive.parameters import CLUTCH_COEFFICIENT, MAX_COEFFICIENTS
-from sprag.engine.warning_text import WarningText
+from sprag.sentences import Amount, Sentence, WarningText
 
 #: A value counts as negative when it is below zero by more than this share of the sum of its terms' magnitudes;
 #: less than that is rounding of a law that touches zero.
@@ -41,11 +41,12 @@ class Dip:
     value: float
 
     @property
-    def place(self) -> str:
+    def place(self) -> Sentence:
         """The interval in words, in rad."""
+        start = Amount(self.start, "rad", 6)
         if math.isinf(self.stop):
-            return f"at every windup above {self.start:.6g} rad"
-        return f"at windups from {self.start:.6g} rad to {self.stop:.6g} rad"
+            return Sentence("at every windup above {start}", start=start)
+        return Sentence("at windups from {start} to {stop}", start=start, stop=Amount(self.stop, "rad", 6))
 
 
 def torque(coefficients: ArrayLike, windup_limit: float, u: ArrayLike) -> _Array:
@@ -119,23 +120,26 @@ def describe(law: Sequence[float], limit: float) -> tuple[bool, tuple[WarningTex
     """Whether a (non-negative) law is monotone in its range, and the warnings about it."""
     warnings = []
     if law[0] > 0.0:
-        text = (
-            f"c_1 = {law[0]:.6g} N*m > 0: the torque jumps to c_1 as soon as contact begins; without backlash the "
-            "clutch can lock (state LOCKED) and carry anything between 0 and c_1 without relative motion"
+        text = Sentence(
+            "c_1 = {torque} > 0: the torque jumps to c_1 as soon as contact begins; without backlash the clutch can "
+            "lock (state LOCKED) and carry anything between 0 and c_1 without relative motion",
+            torque=Amount(float(law[0]), "N*m", 6),
         )
         warnings.append(WarningText(text, "law-jumps"))
     derivative = _derivative(np.asarray(law, dtype=np.float64))
     fall = find_dip([float(c) for c in derivative], limit)
     if fall is not None:
-        text = f"the law is not monotone: its torque falls with growing windup {fall.place}"
+        text = Sentence("the law is not monotone: its torque falls with growing windup {place}", place=fall.place)
         warnings.append(WarningText(text, "law-falls"))
         if math.isfinite(limit):
             end, slope = _at_end(np.asarray(law), limit), _at_end(derivative, limit)
             if slope < 0.0:
-                text = (
-                    f"the slope at the end of the range (u = {limit:.6g} rad) is {slope:.6g} N*m/rad, negative: the "
-                    f"straight continuation would fall to zero at u = {limit - max(end, 0.0) / slope:.6g} rad and pull "
-                    "the shaft back beyond that; give a law measured further"
+                text = Sentence(
+                    "the slope at the end of the range (u = {end}) is {slope}, negative: the straight continuation "
+                    "would fall to zero at u = {zero} and pull the shaft back beyond that; give a law measured further",
+                    end=Amount(limit, "rad", 6),
+                    slope=Amount(slope, "N*m/rad", 6),
+                    zero=Amount(limit - max(end, 0.0) / slope, "rad", 6),
                 )
                 warnings.append(WarningText(text, "law-ends-falling"))
     return fall is None, tuple(warnings)

@@ -3,7 +3,7 @@
 import reprlib
 from dataclasses import dataclass
 
-from sprag.engine.warning_text import WarningText
+from sprag.sentences import WarningText
 
 
 class ClutchError(ValueError):

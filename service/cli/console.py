@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
+from sprag.sentences import WarningText
 from sprag.service import languages
 from sprag.service.cli.layout import Shape, blocks, broken, longest_piece, width_of
 from sprag.service.faults import Code, Fault, FaultError
@@ -153,17 +154,26 @@ def say(*lines: str) -> None:
 
 
 def warning_lines(warnings: Iterable[str], codes: Iterable[str | None] = ()) -> Iterator[str]:
-    """A line for each warning: its sentence; in another language the meaning of its code, and then the sentence.
+    """A line for each warning: its sentence, with code names and in SI units.
 
-    ``codes`` are those of warnings of a service; other warnings know theirs.
+    ``codes`` are those of warnings of a service, which come in English only: in another language such a one has the
+    meaning of its code before it. Other warnings know their sentences.
     """
+    for text, code in zip_longest(warnings, codes):
+        yield _("warning: {text}", text=_warning_text(text, code))
+
+
+def _warning_text(text: str, code: str | None) -> str:
+    if languages.current() == languages.ENGLISH:
+        return text
+    if isinstance(text, WarningText) and text.sentence is not None:
+        from sprag.service.reading.phrases import shown
+
+        return shown(text)
     from sprag.service.fault_meanings import WARNING_MEANINGS
 
-    meanings = dict[str, str](WARNING_MEANINGS.items())
-    for text, code in zip_longest(warnings, codes):
-        meaning = meanings.get(str(code or getattr(text, "code", "")))
-        known = languages.current() == languages.ENGLISH or meaning is None
-        yield _("warning: {text}", text=_(text) if known or meaning is None else f"{_(meaning)} ({text})")
+    meaning = dict[str, str](WARNING_MEANINGS.items()).get(str(code or getattr(text, "code", "")))
+    return _(text) if meaning is None else f"{_(meaning)} ({text})"
 
 
 def confirmed(question: str) -> bool:

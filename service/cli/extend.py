@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from sprag.sentences import Name, WarningText
 from sprag.service.cli import completion
 from sprag.service.cli.console import say, warning_lines, wrong_option
 from sprag.service.cli.files import decode, read_bytes
@@ -173,9 +174,7 @@ def _values(text: str, path: str = "") -> list[float | str]:
     values = [_value(item) for item in with_last_unit([item.strip() for item in items])]
     doubt = settle(items).doubt
     if doubt is not None and not isinstance(values[doubt], str):
-        from sprag.worker.models import WarningText
-
-        say(*warning_lines([WarningText(f"{path}: {assumption(items[doubt])}", "ambiguous-point")]))
+        say(*warning_lines([WarningText(assumption(items[doubt]), "ambiguous-point").at(Name(path))]))
     return values
 
 

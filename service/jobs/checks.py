@@ -40,10 +40,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from datetime import datetime
 
+    from sprag.sentences import WarningText
     from sprag.service.results.explore import ExploreQuery
     from sprag.service.spec.text import Format
     from sprag.worker.chunking import Chunking
-    from sprag.worker.models import WarningText
 
 #: Fields of a schedule by which it is paused and resumed, and the most bytes of a body with them.
 _PAUSING: Final = frozenset({"enabled", "paused_until"})

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sprag.sentences import Amount, Sentence, joined
 from sprag.service.reading.texts import did_you_mean
-from sprag.worker.models import ResultInfo
+from sprag.worker.models import Parameter, ResultInfo
 from sprag.worker.models.parameters import parameter_of, placed
 
 if TYPE_CHECKING:
@@ -22,6 +24,18 @@ def unit_of(study: Study, path: str) -> str:
     """SI unit of a flat path of a spec; "1" where it has none."""
     entry = parameter_of(study, path)
     return "1" if entry is None else placed(entry, path).unit
+
+
+def range_sentence(parameter: Parameter) -> Sentence:
+    """The allowed range of a parameter, as its `range_text`."""
+    ends: list[Sentence] = []
+    if parameter.low != -math.inf:
+        ends.append(joined("", ("> " if parameter.low_open else ">= ", Amount(parameter.low, parameter.unit, 6))))
+    if parameter.high != math.inf:
+        ends.append(joined("", ("<= ", Amount(parameter.high, parameter.unit, 6))))
+    if not ends:
+        return Sentence("any finite number")
+    return ends[0] if len(ends) == 1 else Sentence("{low} and {high}", low=ends[0], high=ends[1])
 
 
 def result_of(infos: Iterable[ResultInfo], name: str) -> ResultInfo | None:

@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
+from sprag.sentences import Amount, Sentence, Typed, joined
 from sprag.service.languages import N_, decimal
 from sprag.service.reading.printed import keyboard
 
@@ -152,10 +153,20 @@ def question(text: str) -> str:
     return "is {} or {} meant? no number of the table shows what its points are".format(*_readings(text))
 
 
-def assumption(text: str) -> str:
+def assumption(text: str) -> Sentence:
     """How a text with a point in doubt is read where that is likely."""
     small, large = _readings(text)
-    return f"'{text.strip()[:40]}' is read as {small}; write {large} if its point separates thousands"
+    return Sentence(
+        "'{text}' is read as {small}; write {large} if its point separates thousands",
+        text=Typed(text.strip()[:40]),
+        small=Amount(float(small), digits=12, form="g"),
+        large=large,
+    )
+
+
+def of_line(line: int, text: Sentence) -> Sentence:
+    """A sentence about a line of a table."""
+    return joined(": ", (Sentence("line {line}", line=str(line)), text))
 
 
 def _readings(text: str) -> tuple[str, str]:

@@ -1,89 +1,62 @@
 """Texts for people, with quantities and names in them, which are shown as a reader wants them.
 
-A `Phrase` is a string, in English, with SI units and code names, for programs and messages; `Reading.say` gives the
-same in the reader's language, units and words. Its first argument is the text of the catalogue.
+A `Phrase` is a `Sentence` whose English has numbers and units as in print; `Reading.say` gives either in the reader's
+language, units and words. Its first argument is the text of the catalogue.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
+from sprag.sentences import Amount, Name, Part, Place, Sentence, Typed, WarningText, filled
 from sprag.service.languages import ENGLISH, gettext, language, ngettext
+from sprag.service.reading.part_names import lower_first, upper_first
 from sprag.service.reading.wording import number, unit_text
 from sprag.worker.models.model import model_of
 
 if TYPE_CHECKING:
     from sprag.service.reading.reader import Reading
 
-
-@dataclass(frozen=True, slots=True)
-class Amount:
-    """A number in SI with its unit, rounded to ``digits``; ``bare`` shows the number without the unit."""
-
-    value: float | None
-    unit: str
-    digits: int = 5
-    bare: bool = False
-
-    def __str__(self) -> str:
-        text = number(self.value, self.digits)
-        return text if self.bare else f"{text} {unit_text(self.unit)}".strip()
-
-
-@dataclass(frozen=True, slots=True)
-class Name:
-    """A path of a spec, a result or a variable, within a sentence in lower case."""
-
-    name: str
-    within: bool = False
-
-    def __str__(self) -> str:
-        return self.name
+__all__ = [
+    "Amount",
+    "Name",
+    "Part",
+    "Phrase",
+    "joined",
+    "lower_first",
+    "plural",
+    "shown",
+    "term",
+    "upper_first",
+]
 
 
-#: What stands for a place of a phrase; whole numbers are shown with separated thousands.
-Part = str | int | Amount | Name
+class Phrase(Sentence):
+    """A sentence for people: its whole numbers and amounts are written as in print, in English too."""
 
-
-class Phrase(str):
-    """A text of the catalogue with ``{places}``, and what stands there; of two texts the ``plural`` where it fits.
-
-    A text that is not in the catalogue, such as a list joined by commas, is the same in every language.
-    """
-
-    text: str
-    plural: tuple[str, int] | None
-    parts: Mapping[str, Part]
-
-    __slots__ = ("parts", "plural", "text")
-
-    def __new__(cls, text: str, /, **parts: Part) -> Phrase:
-        """The phrase ``text`` with its parts."""
-        return cls._made(text, None, parts)
+    __slots__ = ()
 
     @classmethod
-    def _made(cls, text: str, plural: tuple[str, int] | None, parts: Mapping[str, Part]) -> Phrase:
-        english = text if plural is None or plural[1] == 1 else plural[0]
-        with language(ENGLISH):  # the same text whoever reads: programs compare it, and addresses have it
-            plain = _filled(english, {name: _plain(part) for name, part in parts.items()})
-        made = super().__new__(cls, plain)
-        made.text, made.plural, made.parts = text, plural, parts
-        return made
+    def composed(cls, text: str, plural: tuple[str, int] | None, parts: Mapping[str, Part]) -> Self:
+        """The same text whoever reads: programs compare it, and addresses have it."""
+        with language(ENGLISH):
+            return super().composed(text, plural, parts)
 
-    def __reduce__(self) -> tuple[object, ...]:
-        return Phrase._made, (self.text, self.plural, dict(self.parts))
+    @staticmethod
+    def _plain(part: Part) -> str:
+        if isinstance(part, int):
+            return number(part)
+        return _printed(part) if isinstance(part, Amount) and not part.form else str(part)
 
     def said(self, reading: Reading | None) -> str:
         """The text in the language, units and words of a reader; without one, in SI units and code names."""
-        text = self.text and (gettext(self.text) if self.plural is None else ngettext(self.text, *self.plural))
-        return _filled(text, {name: _said(part, reading) for name, part in self.parts.items()})
+        return said(self, reading)
 
 
 def plural(one: str, many: str, count: int, /, **parts: Part) -> Phrase:
     """A phrase for ``count`` things: ``plural("{count} drive", "{count} drives", 3)``; ``count`` is a part of it."""
-    return Phrase._made(one, (many, count), {"count": count, **parts})
+    return Phrase.composed(one, (many, count), {"count": count, **parts})
 
 
 def term(code: str) -> Phrase:
@@ -123,43 +96,47 @@ def part_label(label: str) -> Phrase:
     return Phrase(label)
 
 
-def _filled(text: str, parts: Mapping[str, str]) -> str:
-    return text.format_map(parts) if parts else text
-
-
-def _plain(part: Part) -> str:
-    return number(part) if isinstance(part, int) else str(part)
-
-
 def shown(text: str) -> str:
     """A text in the reader's language, where it has neither quantities nor names of them."""
-    return text.said(None) if isinstance(text, Phrase) else text
+    return said(text, None)
+
+
+def said(text: str, reading: Reading | None) -> str:
+    """A text in the language, units and words of a reader; without one, in SI units and code names."""
+    if isinstance(text, WarningText) and text.sentence is not None:
+        text = text.sentence
+    if not isinstance(text, Sentence):
+        return text
+    of_reader = text.text and (gettext(text.text) if text.plural is None else ngettext(text.text, *text.plural))
+    return filled(of_reader, {name: _said(part, reading) for name, part in text.parts.items()})
 
 
 def _said(part: Part, reading: Reading | None) -> str:
-    if isinstance(part, Phrase):
-        return part.said(reading)
-    if reading is None:
-        return _plain(part)
+    if isinstance(part, str):
+        return said(part, reading)
+    if isinstance(part, int):
+        return number(part)
     if isinstance(part, Amount):
-        return str(Amount(reading.value(part.value, part.unit), reading.unit(part.unit), part.digits, part.bare))
-    if isinstance(part, Name):
-        text = reading.caption(part.name)
-        return lower_first(text) if part.within else text
-    return _plain(part)
+        return _printed(part, reading)
+    if isinstance(part, Typed):
+        return unit_text(part.text)
+    if reading is None:
+        return str(part)
+    if isinstance(part, Place):
+        return reading.place(part)
+    text = reading.caption(part.name)
+    return lower_first(text) if part.within else text
 
 
-def lower_first(text: str) -> str:
-    """A caption within a sentence; one that begins with an abbreviation stays as it is."""
-    return text if text[1:2].isupper() else f"{text[:1].lower()}{text[1:]}"
-
-
-def upper_first(text: str) -> str:
-    """A text as the beginning of a sentence."""
-    return f"{text[:1].upper()}{text[1:]}"
+def _printed(amount: Amount, reading: Reading | None = None) -> str:
+    """An amount as in print, in the units of a reader; without one, in its own unit."""
+    value, unit = amount.value, amount.unit
+    if reading is not None:
+        value, unit = reading.value(value, unit), reading.unit(unit)
+    text = number(value, amount.digits)
+    return text if amount.bare else f"{text} {unit_text(unit)}".strip()
 
 
 def joined(separator: str, parts: Iterable[Part]) -> Phrase:
     """The parts with a separator between them, which is no word."""
-    every = {f"part{place}": part for place, part in enumerate(parts)}
-    return Phrase(separator.join(f"{{{name}}}" for name in every), **every)
+    return Phrase.listed(separator, parts)

@@ -8,16 +8,20 @@ from typing import TYPE_CHECKING, Any, Final
 
 from markupsafe import Markup
 
+from sprag.sentences import Sentence, WarningText
 from sprag.service.faults import refused
 from sprag.service.languages import gettext
+from sprag.service.reading.earlier import earlier_warning
 from sprag.service.reading.numbers import in_language
-from sprag.service.reading.phrases import Name, Phrase, lower_first
+from sprag.service.reading.part_names import lower_first, part_name, run_name
+from sprag.service.reading.phrases import Name, Phrase, said
 from sprag.service.reading.quantities import SI, Units, units_for
 from sprag.service.reading.units import has_unit
 from sprag.service.reading.wording import number, unit_text
-from sprag.worker.models.vocabulary import caption, letter
+from sprag.worker.models.vocabulary import caption, has_caption, letter
 
 if TYPE_CHECKING:
+    from sprag.sentences import Place
     from sprag.worker.study import Study
 
 #: What quantities are called: for people, or as in specs and files.
@@ -59,7 +63,27 @@ class Reading:
 
     def say(self, text: str) -> str:
         """A text; a phrase in the reader's language, units and words."""
-        return text.said(self) if isinstance(text, Phrase) else text
+        return said(text, self)
+
+    def warning(self, text: str) -> str:
+        """A warning: a sentence in the reader's language, units and words; see `earlier_warning` for one without."""
+        known = isinstance(text, Sentence) or (isinstance(text, WarningText) and text.sentence is not None)
+        return self.say(text) if known else earlier_warning(text, getattr(text, "code", ""), self)
+
+    def place(self, place: Place) -> str:
+        """What a place of a spec is called: ``Spring rate, pendulum 0``; ``Run, at most``.
+
+        Where it is about a path or a result, that is what it is called by.
+        """
+        path = place.about or place.pointer.removeprefix("/base").strip("/").replace("/", ".")
+        if place.about or (self.names == CODES and path):
+            return self.caption(path)
+        section, _dot, name = path.partition(".")
+        if not section:
+            return gettext("Machine") if place.pointer else gettext("Spec")
+        if section == "run" and place.pointer.startswith("/run/"):
+            return f"{gettext('Run')}, {lower_first(run_name(name.partition('.')[0]))}"
+        return self.caption(path) if has_caption(self.model, path) else part_name(path)
 
     def say_name(self, name: str) -> str:
         """The title of an axis: a phrase, or the name of a quantity."""

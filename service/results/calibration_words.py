@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -23,17 +22,6 @@ _FAR: Final = 4.0
 #: Share of refits that may end before they converge without a word.
 _ENDED: Final = 0.25
 _MOST_POINTS: Final = 5
-
-
-@dataclass(frozen=True, slots=True)
-class _Quantity(Amount):
-    """An amount that English sentences write in plain characters, as files do."""
-
-    form: str = ".4g"
-
-    def __str__(self) -> str:
-        text = format(self.value, self.form)
-        return text if self.unit == "1" else f"{text} {self.unit}"
 
 
 def sentences(found: Calibration) -> list[str]:
@@ -60,11 +48,11 @@ def _scatter(found: Calibration, known: Answer) -> Iterator[Phrase]:
             yield Phrase(
                 "The standard deviation of {name} follows from the residuals: {sigma}.",
                 name=Name(one.result, within=True),
-                sigma=_Quantity(sigma, found.infos[one.result].unit, 4),
+                sigma=Amount(sigma, found.infos[one.result].unit, 4, form=".4g"),
             )
     if not plan.known_sigma or known.freedom < 1:
         return
-    values: dict[str, Part] = {"value": _Quantity(known.chi_square, "1", 3, form=".3g"), "freedom": known.freedom}
+    values: dict[str, Part] = {"value": Amount(known.chi_square, "1", 3, form=".3g"), "freedom": known.freedom}
     if plan.loss != "linear":
         yield Phrase("Chi-square is {value} for {freedom} degrees of freedom, outliers included.", **values)
         return
@@ -99,7 +87,7 @@ def _direction(found: Calibration, one: Direction) -> Phrase:
     if len(names) == 1:
         return Phrase("These points do not determine {name}.", name=names[0])
     changes = [
-        Phrase("{name} by {change}", name=name, change=_Quantity(change, unit_of(found.study, path), 3, form="+.3g"))
+        Phrase("{name} by {change}", name=name, change=Amount(change, unit_of(found.study, path), 3, form="+.3g"))
         for path, name, change in zip(paths, names, one.changes, strict=True)
     ]
     parts = {"names": _listed(names), "changes": _listed(changes)}
@@ -113,7 +101,7 @@ def _bounds(found: Calibration, known: Answer) -> Iterator[Phrase]:
         return
     for one, path, (low, high) in zip(found.plan.unknown, found.names, known.at_bounds.tolist(), strict=True):
         unit, name = unit_of(found.study, path), Name(path, within=True)
-        ends = [_Quantity(end, unit, 4) for end, reached in ((one.low, low), (one.high, high)) if reached]
+        ends = [Amount(end, unit, 4, form=".4g") for end, reached in ((one.low, low), (one.high, high)) if reached]
         if len(ends) == 1:
             yield Phrase(
                 "The interval of {name} reaches the end of its range ({end}); a wider one may change it.",
@@ -143,14 +131,14 @@ def _points(found: Calibration, known: Answer) -> Iterator[Phrase]:
         yield Phrase(
             "Measured value {number} is {count} standard deviations off the fit.",
             number=index + 1,
-            count=_Quantity(round(abs(residuals[index]), 1), "1", form=".1f"),
+            count=Amount(round(abs(residuals[index]), 1), "1", form=".1f"),
         )
     if len(far) > _MOST_POINTS:
         yield plural(
             "{count} further value is more than {limit} standard deviations off.",
             "{count} further values are more than {limit} standard deviations off.",
             len(far) - _MOST_POINTS,
-            limit=_Quantity(_FAR, "1", form="g"),
+            limit=Amount(_FAR, "1", form="g"),
         )
 
 
@@ -173,14 +161,18 @@ def _next(found: Calibration, known: Answer) -> Iterator[Phrase]:
         return
     best = int(np.argmax(one.narrower))
     at = [
-        Phrase("{name} = {value}", name=Name(path, within=True), value=_Quantity(value, unit_of(found.study, path), 4))
+        Phrase(
+            "{name} = {value}",
+            name=Name(path, within=True),
+            value=Amount(value, unit_of(found.study, path), 4, form=".4g"),
+        )
         for path, value in zip(found.plan.paths_at, one.condition, strict=True)
     ]
     yield Phrase(
         "A further measurement says most at {condition}: the interval of {name} would become {share} % narrower.",
         condition=joined(", ", at),
         name=Name(found.names[best], within=True),
-        share=_Quantity(100.0 * float(one.narrower[best]), "1", 2, form=".2g"),
+        share=Amount(100.0 * float(one.narrower[best]), "1", 2, form=".2g"),
     )
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.languages import N_, _, decimal, gettext, grouped, ngettext
 from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.phrases import lower_first
+from sprag.service.reading.part_names import NUMBERED, lower_first, part_name, run_name
 from sprag.service.reading.wording import number, unit_text, words
 from sprag.service.results.exports.inputs import inputs as every_input
 from sprag.service.results.exports.inputs import run_inputs
@@ -24,18 +24,7 @@ if TYPE_CHECKING:
     from sprag.worker.study import Study
 
 _RUN: Final = {entry.name: entry for entry in (*SETTLED_RUN.values(), DURATION, *ANY_RUN.values())}
-#: What parts of a machine are called that have a number.
-_NUMBERED: Final = {
-    "pendulums": N_("Pendulum {number}"), "parts": N_("Part {number}"), "stages": N_("Stage {number}"),
-    "steps": N_("Step {number}"),
-}  # fmt: skip
-_NUMBER: Final = re.compile(rf"({'|'.join(_NUMBERED)})\.(\d+)\.")
-#: Parts of a spec beside those of a machine.
-PARTS: Final = (
-    N_("Columns"), N_("Count"), N_("Csv"), N_("Data"), N_("Diagram"), N_("Drives"), N_("Goal"), N_("Limits"),
-    N_("Points"), N_("Rows"), N_("Run"), N_("Sense"), N_("Starts"), N_("Table"), N_("Tolerances"), N_("Torque"),
-    N_("Values"),
-)  # fmt: skip
+_NUMBER: Final = re.compile(rf"({'|'.join(NUMBERED)})\.(\d+)\.")
 _YES_NO: Final = {"true": N_("yes"), "false": N_("no")}
 _COUNT: Final = re.compile(r"(\d+) (period|revolution)s?")
 
@@ -53,27 +42,12 @@ def inputs(study: Study, spec: Mapping[str, Any]) -> list[tuple[str, list[dict[s
     return [(part_name(section), rows) for section, rows in sections.items()]
 
 
-def part_name(path: str) -> str:
-    """What a part of a machine, or of a spec, is called: ``Pendulum 0, clutch``."""
-    if not path:
-        return _("General")
-    names: list[str] = []
-    for name in path.split("."):
-        if name.isdigit():
-            text = _NUMBERED.get(names.pop(), N_("No. {number}"))
-            names.append(_(text, number=name))
-        else:
-            names.append(name)
-    said = [gettext(words(name)) if name.islower() else name for name in names]
-    return ", ".join([said[0], *map(lower_first, said[1:])])
-
-
 def choice_name(item: Input) -> str:
     """What a choice of the machine is called: ``How the resistance is given, part 0``."""
     text = _(item.description) if item.description else _(words(item.path))
     text = text[:1].upper() + text[1:]
     numbered = _NUMBER.match(item.path)
-    return f"{text}, {lower_first(_(_NUMBERED[numbered[1]], number=numbered[2]))}" if numbered else text
+    return f"{text}, {lower_first(_(NUMBERED[numbered[1]], number=numbered[2]))}" if numbered else text
 
 
 def in_words(item: Input) -> float | str | None:
@@ -105,13 +79,6 @@ def _counted(text: str) -> str:
     if found[2] == "period":
         return ngettext("{n} period", "{n} periods", count, n=grouped(count))
     return ngettext("{n} revolution", "{n} revolutions", count, n=grouped(count))
-
-
-def run_name(name: str) -> str:
-    """What a setting of the run is called: ``Largest order``."""
-    if name == "window":
-        return _("evaluated window")
-    return _(_RUN[name].label if name in _RUN else words(name))
 
 
 def run_settings(study: Study, spec: Mapping[str, Any], reading: Reading) -> list[tuple[str, str, Input]]:

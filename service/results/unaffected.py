@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from cachetools import LRUCache, cachedmethod
 
+from sprag.sentences import Place, Sentence, WarningText
 from sprag.service.results.curves import Fetch
 from sprag.service.results.tolerances.nominal import nominal_only
 from sprag.worker import models
@@ -49,10 +50,14 @@ def unaffected(study: Study, fetch: Fetch) -> tuple[str, ...]:
                 break
             looked += sum(map(len, groups))
         if looked:
-            everywhere = looked >= study.cases
-            where = "any case" if everywhere else f"any of {looked:,} cases that were compared"
-            text = f"/axes/{position} ({' = '.join(axis.paths)}): was varied, but changes no result in {where}"
-            found.append(models.WarningText(text, "no-effect"))
+            text = (
+                Sentence("was varied, but changes no result in any case")
+                if looked >= study.cases
+                else Sentence(
+                    "was varied, but changes no result in any of {count} cases that were compared", count=looked
+                )
+            )
+            found.append(WarningText(text, "no-effect").at(Place(f"/axes/{position}", " = ".join(axis.paths))))
     return tuple(found)
 
 

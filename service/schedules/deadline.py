@@ -5,12 +5,12 @@ from __future__ import annotations
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Final
 
+from sprag.sentences import Amount, Sentence, WarningText
 from sprag.service.faults import Code
 from sprag.service.languages import N_
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity
 from sprag.service.schedules.times import TimingError, next_time_of_day, read_time_of_day
 from sprag.worker.limits import MAX_FINISH_DAYS
-from sprag.worker.models import WarningText
 from sprag.worker.order import coverage, order_of
 
 if TYPE_CHECKING:
@@ -131,21 +131,28 @@ def finish_warnings(study: Study, seconds: float, left: float) -> tuple[str, ...
     if seconds <= left:
         return ()
     if study.plan is not None:
-        text = (
-            f"All its rounds may need about {_hours(seconds)}, and {_hours(left)} are left until its deadline: what is "
-            "done by then is kept, with its error."
+        text = Sentence(
+            "All its rounds may need about {needed}, and {left} are left until its deadline: what is done by then is "
+            "kept, with its error.",
+            needed=_hours(seconds),
+            left=_hours(left),
         )
         return (WarningText(text, "late"),)
     done = int(study.cases * left / seconds)
-    text = (
-        f"By estimate it will not be finished by then: it needs about {_hours(seconds)} and {_hours(left)} are left, "
-        f"enough for about {done:,} of {study.cases:,} cases: then {coverage(order_of(study), done)}."
+    text = Sentence(
+        "By estimate it will not be finished by then: it needs about {needed} and {left} are left, enough for about "
+        "{done} of {cases} cases: then {coverage}.",
+        needed=_hours(seconds),
+        left=_hours(left),
+        done=done,
+        cases=study.cases,
+        coverage=coverage(order_of(study), done).sentence,
     )
     return (WarningText(text, "late"),)
 
 
-def _hours(seconds: float) -> str:
+def _hours(seconds: float) -> Amount:
     for unit, size in (("d", 86400.0), ("h", 3600.0), ("min", 60.0)):
         if seconds >= 2.0 * size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds:.3g} s"
+            return Amount(seconds / size, unit, 3)
+    return Amount(seconds, "s", 3)

@@ -9,7 +9,7 @@ import csv
 import re
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.reading.numbers import WITHOUT_DOUBT, assumption, question
+from sprag.service.reading.numbers import WITHOUT_DOUBT, assumption, of_line, question
 from sprag.service.reading.together import AMBIGUOUS_UNIT, questions
 from sprag.service.spec.table_text import MAX_HEADING, CsvRow, Split, settled_table, split, with_units
 
@@ -112,5 +112,5 @@ def _settled(report: Report, where: str, table: Split, texts: Collection[str]) -
         )
         return None
     if doubt is not None:
-        report.warn("ambiguous-point", f"{where}: line {doubt.line}: {assumption(doubt.text)}")
+        report.warn("ambiguous-point", where, of_line(doubt.line, assumption(doubt.text)))
     return [table.rows[0], *rows]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from sprag.service.reading.numbers import WITHOUT_DOUBT, assumption, question, settle
+from sprag.service.reading.part_names import RUN_LABELS
 from sprag.service.spec.fields import read_choice, read_flag, read_number, read_periods, read_plain, read_whole
 from sprag.service.spec.lists import refuse_mixed
 from sprag.service.spec.report import Report, join
@@ -174,7 +175,7 @@ def _settled(report: Report, pointer: str, rows: list[Any]) -> list[list[Any]]:
         if any(own != rows[i][k] for (i, k), own in zip(places, texts, strict=True)):
             report.fault(where, "ambiguous-point", question(text), text, allowed=WITHOUT_DOUBT)
         else:
-            report.warn("ambiguous-point", f"{where}: {assumption(text)}")
+            report.warn("ambiguous-point", where, assumption(text))
     made = [list(row) if isinstance(row, list) else [] for row in rows]
     for (i, k), text in zip(places, texts, strict=True):
         made[i][k] = text
@@ -211,16 +212,18 @@ _BACKLASH: Final = "whether the angles include the backlash, which is then subtr
 
 #: Fields of a run until it is settled.
 SETTLED_RUN: Final = named(
-    Described("until", "Each case runs", _UNTIL, "choice", 0, 0, SETTLED, ((SETTLED, "until its motion is settled"),)),
-    Described("at_most", "At most", _AT_MOST, "periods", MIN_SETTLED_PERIODS, MAX_SETTLED_PERIODS, 1000),
-    Described("settled", "Settled within", _SETTLED, "number", MIN_SETTLED, MAX_SETTLED, 1e-8),
-    Described("max_period", "Largest order", _MAX_PERIOD, "whole", 1, MAX_ORBIT_PERIODS, 32),
+    Described(
+        "until", RUN_LABELS["until"], _UNTIL, "choice", 0, 0, SETTLED, ((SETTLED, "until its motion is settled"),)
+    ),
+    Described("at_most", RUN_LABELS["at_most"], _AT_MOST, "periods", MIN_SETTLED_PERIODS, MAX_SETTLED_PERIODS, 1000),
+    Described("settled", RUN_LABELS["settled"], _SETTLED, "number", MIN_SETTLED, MAX_SETTLED, 1e-8),
+    Described("max_period", RUN_LABELS["max_period"], _MAX_PERIOD, "whole", 1, MAX_ORBIT_PERIODS, 32),
 )
-DURATION: Final = Described("duration", "Duration", _DURATION, "time", default="60 periods")
+DURATION: Final = Described("duration", RUN_LABELS["duration"], _DURATION, "time", default="60 periods")
 #: Fields of every run.
 ANY_RUN: Final = named(
-    Described("tolerance", "Tolerance", _TOLERANCE, "number", MIN_TOLERANCE, MAX_TOLERANCE, 1e-9),
-    Described("reset", "Windup counts", _RESET, "choice", default="contact", choices=_READINGS),
+    Described("tolerance", RUN_LABELS["tolerance"], _TOLERANCE, "number", MIN_TOLERANCE, MAX_TOLERANCE, 1e-9),
+    Described("reset", RUN_LABELS["reset"], _RESET, "choice", default="contact", choices=_READINGS),
 )
 #: Options of the fit of measured clutch data, besides the accuracy.
 FIT: Final = named(

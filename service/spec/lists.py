@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from sprag.sentences import Place
 from sprag.service.reading.numbers import assumption, settle, settled
 from sprag.service.reading.printed import could_be_values
 from sprag.service.reading.together import AMBIGUOUS_UNIT, questions, split_list, with_last_unit
@@ -67,8 +68,7 @@ def read_together(
         return None
     if doubt is not None:
         pointer, text = written[doubt]
-        place = f"{pointer} ({about})" if about else pointer
-        report.warn("ambiguous-point", f"{place}: {assumption(text)}")
+        report.warn("ambiguous-point", Place(pointer, about), assumption(text))
     return [value for _, value in pairs]
 
 

@@ -17,9 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.sentences import Amount, Sentence, WarningText
 from sprag.service.faults import Fault, FaultError
 from sprag.service.languages import N_
-from sprag.service.reading.numbers import WITHOUT_DOUBT, assumption, is_ambiguous, parse_number, question
+from sprag.service.reading.numbers import WITHOUT_DOUBT, assumption, is_ambiguous, of_line, parse_number, question
 from sprag.service.spec.table_text import (
     CsvRow,
     Split,
@@ -29,7 +30,6 @@ from sprag.service.spec.table_text import (
     with_units,
 )
 from sprag.worker.limits import MAX_CLUTCH_ROWS
-from sprag.worker.models import WarningText
 
 #: Most faults reported for one file; a file of another kind would have one in every line.
 _MAX_PROBLEMS = 20
@@ -155,17 +155,26 @@ def _factor(heading: str, unit: str, words: frozenset[str], convert: Callable[[s
 
 def _assumed(factors: tuple[float | None, float | None], rows: NDArray[np.float64]) -> Iterator[WarningText]:
     """Warnings about assumptions where the file names no units."""
-    bare = [
-        f"{name}s are taken in {unit}"
-        for factor, (name, unit) in zip(factors, _QUANTITIES, strict=True)
-        if factor is None
-    ]
-    if bare:
-        text = f"the file does not name every unit: {' and '.join(bare)}; use a header such as angle_deg,torque_Nm"
+    angle, torque = (factor is None for factor in factors)
+    if angle or torque:
+        taken = (
+            Sentence("angles are taken in rad and torques are taken in N*m")
+            if angle and torque
+            else Sentence("angles are taken in rad")
+            if angle
+            else Sentence("torques are taken in N*m")
+        )
+        text = Sentence(
+            "the file does not name every unit: {taken}; use a header such as angle_deg,torque_Nm", taken=taken
+        )
         yield WarningText(text, "assumed-units")
     largest = float(np.abs(rows[:, 0]).max())
     if factors[0] is None and largest > _LARGEST_PLAUSIBLE:
-        text = f"the largest angle would be {largest:g} rad, {math.degrees(largest):.4g} degrees; was it in degrees?"
+        text = Sentence(
+            "the largest angle would be {angle} rad, {degrees} degrees; was it in degrees?",
+            angle=Amount(largest, digits=6),
+            degrees=Amount(math.degrees(largest), digits=4),
+        )
         yield WarningText(text, "implausible-value")
 
 
@@ -187,7 +196,8 @@ def _numbers(table: Split, factors: tuple[float | None, float | None]) -> Measur
     scaled = numbers * np.array([1.0 if factor is None else factor for factor in factors])
     warnings = list(_assumed(factors, numbers))
     if doubt is not None:
-        warnings.append(WarningText(f"line {doubt.line}: {assumption(doubt.text)}", "ambiguous-point"))
+        text = of_line(doubt.line, assumption(doubt.text))
+        warnings.append(WarningText(text, "ambiguous-point"))
     return MeasuredData(scaled, tuple(row.line for row in rows), tuple(warnings))
 
 

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
 
+from sprag.sentences import Place, WarningText
 from sprag.service.faults import Code, Fault, FaultError, WarningCode
 from sprag.service.reading.texts import did_you_mean, shorten, shorten_text
 from sprag.worker.limits import MAX_PROBLEMS
-
-if TYPE_CHECKING:
-    from sprag.worker.models import WarningText
 
 
 class SpecError(FaultError):
@@ -61,16 +58,18 @@ class Report:
         """Whether the limit of faults is reached, so that further checks are useless."""
         return len(self.faults) >= MAX_PROBLEMS
 
-    def warn(self, code: WarningCode, message: str) -> None:
-        """Record a warning about something allowed but probably unintended; each sentence only once."""
-        from sprag.worker.models import WarningText  # the commands for a running service have no models
+    def warn(self, code: WarningCode, place: Place | str, text: str) -> None:
+        """Record a warning about something allowed but probably unintended; each sentence only once.
 
-        self.adopt_warning("", WarningText(message, code))
+        ``place`` is a JSON Pointer, or a place with what it is about.
+        """
+        self.adopt_warning(place, WarningText(text, code))
 
-    def adopt_warning(self, prefix: str, warning: WarningText) -> None:
-        """Record a warning of the engine after ``prefix``."""
-        if prefix + warning not in self.warnings:
-            self.warnings.append(type(warning)(prefix + warning, warning.code))
+    def adopt_warning(self, place: Place | str, warning: WarningText) -> None:
+        """Record a warning of the engine with its place."""
+        placed = warning.at(Place(place) if isinstance(place, str) else place)
+        if placed not in self.warnings:
+            self.warnings.append(placed)
 
     def unknown_fields(self, pointer: str, found: Mapping[str, object], known: Iterable[str]) -> None:
         """Record a fault for every key of ``found`` that is not ``known``, with the nearest known one."""

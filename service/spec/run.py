@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.sentences import Amount, Sentence, plural
 from sprag.service.reading.units import PERIOD_NAMES, QuantityError, exact_number, parse_exact, split_quantity, to_float
 from sprag.service.spec.described import ANY_RUN, SETTLED_RUN
 from sprag.service.spec.fields import read_object
@@ -81,8 +82,15 @@ def _warn_of_few_periods(report: Report, at_most: int | None) -> None:
     if at_most is not None and at_most < MEANS_FROM_PERIODS:
         report.warn(
             "short-search",
-            f"/run/at_most: {at_most} periods are too few for the means of irregular motion, which takes "
-            f"{MEANS_FROM_PERIODS}: cases without a periodic motion will be unsettled",
+            "/run/at_most",
+            plural(
+                "{count} periods are too few for the means of irregular motion, which takes {needed}: cases without a "
+                "periodic motion will be unsettled",
+                "{count} periods are too few for the means of irregular motion, which takes {needed}: cases without a "
+                "periodic motion will be unsettled",
+                at_most,
+                needed=MEANS_FROM_PERIODS,
+            ),
         )
 
 
@@ -167,8 +175,13 @@ def _check_times(
             if duration / 3.0 < 1.0 - _ROUNDING:
                 report.warn(
                     "short-window",
-                    f"/run/duration: the window, its last third, is shorter than one excitation period at "
-                    f"{frequency:.6g} Hz ({duration / 3.0:.3g} periods), so means over it depend on its position",
+                    "/run/duration",
+                    Sentence(
+                        "the window, its last third, is shorter than one excitation period at {frequency} ({count} "
+                        "periods), so means over it depend on its position",
+                        frequency=Amount(frequency, "Hz", 6),
+                        count=Amount(duration / 3.0, digits=3),
+                    ),
                 )
             continue
         start, end = (in_periods(time, frequency) for time in run["window"])
@@ -190,8 +203,13 @@ def _check_times(
         if end - start < 1.0 - _ROUNDING:
             report.warn(
                 "short-window",
-                f"/run/window: shorter than one excitation period at {frequency:.6g} Hz ({end - start:.3g} periods), "
-                "so means over it depend on its position",
+                "/run/window",
+                Sentence(
+                    "shorter than one excitation period at {frequency} ({count} periods), so means over it depend on "
+                    "its position",
+                    frequency=Amount(frequency, "Hz", 6),
+                    count=Amount(end - start, digits=3),
+                ),
             )
 
 

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.sentences import Amount, Place, Sentence
 from sprag.service.spec.axes.axes import varied_values
 from sprag.service.spec.report import Report
 from sprag.worker.derived import distinct_values, involved
@@ -30,23 +31,26 @@ _HALF: Final = 0.5 * (1.0 - 1e-9)
 _LONG: Final = 0.1
 _WIDER: Final = 1.5
 
+#: Frequency of the excitation, in Hz, below which it is slow.
+_SLOW: Final = 0.1
+
 #: Last part of a path -> (largest plausible magnitude, its unit, the likely mistake).
-_PLAUSIBLE: Final[dict[str, tuple[float, str, str]]] = {
-    "excitation.frequency": (1e3, "Hz", "was it in rpm or rad/s?"),
-    "excitation.amplitude_x": (0.1, "m", "was it in mm?"),
-    "excitation.amplitude_y": (0.1, "m", "was it in mm?"),
-    "excitation.phase": (2.0 * math.pi, "rad", "was it in degrees?"),
-    "inertia": (100.0, "kg*m^2", "was it in g*cm^2 or kg*mm^2?"),
-    "mass": (1e3, "kg", "was it in g?"),
-    "arm": (1.0, "m", "was it in mm?"),
-    "spring_arm": (1.0, "m", "was it in mm?"),
-    "spring_rate": (1e8, "N/m", "was it in another unit?"),
-    "damping": (100.0, "N*m*s/rad", "was it in another unit?"),
-    "backlash": (0.1, "rad", "was it in degrees?"),
-    "initial_angle": (math.pi, "rad", "was it in degrees?"),
-    "initial_windup": (1.0, "rad", "was it in degrees?"),
-    "initial_speed": (1e3, "rad/s", "was it in rpm?"),
-    "load": (1e4, "N*m", "was it in N*mm?"),
+_PLAUSIBLE: Final[dict[str, tuple[float, str, Sentence]]] = {
+    "excitation.frequency": (1e3, "Hz", Sentence("was it in rpm or rad/s?")),
+    "excitation.amplitude_x": (0.1, "m", Sentence("was it in mm?")),
+    "excitation.amplitude_y": (0.1, "m", Sentence("was it in mm?")),
+    "excitation.phase": (2.0 * math.pi, "rad", Sentence("was it in degrees?")),
+    "inertia": (100.0, "kg*m^2", Sentence("was it in g*cm^2 or kg*mm^2?")),
+    "mass": (1e3, "kg", Sentence("was it in g?")),
+    "arm": (1.0, "m", Sentence("was it in mm?")),
+    "spring_arm": (1.0, "m", Sentence("was it in mm?")),
+    "spring_rate": (1e8, "N/m", Sentence("was it in another unit?")),
+    "damping": (100.0, "N*m*s/rad", Sentence("was it in another unit?")),
+    "backlash": (0.1, "rad", Sentence("was it in degrees?")),
+    "initial_angle": (math.pi, "rad", Sentence("was it in degrees?")),
+    "initial_windup": (1.0, "rad", Sentence("was it in degrees?")),
+    "initial_speed": (1e3, "rad/s", Sentence("was it in rpm?")),
+    "load": (1e4, "N*m", Sentence("was it in N*mm?")),
 }
 
 
@@ -58,14 +62,19 @@ def warn_vibration_drive(report: Report, study: Study) -> None:
     if has_starts(study.run) and runs > _MANY_RUNS:
         report.warn(
             "many-runs",
-            f"/starts/count: {study.cases:,} cases with {count_of(study.run):,} starts each are {runs:,} runs; "
-            "start with a few dozen for each case",
+            "/starts/count",
+            Sentence(
+                "{cases} cases with {starts} starts each are {runs} runs; start with a few dozen for each case",
+                cases=study.cases,
+                starts=count_of(study.run),
+                runs=runs,
+            ),
         )
     if not any(_values(study, f"excitation.amplitude_{axis}").any() for axis in "xy"):
-        report.warn("nothing-moves", "/base/excitation: both amplitudes are 0, so the base does not move")
-    if _values(study, "excitation.frequency").min() < 0.1:
-        where = _pointer(study, "excitation.frequency")
-        report.warn("slow-excitation", f"{where}: below 0.1 Hz, which is slow for a vibration drive")
+        report.warn("nothing-moves", "/base/excitation", Sentence("both amplitudes are 0, so the base does not move"))
+    if _values(study, "excitation.frequency").min() < _SLOW:
+        slow = Sentence("below {limit}, which is slow for a vibration drive", limit=Amount(_SLOW, "Hz"))
+        report.warn("slow-excitation", _place(study, "excitation.frequency"), slow)
     pendulums = sum(path.startswith("pendulums.") and path.endswith(".mass") for path in study.base)
     _upright(report, study, pendulums)
     for index in range(pendulums):
@@ -74,14 +83,14 @@ def warn_vibration_drive(report: Report, study: Study) -> None:
 
 
 #: The same for a machine shaft.
-_PLAUSIBLE_SHAFT: Final[dict[str, tuple[float, str, str]]] = {
-    "mean_speed": (1e3, "rad/s", "was it in rpm?"),
+_PLAUSIBLE_SHAFT: Final[dict[str, tuple[float, str, Sentence]]] = {
+    "mean_speed": (1e3, "rad/s", Sentence("was it in rpm?")),
     **dict.fromkeys(
         ("crank", "rod", "offset", "rod_centre", "frame", "coupler", "rocker", "coupler_centre", "pivot_distance",
          "link_arm", "lift", "follower", "arm"),
-        (10.0, "m", "was it in mm?"),
+        (10.0, "m", Sentence("was it in mm?")),
     ),
-    "inclination": (2.0 * math.pi, "rad", "was it in degrees?"),
+    "inclination": (2.0 * math.pi, "rad", Sentence("was it in degrees?")),
 }  # fmt: skip
 
 
@@ -96,8 +105,11 @@ def warn_machine_shaft(report: Report, study: Study) -> None:
             where = "/base/" + f"{prefix}operation".replace(".", "/")
             report.warn(
                 "replaced-value",
-                f'{where}: is not used: the balance "constant" on the side of the operation replaces it by a '
-                'constant torque; choose "scale" to keep its shape',
+                where,
+                Sentence(
+                    'is not used: the balance "constant" on the side of the operation replaces it by a constant '
+                    'torque; choose "scale" to keep its shape'
+                ),
             )
     if (
         structure["balance"] == "constant"
@@ -106,20 +118,26 @@ def warn_machine_shaft(report: Report, study: Study) -> None:
     ):
         report.warn(
             "replaced-value",
-            '/base/drive/torque: is not used: the balance "constant" replaces it by the mean resistance; choose '
-            '"scale" or "refuse" to keep its shape',
+            "/base/drive/torque",
+            Sentence(
+                'is not used: the balance "constant" replaces it by the mean resistance; choose "scale" or "refuse" '
+                "to keep its shape"
+            ),
         )
     if structure["balance"] == "motor" and _values(study, "wanted_irregularity").size:
-        report.warn("no-effect", "/base/wanted_irregularity: is not used: with a motor no required inertia is computed")
+        unused = Sentence("is not used: with a motor no required inertia is computed")
+        report.warn("no-effect", "/base/wanted_irregularity", unused)
     if all(
         part["operation"]["quantity"] == "none" and part["mechanism"]["kind"] == "none" for _, part in _parts(study)
     ):
-        report.warn("nothing-acts", "/base: has neither a mechanism nor an operation, so the shaft turns evenly")
+        alone = Sentence("has neither a mechanism nor an operation, so the shaft turns evenly")
+        report.warn("nothing-acts", "/base", alone)
     else:
         for prefix, part in _parts(study):
             if part["operation"]["quantity"] == "none" and part["mechanism"]["kind"] == "none":
                 where = "/base/" + prefix.rstrip(".").replace(".", "/")
-                report.warn("nothing-acts", f"{where}: has neither a mechanism nor an operation, so it does nothing")
+                idle = Sentence("has neither a mechanism nor an operation, so it does nothing")
+                report.warn("nothing-acts", where, idle)
     _shaft_relations(report, study)
 
 
@@ -165,8 +183,14 @@ def _short_tables(report: Report, study: Study) -> None:
             last, rest, whole = (math.degrees(angle) for angle in (angles[-1], missing, period))
             report.warn(
                 "table-ends-early",
-                f"/base/{where}: the table ends at {last:.6g} deg, {rest:.4g} deg before its cycle of {whole:.4g} deg; "
-                "over the rest its value goes from the last row back to the first; give rows up to the end of it",
+                f"/base/{where}",
+                Sentence(
+                    "the table ends at {last}, {rest} before its cycle of {whole}; over the rest its value goes from "
+                    "the last row back to the first; give rows up to the end of it",
+                    last=Amount(last, "deg", 6),
+                    rest=Amount(rest, "deg", 4),
+                    whole=Amount(whole, "deg", 4),
+                ),
             )
 
 
@@ -174,17 +198,25 @@ def _discharge(report: Report, study: Study, prefix: str) -> None:
     names = ("suction_pressure", "discharge_pressure", "clearance", "exponent")
     low, high, clearance, exponent, weight = _columns(study, [prefix + name for name in names])
     low, high, most = np.broadcast_arrays(low, high, machine_shaft.reachable_pressure(low, clearance, exponent))
-    where = _pointer(study, f"{prefix}discharge_pressure")
+    where = _place(study, f"{prefix}discharge_pressure")
     beyond, below = high > most, high < low
     if beyond.any():
         report.warn(
             "no-discharge",
-            f"{where}: the compressor reaches {most[beyond].min():.6g} Pa at most and discharges nothing at a higher "
-            "pressure: its valves stay shut" + _share(beyond, weight),
+            where,
+            _with_share(
+                Sentence(
+                    "the compressor reaches {pressure} at most and discharges nothing at a higher pressure: its "
+                    "valves stay shut",
+                    pressure=Amount(float(most[beyond].min()), "Pa", 6),
+                ),
+                beyond,
+                weight,
+            ),
         )
     if below.any():
-        text = f"{where}: is below the suction pressure: nothing is compressed"
-        report.warn("no-compression", text + _share(below, weight))
+        text = Sentence("is below the suction pressure: nothing is compressed")
+        report.warn("no-compression", where, _with_share(text, below, weight))
 
 
 def _turned_step(report: Report, study: Study, prefix: str, *, wraps: bool) -> None:
@@ -194,13 +226,13 @@ def _turned_step(report: Report, study: Study, prefix: str, *, wraps: bool) -> N
     varied = [path for path in paths if path in study.column_paths]
     if not varied or not turned.any() or (wraps and turned.all()):
         return
-    what = (
-        "where `from` exceeds `to` the step continues past the end of the cycle and acts in nearly all of it"
+    text = (
+        Sentence("where `from` exceeds `to` the step continues past the end of the cycle and acts in nearly all of it")
         if wraps
-        else "where `from` exceeds `to` the step over the stroke never acts"
+        else Sentence("where `from` exceeds `to` the step over the stroke never acts")
     )
-    text = f"{_pointer(study, varied[0])}: {what}" + _share(turned, weight)
-    report.warn("wraps-around" if wraps else "never-acts", text)
+    where = _place(study, varied[0])
+    report.warn("wraps-around" if wraps else "never-acts", where, _with_share(text, turned, weight))
 
 
 def _chosen_angle(report: Report, study: Study) -> None:
@@ -214,8 +246,14 @@ def _chosen_angle(report: Report, study: Study) -> None:
     if 0 < count <= chosen:
         report.warn(
             "no-such-angle",
-            f"/base/phi_c: {chosen} is out of range: the machine of base has {count:.0f} angles with T = T_mean, "
-            f"numbered 0 to {count - 1:.0f}; it and the results of s3 and s4 stay empty",
+            "/base/phi_c",
+            Sentence(
+                "{chosen} is out of range: the machine of base has {count} angles with T = T_mean, numbered 0 to "
+                "{last}; it and the results of s3 and s4 stay empty",
+                chosen=str(chosen),
+                count=str(round(count)),
+                last=str(round(count) - 1),
+            ),
         )
 
 
@@ -223,7 +261,9 @@ def _values(study: Study, path: str) -> NDArray[np.float64]:
     return distinct_values(study, path) if path in study.derive else varied_values(path, study.axes, study.base)
 
 
-def _plausible(report: Report, study: Study, path: str, known: dict[str, tuple[float, str, str]] = _PLAUSIBLE) -> None:
+def _plausible(
+    report: Report, study: Study, path: str, known: dict[str, tuple[float, str, Sentence]] = _PLAUSIBLE
+) -> None:
     entry = known.get(path) or known.get(path.rsplit(".", 1)[-1])
     if entry is None:
         return
@@ -231,18 +271,23 @@ def _plausible(report: Report, study: Study, path: str, known: dict[str, tuple[f
     values = _values(study, path)
     largest = float(values[np.abs(values).argmax()])
     if abs(largest) > limit:
-        text = f"{_pointer(study, path)}: {largest:g} {unit} is more than {limit:.4g} {unit}; {question}"
-        report.warn("implausible-value", text)
+        text = Sentence(
+            "{value} is more than {limit}; {question}",
+            value=Amount(largest, unit, 6),
+            limit=Amount(limit, unit, 4),
+            question=question,
+        )
+        report.warn("implausible-value", _place(study, path), text)
 
 
-def _pointer(study: Study, path: str) -> str:
-    """Where the spec gives the values of ``path``: its axis or its formula (shown with the path), or the base."""
+def _place(study: Study, path: str) -> Place:
+    """Where the spec gives the values of ``path``: its axis or its formula, or the base."""
     if path in study.derive:
-        return f"/derive ({path})"
+        return Place("/derive", path)
     for position, axis in enumerate(study.axes):
         if path in axis.paths:
-            return f"/axes/{position} ({path})"
-    return "/base/" + path.replace(".", "/")
+            return Place(f"/axes/{position}", path)
+    return Place("/base/" + path.replace(".", "/"))
 
 
 def _upright(report: Report, study: Study, pendulums: int) -> None:
@@ -254,9 +299,17 @@ def _upright(report: Report, study: Study, pendulums: int) -> None:
     if still.any():
         report.warn(
             "stays-upright",
-            "/base/pendulums: with vibration along y alone a pendulum that starts upright without speed stays upright, "
-            "even at parametric resonance, and nothing moves; give an initial angle such as 0.01 rad or a horizontal "
-            "amplitude" + _share(still, weight),
+            "/base/pendulums",
+            _with_share(
+                Sentence(
+                    "with vibration along y alone a pendulum that starts upright without speed stays upright, even at "
+                    "parametric resonance, and nothing moves; give an initial angle such as {angle} or a horizontal "
+                    "amplitude",
+                    angle=Amount(0.01, "rad"),
+                ),
+                still,
+                weight,
+            ),
         )
 
 
@@ -270,9 +323,17 @@ def _stability(report: Report, study: Study, index: int) -> None:
         worst = int(np.argmin(np.where(unstable, spring - gravity, np.inf)))
         report.warn(
             "falls-over",
-            f"/base/pendulums/{index}: c a^2 < M g l: the spring's {spring.flat[worst]:.4g} N*m/rad do not hold the "
-            f"pendulum up against gravity's {gravity.flat[worst]:.4g} N*m/rad; without vibration it falls to one side"
-            + _share(unstable, weight),
+            f"/base/pendulums/{index}",
+            _with_share(
+                Sentence(
+                    "c a^2 < M g l: the spring's {spring} do not hold the pendulum up against gravity's {gravity}; "
+                    "without vibration it falls to one side",
+                    spring=Amount(float(spring.flat[worst]), "N*m/rad", 4),
+                    gravity=Amount(float(gravity.flat[worst]), "N*m/rad", 4),
+                ),
+                unstable,
+                weight,
+            ),
         )
 
 
@@ -286,18 +347,29 @@ def _inertia(report: Report, study: Study, index: int) -> None:
         worst = int(np.argmax(np.where(wrong, need - have, -np.inf)))
         report.warn(
             "impossible-inertia",
-            f"/base/pendulums/{index}: J < M l^2: an inertia of {have.flat[worst]:.4g} kg*m^2 about the axis is less "
-            f"than the {need.flat[worst]:.4g} kg*m^2 of the mass at its arm alone, which no rigid body has"
-            + _share(wrong, weight),
+            f"/base/pendulums/{index}",
+            _with_share(
+                Sentence(
+                    "J < M l^2: an inertia of {inertia} about the axis is less than the {needed} of the mass at its "
+                    "arm alone, which no rigid body has",
+                    inertia=Amount(float(have.flat[worst]), "kg*m^2", 4),
+                    needed=Amount(float(need.flat[worst]), "kg*m^2", 4),
+                ),
+                wrong,
+                weight,
+            ),
         )
 
 
-def _share(found: NDArray[np.bool_], weight: NDArray[np.float64]) -> str:
-    """The number of cases concerned, where every combination was checked."""
+def _with_share(text: Sentence, concerned: NDArray[np.bool_], weight: NDArray[np.float64]) -> Sentence:
+    """A sentence with the number of cases concerned, where every combination was checked."""
     cases = float(weight)
-    if found.size == 1 or not cases:
-        return "" if found.size == 1 else " (in the worst case of the axes)"
-    return f" (in {int(found.sum() * cases):,} of {int(found.size * cases):,} cases)"
+    if concerned.size == 1:
+        return text
+    if not cases:
+        return Sentence("{sentence} (in the worst case of the axes)", sentence=text)
+    some, every = int(concerned.sum() * cases), int(concerned.size * cases)
+    return Sentence("{sentence} (in {some} of {all} cases)", sentence=text, some=some, all=every)
 
 
 def _columns(study: Study, paths: Sequence[str]) -> list[NDArray[np.float64]]:

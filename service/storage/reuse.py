@@ -12,6 +12,7 @@ import numpy as np
 import sqlalchemy as sa
 from cachetools import LRUCache
 
+from sprag.sentences import Sentence, WarningText
 from sprag.service.storage.case_keys import KEYED, any_below, newest_with
 from sprag.service.storage.cases import conditions
 from sprag.service.storage.digests import Digests
@@ -23,7 +24,7 @@ from sprag.service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, 
 from sprag.service.storage.warning_texts import read_warnings, write_warnings
 from sprag.worker import fingerprint, models
 from sprag.worker.case_keys import case_keys
-from sprag.worker.models import WarningText, WorkerEnding
+from sprag.worker.models import WorkerEnding
 from sprag.worker.order import order_of
 from sprag.worker.ports import Known
 from sprag.worker.reuse import Wanted, kin_hash, shared_cases, span, taken
@@ -58,9 +59,11 @@ _SOURCE: Final[tuple[sa.ColumnElement[Any], ...]] = (
 _NO_RESULT: Final = tuple(ending.value for ending in WorkerEnding)
 
 _MIXED: Final = WarningText(
-    "The cases of this study were not all computed by one version of Sprag and its libraries: they may differ in more "
-    "than their parameters, so other studies reuse only those that were computed like their own. A fresh study runs "
-    "all of them alike.",
+    Sentence(
+        "The cases of this study were not all computed by one version of Sprag and its libraries: they may differ in "
+        "more than their parameters, so other studies reuse only those that were computed like their own. A fresh "
+        "study runs all of them alike."
+    ),
     "mixed-origins",
 )
 

@@ -10,13 +10,13 @@ import pytest
 
 from sprag.engine import Ending
 from sprag.engine.machine_shaft import problems
+from sprag.sentences import WarningText
 from sprag.service import faults
 from sprag.service.faults import Code, Fault, FaultError, Kind, ParameterFault, SelectionError, WarningCode
 from sprag.service.http.problems import PROBLEM_TYPES
 from sprag.service.spec.report import SpecError
 from sprag.service.storage import errors as storage
 from sprag.service.storage.warning_texts import read_warnings, write_warnings
-from sprag.worker.models import WarningText
 from sprag.worker.ports import StoreError
 from tests.conftest import ROOT
 

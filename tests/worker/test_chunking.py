@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sprag.worker import models
+from sprag.sentences import WarningText
 from sprag.worker.chunking import CHUNK_SECONDS, MAX_CHUNKS, MIN_CASES, Chunking, chunk_cases, spans, work_of
 from tests.worker import fakes
 
@@ -55,7 +55,7 @@ def test_a_chunk_stays_far_from_its_time_limit(seconds: float, timeout: float, s
 def test_a_case_that_does_not_fit_the_time_limit_is_warned_of() -> None:
     study = fakes.study(64)
     (warning,) = Chunking(0, 2, timeout=1e-9).warnings(study)
-    assert isinstance(warning, models.WarningText)
+    assert isinstance(warning, WarningText)
     assert warning.code == "exceeds-chunk-timeout"
     assert "1e-09 s" in warning
     assert Chunking(0, 2, timeout=600.0).warnings(study) == ()

@@ -35,7 +35,6 @@ from sprag.engine.vibration_drive.parameters import (
     MAX_PENDULUMS,
     START_STATES,
 )
-from sprag.engine.warning_text import WarningText
 from sprag.worker.models import machine_shaft, vibration_drive
 from sprag.worker.models.abilities import (
     has_clutches,
@@ -126,7 +125,6 @@ __all__ = [
     "Span",
     "TableError",
     "Trajectory",
-    "WarningText",
     "WorkerEnding",
     "cache_folder",
     "cache_is_wanted",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from fastapi import Request
 from starlette.responses import RedirectResponse, Response
 
+from sprag.sentences import Place, WarningText
 from sprag.service.faults import FaultError, parameter_error
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.routers import page_router
@@ -22,7 +23,6 @@ from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.reading.numbers import assumption, parse_number, settle
 from sprag.worker.limits import MAX_PRIORITY
-from sprag.worker.models import WarningText
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -104,8 +104,8 @@ def _doubts(values: Values) -> list[WarningText]:
         items = items_of(text) if name.startswith("axis:") else []
         doubt = settle(items).doubt
         if doubt is not None and parse_number(items[doubt]) is not None:
-            place = f"/axes ({name.removeprefix('axis:')})"
-            found.append(WarningText(f"{place}: {assumption(items[doubt])}", "ambiguous-point"))
+            place = Place("/axes", name.removeprefix("axis:"))
+            found.append(WarningText(assumption(items[doubt]), "ambiguous-point").at(place))
     return found
 
 

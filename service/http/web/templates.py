@@ -15,6 +15,7 @@ from jinja2.ext import Extension
 from markupsafe import Markup, escape
 from starlette.responses import Response
 
+from sprag.sentences import Sentence, WarningText
 from sprag.service import languages
 from sprag.service.actor import Role
 from sprag.service.http.access import ASKING
@@ -25,12 +26,11 @@ from sprag.service.http.web.explained import explained
 from sprag.service.http.web.script_texts import translated_texts
 from sprag.service.languages import N_, recorded
 from sprag.service.languages.ranges import allowed_text
-from sprag.service.reading.phrases import Phrase, model_title, shown, titled, word
-from sprag.service.reading.reader import CLUTCH
+from sprag.service.reading.phrases import model_title, shown, titled, word
+from sprag.service.reading.reader import CLUTCH, Reading
 from sprag.service.reading.wording import counted, duration, number, symbol, typed_text, unit_text
-from sprag.service.results.fault_texts import fault_text, warning_text
+from sprag.service.results.fault_texts import fault_text
 from sprag.service.schedules.times import wall_clock
-from sprag.worker.models import WarningText
 
 #: The beginning of an attribute that is an address: a path of this service, or an expression that may give one.
 _ADDRESS = re.compile(
@@ -85,7 +85,11 @@ def _read(value: object) -> object:
     """
     if isinstance(value, WarningText):
         raise TypeError("a warning is written by the filter `warning`")
-    return shown(value) if isinstance(value, Phrase) else value
+    return shown(value) if isinstance(value, Sentence) else value
+
+
+def _warning(text: str, reading: Reading) -> str:
+    return reading.warning(text)
 
 
 @lru_cache(maxsize=1)
@@ -119,7 +123,7 @@ def _templates() -> Environment:
         "recorded": recorded.said,
         "say": shown,
         "fault": fault_text,
-        "warning": warning_text,
+        "warning": _warning,
         "allowed": allowed_text,
         "day": day,
         "model": model_title,

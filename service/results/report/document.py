@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Final
 from sprag.service.languages import N_, _, date_format, pgettext
 from sprag.service.reading.phrases import lower_first, shown, term, titled, upper_first
 from sprag.service.reading.wording import number, unit_text
-from sprag.service.results.fault_texts import warning_text
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.read import read_figure, read_map
 from sprag.service.results.pictures.curves import draw_figure
@@ -133,7 +132,7 @@ def document_of(report: Report, block: TitleBlock) -> Document:
 
 def _warnings(report: Report) -> Iterator[Block]:
     for text in report.warnings:
-        yield Text(warning_text(text, report.reading), warning=True)
+        yield Text(report.reading.warning(text), warning=True)
 
 
 def _machine(report: Report) -> Iterator[Block]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sprag.sentences import Amount, Place, Sentence
 from sprag.service.reading.texts import quantity_text
 from sprag.service.spec.axes.blocks import first_rows
 from sprag.service.spec.axes.values import PLANS, Plan, count_text
@@ -62,12 +63,10 @@ def _warn_of_order(report: Report, pointer: str, values: NDArray[np.float64], pa
     steps = np.diff(values)
     turns = np.flatnonzero(np.sign(steps) != np.sign(steps[0])) if steps.size else steps
     if turns.size:
-        before, after = (quantity_text(float(values[turns[0] + k]), parameter.unit) for k in (0, 1))
-        trend = "rise" if steps[0] > 0.0 else "fall"
-        report.warn(
-            "not-monotonic",
-            f"{pointer} ({parameter.path}): the values {trend} at first, but {after} stands after {before}",
-        )
+        before, after = (Amount(float(values[turns[0] + k]), parameter.unit, 10) for k in (0, 1))
+        rising = Sentence("the values rise at first, but {after} stands after {before}", after=after, before=before)
+        falling = Sentence("the values fall at first, but {after} stands after {before}", after=after, before=before)
+        report.warn("not-monotonic", Place(pointer, parameter.path), rising if steps[0] > 0.0 else falling)
 
 
 def axis_values(

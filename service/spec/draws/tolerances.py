@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.sentences import Amount, Place, Sentence
+from sprag.service.reading.catalogue import range_sentence
 from sprag.service.reading.together import AMBIGUOUS_UNIT, question
 from sprag.service.spec.draws.correlations import read_correlations
 from sprag.service.spec.draws.described import (
@@ -134,8 +136,13 @@ def warn_of_invalid_drives(report: Report, study: Study) -> None:
             each = study.cases // part.cases
             report.warn(
                 "invalid-drives",
-                f"/derive ({path}): is out of its range ({entry.range_text()}) in {wrong * each:,} of "
-                f"{study.cases:,} cases: these drives fail",
+                Place("/derive", path),
+                Sentence(
+                    "is out of its range ({range}) in {wrong} of {cases} cases: these drives fail",
+                    range=range_sentence(entry),
+                    wrong=wrong * each,
+                    cases=study.cases,
+                ),
             )
 
 
@@ -309,6 +316,10 @@ def _warn_of_cut(report: Report, one: _Drawn) -> None:
     if outside > _CUT:
         report.warn(
             "tolerance-cut",
-            f"{one.pointer} ({one.tolerance.name}): {outside:.2g} of the distribution lies outside the range of the "
-            "parameter; it is left out, and the rest is drawn",
+            Place(one.pointer, one.tolerance.name),
+            Sentence(
+                "{outside} of the distribution lies outside the range of the parameter; it is left out, and the rest "
+                "is drawn",
+                outside=Amount(outside, digits=2),
+            ),
         )

@@ -164,7 +164,7 @@ def _measured(
         )
         return None
     for warning in fit.warnings:
-        report.adopt_warning(f"{pointer}: ", warning)
+        report.adopt_warning(pointer, warning)
     return Clutch(pointer, prefix, fit.coefficients, fit.windup_limit, fit)
 
 
@@ -242,5 +242,5 @@ def _check_law(report: Report, clutch: Clutch, values: Mapping[str, float], poin
         report.fault(where, "no-clutch-law", error.message, coefficients, allowed=error.allowed)
         return False
     for warning in law.warnings:
-        report.adopt_warning(f"{pointer or clutch.pointer}: ", warning)
+        report.adopt_warning(pointer or clutch.pointer, warning)
     return True

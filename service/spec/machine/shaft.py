@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from sprag.sentences import Sentence
 from sprag.service.reading.texts import did_you_mean
 from sprag.service.spec.described import choice
 from sprag.service.spec.fields import read_object
@@ -170,7 +171,9 @@ def _unused(report: Report, found: Mapping[str, Any], structure: Mapping[str, An
     flywheel = drive.get("flywheel") if isinstance(drive, Mapping) else None
     if isinstance(flywheel, Mapping) and structure["drive"].get("flywheel") == "rim" and "poisson_ratio" in flywheel:
         report.warn(
-            "no-effect", "/base/drive/flywheel/poisson_ratio: is not used: the stress of a rim does not depend on it"
+            "no-effect",
+            "/base/drive/flywheel/poisson_ratio",
+            Sentence("is not used: the stress of a rim does not depend on it"),
         )
     text = "selects strokes, but this diagram is over the angle"
     owners = [("/base", found, structure)]
@@ -179,8 +182,8 @@ def _unused(report: Report, found: Mapping[str, Any], structure: Mapping[str, An
     for pointer, given, own in owners:
         operation = given.get("operation")
         if isinstance(operation, Mapping) and own["operation"]["quantity"] == "torque" and "sense" in operation:
-            sense = f"{pointer}/operation/sense: is not used: a positive torque always resists; `sense` is for forces"
-            report.warn("no-effect", sense)
+            sense = Sentence("is not used: a positive torque always resists; `sense` is for forces")
+            report.warn("no-effect", f"{pointer}/operation/sense", sense)
         if isinstance(operation, Mapping) and own["operation"]["over"] == "angle" and "during" in operation:
             report.fault(f"{pointer}/operation/during", "not-used", text,
                            operation["during"], allowed='with `over` "stroke" only')  # fmt: skip

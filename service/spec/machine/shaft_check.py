@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial
 from typing import Any, Final, cast
 
+from sprag.sentences import Sentence
 from sprag.service.faults import Code
 from sprag.service.spec.report import Report
 from sprag.worker.models import (
@@ -29,7 +30,7 @@ _POINTERS: Final[dict[Ending | None, str]] = {
     Ending.MOTOR_STALLED: "/base/drive/motor",
     Ending.MOTOR_OVERRUN: "/base/drive/motor",
 }
-_UNSTABLE: Final = (
+_UNSTABLE: Final = Sentence(
     "the steady motion of this machine is unstable: deviations of the speed grow in every cycle, so a case of it ends "
     "as `unstable_motion`, with the multiplier of the cycle"
 )
@@ -91,7 +92,7 @@ def check_machine(
         return
     try:
         if machine_shaft.check(structure, values) is Ending.UNSTABLE:
-            report.warn("unstable-motion", f"/base: {_UNSTABLE}")
+            report.warn("unstable-motion", "/base", _UNSTABLE)
     except ExpressionError as error:
         formula = _at(structure, error.part).get("formula") if error.part in places else None
         report.fault(places.get(error.part, "/base"), "invalid-formula", str(error), formula)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.sentences import Place, Sentence
 from sprag.service.reading.texts import did_you_mean
 from sprag.service.spec.axes.axes import check_paths, expand
 from sprag.service.spec.axes.values import plan_values
@@ -306,6 +307,6 @@ def _read_within(
         )  # fmt: skip
         return None
     if width is not None and width >= abs(value) > 0.0:
-        place = f"{join(where, 'within')} ({info.name})"
-        report.warn("wide-limit", f"{place}: is at least as wide as the value, so that 0 fulfils the limit, too")
+        text = Sentence("is at least as wide as the value, so that 0 fulfils the limit, too")
+        report.warn("wide-limit", Place(join(where, "within"), info.name), text)
     return width

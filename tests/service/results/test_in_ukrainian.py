@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from sprag.engine import Ending
+from sprag.sentences import WarningText
 from sprag.service import languages
 from sprag.service.faults import Fault
 from sprag.service.http.web.figures.plotly import plotly_figure
@@ -18,7 +19,7 @@ from sprag.service.languages.ranges import allowed_text
 from sprag.service.reading.phrases import Amount, Phrase, joined, part_label, plural, shown, term, titled
 from sprag.service.reading.reader import CODES, Reading
 from sprag.service.reading.wording import typed_text, unit_text
-from sprag.service.results.fault_texts import fault_text, warning_text
+from sprag.service.results.fault_texts import fault_text
 from sprag.service.results.figures.branch import special_text
 from sprag.service.results.figures.figure import Figure, Line, Note, Panel, Quantity
 from sprag.service.results.figures.orders import motion_text
@@ -26,7 +27,7 @@ from sprag.service.results.figures.read import read_figure
 from sprag.service.results.key_answer_words import curve_named
 from sprag.service.results.pictures.curves import draw_figure
 from sprag.service.results.tolerances.conditions import read_conditions
-from sprag.worker.models import ResultInfo, WarningText
+from sprag.worker.models import ResultInfo
 from sprag.worker.models.branches import BranchContact, SpecialPoint
 
 DRIVE, SHAFT = Reading("vibration-drive"), Reading("machine-shaft")
@@ -156,13 +157,11 @@ def test_a_warning_has_its_place_and_its_numbers() -> None:
     text = "/axes/0 (excitation.frequency): 5e+03 Hz is more than 1000 Hz; was it in rpm? (in 3 of 12 cases)"
     warning = WarningText(text, "implausible-value")
     with languages.language("uk"):
-        said = warning_text(warning, DRIVE)
+        said = DRIVE.warning(warning)
         assert said.startswith("Частота збудження: Значення далеко поза тим")
         assert re.search(r"\(5.?000 Гц; 1.?000 Гц; у 3 з 12 випадків\)$", said)
-        assert warning_text("stored by an earlier version", DRIVE) == "stored by an earlier version"
-    assert re.match(
-        r"Excitation frequency: 5.?000 Hz is more than 1.?000 Hz; was it in rpm\?", warning_text(warning, DRIVE)
-    )
+        assert DRIVE.warning("stored by an earlier version") == "stored by an earlier version"
+    assert re.match(r"Excitation frequency: 5.?000 Hz is more than 1.?000 Hz; was it in rpm\?", DRIVE.warning(warning))
 
 
 def test_another_process_gets_the_language_of_the_task() -> None:

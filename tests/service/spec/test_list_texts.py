@@ -15,7 +15,6 @@ from sprag.service.http.web.form.spec import spec_of, values_of
 from sprag.service.languages import language
 from sprag.service.languages.ranges import allowed_text
 from sprag.service.reading.reader import Reading
-from sprag.service.results.fault_texts import warning_text
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.report import SpecError
@@ -124,9 +123,9 @@ def test_points_of_a_text_that_could_separate_thousands_are_told() -> None:
     (warning,) = parsed({"/axes": [{"path": LOAD, "values": "20.000; 25.000 N*mm"}]}).warnings
     assert warning.startswith("/axes/0/values (shaft.load): '20.000 N*mm' is read as 20; write 20000")
     reading = Reading("vibration-drive")
-    assert warning_text(warning, reading).startswith("Load torque: '20.000 N·mm' is read as 20; write 20000")
+    assert reading.warning(warning).startswith("Load torque: '20.000 N·mm' is read as 20; write 20000")
     with language("uk"):
-        assert warning_text(warning, reading).startswith("Момент навантаження: «20.000 Н·мм» прочитано як 20; якщо")
+        assert reading.warning(warning).startswith("Момент навантаження: «20.000 Н·мм» прочитано як 20; якщо")
 
 
 def test_points_of_further_values_are_told() -> None:

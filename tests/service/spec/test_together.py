@@ -21,7 +21,7 @@ from sprag.service.reading.reader import Reading
 from sprag.service.reading.together import question, with_last_unit
 from sprag.service.results.branches import range_of
 from sprag.service.results.explore import ExploreQuery, plan_of
-from sprag.service.results.fault_texts import fault_text, warning_text
+from sprag.service.results.fault_texts import fault_text
 from sprag.service.results.selection import locate_values
 from sprag.service.results.tolerances.conditions import read_conditions
 from sprag.service.results.trajectories import span
@@ -280,7 +280,7 @@ def test_a_list_that_goes_up_and_down_is_pointed_out() -> None:
     assert "0.2 N*m" in warning
     assert "100 N*m" in warning
     with language("uk"):
-        said = warning_text(warning, Reading("vibration-drive"))
+        said = Reading("vibration-drive").warning(warning)
     assert said.startswith("Момент навантаження: ")
     assert "0,2 Н·м" in said
     assert not found([0, 0.05, 0.1])

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
+from sprag.sentences import WarningText
 from sprag.service.results.exports.source import stored
 from sprag.service.storage.origins import CasesOf
 from sprag.service.storage.part import SystemClock
@@ -20,7 +21,7 @@ from sprag.worker import fingerprint, models
 from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.models import ChunkResult, ChunkTask, WarningText
+from sprag.worker.models import ChunkResult, ChunkTask
 from sprag.worker.ports import Chunk, Finished
 from sprag.worker.study import Axis, Study
 from tests.worker.fakes import BASE, RUN

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
+from sprag.sentences import Place, WarningText
 from sprag.service.faults import Fault
 from sprag.service.http.web.figures.fit import FitChart, fit_chart
 from sprag.service.http.web.form.columns import COLUMNS
@@ -23,7 +24,7 @@ from sprag.service.reading.reader import CLUTCH, Choice, Reading, reading_for
 from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.reading.wording import duration, unit_text
 from sprag.service.results.draft_words import draft_words
-from sprag.service.results.fault_texts import fault_text, warning_text
+from sprag.service.results.fault_texts import fault_text
 from sprag.service.results.figures.linkage import Drawing, drawings
 from sprag.service.results.fits import fit_json
 from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
@@ -33,7 +34,6 @@ from sprag.service.spec.machine.clutch import read_clutch
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
 from sprag.service.spec.report import Report
 from sprag.service.spec.stored import accepted
-from sprag.worker.models import WarningText
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -115,7 +115,7 @@ def look_over(
     if checked.parsed is not None and checked.preview is not None:
         reading = reading_for(checked.parsed.study, checked.parsed.spec, choice or Choice(TYPED))
         checked.words = _words(checked.parsed, checked.preview, reading)
-        checked.warnings = tuple(warning_text(text, reading) for text in checked.preview["warnings"])
+        checked.warnings = tuple(reading.warning(text) for text in checked.preview["warnings"])
     return checked
 
 
@@ -173,9 +173,8 @@ def _points(values: Mapping[str, str]) -> list[str]:
     for pointer, names, items, entries in _typed_together(values):
         doubt = settle(items).doubt
         if doubt is not None and not isinstance(entries[doubt], str):
-            place = f"{pointer}{names[doubt]} ({values.get(f'{pointer}path', '')})"
-            warning = WarningText(f"{place}: {assumption(items[doubt])}", "ambiguous-point")
-            notes.append(warning_text(warning, reading))
+            place = Place(f"{pointer}{names[doubt]}", values.get(f"{pointer}path", ""))
+            notes.append(reading.warning(WarningText(assumption(items[doubt]), "ambiguous-point").at(place)))
     return notes
 
 
@@ -198,7 +197,7 @@ def _assumed(text: str) -> list[str]:
         notes = parse_measured(text, parse_quantity).warnings
     except MeasuredDataError:
         return []
-    return [_("Measured data: {text}.", text=warning_text(note, CLUTCH).removesuffix(".")) for note in notes]
+    return [_("Measured data: {text}.", text=CLUTCH.warning(note).removesuffix(".")) for note in notes]
 
 
 def check_text(

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Final
 from fastapi import Query, Request
 from starlette.responses import RedirectResponse, Response
 
+from sprag.sentences import Place
 from sprag.service.faults import FaultError
 from sprag.service.http.context import Context, Ctx, study_with
 from sprag.service.http.problems import ApiError, api_error
@@ -62,7 +63,6 @@ from sprag.service.jobs.submission import Submission, take_in
 from sprag.service.languages import gettext
 from sprag.service.presets import preset_names
 from sprag.service.reading.reader import Reading
-from sprag.service.results.places import place_text
 from sprag.service.spec.design import design_spec
 from sprag.service.spec.document import UNNAMED
 from sprag.service.spec.report import SpecError
@@ -180,7 +180,7 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
             address = await work.check(laboratory_address, checked.spec)
         except SpecError as error:
             reading = Reading(checked.spec["model"])
-            text = "; ".join(f"{place_text(item.where or '', reading)}: {message(item)}" for item in error.faults)
+            text = "; ".join(f"{reading.place(Place(item.where or ''))}: {message(item)}" for item in error.faults)
             checked.faults.setdefault("", []).append(
                 gettext("The laboratory cannot show this machine: {text}", text=text)
             )

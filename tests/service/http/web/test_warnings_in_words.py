@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import pytest
 
+from sprag.sentences import WarningText
 from sprag.service.faults import WarningCode
 from sprag.service.http.views import preset_of
 from sprag.service.languages import language
@@ -16,13 +17,13 @@ from sprag.service.reading.reader import Choice
 from sprag.service.results.report.content import report_of
 from sprag.service.results.report.document import TitleBlock, document_of
 from sprag.service.spec.document import parse_spec
-from sprag.worker.models import WarningText
+from tests.service import warning_samples
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
 
-#: A sentence of each code, as the service writes it, about places of every part of a spec.
+#: A sentence of each code, as earlier versions stored it, about places of every part of a spec.
 DRIVE: dict[WarningCode, str] = {
     "ambiguous-point": "/points: line 3: `20.000` is taken as 20, with a decimal point",
     "assumed-units": "/base/clutch/data: the file does not name every unit: angles are taken in rad",
@@ -77,10 +78,13 @@ def test_every_code_has_a_sentence() -> None:
 
 def warned(service: Service, spec: dict[str, Any], texts: dict[WarningCode, str]) -> str:
     """A stored study with these warnings."""
+    return stored(service, spec, [WarningText(text, code) for code, text in texts.items()])
+
+
+def stored(service: Service, spec: dict[str, Any], warnings: list[str]) -> str:
+    """A stored study with these warnings."""
     made = parse_spec(copy.deepcopy(spec))
-    return service.store.create_study(
-        made.spec, made.study, warnings=[WarningText(text, code) for code, text in texts.items()]
-    ).id
+    return service.store.create_study(made.spec, made.study, warnings=warnings).id
 
 
 def shown(service: Service, study_id: str, spoken: str, **params: str) -> list[str]:
@@ -109,6 +113,21 @@ def test_no_warning_shows_a_pointer_or_a_path(service: Service, model: str, spok
             assert not re.search(r"[A-Za-z]{3,}", re.sub("SPRAG_CHUNK_TIMEOUT|T_mean|Sprag", "", text)), text
     # Programs have the place.
     assert service.http.get(f"/api/v1/studies/{study_id}").json()["warnings"] == list(texts.values())
+
+
+@pytest.mark.parametrize("model", ["drive", "shaft"])
+def test_a_warning_is_a_whole_sentence_with_its_values(service: Service, model: str) -> None:
+    drive = model == "drive"
+    warnings = [*(warning_samples.of_drives() if drive else warning_samples.of_shafts())]
+    study_id = stored(service, SPEC if drive else preset_of("press")["spec"], warnings)
+    on_page = shown(service, study_id, "uk", units="mm")
+    with language("uk"):
+        document = document_of(report_of(service.store, study_id, Choice("mm")), TitleBlock())
+    assert on_page == [block.text for block in document.sections[0].blocks if block.kind == "text"]
+    assert len(on_page) == len(warnings)
+    sentence = "1600 мм — це більше за 100 мм; чи не в мм його подано?" if drive else "(випадків: 2 з 3)"
+    assert any(text.replace("\N{NO-BREAK SPACE}", " ").endswith(sentence) for text in on_page), on_page
+    assert service.http.get(f"/api/v1/studies/{study_id}").json()["warnings"] == warnings
 
 
 def test_places_are_captions_in_the_units_of_the_reader(service: Service) -> None:

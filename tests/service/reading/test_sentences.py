@@ -1,0 +1,154 @@
+"""Sentences with values: plain English for programs, whole in every language, and the same after they were stored."""
+
+from __future__ import annotations
+
+import ast
+import json
+import pickle
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from typing import get_args
+
+import pytest
+
+from docs.catalogues import of_code
+from sprag.sentences import Amount, Name, Place, Sentence, WarningText, joined, plural, sentence_of
+from sprag.service.cli.console import warning_lines
+from sprag.service.faults import WarningCode
+from sprag.service.languages import gettext, language
+from sprag.service.reading.phrases import Phrase, shown
+from sprag.service.reading.quantities import Units
+from sprag.service.reading.reader import Reading
+from sprag.service.storage.warning_texts import read_warnings, write_warnings
+from tests.conftest import ROOT
+from tests.service import warning_samples
+
+DRIVE = Reading("vibration-drive", Units({"N*m": "N*mm", "m": "mm", "rad": "deg"}))
+SHAFT = Reading("machine-shaft", Units({"Pa": "bar", "m": "mm"}))
+#: Names that are the same in every language, and what a user typed.
+KEPT = re.compile(r"SPRAG_CHUNK_TIMEOUT|T_mean|Sprag|«[^»]*»")
+PLACED = Sentence(
+    "{value} is more than {limit}; {question}",
+    value=Amount(1.6, "m", 6),
+    limit=Amount(0.1, "m", 4),
+    question=Sentence("was it in mm?"),
+)
+SENTENCES = [
+    PLACED,
+    Sentence("no values"),
+    plural("{count} row of {all}", "{count} rows of {all}", 20_000, all=1),
+    joined(": ", (Place("/axes/0", "shaft.load"), Name("shaft.load", within=True), "x", PLACED)),
+    Sentence("{a} {b}", a=Amount(None), b=Amount(307.2, digits=3, form=".0f")),
+]
+
+
+@cache
+def samples() -> list[tuple[Reading, list[str]]]:
+    """Warnings of every code, by how they are read."""
+    rest = [*warning_samples.of_data(), *warning_samples.of_work()]
+    return [(DRIVE, [*warning_samples.of_drives(), *rest]), (SHAFT, [*warning_samples.of_shafts()])]
+
+
+def pairs() -> Iterator[tuple[Reading, WarningText]]:
+    for reading, warnings in samples():
+        for text in warnings:
+            assert isinstance(text, WarningText)
+            yield reading, text
+
+
+def test_the_english_of_a_sentence_is_in_plain_characters() -> None:
+    assert [str(text) for text in SENTENCES[:4]] == [
+        "1.6 m is more than 0.1 m; was it in mm?",
+        "no values",
+        "20,000 rows of 1",
+        "/axes/0 (shaft.load): shaft.load: x: 1.6 m is more than 0.1 m; was it in mm?",
+    ]
+    assert Phrase("{a}, {b}", a=Amount(1e-6, "N*m"), b=20_000) == "1·10⁻⁶ N·m, 20\N{NARROW NO-BREAK SPACE}000"
+
+
+@pytest.mark.parametrize("text", SENTENCES, ids=str)
+def test_a_sentence_is_the_same_after_it_was_stored_and_in_another_process(text: Sentence) -> None:
+    again = [sentence_of(json.loads(json.dumps(text.to_json()))), pickle.loads(pickle.dumps(text))]
+    for one in again:
+        assert one == text
+        for spoken in ("en", "uk"):
+            with language(spoken):
+                assert DRIVE.say(one) == DRIVE.say(text)
+                assert shown(one) == shown(text)
+
+
+def test_there_is_a_warning_of_every_code() -> None:
+    assert {text.code for _, text in pairs()} == {*get_args(WarningCode)}
+
+
+def test_a_warning_is_whole_in_ukrainian_with_its_values() -> None:
+    for reading, text in pairs():
+        in_english = reading.warning(text)
+        with language("uk"):
+            in_ukrainian = reading.warning(text)
+        assert not re.search(r"[A-Za-z]{3,}", KEPT.sub("", in_ukrainian)), in_ukrainian
+        assert numbers(in_english) <= numbers(in_ukrainian), (in_english, in_ukrainian)
+        assert not re.search(r"/(?:axes|base|derive|goal|run|starts|tolerances)\b", in_english), in_english
+
+
+def numbers(text: str) -> set[str]:
+    """The numbers of a text, whatever its decimal mark; a typed text has its own."""
+    return set(re.findall(r"\d+(?:\.\d+)?", KEPT.sub("", re.sub("'[^']*'", "", text)).replace(",", ".")))
+
+
+def test_a_warning_has_the_units_of_the_reader() -> None:
+    (wide,) = (text for _, text in pairs() if "1.6 m" in text)
+    assert DRIVE.warning(wide) == "Horizontal amplitude: 1600 mm is more than 100 mm; was it in mm?"
+    assert replace(DRIVE, names="codes").warning(wide).startswith("excitation.amplitude_x: 1600 mm is")
+    with language("uk"):
+        assert DRIVE.warning(wide) == "Горизонтальна амплітуда: 1600 мм — це більше за 100 мм; чи не в мм його подано?"
+    (beyond,) = (text for _, text in pairs() if "810328 Pa" in text)
+    with language("uk"):
+        assert "щонайбільше 8,10328 бар і за" in SHAFT.warning(beyond)
+
+
+def test_a_warning_is_the_same_after_it_was_stored() -> None:
+    for reading, text in pairs():
+        (again,) = read_warnings(write_warnings([text]))
+        assert (again, getattr(again, "code", "")) == (text, text.code)
+        with language("uk"):
+            assert reading.warning(again) == reading.warning(text)
+
+
+def test_an_earlier_release_reads_what_is_stored_now() -> None:
+    """It takes the first two of each."""
+    for _, text in pairs():
+        ((code, english, *_sentence),) = json.loads(write_warnings([text]))
+        assert (code, english) == (text.code, str(text))
+
+
+def test_a_command_says_a_warning_with_code_names() -> None:
+    (wide,) = (text for _, text in pairs() if "1.6 m" in text)
+    assert [*warning_lines([wide])] == [f"warning: {wide}"]
+    with language("uk"):
+        (line,) = warning_lines([wide])
+    assert line.startswith("застереження: /axes/0 (excitation.amplitude_x): 1,6 м — це більше за 0,1 м;")
+
+
+def texts_of_sentences() -> list[str]:
+    """The texts of sentences in the code, which are said in other languages."""
+    found = []
+    for package in ("engine", "worker", "service"):
+        for file in (ROOT / package).rglob("*.py"):
+            source = file.read_text(encoding="utf-8")
+            if "Sentence(" in source:
+                calls = [
+                    node
+                    for node in ast.walk(ast.parse(source))
+                    if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Sentence"
+                ]
+                found += [key.text for call in calls for key, _many in of_code(ast.unparse(call), str(file))]
+    return sorted({*found})
+
+
+@pytest.mark.parametrize("text", texts_of_sentences())
+def test_every_sentence_is_in_the_catalogue(text: str) -> None:
+    with language("uk"):
+        assert gettext(text) != text or not re.search(r"[a-z]{3,}", re.sub(r"\{\w+\}", "", text))
