@@ -99,6 +99,8 @@ def questions(values: Sequence[object], units: Sequence[str]) -> list[Question]:
 
 def _carried(name: str, unit: str, wanted: str) -> str:
     """The unit of another coefficient that goes with a typed one: "N*mm/rad^2" (of N*m/rad^2) for N*m is "N*mm"."""
+    if unit == wanted:
+        return name
     per, wanted_per = (text[len(text.partition("/")[0]) :] for text in (unit, wanted))
     return name.removesuffix(per) + wanted_per if name.endswith(per) else f"another unit, as {name}"
 

@@ -18,7 +18,7 @@ from sprag.service.http.web.form.shaft_spec import base_of
 from sprag.service.http.web.form.spec import spec_of, values_of
 from sprag.service.languages import language
 from sprag.service.reading.reader import Reading
-from sprag.service.reading.together import question, with_last_unit
+from sprag.service.reading.together import question, questions, with_last_unit
 from sprag.service.results.branches import range_of
 from sprag.service.results.explore import ExploreQuery, plan_of
 from sprag.service.results.fault_texts import fault_text
@@ -136,6 +136,7 @@ def test_the_question_names_number_and_units() -> None:
     fault = problems({"/axes": [{"path": LOAD, "values": [50, "100 N*mm"]}]})["/axes/0/values/0"]
     assert "50 in N*m or in N*mm?" in fault.message
     assert (fault.value, fault.allowed, fault.unit) == (50, "50 N*m, 50 N*mm", "N*m")
+    assert [one.allowed for one in questions([12, "100 rpm"], ["rad/s"] * 2)] == ["12 rad/s, 12 rpm"]
     coefficient = problems({"/base/clutch": {"coefficients": [25, 400, "30 N*mm/rad^2"]}})
     assert "400 in N*m/rad or in N*mm/rad?" in coefficient["/base/clutch/coefficients/1"].message
 
