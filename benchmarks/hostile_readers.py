@@ -53,12 +53,12 @@ class Place:
     other: str
     writer: str
 
-    def ask(self, method: str, path: str, token: str, patience: float) -> str:
+    def ask(self, method: str, path: str, token: str, patience: float, **further: str) -> str:
         """Ask for something and read the answer; its status, or that the client left."""
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=patience)
         until_then = time.monotonic() + patience
         try:
-            connection.request(method, path, headers={"Authorization": f"Bearer {token}"})
+            connection.request(method, path, headers={"Authorization": f"Bearer {token}", **further})
             answer = connection.getresponse()
             while answer.read(1 << 20):
                 if time.monotonic() > until_then:
@@ -103,10 +103,10 @@ def probing(place: Place) -> Iterator[dict[str, list[float]]]:
             process.join()
 
 
-def exports(place: Place, seconds: float, form: str) -> Counter[str]:
-    """All rows of the large study in a format, by one reader many times at once."""
-    path = f"/api/v1/studies/{place.study}/results?format={form}"
-    return crowd(EXPORTS, lambda _: place.ask("GET", path, place.reader, seconds))
+def exports(place: Place, seconds: float, form: str, packed: str = "identity") -> Counter[str]:
+    """All rows of the large study in a format, by one reader many times at once, as they are or as gzip."""
+    path, encoding = f"/api/v1/studies/{place.study}/results?format={form}", {"Accept-Encoding": packed}
+    return crowd(EXPORTS, lambda _: place.ask("GET", path, place.reader, seconds, **encoding))
 
 
 def ranges(place: Place, seconds: float) -> Counter[str]:
@@ -192,6 +192,7 @@ def crowd(number: int, ask: Callable[[int], str]) -> Counter[str]:
 
 ATTACKS: Final[dict[str, Callable[[Place, float], Counter[str]]]] = {
     **{f"exports {form}": partial(exports, form=form) for form in FORMATS},
+    "exports csv as gzip": partial(exports, form="csv", packed="gzip"),
     "ranges": ranges,
     "streams": streams,
     "writers": writers,

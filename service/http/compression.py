@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from typing import Final
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -11,6 +12,7 @@ from werkzeug.datastructures import Accept
 from werkzeug.http import parse_accept_header
 
 from sprag.service import formats
+from sprag.service.http.threads import Threads, in_thread
 
 #: Shorter answers are not worth it.
 _LEAST_BYTES: Final = 1000
@@ -44,8 +46,22 @@ class Compression:
 
         app: ASGIApp = self._app
         if scope["type"] == "http" and _takes_gzip(Headers(scope=scope)):
-            app = GZipResponder(app, _LEAST_BYTES, _LEVEL, exclude_content_types=_EXCLUDED)
+            app = _Packed(app, _LEAST_BYTES, _LEVEL, exclude_content_types=_EXCLUDED)
         await app(scope, receive, weakened)
+
+
+class _Packed(GZipResponder):
+    """Compresses what is long in few threads; those of the framework, 40, would leave the others no processor."""
+
+    async def apply_compression(self, body: bytes, *, more_body: bool) -> bytes:
+        """As `GZipResponder.apply_compression`; pieces of files wait for each other, and answers do not for them."""
+        if len(body) < self.thread_minimum_size:
+            return await super().apply_compression(body, more_body=more_body)
+        return await in_thread(self._pack, body, more_body, threads=Threads.PIECES if more_body else Threads.ANSWERS)
+
+    def _pack(self, body: bytes, more_body: bool) -> bytes:
+        end = zlib.Z_SYNC_FLUSH if more_body else zlib.Z_FINISH
+        return self.compressor.compress(body) + self.compressor.flush(end)
 
 
 def _takes_gzip(headers: Headers) -> bool:

@@ -15,12 +15,13 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import BinaryIO, Final
+from typing import BinaryIO, Final, TypeVar
 
 import anyio
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 
+from sprag.service.faults import FaultError
 from sprag.service.http.problems import ApiError
 from sprag.service.http.threads import Threads, in_thread, iterated
 from sprag.service.stale_files import mark, sweep
@@ -36,6 +37,7 @@ _RANGE: Final = re.compile(r"bytes=(?:([0-9]{1,18})-([0-9]{1,18})?|-([0-9]{1,18}
 #: Writes a file to the path, with the folder for what it needs in between.
 Write = Callable[[str, str], Awaitable[None]]
 Turn = Callable[[], AbstractAsyncContextManager[None]]
+R = TypeVar("R")
 
 
 @dataclass
@@ -62,7 +64,10 @@ class _Entry:
 
 
 class KeptFiles:
-    """Files in a folder of this process, by their entity tags. Those that were used longest ago are removed first."""
+    """Files in a folder of this process, by their entity tags. Those that were used longest ago are removed first.
+
+    They take only room that nobody needs: what finds none has them removed.
+    """
 
     def __init__(self, most_bytes: int = _MOST_BYTES) -> None:
         self._most = most_bytes
@@ -148,15 +153,37 @@ class KeptFiles:
         handle, name = tempfile.mkstemp(dir=self._place())
         os.close(handle)
         path = Path(name)
-        try:
+
+        async def attempt() -> None:
             async with self.scratch() as folder:
                 await write(name, folder)
+
+        try:
+            await self.with_room(attempt)
             entry.size = path.stat().st_size
         except BaseException:
             path.unlink(missing_ok=True)
             raise
         entry.path = path
         entry.written.set()
+
+    async def with_room(self, work: Callable[[], Awaitable[R]]) -> R:
+        """The value of ``work``; where it finds no room, the kept files give way, and it has one more try."""
+        try:
+            return await work()
+        except FaultError as error:
+            if error.code != "storage-full" or not self._give_way():
+                raise
+        return await work()
+
+    def _give_way(self) -> bool:
+        """Remove every kept file: they can be written again. Whether there was one."""
+        with self._lock:
+            whole = {tag: entry.path for tag, entry in self._entries.items() if entry.path is not None}
+            for tag, path in whole.items():
+                del self._entries[tag]
+                path.unlink(missing_ok=True)
+        return bool(whole)
 
     @asynccontextmanager
     async def scratch(self) -> AsyncIterator[str]:

@@ -31,6 +31,9 @@ class Threads(StrEnum):
     TOKENS = "tokens"
     FILES = "files"
     STREAMS = "streams"
+    #: Compressing pieces of files, and answers as a whole: few, because each takes a core for itself.
+    PIECES = "pieces"
+    ANSWERS = "answers"
 
 
 #: Number of threads of each kind; those for reading are the framework's own.
@@ -40,6 +43,8 @@ _NUMBERS: Final = {
     Threads.TOKENS: 2,
     Threads.FILES: 8,
     Threads.STREAMS: 4,
+    Threads.PIECES: 1,
+    Threads.ANSWERS: 2,
 }
 #: Whether the current request changes something.
 CHANGING: ContextVar[bool] = ContextVar("changing", default=False)

@@ -102,7 +102,8 @@ class Work:
                 async for piece in made:
                     yield piece
 
-        return await self._attended(streamed(pieces(), media_type, name))
+        begin = partial(context.files.with_room, lambda: streamed(pieces(), media_type, name))
+        return await self._attended(begin())
 
     async def run_case(self, function: Callable[[Study, *Args], R], study: Study, *args: *Args) -> R:
         """The value of a function that runs a case of ``study``, once its kernel is ready."""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import resource
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from random import Random
 from typing import Any
 
@@ -72,6 +75,32 @@ def test_all_rows_or_a_refusal_wherever_the_disk_ends(service: Service, ended: s
     kept = ask(service, ended, form)
     assert kept.status_code == 200
     assert form in BUILT or kept.content == whole
+
+
+@pytest.mark.parametrize("over", [True, False], ids=["ended", "under way"])
+def test_kept_files_give_way_to_what_finds_no_room(
+    service: Service, ended: str, spec: dict[str, Any], over: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wanted = ended if over else service.submit({**spec, "name": "under way"})
+    service.fill(wanted, None if over else range(4))
+    kept = service.app.state.context.files
+
+    def full(folder: Path, _size: int) -> None:
+        if any(path.is_file() and path.stat().st_size for path in kept._folder.iterdir()):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder))
+
+    whole = ask(service, ended, "csv").content
+    monkeypatch.setattr(netcdf, "require_room", full)
+    assert ask(service, wanted, "netcdf").status_code == 200
+    assert ask(service, ended, "csv").content == whole, "it is written again"
+    monkeypatch.setattr(netcdf, "require_room", refuse)
+    other = service.submit({**spec, "name": "other"})
+    service.fill(other)
+    assert ask(service, other, "netcdf").status_code == 507, "it is tried once more, not for ever"
+
+
+def refuse(folder: Path, _size: int) -> None:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder))
 
 
 def test_a_grid_is_smaller_than_the_room_it_asks_for(

@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 import anyio
 import httpx
 import pytest
+from starlette.middleware import gzip
 
 from sprag.service.formats import FORMATS
 from sprag.service.http import guard, looks, work
 from sprag.service.http.api import curves
+from sprag.service.http.compression import Compression
 from sprag.service.http.problems import ApiError
 from sprag.service.http.threads import _NUMBERS, ThreadedRoute, Threads
 from sprag.service.jobs import row_files
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Awaitable, Callable
 
     from anyio.from_thread import BlockingPortal
+    from starlette.types import Receive, Scope, Send
 
 EXPORTS = 45
 STREAMS = 50
@@ -114,6 +117,64 @@ def test_one_request_writes_what_many_want(
         assert part.content == answers[0].content[:10]
 
     portal.call(export)
+
+
+def test_files_that_many_take_as_gzip_leave_a_processor_to_the_others(
+    portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A thread for each of them would take every core from the one that answers."""
+    at_work, most, go_on, asked = list[int](), list[int](), threading.Event(), list[str]()
+    piece = bytes(1 << 20)
+
+    class Slow:
+        """Compresses pieces once it may, and answers at once."""
+
+        def __init__(self, *args: Any) -> None:
+            self._real = compressobj(*args)
+
+        def compress(self, data: bytes) -> bytes:
+            if len(data) == len(piece):
+                at_work.append(1)
+                most.append(len(at_work))
+                assert go_on.wait(600)
+                at_work.pop()
+            packed: bytes = self._real.compress(data)
+            return packed
+
+        def flush(self, *how: int) -> bytes:
+            packed: bytes = self._real.flush(*how)
+            return packed
+
+    compressobj = gzip.zlib.compressobj
+    monkeypatch.setattr(gzip.zlib, "compressobj", Slow)
+
+    async def app(scope: Scope, _receive: Receive, send: Send) -> None:
+        path = scope["path"]
+        await send({"type": "http.response.start", "status": 200, "headers": [(b"content-type", b"text/csv")]})
+        asked.append(path)
+        if path == "/file":
+            for _ in range(2):
+                await send({"type": "http.response.body", "body": piece, "more_body": True})
+        await send({"type": "http.response.body", "body": b"" if path == "/file" else piece[1:]})
+
+    async def get(path: str) -> httpx.Response:
+        transport = httpx.ASGITransport(Compression(app))
+        async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
+            return await client.get(path)
+
+    async def many() -> None:
+        files = [asyncio.ensure_future(get("/file")) for _ in range(EXPORTS)]
+        await until(lambda: asked == ["/file"] * EXPORTS and bool(at_work))
+        if len(at_work) > _NUMBERS[Threads.PIECES]:
+            go_on.set()  # so that the test ends
+        answer = await get("/curve")
+        assert (answer.content, answer.headers["content-encoding"]) == (piece[1:], "gzip")
+        go_on.set()
+        assert {(await file).content for file in files} == {piece + piece}
+
+    portal.call(many)
+    assert len(most) == 2 * EXPORTS
+    assert max(most) == _NUMBERS[Threads.PIECES]
 
 
 def test_a_file_is_written_on_while_anybody_wants_it(
