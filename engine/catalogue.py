@@ -4,9 +4,17 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from sprag.sentences import Sentence
+
 STANDARD_GRAVITY = 9.80665
 
 Kind = Literal["real", "count", "category"]
+
+#: Questions about implausible values: the likely mistake.
+IN_DEGREES = Sentence("was it in degrees?")
+IN_MM = Sentence("was it in mm?")
+IN_RPM = Sentence("was it in rpm?")
+IN_ANOTHER_UNIT = Sentence("was it in another unit?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,7 +23,8 @@ class Parameter:
 
     ``path`` is the spec path with placeholders for indices and names, such as ``N`` for a pendulum's index. ``symbol``
     is that of docs/theory.md. The range is ``low`` .. ``high`` in ``unit``; an open end excludes the bound itself.
-    ``default`` None means the value is required.
+    ``default`` None means the value is required. A magnitude above ``plausible`` is probably a ``mistake``, about which
+    a question is asked.
     """
 
     path: str
@@ -26,6 +35,8 @@ class Parameter:
     low_open: bool
     default: float | None
     help: str
+    plausible: float = math.inf
+    mistake: Sentence | None = None
 
     def range_text(self) -> str:
         """The allowed range for display."""

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from itertools import chain
 
-from sprag.engine.catalogue import STANDARD_GRAVITY, Parameter
+from sprag.engine.catalogue import IN_MM, IN_RPM, STANDARD_GRAVITY, Parameter
 from sprag.engine.machine_shaft.spec import (
     MOVING,
     MachineSpec,
@@ -19,10 +19,16 @@ from sprag.engine.machine_shaft.spec import (
 _INF = math.inf
 _TURN = 2.0 * math.pi
 _ANY = 1e30
+#: Longest plausible part, in m.
+_LONGEST = 10.0
 
 
 def _length(path: str, symbol: str, help_: str, default: float | None = None) -> Parameter:
-    return Parameter(path, symbol, "m", 0.0, 1e3, True, default, help_)
+    return Parameter(path, symbol, "m", 0.0, 1e3, True, default, help_, _LONGEST, IN_MM)
+
+
+def _way(path: str, symbol: str, help_: str) -> Parameter:
+    return Parameter(path, symbol, "m", -1e3, 1e3, False, 0.0, help_, _LONGEST, IN_MM)
 
 
 def _mass(path: str, symbol: str, help_: str) -> Parameter:
@@ -36,11 +42,11 @@ def _inertia(path: str, symbol: str, help_: str) -> Parameter:
 def _rod_and_ram(kind: str, *, offset: bool = True) -> tuple[Parameter, ...]:
     p = f"mechanism.{kind}"
     line = "height of the ram's line above its crank's centre"
-    beside = (Parameter(f"{p}.offset", "e", "m", -1e3, 1e3, False, 0.0, line),) if offset else ()
+    beside = (_way(f"{p}.offset", "e", line),) if offset else ()
     return (
         _length(f"{p}.rod", "L", "length of the connecting rod"),
         *beside,
-        Parameter(f"{p}.rod_centre", "s", "m", -1e3, 1e3, False, 0.0, "crank pin to the rod's centre of mass"),
+        _way(f"{p}.rod_centre", "s", "crank pin to the rod's centre of mass"),
         _mass(f"{p}.rod_mass", "m2", "mass of the rod"),
         _inertia(f"{p}.rod_inertia", "J2", "inertia of the rod about its centre of mass"),
         _mass(f"{p}.ram_mass", "m3", "mass of the ram"),
@@ -49,9 +55,7 @@ def _rod_and_ram(kind: str, *, offset: bool = True) -> tuple[Parameter, ...]:
 
 
 def _inclination(prefix: str) -> Parameter:
-    return Parameter(
-        f"{prefix}.inclination", "beta", "rad", -_TURN, _TURN, False, 0.0, "rise of the forward stroke above the level"
-    )
+    return _angle(f"{prefix}.inclination", "beta", "rise of the forward stroke above the level")
 
 
 def _cam_angle(path: str, symbol: str, help_: str, default: float | None, low_open: bool) -> Parameter:
@@ -66,7 +70,7 @@ def _coupler(kind: str) -> tuple[Parameter, ...]:
     p = f"mechanism.{kind}.coupler"
     return (
         _length(p, "b", "length of the coupler"),
-        Parameter(f"{p}_centre", "s_2", "m", -1e3, 1e3, False, 0.0, "crank pin to its centre of mass"),
+        _way(f"{p}_centre", "s_2", "crank pin to its centre of mass"),
         _mass(f"{p}_mass", "m_2", "mass of the coupler"),
         _inertia(f"{p}_inertia", "J_2", "inertia of the coupler about its centre of mass"),
     )
@@ -118,9 +122,7 @@ MECHANISM_PARAMETERS: Mapping[MechanismKind, tuple[Parameter, ...]] = {
         _length("mechanism.four_bar.crank", "a", "length of the crank"),
         _length("mechanism.four_bar.coupler", "b", "length of the coupler"),
         _length("mechanism.four_bar.rocker", "c", "length of the rocker"),
-        Parameter(
-            "mechanism.four_bar.coupler_centre", "s", "m", -1e3, 1e3, False, 0.0, "crank pin to its centre of mass"
-        ),
+        _way("mechanism.four_bar.coupler_centre", "s", "crank pin to its centre of mass"),
         _mass("mechanism.four_bar.coupler_mass", "m2", "mass of the coupler"),
         _inertia("mechanism.four_bar.coupler_inertia", "J2", "inertia of the coupler about its centre of mass"),
         _inertia("mechanism.four_bar.rocker_inertia", "J3", "inertia of the rocker about its pivot"),
@@ -231,7 +233,7 @@ def _stage(index: int, kind: Stage) -> tuple[Parameter, ...]:
     )
     if kind in {"gear", "worm"}:
         return (*turning, common[0])
-    return (*turning, *common, Parameter(f"{p}.radius", "r", "m", 0.0, 1e3, False, 0.0, radius))
+    return (*turning, *common, Parameter(f"{p}.radius", "r", "m", 0.0, 1e3, False, 0.0, radius, _LONGEST, IN_MM))
 
 
 _CRANK_ANGLE = Parameter(
@@ -243,7 +245,7 @@ def _mechanism(choice: MechanismChoice) -> tuple[Parameter, ...]:
     every = MECHANISM_PARAMETERS[choice.kind]
     if choice.kind == "four_bar" and choice.weights == "all":
         frame = "rise of the frame above the level, from the shaft to the rocker's pivot"
-        every += (Parameter("mechanism.four_bar.inclination", "beta", "rad", -_TURN, _TURN, False, 0.0, frame),)
+        every += (_angle("mechanism.four_bar.inclination", "beta", frame),)
     if choice.bodies == "full":
         return every
     return tuple(entry for entry in every if not entry.path.endswith(("rod_inertia", "coupler_inertia")))
@@ -271,7 +273,11 @@ def parameters(spec: MachineSpec) -> tuple[Parameter, ...]:
     speed = (
         ()
         if spec.balance == "motor"
-        else (Parameter("mean_speed", "w_m", "rad/s", 0.0, 1e6, True, None, "required mean speed of the shaft"),)
+        else (
+            Parameter(
+                "mean_speed", "w_m", "rad/s", 0.0, 1e6, True, None, "required mean speed of the shaft", 1e3, IN_RPM
+            ),
+        )
     )
     own = 0.0 if spec.drive.stages or spec.drive.flywheel else None
     return (

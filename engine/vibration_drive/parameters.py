@@ -1,9 +1,12 @@
 """Parameters of a vibration drive: paths, SI units, ranges, defaults (docs/theory.md, "The machine")."""
 
 import math
+from collections.abc import Mapping
+from dataclasses import replace
 
-from sprag.engine.catalogue import STANDARD_GRAVITY, Parameter
+from sprag.engine.catalogue import IN_ANOTHER_UNIT, IN_DEGREES, IN_MM, IN_RPM, STANDARD_GRAVITY, Parameter
 from sprag.engine.vibration_drive.automaton import Clutch
+from sprag.sentences import Sentence
 
 MAX_PENDULUMS = 8
 MAX_COEFFICIENTS = 12
@@ -14,7 +17,7 @@ _INF = math.inf
 #: Parameters that a study has only where they are given: studies from before they existed keep their cases.
 START_STATES = frozenset({"initial_windup", "initial_clutch"})
 
-PARAMETERS: tuple[Parameter, ...] = (
+_PARAMETERS = (
     Parameter("gravity", "g", "m/s^2", 0.0, 1e3, False, STANDARD_GRAVITY, "gravitational acceleration"),
     Parameter("excitation.frequency", "nu/2pi", "Hz", 0.0, 1e5, True, None, "frequency of the base vibration"),
     Parameter("excitation.amplitude_x", "d", "m", 0.0, 10.0, False, 0.0, "horizontal amplitude of the base"),
@@ -56,6 +59,33 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter("shaft.load", "M_c", "N*m", 0.0, 1e9, False, 0.0, "load torque, which resists rotation only"),
     Parameter("shaft.initial_speed", "phi_e'(0)", "rad/s", 0.0, 1e6, False, 0.0, "shaft speed at t = 0"),
 )
+
+#: Largest plausible magnitude of a parameter by its last names, and the likely mistake beyond it.
+_PLAUSIBLE: Mapping[str, tuple[float, Sentence]] = {
+    "excitation.frequency": (1e3, Sentence("was it in rpm or rad/s?")),
+    "excitation.amplitude_x": (0.1, IN_MM),
+    "excitation.amplitude_y": (0.1, IN_MM),
+    "excitation.phase": (2.0 * math.pi, IN_DEGREES),
+    "inertia": (100.0, Sentence("was it in g*cm^2 or kg*mm^2?")),
+    "mass": (1e3, Sentence("was it in g?")),
+    "arm": (1.0, IN_MM),
+    "spring_arm": (1.0, IN_MM),
+    "spring_rate": (1e8, IN_ANOTHER_UNIT),
+    "damping": (100.0, IN_ANOTHER_UNIT),
+    "backlash": (0.1, IN_DEGREES),
+    "initial_angle": (math.pi, IN_DEGREES),
+    "initial_windup": (1.0, IN_DEGREES),
+    "initial_speed": (1e3, IN_RPM),
+    "load": (1e4, Sentence("was it in N*mm?")),
+}
+
+
+def _with_plausible(parameter: Parameter) -> Parameter:
+    limit = _PLAUSIBLE.get(parameter.path) or _PLAUSIBLE.get(parameter.path.rpartition(".")[2])
+    return parameter if limit is None else replace(parameter, plausible=limit[0], mistake=limit[1])
+
+
+PARAMETERS: tuple[Parameter, ...] = tuple(map(_with_plausible, _PARAMETERS))
 
 #: Coefficients of the clutch polynomial (docs/theory.md); ``K`` counts from 0, so K = 0 is c_1. Unit N*m/rad^K.
 CLUTCH_COEFFICIENT = Parameter(

@@ -15,6 +15,7 @@ from sprag.service.spec.axes.axes import varied_values
 from sprag.service.spec.report import Report
 from sprag.worker.derived import distinct_values, involved
 from sprag.worker.models import machine_shaft
+from sprag.worker.models.parameters import parameter_of
 from sprag.worker.models.starts import count_of, has_starts
 from sprag.worker.study import Axis, Study
 
@@ -33,25 +34,6 @@ _WIDER: Final = 1.5
 
 #: Frequency of the excitation, in Hz, below which it is slow.
 _SLOW: Final = 0.1
-
-#: Last part of a path -> (largest plausible magnitude, its unit, the likely mistake).
-_PLAUSIBLE: Final[dict[str, tuple[float, str, Sentence]]] = {
-    "excitation.frequency": (1e3, "Hz", Sentence("was it in rpm or rad/s?")),
-    "excitation.amplitude_x": (0.1, "m", Sentence("was it in mm?")),
-    "excitation.amplitude_y": (0.1, "m", Sentence("was it in mm?")),
-    "excitation.phase": (2.0 * math.pi, "rad", Sentence("was it in degrees?")),
-    "inertia": (100.0, "kg*m^2", Sentence("was it in g*cm^2 or kg*mm^2?")),
-    "mass": (1e3, "kg", Sentence("was it in g?")),
-    "arm": (1.0, "m", Sentence("was it in mm?")),
-    "spring_arm": (1.0, "m", Sentence("was it in mm?")),
-    "spring_rate": (1e8, "N/m", Sentence("was it in another unit?")),
-    "damping": (100.0, "N*m*s/rad", Sentence("was it in another unit?")),
-    "backlash": (0.1, "rad", Sentence("was it in degrees?")),
-    "initial_angle": (math.pi, "rad", Sentence("was it in degrees?")),
-    "initial_windup": (1.0, "rad", Sentence("was it in degrees?")),
-    "initial_speed": (1e3, "rad/s", Sentence("was it in rpm?")),
-    "load": (1e4, "N*m", Sentence("was it in N*mm?")),
-}
 
 
 def warn_vibration_drive(report: Report, study: Study) -> None:
@@ -82,22 +64,10 @@ def warn_vibration_drive(report: Report, study: Study) -> None:
         _inertia(report, study, index)
 
 
-#: The same for a machine shaft.
-_PLAUSIBLE_SHAFT: Final[dict[str, tuple[float, str, Sentence]]] = {
-    "mean_speed": (1e3, "rad/s", Sentence("was it in rpm?")),
-    **dict.fromkeys(
-        ("crank", "rod", "offset", "rod_centre", "frame", "coupler", "rocker", "coupler_centre", "pivot_distance",
-         "link_arm", "lift", "follower", "arm"),
-        (10.0, "m", Sentence("was it in mm?")),
-    ),
-    "inclination": (2.0 * math.pi, "rad", Sentence("was it in degrees?")),
-}  # fmt: skip
-
-
 def warn_machine_shaft(report: Report, study: Study) -> None:
     """Warn of implausible values of a machine shaft anywhere on the axes of ``study``."""
     for path in dict.fromkeys((*study.base, *study.axis_paths)):
-        _plausible(report, study, path, _PLAUSIBLE_SHAFT)
+        _plausible(report, study, path)
     structure = study.structure or {}
     operation_found = structure.get("balance_side") == "operation"
     for prefix, part in _parts(study):
@@ -261,21 +231,18 @@ def _values(study: Study, path: str) -> NDArray[np.float64]:
     return distinct_values(study, path) if path in study.derive else varied_values(path, study.axes, study.base)
 
 
-def _plausible(
-    report: Report, study: Study, path: str, known: dict[str, tuple[float, str, Sentence]] = _PLAUSIBLE
-) -> None:
-    entry = known.get(path) or known.get(path.rsplit(".", 1)[-1])
-    if entry is None:
+def _plausible(report: Report, study: Study, path: str) -> None:
+    parameter = parameter_of(study, path)
+    if parameter is None or parameter.mistake is None:
         return
-    limit, unit, question = entry
     values = _values(study, path)
     largest = float(values[np.abs(values).argmax()])
-    if abs(largest) > limit:
+    if abs(largest) > parameter.plausible:
         text = Sentence(
             "{value} is more than {limit}; {question}",
-            value=Amount(largest, unit, 6),
-            limit=Amount(limit, unit, 4),
-            question=question,
+            value=Amount(largest, parameter.unit, 6),
+            limit=Amount(parameter.plausible, parameter.unit, 4),
+            question=parameter.mistake,
         )
         report.warn("implausible-value", _place(study, path), text)
 
