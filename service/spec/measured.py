@@ -192,7 +192,7 @@ def _numbers(table: Split, factors: tuple[float | None, float | None]) -> Measur
         raise MeasuredDataError(
             [Fault("data", "empty" if not rows else "too-many", message, len(rows), f"1 .. {MAX_CLUTCH_ROWS} rows")]
         )
-    numbers = np.array([[float(cell) for cell in row.cells] for row in rows], dtype=np.float64)
+    numbers = np.array([[parse_number(cell) for cell in row.cells] for row in rows], dtype=np.float64)
     scaled = numbers * np.array([1.0 if factor is None else factor for factor in factors])
     warnings = list(_assumed(factors, numbers))
     if doubt is not None:

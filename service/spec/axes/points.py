@@ -101,9 +101,10 @@ def _read_cell(cell: str, heading: _Heading) -> float:
     """Read a cell: a number in the unit of its column (SI where there is none), or a text with its own unit."""
     if not cell:
         raise QuantityError("empty", "is empty")
-    if not _is_number(cell):
+    number = parse_number(cell)
+    if number is None:
         return to_float(exact(cell, heading.parameter))
-    return to_float(exact(f"{cell} {heading.unit}" if heading.unit else float(cell), heading.parameter))
+    return to_float(exact(f"{cell} {heading.unit}" if heading.unit else number, heading.parameter))
 
 
 def _is_number(cell: str) -> bool:

@@ -37,6 +37,8 @@ def problems(text: str) -> list[tuple[str | None, str]]:
         "rad,Nm\n0.01,2.5\n0.02,5.25\n",
         "0.01 2.5\r\n0.02 5.25\r\n",
         "angle [rad]  torque [N*m]\n0.01 2.5\n0.02 5.25\n",
+        "angle [mrad];torque [N*mm]\n10;2 500\n20;5\N{NARROW NO-BREAK SPACE}250\n",
+        "angle_rad;torque_Nm\n1·10⁻²;2,5\n2·10^-2;5,25\n",
     ],
 )
 def test_the_same_rows_from_every_way_of_writing_them(text: str) -> None:
@@ -96,3 +98,10 @@ def test_a_unit_of_another_kind_is_refused_by_column() -> None:
 
 def test_a_file_of_another_kind_gives_a_bounded_number_of_problems() -> None:
     assert len(problems("1\n" * 1000)) <= 20
+
+
+def test_numbers_have_the_minus_sign_of_a_typesetter() -> None:
+    assert rows("angle_rad;torque_Nm\n\N{MINUS SIGN}0,01;\N{MINUS SIGN}2,5\n0,02;5,25\n") == [
+        [-0.01, -2.5],
+        [0.02, 5.25],
+    ]

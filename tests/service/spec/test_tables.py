@@ -253,3 +253,17 @@ def test_headings_behind_the_sign_of_a_comment_are_headings() -> None:
     table = "angle [deg];torque [N*m]\n0;1\n90;3,5\n300;1\n"
     assert rows_of("# measured\n#" + table) == rows_of(table)
     assert rows_of("# " + table) == rows_of(table)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("shaft.load\n1 200\n1\N{NARROW NO-BREAK SPACE}500", [1200.0, 1500.0]),
+        ("shaft.load\n2,5·10⁻³\n10^-2", [0.0025, 0.01]),
+        ("pendulums.0.initial_angle\n\N{MINUS SIGN}0.1\n0.1", [-0.1, 0.1]),
+    ],
+)
+def test_numbers_of_a_column_without_a_unit_are_as_pages_print_them(text: str, expected: list[float]) -> None:
+    study = parse_spec(drive_changed({"/axes": [{"points": text}]})).study
+    (column,) = study.columns(range(study.cases)).values()
+    assert column.tolist() == expected
