@@ -259,7 +259,7 @@ def test_headings_behind_the_sign_of_a_comment_are_headings() -> None:
     ("text", "expected"),
     [
         ("shaft.load\n1 200\n1\N{NARROW NO-BREAK SPACE}500", [1200.0, 1500.0]),
-        ("shaft.load\n2,5·10⁻³\n10^-2", [0.0025, 0.01]),
+        ("shaft.load\n2.5·10⁻³\n10^-2", [0.0025, 0.01]),
         ("pendulums.0.initial_angle\n\N{MINUS SIGN}0.1\n0.1", [-0.1, 0.1]),
     ],
 )
