@@ -82,7 +82,7 @@ class ScheduleSummary(TypedDict):
     report_webhook: Annotated[str | None, Doc("address of a webhook to which its runs are reported")]
     report_when: Annotated[str, Doc("always; trouble: only runs that need attention")]
     created_at: Moment
-    next_due: Annotated[Moment | None, Doc("null when it is disabled or over")]
+    next_due: Annotated[Moment | None, Doc("null when it is disabled or over, and in a copy of a database")]
     next_due_local: Annotated[str | None, Doc("the same on the wall clock of `zone`, with its offset")]
     last_run: ScheduleRun | None
     owner: Annotated[str | None, Doc("user to whom it and its studies belong; null: no owner")]
@@ -93,6 +93,7 @@ class ScheduleSummary(TypedDict):
 class ScheduleDetail(ScheduleSummary):
     """A schedule with its spec and its latest runs."""
 
+    off: Annotated[str | None, Doc("why it does not run: the database is a copy; null where schedules run")]
     runs: Annotated[list[ScheduleRun], Doc("latest first")]
     spec: dict[str, Any]
 

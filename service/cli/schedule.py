@@ -333,6 +333,7 @@ def _show(schedule: dict[str, Any], as_json: bool) -> None:
     if schedule["finish_by"]:
         parts.append(_("finished by {time}", time=schedule["finish_by"]))
     say(", ".join(parts) + "; " + _("next run: {time}", time=_next(schedule)))
+    _say_off(schedule)
 
 
 def _when(schedule: dict[str, Any]) -> str:

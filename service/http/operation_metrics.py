@@ -13,6 +13,7 @@ from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from sprag.service.jobs.maintenance import backups
+from sprag.service.jobs.nights import why_off
 from sprag.service.schedules.outcomes import Result
 from sprag.service.storage.schedule_runs import RunState
 
@@ -67,7 +68,7 @@ class OperationCollector(Collector):
 
     def collect(self) -> Iterator[Metric]:
         """Read the metrics; raises StoreError."""
-        yield from _schedules(self._store.list_schedules())
+        yield from _schedules(self._store.list_schedules(), off=why_off(self._store) is not None)
         yield from self._backup_files()
         yield from self._space()
         lengths = _family("queue_requests", "Requests that wait for a process or are worked on by one.", "queue")
@@ -104,8 +105,8 @@ class OperationCollector(Collector):
         yield size
 
 
-def _schedules(records: Iterable[ScheduleRecord]) -> Iterator[Metric]:
-    """Each schedule: when it is due next, when its last due time was taken up, and the outcome of that."""
+def _schedules(records: Iterable[ScheduleRecord], *, off: bool) -> Iterator[Metric]:
+    """Each schedule: when it is due next unless all are ``off``, when its last was, and its outcome."""
     due = _family("schedule_next_due_timestamp_seconds", "When the schedule is due next.", *_SCHEDULE)
     last = _family("schedule_last_run_timestamp_seconds", "When its last due time was taken up.", *_SCHEDULE)
     outcome = _family("schedule_last_run", "1 for the outcome of its last due time.", *_SCHEDULE, "outcome")
@@ -114,7 +115,7 @@ def _schedules(records: Iterable[ScheduleRecord]) -> Iterator[Metric]:
     missed = _family("schedule_last_run_missed", "Due times before the last one that were missed.", *_SCHEDULE)
     for record in records:
         labels = (record.id, record.fields.name)
-        if record.next_due is not None:
+        if record.next_due is not None and not off:
             due.add_metric(labels, record.next_due.timestamp())
         if record.last is not None:
             last.add_metric(labels, record.last.begun_at.timestamp())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sprag.service.answers import filled
@@ -23,12 +24,15 @@ def schedule_address(schedule_id: str) -> str:
 
 def listed(store: Store) -> ScheduleList:
     """Every schedule, newest first, and why none of them runs."""
-    return {"off": why_off(store), "schedules": [summary(record) for record in store.list_schedules()]}
+    off = why_off(store)
+    return {"off": off, "schedules": [_summary(record, off) for record in store.list_schedules()]}
 
 
-def summary(record: ScheduleRecord) -> ScheduleSummary:
-    """A schedule without its spec."""
+def _summary(record: ScheduleRecord, off: str | None) -> ScheduleSummary:
+    """A schedule without its spec; of a copy of a database, where all are ``off``, without a next due time."""
     zone = record.fields.timing.zone
+    if off is not None:
+        record = replace(record, next_due=None)
     own = {
         "cron": None,
         "at": None,
@@ -40,10 +44,11 @@ def summary(record: ScheduleRecord) -> ScheduleSummary:
     return filled(ScheduleSummary, record, **own)
 
 
-def detail(record: ScheduleRecord, runs: tuple[RunRecord, ...]) -> ScheduleDetail:
+def detail(store: Store, record: ScheduleRecord) -> ScheduleDetail:
     """A schedule with everything."""
-    zone = record.fields.timing.zone
-    return {**summary(record), "runs": [run_json(run, zone) for run in runs], "spec": record.fields.spec}
+    zone, off = record.fields.timing.zone, why_off(store)
+    runs = [run_json(run, zone) for run in store.schedule_runs(record.id)]
+    return {**_summary(record, off), "off": off, "runs": runs, "spec": record.fields.spec}
 
 
 def run_json(run: RunRecord, zone: str) -> ScheduleRun:

@@ -168,7 +168,7 @@ async def create_schedule(
 
 
 def _answer(context: Context, record: ScheduleRecord) -> Response:
-    content = detail(record, context.store.schedule_runs(record.id))
+    content = detail(context.store, record)
     return tagged(json_response(content), _tag(record))
 
 
@@ -178,7 +178,7 @@ def _tag(record: ScheduleRecord) -> str:
 
 
 def _made(context: Context, record: ScheduleRecord) -> Response:
-    content = detail(record, context.store.schedule_runs(record.id))
+    content = detail(context.store, record)
     return json_response(content, 201, {"Location": schedule_address(record.id)})
 
 

@@ -15,7 +15,7 @@ from sprag.service.http.context import Context, Ctx
 from sprag.service.http.looks import Seen
 from sprag.service.http.problems import ApiError
 from sprag.service.http.routers import page_router
-from sprag.service.http.schedule_views import summary
+from sprag.service.http.schedule_views import listed as all_schedules
 from sprag.service.http.streams import event_stream
 from sprag.service.http.threads import Threads, in_thread
 from sprag.service.http.web.study_list import listed
@@ -36,7 +36,7 @@ def _studies(context: Context, given: QueryParams) -> Any:
 
 
 def _schedules(context: Context, _: QueryParams) -> Any:
-    return [summary(record) for record in context.store.list_schedules()]
+    return all_schedules(context.store)
 
 
 def _night(context: Context, given: QueryParams) -> Any:

@@ -12,6 +12,7 @@ import pytest
 
 from sprag.service.cli import doctor
 from sprag.service.cli.app import execute
+from sprag.service.cli.schedule import _show
 from sprag.service.delivery import Delivery
 from sprag.service.http.app import create_app
 from sprag.service.jobs.reports.reporter import Reporter
@@ -106,6 +107,7 @@ def by_move(store: Store, target: Path) -> None:
 def test_a_copy_fires_nothing_until_it_is_adopted_and_the_original_goes_on(
     copied: Callable[[Store, Path], None], fired: bool, settings: Settings, clock: Clock, opening: Opening, hook: Hook,
     tmp_path: Path, caplog: pytest.LogCaptureFixture, connect: Callable[..., httpx.Client],
+    capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     original, target = opening(settings.database_url), tmp_path / "staging" / "sprag.sqlite3"
     target.parent.mkdir()
@@ -135,6 +137,7 @@ def test_a_copy_fires_nothing_until_it_is_adopted_and_the_original_goes_on(
     http = connect(create_app(own, store=copy, computer=InThread(), checker=InThread()))
     assert OFF in http.get("/api/v1/schedules").json()["off"]
     assert OFF in http.get("/schedules").text
+    assert_no_next_run(http, capsys)
     assert "копія" in http.get("/schedules", headers={"Accept-Language": "uk"}).text
     assert OFF in http.get("/api/v1/night").json()["off"]
     assert OFF in http.get("/night").text
@@ -163,10 +166,30 @@ def test_a_copy_fires_nothing_until_it_is_adopted_and_the_original_goes_on(
     fire(copy)
     Reporter(copy, delivery).look()
     assert len(hook.requests) == 2 * (nights + 1)
-    assert http.get("/api/v1/schedules").json()["off"] is None
+    (schedule,) = http.get("/api/v1/schedules").json()["schedules"]
+    assert schedule["next_due"] == "2026-01-03T01:00:00Z"
+    assert http.get(schedule["links"]["self"]).json()["off"] is http.get("/api/v1/schedules").json()["off"] is None
+    assert "schedule_next_due_timestamp_seconds{" in http.get("/metrics").text
     assert OFF not in http.get("/schedules").text
     assert http.get("/api/v1/night").json()["off"] is None
     assert OFF not in http.get("/night").text
+
+
+def assert_no_next_run(http: httpx.Client, capsys: pytest.CaptureFixture[str]) -> None:
+    """A copy tells no due time that will pass without a run."""
+    (schedule,) = http.get("/api/v1/schedules").json()["schedules"]
+    shown = http.get(schedule["links"]["self"]).json()
+    for each in (schedule, shown):
+        assert each["next_due"] is each["next_due_local"] is None
+    assert OFF in shown["off"]
+    assert '<td data-head="Next run">none</td>' in http.get("/schedules").text
+    metrics = http.get("/metrics").text
+    assert "schedule_last_run_timestamp_seconds" in metrics
+    assert "schedule_next_due_timestamp_seconds{" not in metrics
+    _show(shown, as_json=False)
+    told = capsys.readouterr().err
+    assert "next run: none" in told
+    assert OFF in told
 
 
 def test_a_dump_restored_into_another_database_is_a_copy(
