@@ -235,11 +235,11 @@ def _find(connection: sa.Connection, spans: _Spans, study: Study, kin: str, numb
     Only rows computed under the fingerprint of this process count. Studies whose cases have keys are found by them,
     unless so many cases are wanted that it is quicker to compare the few studies there are.
     """
-    search, c = _Search(connection, study), STUDIES.c
+    search, c = _Search(connection, study, kin), STUDIES.c
     keyed = sa.select(sa.func.count()).where(c.kin_hash == kin, c.keyed == KEYED, c.number != number)
     by_keys = connection.execute(keyed).scalar_one() * _CASES_A_STUDY >= study.cases
     if by_keys:
-        search.by_keys(kin, number)
+        search.by_keys(number)
     if search.left:
         for candidate in spans.candidates(connection, search.wanted, kin, number, keyed=not by_keys):
             search.look_in(candidate)
@@ -251,16 +251,17 @@ def _find(connection: sa.Connection, spans: _Spans, study: Study, kin: str, numb
 class _Search:
     """The search for the cases of a study in others, one after the other."""
 
-    def __init__(self, connection: sa.Connection, study: Study) -> None:
+    def __init__(self, connection: sa.Connection, study: Study, kin: str) -> None:
         self.wanted = Wanted(study)
         self.left = study.cases
+        self._kin = kin
         self._connection = connection
         self._taken = np.zeros(study.cases, dtype=np.bool_)
         self._parts: list[tuple[Cases, int, Cases]] = []
 
-    def by_keys(self, kin: str, number: int) -> None:
+    def by_keys(self, number: int) -> None:
         """Look in the studies with a case of the same key: for each key in the newest one, then in the one before."""
-        keys, key_of = np.unique(case_keys(self.wanted.study, kin), return_inverse=True)
+        keys, key_of = np.unique(case_keys(self.wanted.study, self._kin), return_inverse=True)
         below, wanted = any_below(keys.size), np.arange(keys.size)
         while wanted.size and self.left:
             studies = newest_with(self._connection, keys[wanted], below[wanted], number)
@@ -273,9 +274,13 @@ class _Search:
             wanted = wanted[~done[wanted]]
 
     def look_in(self, number: int) -> None:
-        """Take the cases that this study has, with rows that may be reused, and that no other had before."""
+        """Take the cases that this study has, with rows that may be reused, and that no other had before.
+
+        A key whose bits were flipped, or that two cases share, can lead to a study that is none of its kin.
+        """
         c = STUDIES.c
-        some = (c.number == number, c.done > 0, c.deleted_at.is_(None), c.fingerprint.in_([fingerprint.digest(), ""]))
+        some = [c.number == number, c.kin_hash == self._kin, c.done > 0, c.deleted_at.is_(None)]
+        some.append(c.fingerprint.in_([fingerprint.digest(), ""]))
         source = next(_readable(self._connection, sa.select(*_SOURCE).where(*some)), None)
         if source is None or not is_sound(source):
             return

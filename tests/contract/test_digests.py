@@ -13,7 +13,7 @@ from sprag.service.storage import digests
 from sprag.service.storage.errors import DatabaseError, NothingToRetryError
 from sprag.service.storage.row_hashes import as_kept, digest_of, digests_of, row_words
 from sprag.service.storage.store import Store
-from sprag.service.storage.tables import CHUNKS, ENDINGS, results_table
+from sprag.service.storage.tables import CASE_KEYS, CHUNKS, ENDINGS, results_table
 from sprag.worker import models
 from sprag.worker.ports import Chunk
 from sprag.worker.states import StudyState
@@ -149,6 +149,19 @@ def test_damaged_rows_are_not_copied_for_another_study(store: Store) -> None:
     np.testing.assert_array_equal(store.case_rows(later.id).values[:25], right)
     assert (store.get_study(record.id).state, store.get_study(record.id).done) == (StudyState.QUEUED, 15)
     assert damaged(store) == []
+
+
+def test_a_key_that_names_another_study_after_a_flip_copies_no_rows_of_another_run(store: Store) -> None:
+    """Studies of other runs have the same parameters: only the kin of a study tells its rows apart."""
+    mine, other = create(store, 25), store.create_study({}, fakes.study(25, "of less accuracy", tolerance=1e-6))
+    for record in (mine, other):
+        finish(store, record)
+    wanted = fakes.study(30, "a larger one")
+    assert store.reusable(wanted) == 25
+    with store.session.write() as connection:
+        connection.execute(sa.update(CASE_KEYS).where(CASE_KEYS.c.study == other.number).values(study=99))
+        connection.execute(sa.update(CASE_KEYS).where(CASE_KEYS.c.study == mine.number).values(study=other.number))
+    assert store.reusable(wanted) == 0
 
 
 def test_a_retry_does_not_bless_damaged_rows(store: Store) -> None:
