@@ -47,7 +47,7 @@ def units() -> set[str]:
     """The names in units that are shown: ``kg`` and ``m`` of ``kg*m^2``."""
     every = [unit for kind in KINDS for unit in (kind.unit, *kind.others)]
     shown = {name for unit in every for name in re.findall(r"[A-Za-z]+\d?", re.sub(r"\^-?\d+", "", unit))}
-    return shown | {"d", "h", "standard deviations"}
+    return shown | {"GB", "MB", "d", "h", "standard deviations"}
 
 
 def vocabulary() -> Iterator[str]:

@@ -63,9 +63,19 @@ class Typed:
         return self.text
 
 
+@dataclass(frozen=True, slots=True)
+class Clause:
+    """A sentence at the end of another one, without its full stop."""
+
+    sentence: str
+
+    def __str__(self) -> str:
+        return str(self.sentence).removesuffix(".")
+
+
 #: What stands for a place of a sentence. Whole numbers are counts, with separated thousands; any other text is a word
 #: that is the same in every language.
-Part = str | int | Amount | Name | Place | Typed
+Part = str | int | Amount | Name | Place | Typed | Clause
 _KINDS: Final = {kind.__name__.lower(): kind for kind in (Amount, Name, Place, Typed)}
 
 
@@ -123,6 +133,8 @@ def sentence_of(data: Mapping[str, Any]) -> Sentence:
 def _part_to_json(part: Part) -> Any:
     if isinstance(part, Sentence):
         return {"sentence": part.to_json()}
+    if isinstance(part, Clause):
+        return {"clause": _part_to_json(part.sentence)}
     return part if isinstance(part, str | int) else {type(part).__name__.lower(): asdict(part)}
 
 
@@ -132,6 +144,8 @@ def _part_of(data: Any) -> Part:
     ((kind, fields),) = data.items()
     if kind == "sentence":
         return sentence_of(fields)
+    if kind == "clause":
+        return Clause(str(fields) if isinstance(fields, str) else sentence_of(fields["sentence"]))
     part: Part = _KINDS[kind](**fields)
     return part
 

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, assert_never
 
+from sprag.sentences import Sentence
 from sprag.worker.models import WorkerEnding
 from sprag.worker.ports import Chunk, Fate
 
@@ -320,8 +321,19 @@ class Dispatch:
         if crashed:
             known.crashed.append(chunk)
             if disjoint(known.crashed) >= FAULT_CRASHES:
-                reason = f"engine fault: {FAULT_CRASHES} different chunks crashed with no success between them"
-                return self._fault(number, f"{reason} ({event.detail})" if event.detail else reason)
+                reason = (
+                    Sentence(
+                        "engine fault: {count} different chunks crashed with no success between them ({detail})",
+                        count=FAULT_CRASHES,
+                        detail=event.detail,
+                    )
+                    if event.detail
+                    else Sentence(
+                        "engine fault: {count} different chunks crashed with no success between them",
+                        count=FAULT_CRASHES,
+                    )
+                )
+                return self._fault(number, reason)
         failed = replace(chunk, failures=chunk.failures + 1)
         if failed.failures < MAX_FAILURES:
             known.waiting.appendleft(failed)

@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, assert_never
 
+from sprag.sentences import Sentence
 from sprag.worker import dispatch
 from sprag.worker.dispatch import Dispatch
 from sprag.worker.opening import Opening
@@ -161,11 +162,11 @@ class Dispatcher:
         shortage = self._store.shortage()
         dropped = self._full is not None
         if dropped:
-            shortage = shortage or f"{self._full}; it is retried from time to time"
+            shortage = shortage or Sentence("{reason}; it is retried from time to time", reason=self._full or "")
         going = any(study.state in {StudyState.QUEUED, StudyState.RUNNING} for study in studies)
         if shortage is not None or self._clock.monotonic() < self._try_again:
             if going or dropped:
-                self._store.hold(self._epoch, shortage or "no room", returned=dropped)
+                self._store.hold(self._epoch, shortage or Sentence("no room"), returned=dropped)
                 if self._only is None:
                     _LOG.error("Every study is held: %s", shortage)
             self._full = None
@@ -358,8 +359,9 @@ class Dispatcher:
             case dispatch.Stop(ticket=ticket):
                 self._executor.stop(ticket)
             case dispatch.Fault(study=number, reason=reason):
-                in_vain = "" if self._renew is None else "; the same happened with newly compiled kernels"
-                self._hold(number, f"{reason}{in_vain}")
+                if self._renew is not None:
+                    reason = Sentence("{reason}; the same happened with newly compiled kernels", reason=reason)
+                self._hold(number, reason)
             case dispatch.Renew(study=number, reason=reason):
                 self._begin_again(number, reason)
             case dispatch.Settle(study=number):

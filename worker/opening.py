@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from sprag.sentences import Sentence
 from sprag.worker import fingerprint
 from sprag.worker.sharing import gives, takes
 
@@ -19,7 +20,9 @@ if TYPE_CHECKING:
 OPEN_STUDIES = 8
 #: Seconds that a study waits for its kernel before this is reported; cached kernels load sooner.
 NOTE_SECONDS = 3.0
-COMPILING = "The kernel of this study is being compiled, once, which can take a minute; other studies continue."
+COMPILING = Sentence(
+    "The kernel of this study is being compiled, once, which can take a minute; other studies continue."
+)
 
 
 class Opening:

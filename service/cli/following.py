@@ -18,7 +18,7 @@ from sprag.service.cli.console import (
     warning_lines,
     write_json,
 )
-from sprag.service.languages import _, recorded
+from sprag.service.languages import _, earlier
 from sprag.worker.states import TERMINAL, StudyState
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def follow(
             held = study["state"] == StudyState.PAUSED and not study["time_over"]
             if held and study.get("reason") not in reasons:
                 reasons.add(study.get("reason"))
-                why = recorded.said(_(study["reason"])) if study.get("reason") else _("on request")
+                why = earlier.said(_(study["reason"])) if study.get("reason") else _("on request")
                 say(_("{study} is paused: {why}", study=study_id, why=why))
 
         return wait_for(client, study_id, Waiting(tell, timeout, patient=patient, notify=say))
@@ -125,7 +125,7 @@ def show_study(study: dict[str, Any], as_json: bool) -> None:
     )
     say("; ".join([counts + (f" ({endings})" if endings else ""), *_remarks(study)]))
     if study["time_over"]:
-        say(f"{study['id']}: {recorded.said(_(study['reason']))}")
+        say(f"{study['id']}: {earlier.said(_(study['reason']))}")
 
 
 def _remarks(study: dict[str, Any]) -> Iterator[str]:

@@ -45,7 +45,7 @@ from sprag.service.cli.options import (
 from sprag.service.cli.running import run_parsed
 from sprag.service.cli.settings import read_settings
 from sprag.service.faults import Fault, warned
-from sprag.service.languages import N_, _, decimal, recorded
+from sprag.service.languages import N_, _, decimal
 from sprag.worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 
 if TYPE_CHECKING:
@@ -317,7 +317,9 @@ def run(
         study_id = record.id if db is not None else None
         write_json({"file": file, "study": study_id, **numbers, "endings": endings, "seconds": round(seconds, 3)})
     if record.time_over:
-        say(recorded.said(_(str(record.reason))))
+        from sprag.service.reading.phrases import told
+
+        say(told(record.reason or ""))
     if record.ok != record.cases:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
 

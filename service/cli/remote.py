@@ -45,7 +45,7 @@ from sprag.service.cli.options import (
 )
 from sprag.service.faults import Fault, Kind
 from sprag.service.formats import Format
-from sprag.service.languages import N_, _, recorded
+from sprag.service.languages import N_, _, earlier
 from sprag.worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ def refusal(error: RefusedError) -> CommandFailureError:
             kind,
             _(
                 "{refusal} Give the service's token with --token or in SPRAG_TOKEN.",
-                refusal=recorded.said(_(str(error))),
+                refusal=earlier.said(_(str(error))),
             ),
         )
     if error.status in (403, 421) or error.status >= 500:

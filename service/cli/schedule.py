@@ -13,7 +13,7 @@ from sprag.service.cli.groups import Groups
 from sprag.service.cli.names import schedule_of
 from sprag.service.cli.options import DEFAULT_SERVER, Fresh, JsonFlag, Server, SpecFile, Token
 from sprag.service.cli.remote import PriorityOption, connection
-from sprag.service.languages import N_, _, recorded
+from sprag.service.languages import N_, _, earlier
 from sprag.worker.limits import MAX_PRIORITY
 
 if TYPE_CHECKING:
@@ -362,7 +362,7 @@ def _say_off(found: dict[str, Any]) -> None:
 
 def _known(text: str | None) -> str | None:
     """A sentence of the service in the language of the task, where the catalogue has it."""
-    return recorded.said(_(text)) if text else text
+    return earlier.said(_(text)) if text else text
 
 
 def _clock(text: str) -> str:

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Final, Protocol
 
+from sprag.sentences import Sentence
 from sprag.service.actor import Actor, Door, Role, share_of
 from sprag.service.faults import shown
 from sprag.service.http.attempts import Attempts
@@ -218,11 +219,11 @@ class Access:
         match self._state(record, datetime.now(UTC)):
             case TokenState.EXPIRED if record.expires_at is not None:
                 ended = record.expires_at.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-                return TOKEN_EXPIRED.format(token=name, time=ended)
+                return Sentence(TOKEN_EXPIRED, token=name, time=ended)
             case TokenState.REVOKED:
-                return TOKEN_REVOKED.format(token=name)
+                return Sentence(TOKEN_REVOKED, token=name)
             case TokenState.USER_REMOVED:
-                return TOKEN_OF_REMOVED_USER.format(token=name, user=record.owner)
+                return Sentence(TOKEN_OF_REMOVED_USER, token=name, user=record.owner or "")
         return None
 
     def _state(self, record: TokenRecord, now: datetime) -> TokenState:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from datetime import timedelta
 from typing import TYPE_CHECKING, Final
 
+from sprag.sentences import Sentence
 from sprag.service.answers import filled
 from sprag.service.answers.schedules import Night, NightRun, RunOutcome, SentReport
 from sprag.service.delivery import origin_of
@@ -56,7 +57,7 @@ def whole_outcome(store: Store, run: EndedRun | Run) -> Outcome:
             if name in {*trouble, *usual} or name not in models.REGIME_SENTENCES
         },
         trouble_flags=trouble,
-        coverage=None if progress.covered is None else str(progress.covered),
+        coverage=None if progress.covered is None else progress.covered.sentence,
     )
 
 
@@ -78,7 +79,7 @@ def report_json(report: ReportRecord) -> SentReport:
 
 def why_off(store: Store) -> str | None:
     """Why no schedule runs: the database is a copy; None where they run."""
-    return recorded.COPY if store.has_schedules() and store.is_copy() else None
+    return Sentence(recorded.COPY) if store.has_schedules() and store.is_copy() else None
 
 
 def night(store: Store, hours: float = HOURS) -> Night:

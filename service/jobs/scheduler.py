@@ -10,12 +10,14 @@ import logging
 import socket
 from contextlib import suppress
 from datetime import timedelta
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
+from sprag.sentences import Sentence
 from sprag.service.actor import Actor, Door, act_as
 from sprag.service.jobs.nights import conclude_runs
 from sprag.service.jobs.polling import PollingThread
 from sprag.service.languages import recorded
+from sprag.service.languages.earlier import sentence_in
 from sprag.service.schedules.policies import Overlap, due_times
 from sprag.service.storage.errors import RunClosedError, StudyNotFoundError
 from sprag.service.storage.part import moment
@@ -93,7 +95,7 @@ class Scheduler(PollingThread):
             if study.held:
                 self._store.let_in(study.number)
             return
-        reason = recorded.OUTSIDE_WINDOW.format(window=study.window)
+        reason = Sentence(recorded.OUTSIDE_WINDOW, window=study.window.sentence)
         if study.state.going or (study.held and study.reason != reason):
             self._store.hold_for_window(study.number, reason)
 
@@ -137,9 +139,9 @@ class Scheduler(PollingThread):
         except (SpecError, FaultError) as error:
             now, end = self._store.clock.now(), _grace_end(run)
             if isinstance(error, FaultError) and error.code in _TRANSIENT and now < end:
-                self._put_off(run, recorded.TRIED_AGAIN.format(problem=error, time=_time(end)))
+                self._put_off(run, Sentence(recorded.TRIED_AGAIN, problem=error.detail, time=_time(end)))
                 return
-            self._refuse(run, str(error))
+            self._refuse(run, error.detail)
             return
         except RunClosedError as error:  # the schedule was paused or deleted, or another process was first
             self._next_try.pop((run.schedule, run.due), None)
@@ -163,7 +165,7 @@ class Scheduler(PollingThread):
         if earlier and overlap is Overlap.SKIP:
             _LOG.warning("The schedule %s was due and is skipped: study %s has not ended.", run.id, earlier[-1])
             self._next_try.pop((run.schedule, run.due), None)
-            self._store.close_run(run, recorded.EARLIER.format(study=earlier[-1]), skipped=True)
+            self._store.close_run(run, Sentence(recorded.EARLIER, study=earlier[-1]), skipped=True)
             return False
         for study in earlier:
             _LOG.warning("The schedule %s was due: its earlier study %s is cancelled.", run.id, study)
@@ -175,8 +177,12 @@ class Scheduler(PollingThread):
         """Refuse a run whose deadline passed before it could be retried: no worker was running, or the reason
         persisted.
         """
-        why = (run.problem or "").removesuffix(recorded.TRIED_AGAIN.format(problem="", time=_time(_grace_end(run))))
-        self._refuse(run, why or recorded.NOT_IN_TIME)
+        problem = run.problem
+        if problem is not None and not isinstance(problem, Sentence):
+            problem = sentence_in(problem) or problem
+        if isinstance(problem, Sentence) and problem.text == recorded.TRIED_AGAIN:
+            problem = cast("str", problem.parts["problem"])
+        self._refuse(run, problem or Sentence(recorded.NOT_IN_TIME))
 
     def _refuse(self, run: OpenRun, problem: str) -> None:
         _LOG.error("The schedule %s was due, but its study was not submitted: %s", run.id, problem)

@@ -7,6 +7,7 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from sprag.sentences import Amount, Sentence
 from sprag.service.faults import FaultError
 from sprag.service.jobs.preview import estimated_bytes, estimated_seconds
 from sprag.service.languages import recorded
@@ -129,9 +130,9 @@ def _require_room(store: Store, needed: int) -> None:
     if needed > left:
         raise FaultError(
             "storage-full",
-            recorded.NO_ROOM_FOR_RESULTS.format(size=_size(needed), room=_size(left)),
+            Sentence(recorded.NO_ROOM_FOR_RESULTS, size=_size(needed), room=_size(left)),
         )
 
 
-def _size(count: int) -> str:
-    return f"{count / 1e9:.3g} GB" if count >= 1e8 else f"{count / 1e6:.3g} MB"
+def _size(count: int) -> Amount:
+    return Amount(count / 1e9, "GB", 3) if count >= 1e8 else Amount(count / 1e6, "MB", 3)

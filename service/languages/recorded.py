@@ -1,15 +1,14 @@
-"""Sentences that are stored in English, such as the reason of a hold, in the language of whoever reads them.
+"""Texts of sentences that are stored, such as the reason of a hold.
 
-Who stores one fills its template with `str.format`; `said` finds the template again. A text without one stays English.
+What is stored keeps its text beside its values (`sprag.sentences`). A text whose wording changes stays here, marked for
+the catalogues, for what is stored.
 """
 
 from __future__ import annotations
 
-import re
-from functools import cache
 from typing import Final
 
-from sprag.service.languages import ENGLISH, N_, current, gettext
+from sprag.service.languages import N_
 
 OUTSIDE_WINDOW: Final = N_("outside its window, {window}; it continues by itself")
 WINDOW: Final = N_("{begin} to {end} ({zone})")
@@ -59,77 +58,3 @@ NO_ROUND: Final = N_("no round is done")
 TOKEN_EXPIRED: Final = N_("The token {token} expired at {time}; `sprag token create` creates another.")
 TOKEN_REVOKED: Final = N_("The token {token} was revoked.")
 TOKEN_OF_REMOVED_USER: Final = N_("The token {token} belongs to the user {user}, who was removed.")
-#: What workers write (`sprag.worker`), which has no languages.
-_OF_WORKERS: Final = (
-    N_("no pass of {total} is complete"),
-    N_("pass {complete} of {total} is complete, a grid of {values} values"),
-    N_("pass {complete} of {total} is complete, {cases} cases"),
-    N_("The kernel of this study is being compiled, once, which can take a minute; other studies continue."),
-    N_("{reason}; the same happened with newly compiled kernels"),
-    N_("engine fault: {count} different chunks crashed with no success between them ({detail})"),
-    N_("engine fault: {count} different chunks crashed with no success between them"),
-    N_("The scheduler {address} cannot be reached; retrying: {trouble}"),
-    N_("{shortage} The worker {address} is refused: {refusal}."),
-    N_("No usable worker has joined the scheduler {address}; the study waits for one."),
-    N_("The processes of the pool end as they start; the log says why."),
-)
-#: The beginnings of error pages.
-_OF_ERRORS: Final = (
-    N_("There is nothing at {address}."),
-    N_("There is no study {study}."),
-    N_("There is no schedule {schedule}."),
-    N_("There is no saved view {view}."),
-    N_("There is no component {component}."),
-    N_("The service failed to answer; the fault is in its log."),
-    N_("{method} is not possible here; possible: {methods}."),
-    N_("A study that is {state} cannot take {action}."),
-    N_("Unknown action."),
-    N_("Unknown kind of problem."),
-    N_("Unknown page; known pages: {pages}."),
-    N_("Unknown example; known examples: {examples}."),
-    N_("Unknown machine; known machines: {machines}."),
-    N_("Unknown question; known questions: {questions}."),
-    N_("Unknown axis; known axes: {axes}."),
-    N_("No case of this study is of this kind."),
-    N_("The case did not end ok, so it has no motion to draw."),
-    N_("Too many computations are waiting already."),
-    N_("The process for computations cannot be started."),
-    N_("The process that ran the computation died."),
-)
-
-#: The longer of two that begin alike stands first.
-_ALL: Final = (
-    OUTSIDE_WINDOW, WINDOW, NO_ROOM, DISK, LARGEST_FILE, EARLIER, PAUSED, DELETED, NOT_IN_TIME, TRIED_AGAIN,
-    NOTICED_LATE, NOT_MADE_UP, GRACE, NOTHING_RAN, NOT_TAKEN, NOT_TAKEN_SILENT, NOT_SUBMITTED, NO_WORKER, WAITS_SILENT,
-    WAITS_STALLED, WAITS, MANY_STUDIES, SHARE_OF_QUEUE, NO_ROOM_FOR_RESULTS, SILENT, LATE_PART, LATE,
-    COPY, OFF, ROUNDS_DONE, NO_ROUND, TOKEN_EXPIRED, TOKEN_REVOKED, TOKEN_OF_REMOVED_USER,
-    *_OF_WORKERS, *_OF_ERRORS,
-)  # fmt: skip
-
-
-def said(text: str) -> str:
-    """A stored sentence in the language of the task, with the sentences in it."""
-    if current() == ENGLISH:
-        return text
-    for template in _ALL:
-        found = _pattern(template).fullmatch(text)
-        if found is not None:
-            parts = {name: _part(name, value) for name, value in found.groupdict().items()}
-            return gettext(template, **parts) if parts else gettext(template)
-    return text
-
-
-def _part(name: str, text: str) -> str:
-    """A part of a sentence: a state, a sentence of its own, with its full stop or, at the end of another, without."""
-    if name == "state":
-        return gettext(text)
-    found = said(text)
-    return said(f"{text}.").removesuffix(".") if found == text else found
-
-
-@cache
-def _pattern(template: str) -> re.Pattern[str]:
-    pieces = re.split(r"\{(\w+)\}", template)
-    return re.compile(
-        "".join(f"(?P<{piece}>.+)" if place % 2 else re.escape(piece) for place, piece in enumerate(pieces)), re.DOTALL
-    )

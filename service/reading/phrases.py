@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Self
 
-from sprag.sentences import Amount, Name, Part, Place, Sentence, Typed, WarningText, filled
-from sprag.service.languages import ENGLISH, gettext, language, ngettext
+from sprag.sentences import Amount, Clause, Name, Part, Place, Sentence, Typed, WarningText, filled
+from sprag.service.languages import ENGLISH, earlier, gettext, language, ngettext
 from sprag.service.reading.part_names import lower_first, upper_first
 from sprag.service.reading.wording import number, unit_text
 from sprag.worker.models.model import model_of
@@ -101,6 +101,11 @@ def shown(text: str) -> str:
     return said(text, None)
 
 
+def told(text: str) -> str:
+    """As `shown`; a text without values is found among those of earlier releases."""
+    return shown(text) if isinstance(text, Sentence) else earlier.said(text)
+
+
 def said(text: str, reading: Reading | None) -> str:
     """A text in the language, units and words of a reader; without one, in SI units and code names."""
     if isinstance(text, WarningText) and text.sentence is not None:
@@ -118,6 +123,8 @@ def _said(part: Part, reading: Reading | None) -> str:
         return number(part)
     if isinstance(part, Amount):
         return _printed(part, reading)
+    if isinstance(part, Clause):
+        return said(part.sentence, reading).removesuffix(".")
     if isinstance(part, Typed):
         return unit_text(part.text)
     if reading is None:

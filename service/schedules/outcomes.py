@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from datetime import datetime
 from enum import StrEnum
 from typing import Any, Final
 
+from sprag.sentences import Sentence, sentence_of
 from sprag.service.languages import N_, gettext, grouped, ngettext
-from sprag.service.languages.recorded import said
+from sprag.service.reading.phrases import told
 
 
 class Result(StrEnum):
@@ -107,16 +108,16 @@ class Outcome:
         shown = {name: grouped(number) for name, number in numbers.items()}
         first = gettext(_SENTENCES[self.result])
         if self.study is None or self.result is Result.FAILED:
-            first += f": {said(self.reason)}" if self.reason else ""
+            first += f": {told(self.reason)}" if self.reason else ""
         elif self.result is Result.FINISHED and self.ok == self.cases and not self.flagged:
             first += ": " + gettext("all {cases} cases ended ok", **shown)
         else:
             first += ": " + gettext("{done} of {cases} cases are done, and {ok} of them ended ok", **shown)
         parts = [first, *(_flagged(name, count) for name, count in self.flagged.items())]
         if self.result is Result.HELD and self.reason:
-            parts.append(gettext("It is held: {reason}", reason=said(self.reason)))
+            parts.append(gettext("It is held: {reason}", reason=told(self.reason)))
         if self.coverage and self.result is not Result.FINISHED:
-            parts.append(gettext("Of the order from coarse to fine, {coverage}", coverage=said(self.coverage)))
+            parts.append(gettext("Of the order from coarse to fine, {coverage}", coverage=told(self.coverage)))
         if self.missed:
             parts.append(
                 ngettext(
@@ -131,19 +132,28 @@ class Outcome:
     def to_json(self) -> dict[str, Any]:
         """The outcome as `of_json` reads it."""
         ended = None if self.ended_at is None else self.ended_at.isoformat()
-        return {**asdict(self), "result": self.result.value, "ended_at": ended}
+        return {**asdict(self), "result": self.result.value, "ended_at": ended, **self.sentences}
+
+    @property
+    def sentences(self) -> dict[str, Any]:
+        """Its sentences with their values, as `of_json` reads them."""
+        known = {"reason": self.reason, "coverage": self.coverage}
+        return {f"{name}_values": text.to_json() for name, text in known.items() if isinstance(text, Sentence)}
 
     @classmethod
     def of_json(cls, data: dict[str, Any]) -> Outcome:
         """The outcome that `to_json` wrote."""
         ended = data["ended_at"]
         flags = data.get("trouble_flags", None if data["flags"] is None else [_UNSETTLED])
-        own = {
+        own: dict[str, Any] = {
             "result": Result(data["result"]),
             "ended_at": None if ended is None else datetime.fromisoformat(ended),
             "trouble_flags": None if flags is None else tuple(flags),
         }
-        return cls(**{**data, **own})
+        values = {name: data[f"{name}_values"] for name in ("reason", "coverage") if f"{name}_values" in data}
+        own |= {name: sentence_of(value) for name, value in values.items()}
+        known = {item.name for item in fields(cls)}
+        return cls(**{**{name: value for name, value in data.items() if name in known}, **own})
 
 
 def _flagged(name: str, count: int) -> str:

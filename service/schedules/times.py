@@ -16,6 +16,7 @@ from zoneinfo import ZoneInfo
 
 from cronsim import CronSim, CronSimError
 
+from sprag.sentences import Sentence
 from sprag.service.faults import Code
 from sprag.service.languages import recorded
 from sprag.service.schedules.occurrences import Occurrences
@@ -160,7 +161,12 @@ class Window:
         return next_time_of_day(self.begin, self.zone, begin) < end
 
     def __str__(self) -> str:
-        return recorded.WINDOW.format(begin=f"{self.begin:%H:%M}", end=f"{self.end:%H:%M}", zone=self.zone)
+        return str(self.sentence)
+
+    @property
+    def sentence(self) -> Sentence:
+        """Its times of day and its zone."""
+        return Sentence(recorded.WINDOW, begin=f"{self.begin:%H:%M}", end=f"{self.end:%H:%M}", zone=self.zone)
 
 
 def next_time_of_day(clock: time, zone: str, moment: datetime) -> datetime:

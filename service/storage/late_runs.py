@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
+from sprag.sentences import Sentence
 from sprag.service.storage.part import Part, micros_of, moment
 from sprag.service.storage.reports import add_reports
 from sprag.service.storage.run_outcomes import about, runs_with_studies
 from sprag.service.storage.schedule_rows import report_to_of
 from sprag.service.storage.schedule_tables import SCHEDULE_RUNS, SCHEDULES
+from sprag.service.storage.stored_sentences import sentence_in
 from sprag.service.storage.tables import CHUNKS, STUDIES, WAITS_FOR_ROOM
 from sprag.service.storage.user_tables import AUDIT_LOG
 from sprag.worker.states import GOING, ChunkState
@@ -61,8 +63,8 @@ class LateRuns(Part):
         )
         should_run = _C.state.in_([state.value for state in GOING]) | (_C.waits_for == WAITS_FOR_ROOM)
         open_runs = (
-            sa.select(*schedule, _R.due, _R.begun_at, _R.state, _R.problem, _C.reason, changed.label("changed"))
-            .add_columns(_C.id.label("study"))
+            sa.select(*schedule, _R.due, _R.begun_at, _R.state, _R.problem, _R.problem_values, changed.label("changed"))
+            .add_columns(_C.id.label("study"), _C.reason, _C.reason_values)
             .select_from(runs_with_studies().join(SCHEDULES, _S.number == _R.schedule))
             .where(
                 _R.concluded_at.is_(None),
@@ -83,7 +85,7 @@ class LateRuns(Part):
             since = max(row.begun_at, row.changed or 0)
             if since > until:
                 continue
-            problem = row.problem if row.study is None else row.reason
+            problem = sentence_in(row, "problem" if row.study is None else "reason")
             due, from_ = moment(row.due), moment(since)
             found.append(
                 ExpectedRun(row.number, row.id, row.name, row.zone, due, from_, row.study, problem, taken=True)
@@ -116,4 +118,6 @@ class LateRuns(Part):
             return 0
         with self.session.write() as connection:
             content = {**about(row, due), "study": run.study, "sentence": sentence}
+            if isinstance(sentence, Sentence):
+                content["known"] = {"sentence_values": sentence.to_json()}
             return add_reports(connection, self._now(), run.schedule, due, "overdue", to, content)

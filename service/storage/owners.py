@@ -2,6 +2,8 @@
 
 from typing import Final
 
+from sprag.sentences import Sentence
+
 #: Separator between process and study in the name of an owner that runs a single study.
 _RUNS: Final = " runs "
 
@@ -18,7 +20,8 @@ def own_study(owner: str) -> str:
 
 def why_abandoned(owner: str) -> str:
     """The reason of a study that its `run_owner` left unfinished."""
-    return (
-        f"`sprag run` (process {owner.partition(_RUNS)[0]}) ended before its study did; resume the study to have a "
-        "worker continue it, or repeat the same `sprag run`, which reuses its finished cases"
+    return Sentence(
+        "`sprag run` (process {process}) ended before its study did; resume the study to have a worker continue it, or "
+        "repeat the same `sprag run`, which reuses its finished cases",
+        process=owner.partition(_RUNS)[0],
     )

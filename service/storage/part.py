@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 
 from sprag.service.storage.errors import StudyNotFoundError
+from sprag.service.storage.stored_sentences import written
 from sprag.service.storage.tables import CHUNKS, STUDIES
 from sprag.worker.states import ChunkState, StudyEvent, StudyState, follow
 
@@ -103,6 +104,9 @@ class Part:
     @staticmethod
     def _change(connection: sa.Connection, number: int, *only: sa.ColumnElement[bool], **values: object) -> None:
         """Put ``values`` into the row of a study where all of ``only`` hold; its revision tells readers of it."""
+        if "reason" in values:
+            reason = values["reason"]
+            values |= written("reason", reason if isinstance(reason, str) else None)
         values["revision"] = STUDIES.c.revision + 1
         connection.execute(sa.update(STUDIES).where(STUDIES.c.number == number, *only).values(values))
 

@@ -6,6 +6,7 @@ from contextlib import suppress
 from threading import Lock
 from typing import TYPE_CHECKING, Final
 
+from sprag.sentences import Sentence
 from sprag.service.languages import recorded
 from sprag.service.storage.clock_watch import clock_problem
 from sprag.service.storage.dispatchers import TAKE_OVER_SECONDS
@@ -69,7 +70,7 @@ class Readiness:
             if problem := clock_problem(self._store):
                 found.append(f"{problem}.")
             if self._store.has_schedules() and self._store.is_copy():
-                found.append(recorded.COPY)
+                found.append(Sentence(recorded.COPY))
             found += self._hindered()
             if not self._store.session.on_server and (linked := self._store.session.file.second_name()):
                 text = str(linked)

@@ -10,8 +10,8 @@ import numpy as np
 
 from sprag.service.storage.editions import edition_of
 from sprag.service.storage.part import moment, optional_moment
+from sprag.service.storage.stored_sentences import read_warnings, sentence_in
 from sprag.service.storage.tables import COARSE_TO_FINE, HELD_AT_DEADLINE
-from sprag.service.storage.warning_texts import read_warnings
 from sprag.worker.states import StudyState
 
 if TYPE_CHECKING:
@@ -326,6 +326,7 @@ def record_of(row: sa.Row[Any]) -> StudyRecord:
     }
     own = {
         "state": StudyState(row.state),
+        "reason": sentence_in(row, "reason"),
         "warnings": read_warnings(row.warnings),
         "created_at": moment(row.created_at),
         "coarse": row.coarse == COARSE_TO_FINE,

@@ -19,9 +19,9 @@ from sprag.service.storage.digests import Digests
 from sprag.service.storage.errors import DatabaseError, StudyNotFoundError
 from sprag.service.storage.origins import HOSTS_BETWEEN
 from sprag.service.storage.round_table import latest_round
+from sprag.service.storage.stored_sentences import read_warnings, write_warnings
 from sprag.service.storage.study_digests import WITH_DIGEST, is_sound, undecodable
 from sprag.service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, further_table, results_table
-from sprag.service.storage.warning_texts import read_warnings, write_warnings
 from sprag.worker import fingerprint, models
 from sprag.worker.case_keys import case_keys
 from sprag.worker.models import WorkerEnding

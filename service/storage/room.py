@@ -13,10 +13,12 @@ from typing import TYPE_CHECKING
 
 import sqlalchemy as sa
 
+from sprag.sentences import Amount, Sentence
 from sprag.service.languages import recorded
 from sprag.service.storage.dispatchers import Dispatchers, return_claims
 from sprag.service.storage.errors import DatabaseFullError
 from sprag.service.storage.reserve import holds, keep_reserve
+from sprag.service.storage.stored_sentences import sentence_in
 from sprag.service.storage.tables import STUDIES, WAITS_FOR_ROOM
 from sprag.worker.states import GOING, StudyEvent
 
@@ -39,13 +41,13 @@ def room(session: Session) -> tuple[int, str]:
     deleted while in use.
     """
     if session.on_server:
-        return UNKNOWN_BYTES, f"the server of {session.location} does not report its free space"
+        return UNKNOWN_BYTES, Sentence("the server of {place} does not report its free space", place=session.location)
     session.require_same_file()
     free = shutil.disk_usage(session.path.parent).free
     limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
     size, log = _size(session.path), _size(session.path.with_name(f"{session.path.name}-wal"))
-    disk = recorded.DISK.format(path=session.path, free=f"{free / 1e6:.3g}")
-    limited = recorded.LARGEST_FILE.format(size=f"{limit / 1e6:.3g}")
+    disk = Sentence(recorded.DISK, path=str(session.path), free=Amount(free / 1e6, digits=3))
+    limited = Sentence(recorded.LARGEST_FILE, size=Amount(limit / 1e6, digits=3))
     capped = limit != resource.RLIM_INFINITY
     if free >= RESERVE_BYTES and not (capped and limit - size - log < RESERVE_BYTES):
         return (limit - size - log, limited) if capped and limit - size - log < free else (free, disk)
@@ -88,18 +90,20 @@ class Room(Dispatchers):
         """Why there is no room for more rows, as a sentence; None where there is room."""
         left, limit = room(self.session)
         if left < RESERVE_BYTES:
-            return recorded.NO_ROOM.format(limit=limit)
+            return Sentence(recorded.NO_ROOM, limit=limit)
         keep_reserve(self.session)
         return None
 
     def full(self) -> str | None:
         """Why every study is held, or will be when one is to run, as a sentence; None while there is room."""
-        held = sa.select(STUDIES.c.reason).where(STUDIES.c.waits_for == WAITS_FOR_ROOM, STUDIES.c.deleted_at.is_(None))
+        c = STUDIES.c
+        held = sa.select(c.reason, c.reason_values).where(c.waits_for == WAITS_FOR_ROOM, c.deleted_at.is_(None))
         with self.session.read() as connection:
-            reason: str | None = connection.execute(held.limit(1)).scalar_one_or_none()
+            row = connection.execute(held.limit(1)).one_or_none()
+        reason = None if row is None else sentence_in(row, "reason")
         if reason is None:
             left, limit = room(self.session)
-            reason = recorded.NO_ROOM.format(limit=limit) if left < RESERVE_BYTES else None
+            reason = Sentence(recorded.NO_ROOM, limit=limit) if left < RESERVE_BYTES else None
         return reason
 
     @holds

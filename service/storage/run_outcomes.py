@@ -18,6 +18,7 @@ from sprag.service.storage.part import micros_of, moment, optional_moment
 from sprag.service.storage.reports import Reports, add_reports
 from sprag.service.storage.schedule_rows import report_to_of, trouble_flags_of
 from sprag.service.storage.schedule_tables import SCHEDULE_RUNS, SCHEDULES
+from sprag.service.storage.stored_sentences import sentence_in
 from sprag.service.storage.tables import HELD_AT_DEADLINE, STUDIES
 from sprag.worker.states import TERMINAL, StudyState
 
@@ -46,11 +47,15 @@ _WITHOUT: Final = {
 _ALIVE: Final = (_C.number == _R.study) & _C.deleted_at.is_(None)
 #: Columns from which `outcome_of` reads.
 COLUMNS: Final = (
-    *(_R[name] for name in ("schedule", "due", "state", "missed", "begun_at", "problem", "concluded_at", "outcome")),
+    *(_R[name] for name in ("schedule", "due", "state", "missed", "begun_at", "problem", "problem_values")),
+    *(_R[name] for name in ("concluded_at", "outcome")),
     _C.id.label("study"),
     _C.name.label("study_name"),
     _C.state.label("study_state"),
-    *(_C[name] for name in ("waits_for", "cases", "done", "ok", "reason", "started_at", "finished_at")),
+    *(
+        _C[name]
+        for name in ("waits_for", "cases", "done", "ok", "reason", "reason_values", "started_at", "finished_at")
+    ),
 )
 
 
@@ -103,7 +108,7 @@ def outcome_of(row: Any) -> Outcome:
     kept = None if row.outcome is None else Outcome.of_json(json.loads(row.outcome))
     if row.state in _WITHOUT:
         ended = None if row.state == "taken" else moment(row.begun_at)
-        return Outcome(_WITHOUT[row.state], reason=row.problem, missed=row.missed, ended_at=ended)
+        return Outcome(_WITHOUT[row.state], reason=sentence_in(row, "problem"), missed=row.missed, ended_at=ended)
     if row.study is None:
         return kept or Outcome(Result.DELETED, missed=row.missed, ended_at=optional_moment(row.concluded_at))
     result = _BY_STATE[StudyState(row.study_state)]
@@ -120,7 +125,7 @@ def outcome_of(row: Any) -> Outcome:
         row.cases,
         row.done,
         row.ok,
-        reason=row.reason,
+        reason=sentence_in(row, "reason"),
         missed=row.missed,
         ended_at=ended,
         seconds=None if began is None or ended is None else (ended - began).total_seconds(),
@@ -162,7 +167,7 @@ class RunOutcomes(Reports):
             if concluded.rowcount and (outcome.trouble or to.when is ReportWhen.ALWAYS):
                 content = {**about(schedule, run.due), "outcome": filled(RunOutcome, outcome), "study": outcome.study}
                 # For mails in other languages than that of the sentence.
-                content["known"] = {"reason": outcome.reason, "missed": outcome.missed}
+                content["known"] = {"reason": outcome.reason, "missed": outcome.missed, **outcome.sentences}
                 add_reports(connection, now, run.schedule, run.due, "run", to, content)
         return bool(concluded.rowcount)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import sqlalchemy as sa
 
+from sprag.sentences import Sentence
 from sprag.service.languages import recorded
 from sprag.service.schedules.policies import CatchUp
 from sprag.service.storage.audit import note
@@ -19,6 +20,7 @@ from sprag.service.storage.run_outcomes import COLUMNS, RunOutcomes, outcome_of,
 from sprag.service.storage.saved_views import inherit_figures
 from sprag.service.storage.schedule_rows import fields_of
 from sprag.service.storage.schedule_tables import SCHEDULE_RUNS, SCHEDULES
+from sprag.service.storage.stored_sentences import sentence_in, written
 from sprag.service.storage.tables import GO_ON, STUDIES
 from sprag.worker.states import StudyState
 
@@ -126,7 +128,7 @@ class ScheduleRuns(RunOutcomes):
                         missed=each.missed,
                         begun_at=self._now(),
                         unbound=0,
-                        problem=problem,
+                        **written("problem", problem),
                     )
                 )
                 if each.too_late:
@@ -137,14 +139,22 @@ class ScheduleRuns(RunOutcomes):
         """Due times that were taken up and have neither a study nor a problem yet."""
         with self.session.read() as connection:
             query = (
-                sa.select(_R.due, _R.begun_at, _R.problem, SCHEDULES)
+                sa.select(_R.due, _R.begun_at, _R.problem, _R.problem_values, SCHEDULES)
                 .join_from(SCHEDULE_RUNS, SCHEDULES)
                 .where(_R.state == RunState.TAKEN.value, _S.deleted_at.is_(None))
                 .order_by(_R.due)
             )
             rows = connection.execute(query).all()
         return [
-            OpenRun(row.number, row.id, row.due, fields_of(row), moment(row.begun_at), row.problem, row.owner)
+            OpenRun(
+                row.number,
+                row.id,
+                row.due,
+                fields_of(row),
+                moment(row.begun_at),
+                sentence_in(row, "problem"),
+                row.owner,
+            )
             for row in rows
         ]
 
@@ -206,7 +216,7 @@ class ScheduleRuns(RunOutcomes):
                 row.missed,
                 moment(row.begun_at),
                 row.study,
-                row.problem,
+                sentence_in(row, "problem"),
                 outcome_of(row),
             )
             for row in rows
@@ -241,6 +251,8 @@ def refuse_open_runs(connection: sa.Connection, schedule: int, schedule_id: str,
 
 def _change_open(connection: sa.Connection, schedule: int, due: int, **values: Any) -> bool:
     """Change a due time that is open; False where it has an outcome by now."""
+    if "problem" in values:
+        values |= written("problem", values["problem"])
     still = sa.update(SCHEDULE_RUNS).where(_R.schedule == schedule, _R.due == due, _R.state == RunState.TAKEN.value)
     return bool(connection.execute(still.values(values)).rowcount)
 
@@ -253,8 +265,8 @@ def _late(delay: timedelta, record: ScheduleRecord) -> str:
     """Why a due time is not run that was taken up with ``delay``."""
     policies = record.fields.policies
     if policies.catch_up is CatchUp.NONE:
-        rule = recorded.NOT_MADE_UP
+        rule = Sentence(recorded.NOT_MADE_UP)
     else:
-        rule = recorded.GRACE.format(grace=policies.misfire_grace)
+        rule = Sentence(recorded.GRACE, grace=str(policies.misfire_grace))
     late = timedelta(seconds=round(delay.total_seconds()))
-    return recorded.NOTICED_LATE.format(delay=late, rule=rule)
+    return Sentence(recorded.NOTICED_LATE, delay=str(late), rule=rule)

@@ -70,6 +70,8 @@ SCHEDULE_RUNS = sa.Table(
     # latter is NULL for runs from before revision 0025.
     sa.Column("concluded_at", sa.BigInteger, index=True),
     sa.Column("outcome", sa.Text),
+    # The values of `problem` (`sprag.service.storage.stored_sentences`).
+    sa.Column("problem_values", sa.Text),
     sa.Index("ix_schedule_runs_due", "due"),
 )
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
+from sprag.sentences import Sentence
 from sprag.service.actor import acting
 from sprag.service.languages import recorded
 from sprag.service.storage.audit import by_sender, note, require_own
@@ -109,7 +110,7 @@ class Schedules(ScheduleRuns, Windows):
             if changes:
                 note(connection, self._now(), "schedule.change", schedule_id, name=fields.name, changes=changes)
             if not fields.enabled:
-                refuse_open_runs(connection, number, schedule_id, self._now(), recorded.PAUSED)
+                refuse_open_runs(connection, number, schedule_id, self._now(), Sentence(recorded.PAUSED))
             return self._schedule(connection, schedule_id)
 
     def delete_schedule(self, schedule_id: str, read: Collection[str] | None = None) -> None:
@@ -122,7 +123,7 @@ class Schedules(ScheduleRuns, Windows):
             require_own("schedule", schedule_id, row.owner)
             require_edition("schedule", schedule_id, self._record(connection, row).etag, read)
             note(connection, self._now(), "schedule.delete", schedule_id, name=row.name, owner=row.owner)
-            refuse_open_runs(connection, row.number, schedule_id, self._now(), recorded.DELETED)
+            refuse_open_runs(connection, row.number, schedule_id, self._now(), Sentence(recorded.DELETED))
             connection.execute(
                 sa.update(SCHEDULES)
                 .where(_S.number == row.number)

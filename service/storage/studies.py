@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 from cachetools import LRUCache
 
+from sprag.sentences import Sentence
 from sprag.service.actor import acting
 from sprag.service.languages import recorded
 from sprag.service.storage.audit import by_sender, note, require_own
@@ -202,7 +203,7 @@ class Studies(Users, Orders, Dispatchers):
         since = moment(row.heartbeat_at).isoformat(timespec="seconds")
         return replace(
             record,
-            reason=recorded.SILENT.format(process=row.owner, since=since),
+            reason=Sentence(recorded.SILENT, process=row.owner, since=since),
         )
 
     def spec(self, study_id: str) -> dict[str, Any]:

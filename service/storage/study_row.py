@@ -6,8 +6,8 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from sprag.service.storage.case_keys import keys_of
+from sprag.service.storage.stored_sentences import write_warnings
 from sprag.service.storage.tables import LINE_BY_LINE
-from sprag.service.storage.warning_texts import write_warnings
 from sprag.worker import models
 from sprag.worker.planning import planner_of
 from sprag.worker.reuse import kin_hash

@@ -9,7 +9,7 @@ from sprag.worker import models
 from sprag.worker.states import ChunkState
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0039"
+HEAD_REVISION = "0040"
 
 METADATA = sa.MetaData(
     naming_convention={
@@ -89,6 +89,8 @@ STUDIES = sa.Table(
     sa.Column("dispatcher", sa.Integer),
     # Of its inputs (`sprag.service.storage.study_digests`); NULL: from before revision 0039.
     sa.Column("digest", sa.BigInteger),
+    # The values of `reason` (`sprag.service.storage.stored_sentences`).
+    sa.Column("reason_values", sa.Text),
     sa.Index("ix_studies_kin_hash_keyed", "kin_hash", "keyed"),
     sqlite_autoincrement=True,
 )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
+from sprag.sentences import Sentence
 from sprag.service.actor import Role, acting
 from sprag.service.faults import FaultError
 from sprag.service.languages import grouped, recorded
@@ -182,9 +183,9 @@ def require_queue(connection: sa.Connection, most: int | None) -> None:
     if pool is None or pool.takes():
         return
     if not pool.free:
-        raise FaultError("queue-full", recorded.MANY_STUDIES.format(count=grouped(pool.taken)))
+        raise FaultError("queue-full", Sentence(recorded.MANY_STUDIES, count=grouped(pool.taken)))
     shares = {"mine": grouped(pool.mine), "free": grouped(pool.free)}
-    raise FaultError("queue-full", recorded.SHARE_OF_QUEUE.format(**shares))
+    raise FaultError("queue-full", Sentence(recorded.SHARE_OF_QUEUE, **shares))
 
 
 def require_user(connection: sa.Connection, name: str, *, removed: bool = False) -> None:

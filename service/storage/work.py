@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import sqlalchemy as sa
 
+from sprag.sentences import Sentence
 from sprag.service.languages import grouped, recorded
 from sprag.service.storage.dispatchers import WAITING, return_claims
 from sprag.service.storage.errors import DatabaseError
@@ -134,11 +135,11 @@ class Work(Storing):
 
     def note(self, epoch: int, number: int, reason: str | None) -> None:
         """Record why a queued or running study does not proceed; None removes the reason."""
-        c = STUDIES.c
+        c, english = STUDIES.c, None if reason is None else str(reason)
         with self.session.write() as connection:
             if not self._may_change(connection, epoch, number):
                 return
-            self._change(connection, number, c.state.in_(GOING), c.reason.is_distinct_from(reason), reason=reason)
+            self._change(connection, number, c.state.in_(GOING), c.reason.is_distinct_from(english), reason=reason)
 
     def fault(self, epoch: int, number: int, reason: str) -> None:
         """Hold the study with a reason and return its claims to waiting, without counting a failure of the cases."""
@@ -172,16 +173,17 @@ class Work(Storing):
                 return
             if done < cases or most_rounds is not None:
                 covered = self._coverage(connection, number, cases)
-                part = str(covered) if covered else ""
+                part = covered.sentence if covered else None
                 if most_rounds is not None:
                     rounds = latest_round(connection, number).round + (done == cases)
-                    done_rounds = recorded.ROUNDS_DONE.format(round=rounds, most=most_rounds)
-                    part = done_rounds if rounds else recorded.NO_ROUND
-                reason = (recorded.LATE_PART if part else recorded.LATE).format(
-                    time=moment(finish_by).isoformat(timespec="seconds"),
-                    done=grouped(done),
-                    cases=grouped(cases),
-                    part=part,
+                    done_rounds = Sentence(recorded.ROUNDS_DONE, round=rounds, most=most_rounds)
+                    part = done_rounds if rounds else Sentence(recorded.NO_ROUND)
+                numbers = {"done": grouped(done), "cases": grouped(cases)}
+                time = moment(finish_by).isoformat(timespec="seconds")
+                reason = (
+                    Sentence(recorded.LATE, time=time, **numbers)
+                    if part is None
+                    else Sentence(recorded.LATE_PART, time=time, part=part, **numbers)
                 )
                 if not paused:
                     self._move(connection, number, StudyEvent.FAULT)

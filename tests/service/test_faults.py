@@ -16,7 +16,7 @@ from sprag.service.faults import Code, Fault, FaultError, Kind, ParameterFault, 
 from sprag.service.http.problems import PROBLEM_TYPES
 from sprag.service.spec.report import SpecError
 from sprag.service.storage import errors as storage
-from sprag.service.storage.warning_texts import read_warnings, write_warnings
+from sprag.service.storage.stored_sentences import read_warnings, write_warnings
 from sprag.worker.ports import StoreError
 from tests.conftest import ROOT
 

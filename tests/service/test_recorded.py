@@ -1,4 +1,4 @@
-"""Stored sentences are found again by those who read them, as the program writes them."""
+"""Sentences that came in English only are found again by those who read them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from datetime import time
 import pytest
 
 from sprag.service import languages
-from sprag.service.languages import recorded
+from sprag.service.languages import earlier, recorded
 from sprag.service.results.regimes import motion_sentence
 from sprag.service.schedules.times import Window
 from sprag.worker.opening import COMPILING
@@ -17,22 +17,22 @@ from sprag.worker.order import Coverage
 def test_the_window_of_a_schedule() -> None:
     text = recorded.OUTSIDE_WINDOW.format(window=Window(time(22), time(6), "Europe/Kyiv"))
     assert text == "outside its window, 22:00 to 06:00 (Europe/Kyiv); it continues by itself"
-    assert recorded.said(text) == text
+    assert earlier.said(text) == text
     with languages.language("uk"):
-        assert recorded.said(text) == "поза своїм вікном часу (від 22:00 до 06:00 (Europe/Kyiv)); продовжиться само"
+        assert earlier.said(text) == "поза своїм вікном часу (від 22:00 до 06:00 (Europe/Kyiv)); продовжиться само"
 
 
 def test_a_full_disk() -> None:
     text = recorded.NO_ROOM.format(limit=recorded.DISK.format(path="/data/sprag.db", free="3.2"))
     with languages.language("uk"):
-        said = recorded.said(text)
+        said = earlier.said(text)
     assert said.startswith("бракує місця: на диску, де лежить /data/sprag.db, залишилося 3.2 МБ;")
 
 
-@pytest.mark.parametrize("template", recorded._ALL)
+@pytest.mark.parametrize("template", earlier._ALL)
 def test_every_sentence_has_a_translation(template: str) -> None:
     with languages.language("uk"):
-        assert recorded.said(template) != template
+        assert earlier.said(template) != template
 
 
 @pytest.mark.parametrize(
@@ -59,14 +59,14 @@ def test_every_sentence_has_a_translation(template: str) -> None:
     ],
 )
 def test_sentences_are_found_in_sentences_of_others(text: str, said: str) -> None:
-    assert recorded.said(text) == text
+    assert earlier.said(text) == text
     with languages.language("uk"):
-        assert said in recorded.said(text)
+        assert said in earlier.said(text)
 
 
 def test_other_texts_stay_as_they_are() -> None:
     with languages.language("uk"):
-        assert recorded.said("not enough sleep") == "not enough sleep"
+        assert earlier.said("not enough sleep") == "not enough sleep"
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,7 @@ from uuid import uuid4
 import dask
 from distributed.scheduler import KilledWorker
 
+from sprag.sentences import Sentence, joined
 from sprag.worker import fingerprint, models
 from sprag.worker.executors import dask_tasks as tasks
 from sprag.worker.executors.dask_jobs import Job, Waiting, Worker, outcome_of, refusals, report_of
@@ -124,12 +125,19 @@ class DaskExecutor:
     def shortage(self) -> str | None:
         """Why nothing can be run at present, as a sentence; None where chunks can run."""
         if self._gone_since is not None:
-            return f"The scheduler {self._link.address} cannot be reached; retrying: {self._link.trouble}"
+            return Sentence(
+                "The scheduler {address} cannot be reached; retrying: {trouble}",
+                address=self._link.address,
+                trouble=self._link.trouble,
+            )
         with self._lock:
             if any(worker.usable for worker in self._workers.values()):
                 return None
             why = refusals(self._workers.values())
-        return f"No usable worker has joined the scheduler {self._link.address}; the study waits for one.{why}"
+        waits = Sentence(
+            "No usable worker has joined the scheduler {address}; the study waits for one.", address=self._link.address
+        )
+        return waits if why is None else joined(" ", (waits, why))
 
     def ready(self, study: Study) -> bool:
         """Whether any worker has loaded the kernel of ``study``; otherwise one starts to load it."""

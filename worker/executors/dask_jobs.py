@@ -7,6 +7,7 @@ from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
+from sprag.sentences import Sentence
 from sprag.worker import fingerprint
 from sprag.worker.executors.dask_tasks import OtherFingerprintError
 from sprag.worker.ports import Fate, Outcome
@@ -96,13 +97,15 @@ class Waiting:
     task: models.ChunkTask
 
 
-def refusals(workers: Iterable[Worker]) -> str:
-    """A sentence, after a blank, that states why workers are refused; "" where none is."""
-    refused = [f"The worker {worker.address} is refused: {worker.refusal}" for worker in workers if worker.refusal]
+def refusals(workers: Iterable[Worker]) -> Sentence | None:
+    """A sentence that states why workers are refused; None where none is."""
+    refused = [worker for worker in workers if worker.refusal]
     if not refused:
-        return ""
-    more = f" (and {len(refused) - 1} more)" if len(refused) > 1 else ""
-    return f" {refused[0]}{more}."
+        return None
+    first = {"address": refused[0].address, "refusal": refused[0].refusal}
+    if len(refused) == 1:
+        return Sentence("The worker {address} is refused: {refusal}.", **first)
+    return Sentence("The worker {address} is refused: {refusal} (and {count} more).", count=len(refused) - 1, **first)
 
 
 def report_of(link: Link, workers: Iterable[Worker], cases: Mapping[str, int], shortage: str | None) -> ExecutorReport:

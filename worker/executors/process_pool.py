@@ -9,6 +9,7 @@ from functools import partial
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
+from sprag.sentences import Sentence
 from sprag.worker import fingerprint, models
 from sprag.worker.executors import known_answers
 from sprag.worker.fingerprint import prepare_as
@@ -32,7 +33,7 @@ SPARE_CHUNKS = 2
 SPARE_SHARE = 0.25
 #: Successive failed starts per process, without any completed work, after which the executor gives up.
 MAX_FAILED_STARTS = 3
-_NO_START = "The processes of the pool end as they start; the log says why."
+_NO_START = Sentence("The processes of the pool end as they start; the log says why.")
 #: Failed compilations of a kernel after which its studies are held.
 MAX_LOADS = 2
 

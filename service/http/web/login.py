@@ -11,7 +11,8 @@ from sprag.service.http.problems import ApiError
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.way_in import LOGIN_PATH, access_of, kept_form, kept_page, login_page, within
-from sprag.service.languages import _, recorded
+from sprag.service.languages import _
+from sprag.service.reading.phrases import told
 
 router = page_router()
 
@@ -33,7 +34,7 @@ async def log_in(request: Request, values: Form) -> Response:
         grant = access.of_token(token)
         if grant is None:
             await access.attempts.failed(request.scope, "page /login")
-            fault = recorded.said(access.why_not(token) or "") or _("This token is not valid.")
+            fault = told(access.why_not(token) or "") or _("This token is not valid.")
             return login_page(request, access, wanted, fault=fault, status=401, kept=kept)
     except ApiError as error:
         response = login_page(request, access, wanted, fault=error.detail, status=error.type.status, kept=kept)

@@ -24,9 +24,9 @@ from sprag.service.http.prefix import PREFIX, here
 from sprag.service.http.reading import PAGE
 from sprag.service.http.web.explained import explained
 from sprag.service.http.web.script_texts import translated_texts
-from sprag.service.languages import N_, recorded
+from sprag.service.languages import N_
 from sprag.service.languages.ranges import allowed_text
-from sprag.service.reading.phrases import model_title, shown, titled, word
+from sprag.service.reading.phrases import model_title, shown, titled, told, word
 from sprag.service.reading.reader import CLUTCH, Reading
 from sprag.service.reading.wording import counted, duration, number, symbol, typed_text, unit_text
 from sprag.service.results.fault_texts import fault_text
@@ -120,7 +120,7 @@ def _templates() -> Environment:
         "words": titled,
         "word": word,
         "text": languages.gettext,
-        "recorded": recorded.said,
+        "recorded": told,
         "say": shown,
         "fault": fault_text,
         "warning": _warning,

@@ -16,7 +16,7 @@ from sprag.service.http.access import COOKIE, Access, Grant
 from sprag.service.http.web.form.values import read_form
 from sprag.service.http.web.problem_page import wants_page
 from sprag.service.http.web.templates import page
-from sprag.service.languages import recorded
+from sprag.service.reading.phrases import told
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -72,7 +72,7 @@ def login_page(
     """The form for the token, with the destination ``wanted`` and the form ``kept`` for it, if any."""
     grant = cast("Grant | None", request.scope.get("sprag.grant"))
     if grant is None:
-        fault = fault or recorded.said(access.why_ended(request.cookies) or "")
+        fault = fault or told(access.why_ended(request.cookies) or "")
     return _private(
         "login.html",
         status=status,

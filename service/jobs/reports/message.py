@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from sprag.sentences import sentence_of
 from sprag.service.json_text import timestamp, to_bytes
 from sprag.service.languages import ENGLISH, N_, _, current, grouped, language, ngettext
-from sprag.service.languages.recorded import said
-from sprag.service.reading.phrases import shown, term
+from sprag.service.reading.phrases import shown, term, told
 from sprag.service.schedules.outcomes import Outcome
 from sprag.service.schedules.times import wall_clock
 
@@ -55,7 +55,8 @@ def sentence(content: dict[str, Any]) -> str:
     """What happened, in a few sentences."""
     outcome = content.get("outcome")
     if outcome is None:
-        return said(str(content["sentence"]))
+        values = content.get("known", {}).get("sentence_values")
+        return told(str(content["sentence"]) if values is None else sentence_of(values))
     if current() == ENGLISH or "known" not in content:  # of a report that an earlier version has put off
         return str(outcome["sentence"])
     names = {item.name for item in fields(Outcome)}
@@ -72,10 +73,15 @@ def facts(content: dict[str, Any]) -> Iterator[Fact]:
     if outcome["ended_at"] is not None:
         yield Fact(_("Ended"), wall_clock(datetime.fromisoformat(outcome["ended_at"]), content["zone"]))
     if outcome["coverage"] is not None:
-        yield Fact(_("Coverage"), said(outcome["coverage"]))
+        yield Fact(_("Coverage"), told(_coverage(content)))
     endings, flags = outcome["endings"] or {}, outcome["flags"] or {}
     yield from (Fact(_("Ended {name}", name=_words(name)), _cases(count)) for name, count in endings.items())
     yield from (Fact(_("Flag {name}", name=_words(name)), _cases(count)) for name, count in flags.items())
+
+
+def _coverage(content: dict[str, Any]) -> str:
+    values = content.get("known", {}).get("coverage_values")
+    return str(content["outcome"]["coverage"]) if values is None else sentence_of(values)
 
 
 def _words(code: str) -> str:

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from datetime import timedelta
 from typing import TYPE_CHECKING, Final
 
+from sprag.sentences import Clause, Sentence
 from sprag.service.answers import filled
 from sprag.service.answers.schedules import LateRun as LateRunAnswer
 from sprag.service.languages import recorded
-from sprag.service.reading.phrases import Phrase
+from sprag.service.languages.earlier import sentence_in
 from sprag.service.schedules.times import local_time, wall_clock
 
 if TYPE_CHECKING:
@@ -47,31 +48,31 @@ def late_runs(store: Store) -> list[LateRun]:
     stalled = not silent and not store.chunk_finished_since(now - STALLED)
     off, found = store.is_copy(), []
     for run in expected:
-        why = Phrase(recorded.OFF) if off and run.study is None else _why(run, now, silent, stalled)
+        why = Sentence(recorded.OFF) if off and run.study is None else _why(run, now, silent, stalled)
         if why is not None:
             due = wall_clock(run.due, run.zone)
-            found.append(LateRun(run, Phrase(recorded.NOTHING_RAN, due=due, why=why)))
+            found.append(LateRun(run, Sentence(recorded.NOTHING_RAN, due=due, why=why)))
     return found
 
 
-def _why(run: ExpectedRun, now: datetime, silent: bool, stalled: bool) -> Phrase | None:
+def _why(run: ExpectedRun, now: datetime, silent: bool, stalled: bool) -> Sentence | None:
     """Why nothing has run; None where nothing speaks against it."""
     if not run.taken:
-        return Phrase(recorded.NOT_TAKEN_SILENT if silent else recorded.NOT_TAKEN)
+        return Sentence(recorded.NOT_TAKEN_SILENT if silent else recorded.NOT_TAKEN)
     if run.study is None:
-        problem = _clause(run.problem) if run.problem else Phrase(recorded.NO_WORKER)
-        return Phrase(recorded.NOT_SUBMITTED, problem=problem)
+        problem = _clause(run.problem) if run.problem else Sentence(recorded.NO_WORKER)
+        return Sentence(recorded.NOT_SUBMITTED, problem=problem)
     if silent:
-        return Phrase(recorded.WAITS_SILENT)
+        return Sentence(recorded.WAITS_SILENT)
     if run.problem:
-        return Phrase(recorded.WAITS, problem=_clause(run.problem))
+        return Sentence(recorded.WAITS, problem=_clause(run.problem))
     if stalled and now - run.since > STALLED:
-        return Phrase(recorded.WAITS_STALLED)
+        return Sentence(recorded.WAITS_STALLED)
     return None
 
 
-def _clause(text: str) -> str:
-    return recorded.said(text).removesuffix(".")
+def _clause(text: str) -> Clause:
+    return Clause(text if isinstance(text, Sentence) else sentence_in(text) or text)
 
 
 def late_json(late: LateRun) -> LateRunAnswer:

@@ -21,7 +21,7 @@ from sprag.service.languages import gettext, language
 from sprag.service.reading.phrases import Phrase, shown
 from sprag.service.reading.quantities import Units
 from sprag.service.reading.reader import Reading
-from sprag.service.storage.warning_texts import read_warnings, write_warnings
+from sprag.service.storage.stored_sentences import read_warnings, write_warnings
 from tests.conftest import ROOT
 from tests.service import warning_samples
 

@@ -353,6 +353,8 @@ def test_a_database_of_before_is_the_deployment_after_its_upgrade_without_a_word
         connection.exec_driver_sql("DROP TABLE deployment")
         connection.exec_driver_sql("ALTER TABLE schedules DROP COLUMN trouble_flags")
         connection.exec_driver_sql("ALTER TABLE studies DROP COLUMN digest")
+        connection.exec_driver_sql("ALTER TABLE studies DROP COLUMN reason_values")
+        connection.exec_driver_sql("ALTER TABLE schedule_runs DROP COLUMN problem_values")
         connection.exec_driver_sql("UPDATE alembic_version SET version_num = '0036'")
     store.close()
     assert execute(["db", "upgrade", "--no-backup", "--db", settings.database]) == 0

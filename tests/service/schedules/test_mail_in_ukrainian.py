@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import json
+import re
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import pytest
 from pydantic import ValidationError
 
+from sprag.sentences import Amount, Clause, Sentence
 from sprag.service import languages
 from sprag.service.answers import filled
 from sprag.service.answers.schedules import RunOutcome
 from sprag.service.delivery import Delivery, DeliverySettings
-from sprag.service.jobs.reports.message import mail, webhook_body
+from sprag.service.jobs.reports.message import mail, sentence, webhook_body
 from sprag.service.languages import recorded
 from sprag.service.schedules.outcomes import Outcome, Result
 from sprag.service.storage.reports import Claimed
@@ -25,7 +29,7 @@ def report(outcome: Outcome) -> Claimed:
     content = {
         "schedule": "sc_1", "name": "Живильник", "due": NIGHT.isoformat(), "zone": "UTC", "study": outcome.study,
         "outcome": filled(RunOutcome, outcome, ended_at=NIGHT.isoformat()),
-        "known": {"reason": outcome.reason, "missed": outcome.missed},
+        "known": {"reason": outcome.reason, "missed": outcome.missed, **outcome.sentences},
     }  # fmt: skip
     return Claimed(1, "rp_1", "sc_1", "email", "dora@example.com", content, 1, NIGHT, NIGHT)
 
@@ -54,6 +58,35 @@ def test_a_mail_says_reasons_and_coverage_in_the_language_of_the_service() -> No
     late, never = (body.get_content() for body in bodies if body is not None)
     assert "Покриття: прохід 1 з 3 завершено, сітка з 2 x 2 значень" in late.splitlines()
     assert "Жоден обчислювач не працював, доки не минув кінцевий строк" in never
+
+
+def test_a_mail_says_sentences_with_their_values() -> None:
+    coverage = Coverage(1, 3, 41, ()).sentence
+    outcome = Outcome(Result.DEADLINE, "st_1", "Feeder", 99, 50, 50, coverage=coverage, ended_at=NIGHT)
+    room = Sentence(recorded.NO_ROOM_FOR_RESULTS, size=Amount(1.25, "GB", 3), room=Amount(3.5, "MB", 3))
+    refused = Outcome(Result.REFUSED, reason=room)
+    delivery = Delivery(sender="sprag@example.com", language="uk")
+    bodies = [mail(stored(report(each)), delivery, NIGHT, None).get_body(("plain",)) for each in (outcome, refused)]
+    late, never = (body.get_content() for body in bodies if body is not None)
+    assert "Покриття: прохід 1 з 3 завершено, 41 випадок" in late.splitlines()
+    assert "1,25 ГБ" in never
+    assert "3,5 МБ" in never
+    assert not re.search("[A-Za-z]{4,}", never.splitlines()[0])
+
+
+def test_an_alarm_says_its_sentence_with_its_values() -> None:
+    why = Sentence(recorded.WAITS, problem=Clause(Coverage(0, 4, 0, ()).sentence))
+    alarm = Sentence(recorded.NOTHING_RAN, due="06:00", why=why)
+    content = {"sentence": alarm, "known": {"sentence_values": alarm.to_json()}}
+    with languages.language("uk"):
+        assert sentence(content).endswith("жодного проходу з 4 ще не завершено.")
+        assert sentence({"sentence": str(alarm)}) == sentence(content)  # as earlier versions stored it
+    assert sentence(content) == str(alarm)
+
+
+def stored(told: Claimed) -> Claimed:
+    """A report that was in the database."""
+    return replace(told, content=json.loads(json.dumps(told.content)))
 
 
 def test_mails_are_english_unless_they_are_set_otherwise_and_webhooks_always() -> None:
