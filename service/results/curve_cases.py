@@ -98,7 +98,7 @@ def draw(selection: Selection, fetch: Fetch) -> Curves:
     columns = fetch(np.concatenate([line.cases for line in selection.lines]), needed)
     endings = [ending or PENDING for ending in columns.endings]
     regimes, orders = kinds_of(columns.values, selection.regime)
-    usable = models.usable(selection.model, columns.endings, columns.flags)
+    usable = models.usable_each(selection.model, columns.endings, columns.flags, names)
     refined: list[Refined] | None = None
     if selection.plan is not None:
         refined = refined_curves(selection.model, selection.plan, selection.lines, ~not_run(endings), columns)
@@ -111,7 +111,8 @@ def draw(selection: Selection, fetch: Fetch) -> Curves:
         if selection.swept and regimes and orders:
             jumps = jumps_of_line(line, columns.flags[part], regimes[part], orders[part])
         kinds = regimes and regimes[part], orders and orders[part]
-        curves.append(Curve(line, y, endings[part], *kinds, own, jumps, columns.flags[part] or None, usable[part]))
+        counts = {name: mask[part] for name, mask in usable.items()}
+        curves.append(Curve(line, y, endings[part], *kinds, own, jumps, columns.flags[part] or None, counts))
         start = part.stop
     return Curves(selection, tuple(curves))
 
@@ -161,7 +162,7 @@ def draw_map(
         None if regimes is None else [regimes[start : start + width] for start in starts],
         None if orders is None else [orders[start : start + width] for start in starts],
         flags=[columns.flags[start : start + width] for start in starts] if columns.flags else None,
-        usable=models.usable(study.model, columns.endings, columns.flags).reshape(cases.shape),
+        usable=models.usable(study.model, columns.endings, columns.flags, z).reshape(cases.shape),
     )
 
 

@@ -85,8 +85,8 @@ class Curve:
 
     Of a settled study also with their regimes, and the excitation periods after which their motions repeat;
     of a refined curve what its planner says of it, of a sweep its jumps. ``flags`` are those of each case, joined by
-    commas, where they are known, and ``usable`` says which results count (`sprag.worker.models.usable`): no line goes
-    through others, and no answer is read from them.
+    commas, where they are known, and ``usable`` says which results count (`sprag.worker.models.usable`), by name: no
+    line goes through others, and no answer is read from them.
     """
 
     line: Line
@@ -97,16 +97,16 @@ class Curve:
     refined: Refined | None = None
     jumps: list[Jump] | None = None
     flags: list[str] | None = None
-    usable: NDArray[np.bool_] | None = None
+    usable: dict[str, NDArray[np.bool_]] | None = None
 
     def known(self, name: str) -> NDArray[np.float64]:
         """A result of each case; NaN where there is none that counts."""
-        return self.y[name] if self.usable is None else np.where(self.usable, self.y[name], np.nan)
+        return self.y[name] if self.usable is None else np.where(self.usable[name], self.y[name], np.nan)
 
     def shown(self, name: str) -> NDArray[np.float64]:
         """A result of each case in pictures, where motions that had not settled are marked; NaN for failed cases."""
         ok = np.array([ending == OK for ending in self.endings], dtype=np.bool_)
-        return np.where(ok, self.y[name], np.nan)
+        return np.where(ok if self.usable is None else ok | self.usable[name], self.y[name], np.nan)
 
     def run(self) -> NDArray[np.intp]:
         """Indices of the cases that were run, ascending, which a picture joins; of a coarser study, its own points."""

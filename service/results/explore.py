@@ -182,10 +182,14 @@ def explore(study: Study, plan: Plan, rows: RowColumns) -> Explored:
     """The cases that a checked question selects, of a study whose finished cases have these ``rows``."""
     known = len(rows.cases)
     parameters = study.columns(rows.cases) if known else {}
-    counts = models.usable(study.model, [ending for ending, _ in rows.kinds], [flags for _, flags in rows.kinds])
-    missing = ~counts[rows.kind] if known else np.empty(0, dtype=np.bool_)
+    endings, flags = [ending for ending, _ in rows.kinds], [own for _, own in rows.kinds]
     kinds = kind_columns(plan.regime)
-    results = {n: v if n in kinds or not known else np.where(missing, np.nan, v) for n, v in rows.values.items()}
+    results = {
+        name: values
+        if name in kinds or not known
+        else np.where(models.usable(study.model, endings, flags, name)[rows.kind], values, np.nan)
+        for name, values in rows.values.items()
+    }
     every = {**results, **parameters}
     empty = np.empty(0)
     selected = np.ones(known, dtype=np.bool_)

@@ -26,7 +26,7 @@ def joined_points(curve: Curve, name: str) -> tuple[NDArray[np.int64], ...] | No
     x = np.asarray(curve.line.x)[run]
     regimes = None if curve.regimes is None else [curve.regimes[place] for place in run.tolist()]
     # A missing value is a gap by itself.
-    usable = None if curve.usable is None else curve.usable[run] | ~np.isfinite(curve.y[name][run])
+    usable = None if curve.usable is None else curve.usable[name][run] | ~np.isfinite(curve.y[name][run])
     parts = stretches(regimes, x.size, usable)
     if curve.refined is not None and x.size:
         return refined_stretches(curve.refined, name, parts)

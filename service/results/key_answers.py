@@ -225,10 +225,10 @@ def _single(
     names = dict.fromkeys(one.result for one in (*main, *here))
     columns = fetch(np.zeros(1, dtype=np.int64), models.with_half_widths(names, by_name))
     line = Line({}, {}, (0.0,), np.zeros(1, dtype=np.int64))
-    usable = models.usable(study.model, columns.endings, columns.flags)
 
     def one(answer: Answer) -> Found:
         info, value = by_name[answer.result], float(columns.values[answer.result][0])
+        usable = models.usable(study.model, columns.endings, columns.flags, info.name)
         known, why = math.isfinite(value) and bool(usable[0]), _why(np.array([value]), columns.endings)
         width = columns.values.get(models.half_width(info.name), np.array([np.nan]))[0]
         return Found(
@@ -249,9 +249,9 @@ def _overall(study: Study, answers: Sequence[Answer], by_name: dict[str, ResultI
     regime = models.regime_info(tuple(by_name.values()))
     names = [*(one.result for one in extremes), *kind_columns(regime)[:1]]
     columns = whole(models.with_half_widths(names, by_name))
-    usable = models.usable(study.model, columns.endings, columns.flags)
     for answer in extremes:
         info, values = by_name[answer.result], columns.values[answer.result]
+        usable = models.usable(study.model, columns.endings, columns.flags, info.name)
         kept = np.flatnonzero(np.isfinite(values) & usable)
         if not kept.size:
             yield Found(answer, info, info.unit, why=_why(values, columns.endings))

@@ -133,8 +133,11 @@ def sensitivity(study: Study, spec: Mapping[str, Any], names: Sequence[str], fet
     columns = fetch(np.arange(study.cases, dtype=np.int64), list(dict.fromkeys([*names, *kinds])))
     regimes, _ = kinds_of(columns.values, regime)
     sample = _design(study, spec)
-    usable = models.usable(study.model, columns.endings, columns.flags)
-    return [_of_result(study, varying, info, columns.values[info.name], usable, regimes, sample) for info in results]
+    usable = models.usable_each(study.model, columns.endings, columns.flags, names)
+    return [
+        _of_result(study, varying, info, columns.values[info.name], usable[info.name], regimes, sample)
+        for info in results
+    ]
 
 
 def _design(study: Study, spec: Mapping[str, Any]) -> Mapping[str, Any] | None:

@@ -56,7 +56,7 @@ from sprag.worker.models.common import (
 from sprag.worker.models.model import Model, all_models, model_names, model_of, register, unregister
 from sprag.worker.models.presentation import Panel, Presentation, Reference
 from sprag.worker.models.tasks import chunk_task, run_chunk, run_task
-from sprag.worker.models.usable import half_width, unsettled, usable, with_half_widths
+from sprag.worker.models.usable import half_width, unsettled, usable, usable_each, with_half_widths
 from sprag.worker.models.vibration_drive import (
     NOT_SETTLED,
     WINDUP_OUT_OF_DATA,
@@ -178,6 +178,7 @@ __all__ = [
     "unregister",
     "unsettled",
     "usable",
+    "usable_each",
     "variant_of",
     "variants",
     "warm_up",

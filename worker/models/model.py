@@ -50,6 +50,11 @@ class Model(Protocol):
         return frozenset()
 
     @property
+    def without_motion(self) -> Mapping[Ending, frozenset[str]]:
+        """Results of cases with that ending that count as others do: they tell what a motion needs."""
+        return {}
+
+    @property
     def presentation(self) -> Presentation:
         """Presentation of the model to users."""
         return Presentation()

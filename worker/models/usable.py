@@ -1,9 +1,10 @@
 """Usable results: the one rule by which a row counts, for planners, curves, answers, yields, reports and all others.
 
-A row is usable where its case ended ok and no flag of it says that the motion had not settled (`Model.unsettled`). What
-is not usable is a missing value: it is neither interpolated nor compared with others. Any other flag stands beside a
-result that counts: a held motion that depends on its run-up ("history_dependent") is a steady motion of the machine. A
-usable mean of irregular motion has a half width ("NAME.half_width"), which counts against every limit.
+A row is usable where its case ended ok and no flag of it says that the motion had not settled (`Model.unsettled`).
+Results that tell what a motion needs count without one (`Model.without_motion`). What is not usable is a missing value:
+it is neither interpolated nor compared with others. Any other flag stands beside a result that counts: a held motion
+that depends on its run-up ("history_dependent") is a steady motion of the machine. A usable mean of irregular motion
+has a half width ("NAME.half_width"), which counts against every limit.
 """
 
 from __future__ import annotations
@@ -25,8 +26,10 @@ if TYPE_CHECKING:
 _HALF_WIDTH: Final = ".half_width"
 
 
-def usable(model: str, endings: Sequence[str | None], flags: Sequence[str]) -> NDArray[np.bool_]:
-    """Which rows count.
+def usable(
+    model: str, endings: Sequence[str | None], flags: Sequence[str], result: str | None = None
+) -> NDArray[np.bool_]:
+    """Which rows count; of a ``result`` that tells what a motion needs, also those without one.
 
     Parameters
     ----------
@@ -36,13 +39,26 @@ def usable(model: str, endings: Sequence[str | None], flags: Sequence[str]) -> N
         None for a case without a row.
     flags : sequence of str, length m or 0
         Those of each row, joined by commas; of length 0 where no row has any.
+    result : str, optional
+        For readers of one result. Planners, yields and whoever else asks whether a machine works leave it out.
 
     Returns
     -------
     bool array, shape (m,)
     """
-    ok = np.fromiter((ending == Ending.OK for ending in endings), dtype=np.bool_, count=len(endings))
+    counting: set[str | None] = {Ending.OK}
+    counting |= {ending for ending, names in model_of(model).without_motion.items() if result in names}
+    ok = np.fromiter((ending in counting for ending in endings), dtype=np.bool_, count=len(endings))
     return ok & ~unsettled(model, flags) if len(flags) else ok
+
+
+def usable_each(
+    model: str, endings: Sequence[str | None], flags: Sequence[str], results: Sequence[str]
+) -> dict[str, NDArray[np.bool_]]:
+    """`usable` of each of several results, by name."""
+    needs = frozenset[str]().union(*model_of(model).without_motion.values())
+    rows = usable(model, endings, flags)
+    return {name: usable(model, endings, flags, name) if name in needs else rows for name in results}
 
 
 def unsettled(model: str, flags: Sequence[str]) -> NDArray[np.bool_]:

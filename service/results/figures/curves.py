@@ -186,9 +186,10 @@ def _marks(lines: Sequence[tuple[int, Curve]], infos: Sequence[ResultInfo], regi
 
 def _regimes(curve: Curve) -> Sequence[str | None]:
     """The regime of each case; of runs of a given time, which have none, that of motions that had not settled."""
-    if curve.regimes is not None or curve.usable is None:
+    if curve.regimes is not None or not curve.usable:
         return curve.regimes or ()
-    return _not_settled(curve.endings, curve.usable)
+    # Of cases that ended ok, every result counts, or none.
+    return _not_settled(curve.endings, next(iter(curve.usable.values())))
 
 
 def _not_settled(endings: Sequence[str], usable: NDArray[np.bool_]) -> list[str | None]:

@@ -301,13 +301,16 @@ def ranges(model: str, infos: Sequence[ResultInfo], blocks: Iterable[RowBlock]) 
     computed, and that of an unstable motion is not the machine's.
     """
     columns = [index for index, info in enumerate(infos) if info.kind != "category"]
+    names = [infos[index].name for index in columns]
     every = np.arange(len(columns))
     known, total = np.zeros(every.size, dtype=np.int64), np.zeros(every.size)
     # Value and case of the least and largest value of each result.
     value = {np.less: np.full(every.size, np.inf), np.greater: np.full(every.size, -np.inf)}
     case = {better: np.zeros(every.size, dtype=np.int64) for better in value}
     for block in blocks:
-        values = np.where(models.usable(model, block.endings, block.flags)[:, None], block.values[:, columns], np.nan)
+        usable = models.usable_each(model, block.endings, block.flags, names)
+        counts = np.array([usable[name] for name in names]).reshape(len(names), len(block.endings)).T
+        values = np.where(counts, block.values[:, columns], np.nan)
         there = ~np.isnan(values)
         known += there.sum(axis=0)
         total += np.where(there, values, 0.0).sum(axis=0)

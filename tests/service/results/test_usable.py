@@ -16,11 +16,13 @@ from sprag.service.results.curves import CurveQuery
 from sprag.service.results.differences import differences
 from sprag.service.results.figures.curves import curves_figure, doubtful_marks
 from sprag.service.results.joined import joined_points
+from sprag.service.results.key_answers import answers_query, find_answers
+from sprag.service.results.report.content import ranges
 from sprag.service.results.sensitivity import sensitivity
 from sprag.service.results.tolerances.batch import Asked
 from sprag.service.results.tolerances.yields import yields
 from sprag.service.spec.document import parse_spec
-from sprag.service.storage.records import CaseColumns
+from sprag.service.storage.records import CaseColumns, RowBlock
 from sprag.worker import models
 from sprag.worker.models.usable import against
 from sprag.worker.planning.goals.plan import GoalPlan
@@ -208,3 +210,40 @@ def test_a_refined_curve_is_resolved_without_unsettled_points() -> None:
     assert np.flatnonzero(~refined.ok).tolist() == [3]
     assert np.isnan(refined.values[refined_study.SPEED][3])
     assert not refined.joined[refined_study.SPEED][2:4].any()
+
+
+def test_what_a_shaft_needs_in_order_to_turn_counts_where_it_does_not() -> None:
+    """The required inertia does not depend on the inertia that there is: 1 N*m over half a cycle, in closed form."""
+    shaft = {
+        "sprag": 1, "model": "machine-shaft",
+        "base": {
+            "cycle": "1 revolution", "mean_speed": "2 rad/s", "mean_speed_is": "midrange", "wanted_irregularity": 0.5,
+            "drive": {"inertia": "5 kg*m^2"},
+            "operation": {"quantity": "torque", "over": "angle", "steps": [{"from": 0, "to": "180 deg", "value": 2}]},
+        },
+        "axes": [{"path": "drive.inertia", "values": [0.1, 5]}],
+    }  # fmt: skip
+    study = parse_spec(shaft).study
+    infos = models.study_results(study)
+    batch = models.run_chunk(study, 0, 2)
+    places = {info.name: place for place, info in enumerate(infos)}
+
+    def fetch(cases: NDArray[np.int64], names: Sequence[str]) -> CaseColumns:
+        values = {name: batch.values[cases][:, places[name]] for name in names}
+        return CaseColumns(cases, [batch.endings[case] for case in cases.tolist()], values, [""] * len(cases))
+
+    assert list(batch.endings) == ["inertia_insufficient", "ok"]
+    query = CurveQuery("drive.inertia", ("required_inertia", "least_mean_speed", "irregularity"), (), ())
+    (curve,) = draw(select(study, infos, query), fetch).curves
+    # Energy to be stored: 1 N*m over half a turn, pi J; pi/(delta omega^2) = pi/(0.5*4).
+    assert curve.known("required_inertia") == pytest.approx([np.pi / 2.0, np.pi / 2.0], rel=1e-9)
+    assert np.isfinite(curve.shown("least_mean_speed")).all()
+    assert np.isnan(curve.known("irregularity")).tolist() == [True, False]
+    answers = find_answers(study, infos, answers_query(study, infos), "0.1 kg*m^2", fetch).curves[0].answers
+    (needed,) = (one for one in answers if one.answer.result == "required_inertia")
+    assert needed.value == pytest.approx(np.pi / 2.0, rel=1e-9)
+    block = RowBlock(infos, np.arange(2), list(batch.endings), ["", ""], batch.values)
+    least = {one.info.name: one.least for one in ranges("machine-shaft", infos, [block])}
+    assert least["required_inertia"] == pytest.approx(np.pi / 2.0, rel=1e-9)
+    # Whether the machine works is another question.
+    assert models.usable("machine-shaft", batch.endings, ["", ""]).tolist() == [False, True]

@@ -7,6 +7,7 @@ import math
 from dataclasses import replace
 from functools import cache
 from itertools import product
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
@@ -177,6 +178,17 @@ class MachineShaft(Model):
             Ending.UNSTABLE,
         }
     )
+    #: What the shaft needs in order to turn, which is asked where it does not.
+    without_motion = MappingProxyType(
+        {
+            Ending.INERTIA_INSUFFICIENT: frozenset(
+                {
+                    "least_mean_speed", "required_inertia", "required_inertia.energy", "flywheel.required_mass",
+                    "flywheel.required_diameter",
+                }
+            )
+        }
+    )  # fmt: skip
     presentation = PRESENTATION
 
     def presentation_of(self, study: Study) -> Presentation:
