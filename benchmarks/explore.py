@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks.reading import build, grid
 from sprag.service.jobs.column_files import ColumnFiles
-from sprag.service.jobs.explore import Columns
+from sprag.service.jobs.columns import Columns
 from sprag.service.json_text import to_bytes
 from sprag.service.results.explore import ExploreQuery, explore, explored_json, plan_of
 from sprag.service.results.figures.explore import explore_figure

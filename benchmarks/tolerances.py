@@ -24,7 +24,7 @@ from scipy.stats import norm, qmc
 
 from sprag.service.client import Client
 from sprag.service.jobs.batch_answers import RibbonQuery, YieldQuery, both
-from sprag.service.jobs.checks import Library
+from sprag.service.jobs.library import Library
 from sprag.service.results.explore import MOST_SHOWN
 from sprag.service.results.tolerances.quantiles import proportion, quantiles
 from sprag.service.spec.document import parse_spec

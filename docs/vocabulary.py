@@ -24,11 +24,12 @@ from sprag.service.spec.machine.shaft_parts import MECHANISM_CHOICES
 from sprag.service.spec.saved_views import PAGES
 from sprag.service.storage.scopes import TokenScope
 from sprag.worker import models
+from sprag.worker.directions import DIRECTIONS
 from sprag.worker.models.machine_shaft import REMARKS
-from sprag.worker.models.model import Model, all_models
+from sprag.worker.models.model import Model
+from sprag.worker.models.registry import all_models
 from sprag.worker.models.vocabulary import caption, caption_texts
 from sprag.worker.states import StudyState
-from sprag.worker.sweeps import DIRECTIONS
 
 #: Variables of motions by which a model finds the parts whose lines it draws.
 _SWINGING = ("pendulums.0.angle", "pendulums.1.angle", "shaft.angle")

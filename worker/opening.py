@@ -11,8 +11,7 @@ from sprag.worker.sharing import gives, takes
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from sprag.worker.ports import ActiveStudy, Clock, Executor, Store
-    from sprag.worker.sharing import Peer
+    from sprag.worker.ports import ActiveStudy, Clock, Executor, Peer, Store
     from sprag.worker.study import Study
 
 #: Number of studies active at the same time; the others wait in order of submission. Each owner may have one, however

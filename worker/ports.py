@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from sprag.worker.models import ChunkResult
     from sprag.worker.planning.rounds import Rows
     from sprag.worker.reports import ExecutorReport
-    from sprag.worker.sharing import Peer
     from sprag.worker.states import StudyState
     from sprag.worker.study import Study
 
@@ -100,6 +99,14 @@ class ActiveStudy:
     fingerprint: str = ""
     rank: int = 0
     owner: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """Another dispatcher that is at work and has usable workers: its fingerprint and its number of studies."""
+
+    fingerprint: str
+    studies: int
 
 
 class StoreError(SpragError):

@@ -7,21 +7,12 @@ of studies differ by one at most once they have settled. One that can run nothin
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from sprag.worker.ports import ActiveStudy
-
-
-@dataclass(frozen=True, slots=True)
-class Peer:
-    """Another dispatcher that is at work and has usable workers: its fingerprint and its number of studies."""
-
-    fingerprint: str
-    studies: int
+    from sprag.worker.ports import ActiveStudy, Peer
 
 
 def takes(study: ActiveStudy, fingerprint: str, studies: int, peers: Sequence[Peer], *, stuck: bool = False) -> bool:

@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 from sprag.worker.packed import packed, unpacked
 
 if TYPE_CHECKING:
-    from sprag.worker.study import Study
-
     Floats = NDArray[np.float64]
 
 #: Path of the axis of drives. It is not a parameter of any machine.
@@ -171,14 +169,3 @@ class Spread:
 
     def __repr__(self) -> str:
         return f"Spread({self.names!r}, {self.drives} drives)"
-
-
-def without_drives(study: Study) -> Study:
-    """The study of the nominal drive alone, in the order of ``study``; itself without tolerances."""
-    if study.spread is None:
-        return study
-    *places, drives = study.axes
-    if study.combine == "zip":
-        nominal = drives.array == 0.0
-        places = [type(axis)(axis.paths, axis.array[nominal]) for axis in places]
-    return replace(study, axes=tuple(places), spread=None)

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.worker.axis import SAME_VALUE, Axis
+from sprag.worker.directions import DOWN, SWEEP, UP
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_COLUMNS
 from sprag.worker.models.formulas import evaluate
 from sprag.worker.packed import packed, unpacked
 from sprag.worker.spread import DRIVE, Spread
-from sprag.worker.sweeps import check_sweep
 
 __all__ = ["SAME_VALUE", "Axis", "Combine", "Study"]
 
@@ -89,7 +89,7 @@ class Study:
         if self.combine == "zip" and len({len(axis) for axis in self.axes}) > 1:
             raise ValueError("axes that are zipped must have equal lengths")
         self._check_spread(paths)
-        check_sweep(self, paths)
+        _check_sweep(self, paths)
         own = (self.spread is not None) + (self.sweep is not None)
         most = (MAX_AXES if self.combine == "grid" else MAX_COLUMNS) + own
         if len(self.axes) > most or sum(map(len, self.axes)) > MAX_AXIS_VALUES or self.cases > MAX_CASES:
@@ -352,3 +352,31 @@ class Study:
 
 def _same(column: NDArray[np.float64], value: float) -> NDArray[np.bool_]:
     return np.asarray(np.isclose(column, value, rtol=SAME_VALUE, atol=0.0))
+
+
+def _check_sweep(study: Study, paths: Sequence[str]) -> None:
+    """Raise ValueError where a study that is swept lacks an axis, or another one has directions.
+
+    ``paths`` are those of all axes.
+    """
+    if study.sweep is None:
+        if SWEEP in paths:
+            raise ValueError("an axis of directions needs a swept axis")
+        return
+    if not study.axes or study.axes[-1].paths != (SWEEP,):
+        raise ValueError("the last axis of a swept study is that of its directions")
+    if study.sweep == SWEEP or study.sweep not in paths:
+        raise ValueError("the swept path must be on an axis")
+    if not np.isin(study.axes[-1].array, (UP, DOWN)).all():
+        raise ValueError("a direction is 0 (up) or 1 (down)")
+
+
+def without_drives(study: Study) -> Study:
+    """The study of the nominal drive alone, in the order of ``study``; itself without tolerances."""
+    if study.spread is None:
+        return study
+    *places, drives = study.axes
+    if study.combine == "zip":
+        nominal = drives.array == 0.0
+        places = [type(axis)(axis.paths, axis.array[nominal]) for axis in places]
+    return replace(study, axes=tuple(places), spread=None)

@@ -2,15 +2,16 @@
 
 The cases with equal values on all other axes and the same direction are a *line*. A line is run in the order of the
 swept values, ascending (up) or descending (down), and never split: every case needs the one before it. The direction
-is an axis with the path `SWEEP`, the last one of the study.
+is an axis with the path `sprag.worker.directions.SWEEP`, the last one of the study.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+from sprag.worker.directions import DOWN
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,34 +19,6 @@ if TYPE_CHECKING:
     from sprag.worker.study import Study
 
     Numbers = NDArray[np.int64]
-
-#: Path of the axis of directions. It is not a parameter of any machine.
-SWEEP: Final = "sweep"
-UP, DOWN = 0, 1
-#: The directions in words, by their numbers.
-DIRECTIONS: Final = ("up", "down")
-
-
-def check_sweep(study: Study, paths: Sequence[str]) -> None:
-    """Raise ValueError where a study that is swept lacks an axis, or another one has directions.
-
-    ``paths`` are those of all axes.
-    """
-    if study.sweep is None:
-        if SWEEP in paths:
-            raise ValueError("an axis of directions needs a swept axis")
-        return
-    if not study.axes or study.axes[-1].paths != (SWEEP,):
-        raise ValueError("the last axis of a swept study is that of its directions")
-    if study.sweep == SWEEP or study.sweep not in paths:
-        raise ValueError("the swept path must be on an axis")
-    if not np.isin(study.axes[-1].array, (UP, DOWN)).all():
-        raise ValueError("a direction is 0 (up) or 1 (down)")
-
-
-def direction(value: float) -> str:
-    """A value of the axis `SWEEP` in words."""
-    return DIRECTIONS[int(value)]
 
 
 def line_length(study: Study) -> int:

@@ -94,6 +94,7 @@ from sprag.service.http.web.laboratory import drive as drive_laboratory
 from sprag.service.http.web.laboratory import pages as laboratory
 from sprag.service.jobs import checks, row_files
 from sprag.service.jobs.housekeeping import Housekeeping
+from sprag.service.jobs.library import Library
 from sprag.service.jobs.reports.reporter import Reporter
 from sprag.service.jobs.reports.watchdog import Watchdog, late_runs
 from sprag.service.settings import Settings, UnsafeSettingsError
@@ -306,7 +307,7 @@ def create_app(
         used_computer,
         used_checker,
         used_writer,
-        checks.Library(used_store),
+        Library(used_store),
         check_shares=Shares(max(settings.check_processes - 1, 1), MAX_CHECKS_EACH, MAX_CHECKS),
     )
     queues = (

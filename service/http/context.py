@@ -15,7 +15,7 @@ from sprag.service.http.kept_files import KeptFiles
 from sprag.service.http.looks import Looks
 from sprag.service.http.problems import ApiError
 from sprag.service.http.shares import Shares
-from sprag.service.jobs.checks import Library
+from sprag.service.jobs.library import Library
 from sprag.service.results.unaffected import Unaffected
 from sprag.service.settings import Settings
 from sprag.service.storage.store import Store

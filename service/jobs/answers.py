@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from sprag.service.answers.calibration import CalibrationReport
-    from sprag.service.jobs.checks import Library
+    from sprag.service.jobs.library import Library
     from sprag.service.reading.reader import Choice
     from sprag.service.results.curves import Curve, CurveQuery, Curves, Map
 

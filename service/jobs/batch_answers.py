@@ -21,7 +21,7 @@ from sprag.worker import models
 
 if TYPE_CHECKING:
     from sprag.service.answers.tolerances import RibbonReport, YieldReport
-    from sprag.service.jobs.checks import Library
+    from sprag.service.jobs.library import Library
     from sprag.service.reading.reader import Choice
     from sprag.service.results.pictures.curves import Picture
 

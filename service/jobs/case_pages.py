@@ -19,7 +19,7 @@ from sprag.worker.codes import FLAG_MASKS
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from sprag.service.jobs.checks import Library
+    from sprag.service.jobs.library import Library
 
 _ALLOWED = "`next_page_token` of a page of the same order"
 

@@ -7,13 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from sprag.service.faults import FaultError, parameter_error
-from sprag.service.jobs.calibrations import Calibrations
-from sprag.service.jobs.explore import Columns, selection_spec
-from sprag.service.jobs.fronts import Fronts
+from sprag.service.jobs.explore import selection_spec
+from sprag.service.jobs.library import Library
 from sprag.service.jobs.preview import preview_json
 from sprag.service.jobs.start_from import with_start
 from sprag.service.jobs.submission import Submission, hash_of, submission
@@ -32,18 +30,15 @@ from sprag.service.spec.narrow import narrowed_spec, swept_axis
 from sprag.service.spec.report import SpecError
 from sprag.service.spec.saved_views import View, ViewChange, read_view, read_view_change
 from sprag.service.spec.stored import accepted
-from sprag.service.storage.store import Store
 from sprag.worker import models
-from sprag.worker.pool.child_process import uncounted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
     from datetime import datetime
 
     from sprag.sentences import WarningText
     from sprag.service.results.explore import ExploreQuery
     from sprag.service.spec.text import Format
-    from sprag.worker.chunking import Chunking
 
 #: Fields of a schedule by which it is paused and resumed, and the most bytes of a body with them.
 _PAUSING: Final = frozenset({"enabled", "paused_until"})
@@ -58,30 +53,6 @@ def prepare() -> None:
     """
     units.load()
     compile_elsewhere()
-
-
-class Library:
-    """Access to the stored studies; a process that receives it opens its own store.
-
-    Parameters
-    ----------
-    store : Store
-    """
-
-    def __init__(self, store: Store) -> None:
-        self.store = store
-        self.fronts = Fronts(store)
-        self.columns = Columns(store)
-        self.calibrations = Calibrations(store)
-
-    def __reduce__(self) -> tuple[Callable[[str, Chunking], Library], tuple[str, Chunking]]:
-        return _library, (self.store.session.url.render_as_string(hide_password=False), self.store.base_chunking)
-
-
-@lru_cache(maxsize=1)
-def _library(url: str, chunking: Chunking) -> Library:
-    with uncounted():
-        return Library(Store.open(url, chunking=chunking, create=False))
 
 
 def begin(library: Library) -> None:

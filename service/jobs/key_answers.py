@@ -20,7 +20,7 @@ from sprag.worker import models
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.jobs.checks import Library
+    from sprag.service.jobs.library import Library
     from sprag.service.reading.reader import Choice
     from sprag.service.results.curves import CurveQuery
     from sprag.service.results.key_answers import StudyAnswers

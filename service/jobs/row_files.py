@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from sprag.service.formats import Format, Header
-    from sprag.service.jobs.checks import Library
+    from sprag.service.jobs.library import Library
 
 
 def prepare() -> None:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from sprag.service.answers.results import ResultSensitivity
-    from sprag.service.jobs.checks import Library
+    from sprag.service.jobs.library import Library
     from sprag.service.reading.reader import Choice, Reading
     from sprag.service.results.pictures.curves import Picture
 

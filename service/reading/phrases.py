@@ -13,7 +13,7 @@ from sprag.sentences import Amount, Clause, Name, Part, Place, Sentence, Typed, 
 from sprag.service.languages import ENGLISH, earlier, gettext, language, ngettext
 from sprag.service.reading.part_names import lower_first, upper_first
 from sprag.service.reading.wording import number, unit_text
-from sprag.worker.models.model import model_of
+from sprag.worker.models.registry import model_of
 
 if TYPE_CHECKING:
     from sprag.service.reading.reader import Reading

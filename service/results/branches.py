@@ -18,12 +18,13 @@ from sprag.service.results.exports import table_csv
 from sprag.service.results.portraits import require_strobes
 from sprag.service.results.selection import ends_of_range
 from sprag.worker import models
+from sprag.worker.directions import SWEEP
 from sprag.worker.models.abilities import branch_results, run_branch
-from sprag.worker.models.branches import Along, allowed_values
+from sprag.worker.models.branches import Along
 from sprag.worker.models.common import NO_PARAMETERS, case_machine
+from sprag.worker.models.parameters import allowed_values
 from sprag.worker.models.starts import motion_of
 from sprag.worker.models.vibration_drive.start_states import is_initial
-from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

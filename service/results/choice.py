@@ -25,7 +25,7 @@ from sprag.service.results.refined import curve_plan, families, plan_along
 from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.selection import locate_axes, value_of
 from sprag.worker import models
-from sprag.worker.sweeps import SWEEP
+from sprag.worker.directions import SWEEP
 
 if TYPE_CHECKING:
     from sprag.worker.models import ResultInfo

@@ -35,8 +35,8 @@ from sprag.service.results.selection import (
 from sprag.service.results.sweeps import jumps_of_line, swept_along
 from sprag.worker import models
 from sprag.worker.codes import PENDING
+from sprag.worker.directions import SWEEP
 from sprag.worker.limits import MAX_CURVE_VALUES
-from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

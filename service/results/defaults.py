@@ -19,9 +19,9 @@ from sprag.service.results.refined import curve_plan, families
 from sprag.service.results.refined_maps import map_plan, squares
 from sprag.service.results.selection import axis_name, held_text, locate_axes, value_of
 from sprag.worker import models
+from sprag.worker.directions import SWEEP
 from sprag.worker.models import NO_PARAMETERS
 from sprag.worker.spread import DRIVE
-from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from sprag.service.reading.catalogue import unit_of
 from sprag.worker import models
-from sprag.worker.sweeps import SWEEP, direction
+from sprag.worker.directions import SWEEP, direction
 
 if TYPE_CHECKING:
     import numpy as np

@@ -13,7 +13,7 @@ from sprag.service.reading.wording import percent
 from sprag.service.results import exports
 from sprag.service.results.directions import case_values, in_words
 from sprag.service.results.selection import axis_name
-from sprag.worker.sweeps import SWEEP, direction
+from sprag.worker.directions import SWEEP, direction
 
 if TYPE_CHECKING:
     from sprag.service.reading.reader import Reading

@@ -16,9 +16,9 @@ from sprag.service.reading.texts import did_you_mean, quantity_text
 from sprag.service.reading.together import AMBIGUOUS_UNIT, question, with_unit_of_end
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
+from sprag.worker.directions import DIRECTIONS, SWEEP, direction
 from sprag.worker.spread import DRIVE
 from sprag.worker.study import SAME_VALUE
-from sprag.worker.sweeps import DIRECTIONS, SWEEP, direction
 
 if TYPE_CHECKING:
     from sprag.worker.models import ResultInfo

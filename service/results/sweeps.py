@@ -9,8 +9,8 @@ import numpy as np
 
 from sprag.service.reading.phrases import Amount, Name, Part, Phrase, joined, plural, term
 from sprag.service.reading.wording import percent
+from sprag.worker.directions import DOWN, SWEEP, direction
 from sprag.worker.models import JUMPED
-from sprag.worker.sweeps import DOWN, SWEEP, direction
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

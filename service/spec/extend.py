@@ -18,8 +18,8 @@ from sprag.service.spec.document import ParsedSpec, parse_spec
 from sprag.service.spec.fields import TOLERANCE_FIELDS, WHICH_CASES, read_object
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.report import Report, SpecError, join
-from sprag.worker.spread import without_drives
-from sprag.worker.sweeps import SWEEP
+from sprag.worker.directions import SWEEP
+from sprag.worker.study import without_drives
 
 if TYPE_CHECKING:
     from sprag.service.spec.machine.machine import Machine

@@ -8,8 +8,8 @@ import numpy as np
 
 from sprag.service.spec.axes.sweep import SWEPT, sweep_of
 from sprag.service.spec.fields import WHICH_CASES
+from sprag.worker.directions import DIRECTIONS, DOWN
 from sprag.worker.limits import MAX_NAME_LENGTH, NARROW_STEPS
-from sprag.worker.sweeps import DIRECTIONS, DOWN
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

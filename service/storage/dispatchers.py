@@ -19,8 +19,7 @@ from sprag.service.storage.part import SILENT_SECONDS, Part, announce, micros_of
 from sprag.service.storage.records import DispatcherRecord
 from sprag.service.storage.tables import CHUNKS, DISPATCHERS, STUDIES
 from sprag.worker import fingerprint
-from sprag.worker.ports import EpochLostError
-from sprag.worker.sharing import Peer
+from sprag.worker.ports import EpochLostError, Peer
 from sprag.worker.states import TERMINAL, ChunkState, StudyEvent, StudyState
 
 if TYPE_CHECKING:

@@ -12,9 +12,8 @@ from sprag.service.storage.owners import run_owner
 from sprag.service.storage.readiness import Readiness
 from sprag.service.storage.store import Store
 from sprag.worker import fingerprint
-from sprag.worker.ports import EpochLostError, Finished
+from sprag.worker.ports import EpochLostError, Finished, Peer
 from sprag.worker.reports import WorkerReport
-from sprag.worker.sharing import Peer
 from sprag.worker.states import StudyState
 from tests.contract.filling import create
 from tests.worker import fakes

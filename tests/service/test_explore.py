@@ -22,7 +22,7 @@ from sprag.service.cli import explore
 from sprag.service.client import AsyncClient, Client, RefusedError
 from sprag.service.http.web import explore as explore_pages
 from sprag.service.http.web.form.spec import spec_of
-from sprag.service.jobs.explore import Columns
+from sprag.service.jobs.columns import Columns
 from sprag.service.reading.wording import number
 from tests.conftest import ROOT, Finished
 from tests.service.conftest import API, PortalTransport, Service

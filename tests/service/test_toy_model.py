@@ -27,8 +27,9 @@ from sprag.service.storage.part import SystemClock
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.inline import InlineExecutor
 from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
-from sprag.worker.models.model import Model, model_of
+from sprag.worker.models.model import Model
 from sprag.worker.models.presentation import Presentation
+from sprag.worker.models.registry import model_of
 from sprag.worker.study import Study
 from tests.service.registered import create_table, registered
 

@@ -6,8 +6,8 @@ from random import Random
 
 import pytest
 
-from sprag.worker.ports import ActiveStudy
-from sprag.worker.sharing import Peer, gives, takes
+from sprag.worker.ports import ActiveStudy, Peer
+from sprag.worker.sharing import gives, takes
 from sprag.worker.states import StudyState
 
 

@@ -53,8 +53,9 @@ from sprag.worker.models.common import (
     KernelShape,
     WorkerEnding,
 )
-from sprag.worker.models.model import Model, all_models, model_names, model_of, register, unregister
+from sprag.worker.models.model import Model
 from sprag.worker.models.presentation import Panel, Presentation, Reference
+from sprag.worker.models.registry import all_models, model_names, model_of, register, unregister
 from sprag.worker.models.tasks import chunk_task, run_chunk, run_task
 from sprag.worker.models.usable import half_width, unsettled, usable, usable_each, with_half_widths
 from sprag.worker.models.vibration_drive import (

@@ -5,9 +5,9 @@ Every function is a module's own, so that another process can run it.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-from sprag.worker.models.model import model_of
+from sprag.worker.models.registry import model_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from sprag.engine.outcome import Basin, Engagements, Portrait
     from sprag.worker.models.branches import Along, CaseBranch
     from sprag.worker.models.common import KernelShape
+    from sprag.worker.models.model import Strobes, Transients
     from sprag.worker.models.sections import CaseSections, Sampling
     from sprag.worker.models.turns import CaseTurn
     from sprag.worker.study import Study
@@ -24,62 +25,6 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 Ability = TypeVar("Ability")
-
-
-class Clutches(Protocol):
-    """The machines of a model have clutches."""
-
-    def engagements(self, study: Study, case: int) -> Engagements:
-        """Engagements of the clutches of one case."""
-        ...
-
-
-class Strobes(Protocol):
-    """The cases of a model have strobes, one state per excitation period, and begin with initial values."""
-
-    def portrait(self, study: Study, case: int) -> Portrait:
-        """How one case approaches its motion."""
-        ...
-
-    def turn(self, study: Study, case: int, points: int) -> CaseTurn:
-        """The settled motion of a case of a settled study."""
-        ...
-
-    def branch(self, study: Study, case: int, along: Along) -> CaseBranch:
-        """The branch through the settled motion of a case."""
-        ...
-
-    def branch_results(self, study: Study) -> tuple[str, ...]:
-        """Names of the results of a branch."""
-        ...
-
-    def sections(self, study: Study, case: int, asked: Sampling) -> CaseSections:
-        """Strobes of settled motions along a parameter of a case."""
-        ...
-
-    def basin(self, study: Study, case: int, paths: tuple[str, str], x: Floats, y: Floats) -> Basin:
-        """The regimes to which one case comes from a grid of the initial values ``x`` and ``y`` (SI) of two paths."""
-        ...
-
-    def end_state(self, study: Study, case: int) -> dict[str, float] | None:
-        """Initial values (SI) by path that go on from the end of one case; None where it does not end ok."""
-        ...
-
-
-class Transients(Protocol):
-    """The machines of a model run up, are loaded anew and coast over time, beside their cases."""
-
-    def has_motor(self, study: Study) -> bool:
-        """Whether a motor drives the machine, whose torque follows the speed."""
-        ...
-
-    def shape(self, study: Study) -> KernelShape:
-        """The kernel of transients, which is compiled apart from that of the cases."""
-        ...
-
-    def run(self, study: Study, case: int, course: Course, points: int) -> Transient:
-        """A transient of a case with ``points`` equally spaced times."""
-        ...
 
 
 def has_clutches(study: Study) -> bool:

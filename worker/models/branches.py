@@ -7,16 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.worker.models.common import case_machine
-from sprag.worker.models.formulas import evaluate
-from sprag.worker.models.parameters import parameter_of
-
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from numpy.typing import ArrayLike, NDArray
-
-    from sprag.worker.study import Study
+    from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,24 +78,3 @@ class CaseBranch:
     specials: tuple[SpecialPoint, ...]
     ends: tuple[str, str]
     note: str = ""
-
-
-def machines_along(
-    study: Study, case: int, paths: tuple[str, ...]
-) -> Callable[[NDArray[np.float64]], Mapping[str, ArrayLike]]:
-    """The machine of a case for values of some of its parameters, with what is derived from them."""
-    own = case_machine(study, case)
-
-    def machines(values: NDArray[np.float64]) -> Mapping[str, ArrayLike]:
-        found = dict.fromkeys(paths, values)
-        return {**own, **found, **evaluate(study.derive, own, found, len(values))}
-
-    return machines
-
-
-def allowed_values(study: Study, paths: tuple[str, ...]) -> tuple[float, float]:
-    """Smallest and largest value (SI) that all parameters allow."""
-    entries = [parameter_of(study, path) for path in paths]
-    lows = [entry.low for entry in entries if entry is not None]
-    highs = [entry.high for entry in entries if entry is not None]
-    return max(lows, default=-np.inf), min(highs, default=np.inf)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag.engine.endings import ENDINGS
+from sprag.worker.directions import SWEEP
 from sprag.worker.spread import DRIVE
-from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""The interface of a model, and the registry of models."""
+"""The interface of a model, and of what only some models can do."""
 
 from __future__ import annotations
 
@@ -15,12 +15,71 @@ if TYPE_CHECKING:
 
     from sprag.engine import Ending
     from sprag.engine.catalogue import Parameter, ResultInfo
-    from sprag.engine.outcome import Trajectory
-    from sprag.worker.models.abilities import Clutches, Strobes, Transients
+    from sprag.engine.machine_shaft.transient_course import Course, Transient
+    from sprag.engine.outcome import Basin, Engagements, Portrait, Trajectory
+    from sprag.worker.models.branches import Along, CaseBranch
     from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
+    from sprag.worker.models.sections import CaseSections, Sampling
+    from sprag.worker.models.turns import CaseTurn
     from sprag.worker.study import Study
 
     Floats = NDArray[np.float64]
+
+
+class Clutches(Protocol):
+    """The machines of a model have clutches."""
+
+    def engagements(self, study: Study, case: int) -> Engagements:
+        """Engagements of the clutches of one case."""
+        ...
+
+
+class Strobes(Protocol):
+    """The cases of a model have strobes, one state per excitation period, and begin with initial values."""
+
+    def portrait(self, study: Study, case: int) -> Portrait:
+        """How one case approaches its motion."""
+        ...
+
+    def turn(self, study: Study, case: int, points: int) -> CaseTurn:
+        """The settled motion of a case of a settled study."""
+        ...
+
+    def branch(self, study: Study, case: int, along: Along) -> CaseBranch:
+        """The branch through the settled motion of a case."""
+        ...
+
+    def branch_results(self, study: Study) -> tuple[str, ...]:
+        """Names of the results of a branch."""
+        ...
+
+    def sections(self, study: Study, case: int, asked: Sampling) -> CaseSections:
+        """Strobes of settled motions along a parameter of a case."""
+        ...
+
+    def basin(self, study: Study, case: int, paths: tuple[str, str], x: Floats, y: Floats) -> Basin:
+        """The regimes to which one case comes from a grid of the initial values ``x`` and ``y`` (SI) of two paths."""
+        ...
+
+    def end_state(self, study: Study, case: int) -> dict[str, float] | None:
+        """Initial values (SI) by path that go on from the end of one case; None where it does not end ok."""
+        ...
+
+
+class Transients(Protocol):
+    """The machines of a model run up, are loaded anew and coast over time, beside their cases."""
+
+    def has_motor(self, study: Study) -> bool:
+        """Whether a motor drives the machine, whose torque follows the speed."""
+        ...
+
+    def shape(self, study: Study) -> KernelShape:
+        """The kernel of transients, which is compiled apart from that of the cases."""
+        ...
+
+    def run(self, study: Study, case: int, course: Course, points: int) -> Transient:
+        """A transient of a case with ``points`` equally spaced times."""
+        ...
 
 
 class Model(Protocol):
@@ -154,36 +213,3 @@ class Model(Protocol):
     def known_answers(self, shape: KernelShape) -> bytes:
         """Results of a short case by the loaded kernel of that shape; the same bytes on every sound processor."""
         return b""
-
-
-_MODELS: dict[str, Model] = {}
-
-
-def register(model: Model) -> None:
-    """Register a model. Raises ValueError where its name is taken."""
-    if model.name in _MODELS:
-        raise ValueError(f"there already is a model {model.name!r}")
-    _MODELS[model.name] = model
-
-
-def unregister(name: str) -> None:
-    """Remove a model; KeyError for an unknown name."""
-    del _MODELS[name]
-
-
-def model_of(name: str) -> Model:
-    """The model of that name; ValueError for an unknown name."""
-    try:
-        return _MODELS[name]
-    except KeyError:
-        raise ValueError(f"unknown model {name!r}; known models: {', '.join(_MODELS)}") from None
-
-
-def model_names() -> tuple[str, ...]:
-    """Names of all models."""
-    return tuple(_MODELS)
-
-
-def all_models() -> tuple[Model, ...]:
-    """Every model."""
-    return tuple(_MODELS.values())

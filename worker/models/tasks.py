@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sprag.worker.models.common import NO_PARAMETERS, ChunkResult, ChunkTask, WorkerEnding, run_accepted
-from sprag.worker.models.model import model_of
 from sprag.worker.models.parameters import refused_cases
+from sprag.worker.models.registry import model_of
 from sprag.worker.sweeps import lines_of
 
 if TYPE_CHECKING:

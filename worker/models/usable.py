@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 
 from sprag.engine import Ending
-from sprag.worker.models.model import model_of
+from sprag.worker.models.registry import model_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

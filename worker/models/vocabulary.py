@@ -7,10 +7,10 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Final
 
-from sprag.worker.models.model import model_of
+from sprag.worker.directions import SWEEP
 from sprag.worker.models.parameters import general_path, model_parameter
+from sprag.worker.models.registry import model_of
 from sprag.worker.spread import DRIVE
-from sprag.worker.sweeps import SWEEP
 
 _HALF_WIDTH: Final = ".half_width"
 #: Caption of the half width of a mean.

@@ -8,8 +8,8 @@ import numpy as np
 
 from sprag.worker.models.usable import half_width
 from sprag.worker.models.vibration_drive.settled import IRREGULAR
+from sprag.worker.planning.goals.draws import logarithm
 from sprag.worker.planning.refine_plan import MULTIPLIER, ORDER, REGIME, SETTLED_AFTER
-from sprag.worker.planning.transients import settling
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -27,6 +27,18 @@ if TYPE_CHECKING:
 _CONSTANT: Final = 1e-7
 #: Code of a case without results; those of regimes are not negative.
 FAILED: Final = -1.0
+#: Multipliers of settled motions that count as these.
+_LEAST, _MOST = 0.01, 0.99999
+
+
+def settling(after: Floats, multiplier: Floats, order: Floats) -> Floats:
+    """Logarithm of the settling time, in times that the distance shrinks by the factor e; NaN where nothing settles.
+
+    ``after`` are periods until the motion is settled, ``multiplier`` is that of the distance from it in ``order``
+    periods.
+    """
+    rate = -logarithm(np.clip(multiplier, _LEAST, _MOST)) / order
+    return logarithm(np.maximum(after, 1.0) * rate)
 
 
 class Samples:
@@ -42,7 +54,7 @@ class Samples:
     regimes, orders : float64 arrays, shape (combinations, places...)
         Regime, or `FAILED`, and order; 0 in studies that are not settled.
     settling : float64 array, shape (combinations, places...)
-        As of `sprag.worker.planning.transients.settling`; NaN where nothing settles.
+        As of `settling`; NaN where nothing settles.
     multipliers : float64 array, shape (combinations, places...)
         Those of the settled motions; 0 where nothing settles.
     has_width : bool array, shape (results,)

@@ -13,8 +13,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.worker.planning.goals.draws import logarithm
-
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -30,18 +28,6 @@ ROUGH: Final = 0.05
 _SENSITIVE: Final = 0.08
 #: A motion whose multiplier is larger is about to lose its stability: beside a jump it may be lost for a while.
 _WEAK: Final = 0.95
-#: Multipliers that count as these.
-_LEAST, _MOST = 0.01, 0.99999
-
-
-def settling(after: Floats, multiplier: Floats, order: Floats) -> Floats:
-    """Logarithm of the settling time, in times that the distance shrinks by the factor e; NaN where nothing settles.
-
-    ``after`` are periods until the motion is settled, ``multiplier`` is that of the distance from it in ``order``
-    periods.
-    """
-    rate = -logarithm(np.clip(multiplier, _LEAST, _MOST)) / order
-    return logarithm(np.maximum(after, 1.0) * rate)
 
 
 def roughness(left: Floats, middle: Floats, right: Floats) -> Floats:

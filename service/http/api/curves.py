@@ -38,7 +38,7 @@ from sprag.worker import models
 from sprag.worker.limits import MAX_STARTS
 
 if TYPE_CHECKING:
-    from sprag.service.jobs.checks import Library
+    from sprag.service.jobs.library import Library
     from sprag.service.reading.reader import Choice
     from sprag.service.storage.records import StudyRecord
     from sprag.worker.study import Study

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
     from sprag.service.answers.explore import Exploration
     from sprag.service.faults import Fault
-    from sprag.service.jobs.checks import Library
+    from sprag.service.jobs.library import Library
     from sprag.service.storage.records import StudyRecord
     from sprag.worker.study import Study
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from sprag.service.answers.goals import Design, FrontReport
     from sprag.service.faults import Fault
-    from sprag.service.jobs.checks import Library
+    from sprag.service.jobs.library import Library
     from sprag.service.results.fronts import Designs
     from sprag.worker.study import Study
 

@@ -10,7 +10,7 @@ from sprag.service.faults import SelectionError
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.results.defaults import MOST_CHOICES
 from sprag.service.results.selection import value_of
-from sprag.worker.sweeps import DIRECTIONS, SWEEP
+from sprag.worker.directions import DIRECTIONS, SWEEP
 
 if TYPE_CHECKING:
     from sprag.service.reading.reader import Reading

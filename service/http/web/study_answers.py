@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from sprag.service.faults import Fault
-    from sprag.service.jobs.checks import Library
+    from sprag.service.jobs.library import Library
     from sprag.service.reading.phrases import Phrase
     from sprag.service.reading.reader import Choice, Reading
     from sprag.service.results.curves import CurveQuery

@@ -12,7 +12,7 @@ import pyarrow as pa
 
 from sprag.service.results.exports.inputs import column_description
 from sprag.service.results.exports.source import machine
-from sprag.worker.sweeps import SWEEP
+from sprag.worker.directions import SWEEP
 
 if TYPE_CHECKING:
     from sprag.service.results.exports.source import Source

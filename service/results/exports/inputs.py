@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, Literal
 from sprag.service.languages import N_
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.spec.machine.registry import part_of
+from sprag.worker.directions import SWEEP
 from sprag.worker.models.parameters import parameter_of
 from sprag.worker.spread import DRIVE
-from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
     from sprag.worker.study import Study

@@ -19,7 +19,7 @@ from sprag.service.results.exports.source import machine
 from sprag.service.results.exports.spool import require_room, spooled
 from sprag.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, flags_mask
 from sprag.worker.derived import blocks
-from sprag.worker.sweeps import DIRECTIONS, DOWN, SWEEP, UP
+from sprag.worker.directions import DIRECTIONS, DOWN, SWEEP, UP
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

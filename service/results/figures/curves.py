@@ -15,8 +15,8 @@ from sprag.service.results.refined import jumps_of, sentence
 from sprag.service.results.regimes import DOUBTFUL, MARKED, UNSETTLED, regimes_of
 from sprag.service.results.sweeps import hysteresis, values_text, without_direction
 from sprag.worker.codes import PENDING
+from sprag.worker.directions import SWEEP
 from sprag.worker.models import Ending, WorkerEnding
-from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

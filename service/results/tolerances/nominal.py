@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from sprag.worker.spread import DRIVE, without_drives
+from sprag.worker.spread import DRIVE
+from sprag.worker.study import without_drives
 
 if TYPE_CHECKING:
     import numpy as np

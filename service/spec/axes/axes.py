@@ -17,11 +17,11 @@ from sprag.service.spec.described import Listed
 from sprag.service.spec.fields import read_object, read_one
 from sprag.service.spec.machine.machine import Machine
 from sprag.service.spec.report import Report, join
+from sprag.worker.directions import SWEEP
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_TIED_PATHS
 from sprag.worker.models import Parameter
 from sprag.worker.models.parameters import in_range
 from sprag.worker.study import Axis, Combine
-from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -10,10 +10,10 @@ from sprag.service.spec.described import choice
 from sprag.service.spec.plan.outline import chooses
 from sprag.service.spec.report import Report, join
 from sprag.worker import models
+from sprag.worker.directions import DOWN, SWEEP, UP
 from sprag.worker.limits import MAX_CASES
 from sprag.worker.models.vibration_drive.start_states import is_initial
 from sprag.worker.study import Axis
-from sprag.worker.sweeps import DOWN, SWEEP, UP
 
 if TYPE_CHECKING:
     from sprag.worker.study import Study

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from sprag.engine.machine_shaft.sketch import Sketch
     from sprag.engine.machine_shaft.transient_course import Course, Transient
     from sprag.engine.outcome import Trajectory
-    from sprag.worker.models.abilities import Transients
+    from sprag.worker.models.model import Transients
     from sprag.worker.models.presentation import Presentation
     from sprag.worker.study import Study
 

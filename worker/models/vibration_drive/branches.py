@@ -8,15 +8,9 @@ import numpy as np
 
 from sprag.engine.vibration_drive.cases import pendulum_count
 from sprag.engine.vibration_drive.results import orbit_infos
-from sprag.worker.models.branches import (
-    Along,
-    BranchContact,
-    CaseBranch,
-    SpecialPoint,
-    allowed_values,
-    machines_along,
-)
+from sprag.worker.models.branches import Along, BranchContact, CaseBranch, SpecialPoint
 from sprag.worker.models.common import case_machine
+from sprag.worker.models.parameters import allowed_values, machines_along
 from sprag.worker.models.vibration_drive.settled import settings_of, settled_study
 from sprag.worker.models.vibration_drive.swept import start_of
 

@@ -56,8 +56,8 @@ if TYPE_CHECKING:
     from sprag.engine.catalogue import Parameter
     from sprag.engine.outcome import Basin, Engagements, Portrait, Trajectory
     from sprag.engine.run import Reset, Unit
-    from sprag.worker.models.abilities import Clutches, Strobes
     from sprag.worker.models.branches import Along, CaseBranch
+    from sprag.worker.models.model import Clutches, Strobes
     from sprag.worker.models.sections import CaseSections, Sampling
     from sprag.worker.models.turns import CaseTurn
     from sprag.worker.study import Study

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sprag.engine.vibration_drive.regimes import Regime
-from sprag.worker.models.branches import machines_along
+from sprag.worker.models.parameters import machines_along
 from sprag.worker.models.sections import CaseSections, Sampling
 from sprag.worker.models.vibration_drive.settled import settings_of, settled_study
 from sprag.worker.models.vibration_drive.swept import start_of

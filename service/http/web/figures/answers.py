@@ -31,7 +31,7 @@ from sprag.worker import models
 
 if TYPE_CHECKING:
     from sprag.service.jobs.batch_answers import RibbonQuery, YieldQuery
-    from sprag.service.jobs.checks import Library
+    from sprag.service.jobs.library import Library
     from sprag.service.reading.reader import Choice, Reading
     from sprag.service.results.basins import BasinQuery
     from sprag.service.results.curves import CurveQuery

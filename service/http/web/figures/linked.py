@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.worker import models
-from sprag.worker.sweeps import DIRECTIONS, SWEEP
+from sprag.worker.directions import DIRECTIONS, SWEEP
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sprag.service.http.web.form.check import Checked, look_over
-from sprag.service.jobs.checks import Library
+from sprag.service.jobs.library import Library
 from sprag.service.jobs.submission import Submission, submission
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from sprag.service.languages.catalogue import Catalogue, Entry, Key
 from sprag.service.spec.described import ANY_RUN, SETTLED_RUN
 from sprag.service.spec.machine.choices import MEANINGS
 from sprag.worker.models import ENDING_SENTENCES, REGIME_SENTENCES
-from sprag.worker.models.model import all_models
+from sprag.worker.models.registry import all_models
 from tests.service.http.web.test_accessibility import LONG, PAGES, studies
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.jobs import answers, key_answers
-from sprag.service.jobs.checks import Library
+from sprag.service.jobs.library import Library
 from sprag.service.presets import preset_text
 from sprag.service.reading.reader import Choice
 from sprag.service.results.curves import CurveQuery

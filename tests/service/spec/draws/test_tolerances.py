@@ -15,8 +15,8 @@ from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.longer import longer_spec
 from sprag.service.spec.schema.document import spec_schema
 from sprag.worker.models.parameters import in_range, parameter_of
-from sprag.worker.spread import DRIVE, Spread, without_drives
-from sprag.worker.study import Study
+from sprag.worker.spread import DRIVE, Spread
+from sprag.worker.study import Study, without_drives
 from tests.service.spec_sample import changed, parsed, problems
 
 LOADS = [{"path": "shaft.load", "values": [0.05, 0.1, 0.2]}]
