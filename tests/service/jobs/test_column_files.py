@@ -13,7 +13,8 @@ from anyio.from_thread import BlockingPortal
 
 from sprag.service.http import read_ahead as ahead
 from sprag.service.http.read_ahead import read_ahead
-from sprag.service.jobs import columns, explore
+from sprag.service.jobs import columns as module
+from sprag.service.jobs import explore
 from sprag.service.jobs.column_files import ColumnFiles
 from sprag.service.jobs.columns import Columns
 from sprag.service.storage.columns import RowColumns
@@ -107,7 +108,7 @@ def test_a_folder_that_cannot_be_written_is_no_failure(tmp_path: Path) -> None:
 def test_an_ended_study_is_read_once_until_it_has_run_again(
     service: Service, spec: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(columns, "LARGE", 5)
+    monkeypatch.setattr(module, "LARGE", 5)
     study_id = service.submit(spec)
     service.fill(study_id)
     reads, read = list[list[str]](), service.store.row_columns
@@ -131,7 +132,7 @@ def test_columns_are_read_ahead_once_a_study_has_ended(
     service: Service, spec: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, portal: BlockingPortal
 ) -> None:
     context = service.app.state.context
-    monkeypatch.setattr(columns, "LARGE", 5)
+    monkeypatch.setattr(module, "LARGE", 5)
     columns = Columns(service.store, ColumnFiles(tmp_path / "columns"))
     monkeypatch.setattr(context.library, "columns", columns)
     study_id = service.submit(spec)
