@@ -143,7 +143,7 @@ def locate_axes(study: Study, at: Sequence[tuple[str, str]], parameter: str = "a
             continue
         index = study.axes[position].index_of(value)
         if index is None:
-            values = np.sort(study.axes[position].array).tolist()
+            values = np.unique(study.axes[position].array).tolist()
             known = listed(map(direction, values) if path == SWEEP else values)
             message = "the axis has no such value"
             raise refused(parameter, "unknown-value", message, f"{path}={text}", allowed=known, unit=unit)

@@ -188,3 +188,11 @@ def test_a_machine_shaft_of_two_columns() -> None:
     (other,) = {*paths} - {query.x}
     for line in lines:
         assert {study.case_parameters(case)[other] for case in line.cases.tolist()} == {line.by[other]}
+
+
+def test_a_value_that_no_case_has_is_refused_with_each_value_once(spec: dict[str, Any]) -> None:
+    study = table(spec, "points")
+    query = CurveQuery(LOAD, ("shaft.speed.mean",), (), ((FREQUENCY, "23 Hz"),))
+    with pytest.raises(SelectionError) as refused:
+        select(study, models.study_results(study), query)
+    assert refused.value.faults[0].allowed == "20.0, 22.0, 25.0"
