@@ -17,7 +17,7 @@ from sprag.engine import Ending
 from sprag.worker.models.registry import model_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -89,8 +89,3 @@ def against(
     if kind == "is":
         return np.asarray(values + np.copysign(wide, values - bound))
     return np.asarray(values - wide if kind == "at_least" else values + wide)
-
-
-def of_columns(name: str, columns: Mapping[str, Floats]) -> Floats | None:
-    """The half widths of a result among its columns; None where it has none."""
-    return columns.get(half_width(name))

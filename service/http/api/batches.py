@@ -46,7 +46,6 @@ By = Annotated[
     list[str] | None,
     Query(description="axis with one line for each of its values; may be repeated"),
 ]
-AsMap = Annotated[bool, Query(alias="map", description="of a picture: a map over `x` and the axis `by`")]
 Probability = Annotated[float, Field(gt=0.0, lt=1.0)]
 
 
