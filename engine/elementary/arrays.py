@@ -13,13 +13,25 @@ from typing import Final, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sprag.engine.elementary.functions import (
+    ARCCOS,
+    ARCSIN,
+    ARCTAN,
+    ARCTAN2,
+    COS,
+    COSH,
+    EXP,
+    LOG,
+    POWER,
+    SIN,
+    SINH,
+    TAN,
+    TANH,
+)
 from sprag.engine.taylor.straight import LARGEST_ANGLE
 
 Floats = NDArray[np.float64]
 
-#: Functions of one variable, and of two, by the numbers that compiled code has for them.
-SIN, COS, TAN, ARCSIN, ARCCOS, ARCTAN, EXP, LOG, SINH, COSH, TANH = range(11)
-ARCTAN2, POWER = range(2)
 #: Binary digits of pi for angles of any size.
 _DIGITS: Final = 1_200
 

@@ -5,19 +5,7 @@ from numpy.typing import NDArray
 
 from sprag.engine.compile.jit import compiled
 from sprag.engine.elementary.angles import arccosine, arcsine, arctangent, arctangent_of, cosine, sine, tangent
-from sprag.engine.elementary.arrays import (
-    ARCCOS,
-    ARCSIN,
-    ARCTAN,
-    ARCTAN2,
-    COS,
-    COSH,
-    EXP,
-    LOG,
-    SIN,
-    SINH,
-    TAN,
-)
+from sprag.engine.elementary.functions import ARCCOS, ARCSIN, ARCTAN, ARCTAN2, COS, COSH, EXP, LOG, SIN, SINH, TAN
 from sprag.engine.elementary.powers import (
     exponential,
     hyperbolic_cosine,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
+from sprag.service.cli.configured import read_settings
 from sprag.service.cli.console import WrongInputError, say, show_table, warning_lines, write_json, write_text
 from sprag.service.cli.file_formats import file_format
 from sprag.service.cli.files import MAX_DATA_BYTES, decode, read_bytes, read_spec, spec_failure, write_pieces
@@ -26,7 +27,6 @@ from sprag.service.cli.options import (
 from sprag.service.cli.pictures import heading
 from sprag.service.cli.remote import connection
 from sprag.service.cli.running import run_parsed
-from sprag.service.cli.settings import read_settings
 from sprag.service.cli.stores import store_of
 from sprag.service.faults import Fault
 from sprag.service.languages import N_, _

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sprag.service.cli.configured import read_settings
 from sprag.service.cli.console import ExitCode, TroubleError, WrongInputError, say, write_json
 from sprag.service.cli.files import write_pieces
 from sprag.service.cli.groups import Groups
 from sprag.service.cli.options import Database, JsonFlag, OutputFile
-from sprag.service.cli.settings import read_settings
 from sprag.service.cli.stores import database_of, named_store
 from sprag.service.faults import FaultError
 from sprag.service.languages import _

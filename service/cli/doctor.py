@@ -16,9 +16,9 @@ from typing import Annotated, Any
 
 import typer
 
+from sprag.service.cli.configured import read_settings
 from sprag.service.cli.console import ExitCode, WrongInputError, console, write_json, write_text
 from sprag.service.cli.options import Database, JsonFlag
-from sprag.service.cli.settings import read_settings
 from sprag.service.faults import Fault
 from sprag.service.languages import N_, _, decimal, recorded
 from sprag.worker.limits import MAX_TOLERANCE, MIN_TOLERANCE

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sprag.service.cli import completion
+from sprag.service.cli.configured import read_settings
 from sprag.service.cli.console import (
     ExitCode,
     WrongInputError,
@@ -43,7 +44,6 @@ from sprag.service.cli.options import (
     ValueFormatOption,
 )
 from sprag.service.cli.running import run_parsed
-from sprag.service.cli.settings import read_settings
 from sprag.service.faults import Fault, warned
 from sprag.service.languages import N_, _, decimal
 from sprag.worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS

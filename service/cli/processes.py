@@ -9,9 +9,9 @@ from typing import Annotated
 import typer
 
 from sprag.service import languages
+from sprag.service.cli.configured import read_settings
 from sprag.service.cli.console import TroubleError, WrongInputError, write_json
 from sprag.service.cli.options import ChunkCases, Database, JsonFlag, Processes
-from sprag.service.cli.settings import read_settings
 from sprag.service.cli.stores import database_of
 
 Host = Annotated[

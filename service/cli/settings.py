@@ -1,4 +1,4 @@
-"""The settings of a command: from its options, the environment, the file of settings, the defaults, in this order."""
+"""``sprag settings``: every setting, its value, and where it comes from."""
 
 from __future__ import annotations
 
@@ -7,44 +7,14 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Final
 
+from sprag.service.cli.configured import read_settings
 from sprag.service.cli.console import WrongInputError, show_table, write_json
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag
 from sprag.service.faults import Fault
 from sprag.service.languages import N_, _
-from sprag.service.reading.texts import shorten
 
 if TYPE_CHECKING:
-    from sprag.service.settings import Settings
-
-
-def read_settings(**options: object) -> Settings:
-    """The settings, overridden by the given options.
-
-    Raises WrongInputError with every invalid setting, named by its environment variable or option.
-    """
-    from pydantic import ValidationError
-
-    from sprag.service.settings import ENV_PREFIX, Settings, SettingsFileError, is_secret
-
-    given = {name: value for name, value in options.items() if value is not None}
-    try:
-        return Settings(**given)  # type: ignore[arg-type]
-    except SettingsFileError as error:
-        raise WrongInputError("invalid-settings", str(error)) from error
-    except ValidationError as error:
-        problems = []
-        for item in error.errors(include_url=False):
-            name = str(item["loc"][0])
-            value = None if is_secret(name) else shorten(item.get("input"))
-            problems.append(
-                Fault(
-                    ENV_PREFIX + name.upper(),
-                    "wrong-type" if item["type"] == "missing" else "invalid-text",
-                    item["msg"].removeprefix("Value error, "),
-                    value,
-                )
-            )
-        raise WrongInputError("invalid-settings", _("invalid setting"), problems) from error
+    pass
 
 
 #: Environment variables that are not settings of the service, each with its meaning.

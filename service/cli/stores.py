@@ -5,8 +5,8 @@ from __future__ import annotations
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from sprag.service.cli.configured import read_settings
 from sprag.service.cli.console import WrongInputError, say
-from sprag.service.cli.settings import read_settings
 from sprag.service.languages import _
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import pytest
 from pydantic import ValidationError
 
+from sprag.service.cli.configured import read_settings
 from sprag.service.cli.console import WrongInputError
-from sprag.service.cli.settings import read_settings
 from sprag.service.settings import Settings, available_cores, default_database_path, shown, table
 
 if TYPE_CHECKING:

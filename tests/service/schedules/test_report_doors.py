@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from pydantic import SecretStr, ValidationError
 
+from sprag.service.cli.configured import read_settings
 from sprag.service.cli.console import WrongInputError
-from sprag.service.cli.settings import read_settings
 from sprag.service.delivery import is_mail_address, mail_server, origin_of
 from sprag.service.http.app import chunking, create_app
 from sprag.service.jobs.maintenance import Maintenance, MaintenancePlan
