@@ -88,12 +88,13 @@ def is_ambiguous(text: str) -> bool:
 def in_language(text: str) -> str:
     """A text that somebody types on a page: where the language writes decimal commas, a comma in its number is one.
 
-    Such a language prints 1.234 as ``1,234`` and never separates thousands by a comma.
+    Such a language prints 1.234 as ``1,234`` and never separates thousands by a comma. A further decimal says so to the
+    numbers that stand beside it: in ``1,234; 2.500`` the point separates thousands.
     """
     if decimal(".") != ",":
         return text
     typed = keyboard(text)
-    return typed.replace(",", ".", 1) if is_ambiguous(typed) else text
+    return _NUMBER.sub(r"\g<0>0", typed, count=1) if is_ambiguous(typed) else text
 
 
 def could_be_one(text: str) -> bool:

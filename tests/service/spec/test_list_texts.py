@@ -212,3 +212,18 @@ def test_a_range_as_one_text_is_refused_with_what_to_write(changes: dict[str, An
     with language("uk"):
         assert allowed_text(allowed).startswith("список ")
         assert allowed_text(allowed).endswith(example)
+
+
+def test_a_comma_of_a_language_with_decimal_commas_is_certain_for_its_list() -> None:
+    ends = {"way": "linspace", "from": "1,000", "to": "5,000", "count": "5"}
+    with language("uk"):
+        mixed = check_form(form(way="values", values="1,250; 2.500 N*mm"), Chunking())
+        between = check_form(form(**ends), Chunking())
+        one = check_form(form(way="values", values="1,250 N*mm"), Chunking())
+    assert mixed.parsed is not None
+    assert mixed.parsed.study.axes[0].array.tolist() == pytest.approx([0.00125, 2.5])
+    assert between.parsed is not None
+    assert between.parsed.study.axes[0].array.tolist() == [1.0, 2.0, 3.0, 4.0, 5.0]
+    assert one.spec["axes"][0]["values"] == ["1.2500 N*mm"]
+    assert not [note for found in (mixed, between, one) for note in (*found.notes, *found.warnings)]
+    assert not [note for found in (mixed, between, one) if found.parsed for note in found.parsed.warnings]

@@ -19,7 +19,9 @@ _WHOLE: Final = re.compile(r"[+-]?[0-9]{1,18}")
 
 def plain(text: str) -> Any:
     """A field's text for the spec: a number where it is one, otherwise the text with its unit."""
-    text = in_language(text.strip())
+    typed = text.strip()
+    text = in_language(typed)
+    text = text if text == typed else with_point(text)
     number = with_point(keyboard(text).replace("\N{MINUS SIGN}", "-"))
     if _WHOLE.fullmatch(number):
         return int(number)
