@@ -5,17 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from sprag.service.cli.configured import read_settings
 from sprag.service.cli.console import WrongInputError, show_table, write_json
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag
 from sprag.service.faults import Fault
 from sprag.service.languages import N_, _
-
-if TYPE_CHECKING:
-    pass
-
 
 #: Environment variables that are not settings of the service, each with its meaning.
 VARIABLES: Final = {
