@@ -73,9 +73,24 @@ class Clause:
         return str(self.sentence).removesuffix(".")
 
 
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """A clause as a sentence of its own, with a capital and a full stop."""
+
+    clause: str
+
+    def __str__(self) -> str:
+        return whole(str(self.clause))
+
+
+def whole(text: str) -> str:
+    """A clause with a capital and a full stop."""
+    return f"{text[:1].upper()}{text[1:]}{'' if text.endswith('.') else '.'}"
+
+
 #: What stands for a place of a sentence. Whole numbers are counts, with separated thousands; any other text is a word
 #: that is the same in every language.
-Part = str | int | Amount | Name | Place | Typed | Clause
+Part = str | int | Amount | Name | Place | Typed | Clause | Whole
 _KINDS: Final = {kind.__name__.lower(): kind for kind in (Amount, Name, Place, Typed)}
 
 
@@ -135,6 +150,8 @@ def _part_to_json(part: Part) -> Any:
         return {"sentence": part.to_json()}
     if isinstance(part, Clause):
         return {"clause": _part_to_json(part.sentence)}
+    if isinstance(part, Whole):
+        return {"whole": _part_to_json(part.clause)}
     return part if isinstance(part, str | int) else {type(part).__name__.lower(): asdict(part)}
 
 
@@ -144,8 +161,9 @@ def _part_of(data: Any) -> Part:
     ((kind, fields),) = data.items()
     if kind == "sentence":
         return sentence_of(fields)
-    if kind == "clause":
-        return Clause(str(fields) if isinstance(fields, str) else sentence_of(fields["sentence"]))
+    if kind in {"clause", "whole"}:
+        inner = fields if isinstance(fields, str) else sentence_of(fields["sentence"])
+        return Clause(inner) if kind == "clause" else Whole(inner)
     part: Part = _KINDS[kind](**fields)
     return part
 

@@ -3,6 +3,8 @@
 from enum import StrEnum
 from typing import ClassVar
 
+from sprag.sentences import Sentence
+
 
 class StudyState(StrEnum):
     """State of a study. The member's value is what is stored and shown."""
@@ -114,7 +116,10 @@ class TransitionError(Exception):
     code: ClassVar[str] = "wrong-state"
 
     def __init__(self, state: StudyState, event: StudyEvent) -> None:
-        super().__init__(f"a study that is {state.value} cannot take {event.value.replace('_', ' ')!r}")
+        action = repr(event.value.replace("_", " "))
+        super().__init__(
+            Sentence("a study that is {state} cannot take {action}", state=Sentence(state.value), action=action)
+        )
         self.state = state
         self.event = event
 

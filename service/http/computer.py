@@ -13,6 +13,7 @@ from typing import Any, Protocol, TypeVar, TypeVarTuple
 
 import anyio
 
+from sprag.sentences import Amount, Sentence
 from sprag.service.faults import Kind
 from sprag.service.http.problems import ApiError
 from sprag.service.http.shares import not_in_time
@@ -28,7 +29,7 @@ R = TypeVar("R")
 #: Most computations that wait for the process; further ones are refused immediately.
 MAX_WAITING = 8
 _LATER = {"Retry-After": "5"}
-_ENDING = "The service is shutting down; the request was not carried out."
+_ENDING = Sentence("The service is shutting down; the request was not carried out.")
 
 
 class Computes(Protocol):
@@ -222,32 +223,48 @@ class ProcessComputer:
     def _turn(self, timeout: float) -> Iterator[None]:
         """Admit one waiting computation; convert its failures to ApiErrors."""
         if self._waiting >= self._limits.waiting:
-            raise ApiError("unavailable", "Too many computations are waiting already.", headers=_LATER)
+            raise ApiError("unavailable", Sentence("Too many computations are waiting already."), headers=_LATER)
         self._waiting += 1
-        named = f", the limit of {self._limits.setting}" if self._limits.setting else ""
         try:
             yield
         except TimeoutError as error:
-            detail = f"The computation did not end within {timeout:g} s by the clock."
+            time = Amount(timeout, "s", 6)
+            detail = Sentence("The computation did not end within {time} by the clock.", time=time)
             raise ApiError(self._limits.problem, detail) from error
         except MemoryError as error:
-            detail = f"The computation needs more than the {self._limits.memory // 2**20} MiB of memory it may use."
+            size = str(self._limits.memory // 2**20)
+            detail = Sentence("The computation needs more than the {size} MiB of memory it may use.", size=size)
             raise ApiError(self._limits.problem, detail) from error
         except ProcessDiedError as error:
             if _too_long(error):
-                detail = f"The computation did not end within {self._limits.seconds:g} s of processor time{named}."
-                raise ApiError(self._limits.problem, detail) from error
+                raise ApiError(self._limits.problem, self._over_time()) from error
             killed = error.exitcode in (-signal.SIGKILL, -signal.SIGTERM)
             kind: Kind = "unavailable" if killed else self._limits.died
-            how = "was killed" if killed else "died"
-            detail = f"The process that ran the computation {how}, and when it was run once more, too."
+            detail = (
+                Sentence("The process that ran the computation was killed, and when it was run once more, too.")
+                if killed
+                else Sentence("The process that ran the computation died, and when it was run once more, too.")
+            )
             raise ApiError(kind, detail, headers=_LATER if kind == "unavailable" else None) from error
         except ProcessStartError as error:
-            raise ApiError("unavailable", "The process for computations cannot be started.", headers=_LATER) from error
+            raise ApiError(
+                "unavailable", Sentence("The process for computations cannot be started."), headers=_LATER
+            ) from error
         except JobStoppedError as error:
             raise ApiError("unavailable", _ENDING, headers=_LATER) from error
         finally:
             self._waiting -= 1
+
+    def _over_time(self) -> Sentence:
+        """That a computation took more processor time than it may."""
+        time, setting = Amount(self._limits.seconds, "s", 6), self._limits.setting
+        if not setting:
+            return Sentence("The computation did not end within {time} of processor time.", time=time)
+        return Sentence(
+            "The computation did not end within {time} of processor time, the limit of {setting}.",
+            time=time,
+            setting=setting,
+        )
 
     def _schedule(self, timeout: float, function: Callable[[*Args], R], *args: *Args) -> Job[R]:
         with self._lock:

@@ -13,6 +13,7 @@ from starlette.requests import ClientDisconnect, Request, cookie_parser
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from sprag.sentences import Sentence
 from sprag.service.actor import Actor, Role, act_as
 from sprag.service.faults import ParameterFault, shown
 from sprag.service.http.access import ASKING, OPEN, Access, Grant, token_in
@@ -153,7 +154,7 @@ class Guard:
         scope["sprag.grant"] = await self._grant(scope, headers)
         if "\n" in scope["path"]:
             # The patterns of the routes end in "$", which also matches before a final line feed.
-            raise ApiError("not-found", "There is nothing at this address: it has a line feed in it.")
+            raise ApiError("not-found", Sentence("There is nothing at this address: it has a line feed in it."))
         length = headers.get("content-length", "0")
         if not (length.isascii() and length.isdigit()):
             raise ApiError("bad-request", "Content-Length is not a number.")

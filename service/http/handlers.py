@@ -13,6 +13,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 
+from sprag.sentences import Sentence, Whole, joined, whole
 from sprag.service.faults import Code, Fault, FaultError, Kind, ParameterFault, parameter_error, shown
 from sprag.service.http.problems import PROBLEM_TYPES, ApiError, api_error, problem_response
 from sprag.service.http.web.problem_page import problem_page
@@ -45,8 +46,8 @@ def _answer(request: Request, error: ApiError) -> Response:
 
 
 def _sentence(error: Exception) -> str:
-    text = str(error)
-    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+    clause = error.args[0] if error.args else ""
+    return joined("", (Whole(clause),)) if isinstance(clause, Sentence) else whole(str(error))
 
 
 def _known(request: Request, error: Exception) -> Response:
@@ -60,19 +61,21 @@ def _known(request: Request, error: Exception) -> Response:
 def _unknown(request: Request, error: Exception) -> Response:
     _log.error("%s %s failed", request.method, request.url.path, exc_info=error)
     # The framework passes the exception on to the server, which then closes the connection; the client must know.
-    detail = "The service failed to answer; the fault is in its log."
+    detail = Sentence("The service failed to answer; the fault is in its log.")
     return _answer(request, ApiError("internal", detail, headers={"Connection": "close"}))
 
 
 def _http(request: Request, error: Exception) -> Response:
     raised = cast("HTTPException", error)
     if raised.status_code == 404:
-        return _answer(request, ApiError("not-found", f"There is nothing at {shown(request.url.path)}."))
+        return _answer(
+            request, ApiError("not-found", Sentence("There is nothing at {address}.", address=shown(request.url.path)))
+        )
     if raised.status_code == 405:
         methods = ", ".join(sorted(_methods_at(request.app, request.url.path)))
         if request.method == "OPTIONS":
             return Response(status_code=204, headers={"Allow": methods})
-        detail = f"{request.method} is not possible here; possible: {methods}."
+        detail = Sentence("{method} is not possible here; possible: {methods}.", method=request.method, methods=methods)
         return _answer(request, ApiError("method-not-allowed", detail, headers={"Allow": methods}))
     if raised.status_code < 500:
         return _answer(request, ApiError("bad-request", str(raised.detail)))

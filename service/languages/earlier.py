@@ -63,37 +63,13 @@ _OF_WORKERS: Final = (
     N_("No usable worker has joined the scheduler {address}; the study waits for one."),
     N_("The processes of the pool end as they start; the log says why."),
 )
-#: The beginnings of error pages.
-_OF_ERRORS: Final = (
-    N_("There is nothing at {address}."),
-    N_("There is no study {study}."),
-    N_("There is no schedule {schedule}."),
-    N_("There is no saved view {view}."),
-    N_("There is no component {component}."),
-    N_("The service failed to answer; the fault is in its log."),
-    N_("{method} is not possible here; possible: {methods}."),
-    N_("A study that is {state} cannot take {action}."),
-    N_("Unknown action."),
-    N_("Unknown kind of problem."),
-    N_("Unknown page; known pages: {pages}."),
-    N_("Unknown example; known examples: {examples}."),
-    N_("Unknown machine; known machines: {machines}."),
-    N_("Unknown question; known questions: {questions}."),
-    N_("Unknown axis; known axes: {axes}."),
-    N_("No case of this study is of this kind."),
-    N_("The case did not end ok, so it has no motion to draw."),
-    N_("Too many computations are waiting already."),
-    N_("The process for computations cannot be started."),
-    N_("The process that ran the computation died."),
-)
-
 #: The longer of two that begin alike stands first.
 _ALL: Final = (
     OUTSIDE_WINDOW, WINDOW, NO_ROOM, DISK, LARGEST_FILE, EARLIER, PAUSED, DELETED, NOT_IN_TIME, TRIED_AGAIN,
     NOTICED_LATE, NOT_MADE_UP, GRACE, NOTHING_RAN, NOT_TAKEN, NOT_TAKEN_SILENT, NOT_SUBMITTED, NO_WORKER, WAITS_SILENT,
     WAITS_STALLED, WAITS, MANY_STUDIES, SHARE_OF_QUEUE, NO_ROOM_FOR_RESULTS, SILENT, LATE_PART, LATE,
     COPY, OFF, ROUNDS_DONE, NO_ROUND, TOKEN_EXPIRED, TOKEN_REVOKED, TOKEN_OF_REMOVED_USER,
-    *_OF_WORKERS, *_OF_ERRORS,
+    *_OF_WORKERS,
 )  # fmt: skip
 
 
@@ -113,14 +89,12 @@ def sentence_in(text: str) -> Sentence | None:
     for template in _ALL:
         match = _pattern(template).fullmatch(text)
         if match is not None:
-            return Sentence(template, **{name: _part(name, value) for name, value in match.groupdict().items()})
+            return Sentence(template, **{name: _part(value) for name, value in match.groupdict().items()})
     return None
 
 
-def _part(name: str, text: str) -> Part:
-    """A part of a sentence: a state, a sentence of its own, with its full stop or, at the end of another, without."""
-    if name == "state":
-        return Sentence(text)
+def _part(text: str) -> Part:
+    """A part of a sentence: a sentence of its own, with its full stop or, at the end of another, without."""
     clause = sentence_in(f"{text}.")
     return sentence_in(text) or (text if clause is None else Clause(clause))
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Self
 
-from sprag.sentences import Amount, Clause, Name, Part, Place, Sentence, Typed, WarningText, filled
+from sprag.sentences import Amount, Clause, Name, Part, Place, Sentence, Typed, WarningText, Whole, filled, whole
 from sprag.service.languages import ENGLISH, earlier, gettext, language, ngettext
 from sprag.service.reading.part_names import lower_first, upper_first
 from sprag.service.reading.wording import number, unit_text
@@ -125,6 +125,8 @@ def _said(part: Part, reading: Reading | None) -> str:
         return _printed(part, reading)
     if isinstance(part, Clause):
         return said(part.sentence, reading).removesuffix(".")
+    if isinstance(part, Whole):
+        return whole(said(part.clause, reading))
     if isinstance(part, Typed):
         return unit_text(part.text)
     if reading is None:

@@ -1,5 +1,6 @@
 """Errors of the database, each with a one-sentence message."""
 
+from sprag.sentences import Sentence
 from sprag.worker.ports import StoreError, StoreFullError
 
 __all__ = [
@@ -87,7 +88,7 @@ class StudyNotFoundError(StoreError):
     code = "study-not-found"
 
     def __init__(self, study_id: str) -> None:
-        super().__init__(f"there is no study {study_id!r}")
+        super().__init__(Sentence("there is no study {study}", study=repr(study_id)))
         self.study_id = study_id
 
     def __reduce__(self) -> "tuple[type[StudyNotFoundError], tuple[str]]":
@@ -100,7 +101,7 @@ class ScheduleNotFoundError(StoreError):
     code = "schedule-not-found"
 
     def __init__(self, schedule_id: str) -> None:
-        super().__init__(f"there is no schedule {schedule_id!r}")
+        super().__init__(Sentence("there is no schedule {schedule}", schedule=repr(schedule_id)))
 
 
 class ComponentNotFoundError(StoreError):
@@ -109,7 +110,7 @@ class ComponentNotFoundError(StoreError):
     code = "component-not-found"
 
     def __init__(self, component_id: str) -> None:
-        super().__init__(f"there is no component {component_id!r}")
+        super().__init__(Sentence("there is no component {component}", component=repr(component_id)))
 
 
 class TooManyComponentsError(StoreError):
@@ -124,7 +125,7 @@ class ViewNotFoundError(StoreError):
     code = "view-not-found"
 
     def __init__(self, view_id: str) -> None:
-        super().__init__(f"there is no saved view {view_id!r}")
+        super().__init__(Sentence("there is no saved view {view}", view=repr(view_id)))
 
 
 class TooManyViewsError(StoreError):

@@ -8,6 +8,7 @@ from fastapi import Request
 from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 
+from sprag.sentences import Sentence
 from sprag.service.http.problems import PROBLEM_TYPES, ApiError
 from sprag.service.http.respond import entity_tag, json_response, not_modified
 from sprag.service.http.routers import page_router
@@ -39,7 +40,7 @@ async def docs(request: Request) -> Response:
 async def manual(name: str) -> Response:
     """A page of the guide or the theory."""
     if name not in PAGES:
-        raise ApiError("not-found", f"Unknown page; known pages: {', '.join(PAGES)}.")
+        raise ApiError("not-found", Sentence("Unknown page; known pages: {pages}.", pages=", ".join(PAGES)))
     return await in_thread(lambda: page("manual.html", page=manual_page(name), titles=titles()))
 
 
@@ -54,7 +55,7 @@ async def openapi(request: Request) -> Response:
 async def problem(slug: str) -> Response:
     """Explanation of a kind of problem."""
     if slug not in PROBLEM_TYPES:
-        raise ApiError("not-found", "Unknown kind of problem.")
+        raise ApiError("not-found", Sentence("Unknown kind of problem."))
     return page("problem.html", problem=PROBLEM_TYPES[slug])
 
 

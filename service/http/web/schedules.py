@@ -12,6 +12,7 @@ from zoneinfo import ZoneInfo
 from fastapi import Query
 from starlette.responses import RedirectResponse, Response
 
+from sprag.sentences import Sentence
 from sprag.service.faults import Fault
 from sprag.service.http.context import Context, Ctx
 from sprag.service.http.problems import ApiError
@@ -124,7 +125,7 @@ def act(context: Ctx, schedule_id: str, verb: str) -> Response:
     elif verb in _CHANGES:
         _change(context, schedule_id, _CHANGES[verb])
     else:
-        raise ApiError("not-found", "Unknown action.")
+        raise ApiError("not-found", Sentence("Unknown action."))
     return RedirectResponse("/schedules", status_code=303)
 
 

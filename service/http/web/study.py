@@ -11,6 +11,7 @@ import numpy as np
 from starlette.datastructures import QueryParams
 from starlette.responses import RedirectResponse, Response
 
+from sprag.sentences import Sentence
 from sprag.service import formats
 from sprag.service.faults import SelectionError
 from sprag.service.http import views
@@ -343,7 +344,7 @@ async def run_longer(context: Ctx, work: Attended, study_id: StudyId, kind: str)
 
     counts = await in_thread(find)
     if kind not in counts:
-        raise ApiError("not-found", "No case of this study is of this kind.")
+        raise ApiError("not-found", Sentence("No case of this study is of this kind."))
     now = context.store.clock.now()
     made = await work.check(checks.longer_study, context.library, study_id, kind, None, now, {})
     # Pressed twice, it submits one study, unless more cases of this kind have finished.
@@ -372,7 +373,7 @@ def act(context: Ctx, study_id: StudyId, verb: str) -> Response:
         "retry": context.store.retry_study,
     }
     if verb not in wishes:
-        raise ApiError("not-found", "Unknown action.")
+        raise ApiError("not-found", Sentence("Unknown action."))
     wishes[verb](study_id)
     return RedirectResponse(f"/studies/{study_id}", status_code=303)
 

@@ -16,12 +16,17 @@ import pytest
 from docs.catalogues import of_code
 from sprag.sentences import Amount, Name, Place, Sentence, WarningText, joined, plural, sentence_of
 from sprag.service.cli.console import warning_lines
-from sprag.service.faults import WarningCode
+from sprag.service.faults import FaultError, WarningCode
+from sprag.service.http.handlers import as_api_error
 from sprag.service.languages import gettext, language
-from sprag.service.reading.phrases import Phrase, shown
+from sprag.service.languages.recorded import MANY_STUDIES
+from sprag.service.reading.phrases import Phrase, shown, told
 from sprag.service.reading.quantities import Units
 from sprag.service.reading.reader import Reading
+from sprag.service.storage.errors import StudyNotFoundError
 from sprag.service.storage.stored_sentences import read_warnings, write_warnings
+from sprag.worker.ports import StoreError
+from sprag.worker.states import StudyEvent, StudyState, TransitionError
 from tests.conftest import ROOT
 from tests.service import warning_samples
 
@@ -152,3 +157,25 @@ def texts_of_sentences() -> list[str]:
 def test_every_sentence_is_in_the_catalogue(text: str) -> None:
     with language("uk"):
         assert gettext(text) != text or not re.search(r"[a-z]{3,}", re.sub(r"\{\w+\}", "", text))
+
+
+@pytest.mark.parametrize(
+    ("error", "english", "ukrainian"),
+    [
+        (StudyNotFoundError("st_1"), "There is no study 'st_1'.", "Немає дослідження 'st_1'."),
+        (
+            TransitionError(StudyState.FINISHED, StudyEvent.PAUSE),
+            "A study that is finished cannot take 'pause'.",
+            "Для дослідження в стані «завершене» неможлива дія 'pause'.",
+        ),
+        (StoreError("the disk is broken"), "The disk is broken.", "The disk is broken."),
+        (FaultError("queue-full", Sentence(MANY_STUDIES, count="64")), "64 studies have not ended yet.",
+         "Досліджень, які ще не закінчилися: 64."),
+    ],
+)  # fmt: skip
+def test_a_problem_is_a_sentence_in_every_language(error: Exception, english: str, ukrainian: str) -> None:
+    problem = as_api_error(error)
+    assert problem is not None
+    assert problem.detail == english
+    with language("uk"):
+        assert told(problem.detail) == ukrainian

@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
+from sprag.sentences import Sentence
 from sprag.service.faults import Fault
 from sprag.service.http.problems import ApiError
 from sprag.service.http.views import preset_of
@@ -154,7 +155,9 @@ def read_machine(
     """
     name = machine[0][1]
     if name not in {OWN, *known}:
-        raise ApiError("not-found", f"Unknown machine; known machines: {', '.join(known) or 'none'}.")
+        raise ApiError(
+            "not-found", Sentence("Unknown machine; known machines: {machines}.", machines=", ".join(known) or "none")
+        )
     try:
         spec = single_machine(own_spec(dict(machine), model) if name == OWN else preset_of(name)["spec"])
         return spec, parse_spec(spec).study

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final
 from fastapi import Query, Request
 from starlette.responses import RedirectResponse, Response
 
-from sprag.sentences import Place
+from sprag.sentences import Place, Sentence
 from sprag.service.faults import FaultError
 from sprag.service.http.context import Context, Ctx, study_with
 from sprag.service.http.problems import ApiError, api_error
@@ -150,7 +150,9 @@ def _start(
     if preset is None:
         return None
     if preset not in preset_names():
-        raise ApiError("not-found", f"Unknown example; known examples: {', '.join(preset_names())}.")
+        raise ApiError(
+            "not-found", Sentence("Unknown example; known examples: {examples}.", examples=", ".join(preset_names()))
+        )
     found: dict[str, Any] = preset_of(preset)["spec"]
     return found
 

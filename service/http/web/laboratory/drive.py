@@ -7,6 +7,7 @@ from urllib.parse import parse_qsl, urlencode
 
 from starlette.responses import Response
 
+from sprag.sentences import Sentence
 from sprag.service.http.drawing import picture, table
 from sprag.service.http.problems import ApiError
 from sprag.service.http.reading import CHOICE
@@ -223,7 +224,7 @@ async def drive_curves(work: Attended, form: Literal["svg", "png", "csv"]) -> Re
             return await picture(draw_figure, form, read_figure(figure, _reading(chosen)), chosen.study.name).response(
                 work
             )
-    raise ApiError("not-found", "The case did not end ok, so it has no motion to draw.")
+    raise ApiError("not-found", Sentence("The case did not end ok, so it has no motion to draw."))
 
 
 @router.get(f"{_OWN}/form")
@@ -238,7 +239,7 @@ async def drive_study(work: Attended, along: str = "load") -> Response:
     """The current drive over the range of a slider, as a study to check and submit."""
     chosen, _ = await work.check(_settings, dict(work.request.query_params), CHOICE.get())
     if along not in STUDIES:
-        raise ApiError("not-found", f"Unknown axis; known axes: {', '.join(STUDIES)}.")
+        raise ApiError("not-found", Sentence("Unknown axis; known axes: {axes}.", axes=", ".join(STUDIES)))
     word, path = STUDIES[along]
     slider = next(slider for slider in chosen.sliders if slider.path == path)
     axis = {"path": path, "linspace": [written(slider, slider.low), written(slider, slider.high), _VALUES]}

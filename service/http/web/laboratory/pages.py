@@ -8,6 +8,7 @@ from urllib.parse import urlencode
 from fastapi import Query
 from starlette.responses import Response
 
+from sprag.sentences import Sentence
 from sprag.service.http.drawing import picture, table
 from sprag.service.http.problems import ApiError
 from sprag.service.http.reading import CHOICE
@@ -191,5 +192,7 @@ async def laboratory_study(work: Attended, question: str = "inertia") -> Respons
     """One of the questions about the current machine, as a study to check and submit."""
     chosen = await work.check(setting, dict(work.request.query_params), CHOICE.get())
     if question not in QUESTIONS:
-        raise ApiError("not-found", f"Unknown question; known questions: {', '.join(QUESTIONS)}.")
+        raise ApiError(
+            "not-found", Sentence("Unknown question; known questions: {questions}.", questions=", ".join(QUESTIONS))
+        )
     return await spec_in_form(work, question_spec(chosen, question))
