@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Final
 
-from docs.allowed_texts import allowed_texts
+from docs.fault_texts import fault_texts
 from docs.form_texts import form_values
 from docs.vocabulary import units, vocabulary
 from sprag.service import languages
@@ -71,7 +71,7 @@ def vocabularies() -> Iterator[tuple[Key, str]]:
     """Texts that are values of the program and translated where they are shown, with their plurals."""
     for noun in NOUNS:
         yield Key(f"{{n}} {noun}"), f"{{n}} {noun}s"
-    yield from ((Key(text), "") for text in (*vocabulary(), *form_values(), *allowed_texts()))
+    yield from ((Key(text), "") for text in (*vocabulary(), *form_values(), *fault_texts()))
     yield from ((Key(unit, "unit"), "") for unit in units())
     yield from ((Key(text), "") for text in help_texts(command_line(languages.ENGLISH)))
     yield from ((Key(preset.shows), "") for preset in ABOUT.values())

@@ -77,7 +77,7 @@ class CommandFailureError(FaultError):
         yield _(self.detail)
         for fault in self.faults:
             yield f"  {fault_line(fault)}"
-            if _(fault.message) == fault.message and languages.current() != languages.ENGLISH:
+            if languages.current() != languages.ENGLISH and not _is_translated(fault):
                 yield f"    {fault.message}"
 
     def document(self) -> dict[str, object]:
@@ -88,15 +88,20 @@ class CommandFailureError(FaultError):
         return document
 
 
+def _is_translated(fault: Fault) -> bool:
+    from sprag.service.reading.faults import is_translated
+
+    return is_translated(fault)
+
+
 def fault_line(fault: Fault) -> str:
     """A fault in one line: where it is, what it is, the value, and what is allowed.
 
-    In another language a sentence that is not in the catalogue is replaced by the meaning of its code.
+    A sentence that has no translation is replaced by the meaning of its code.
     """
     if languages.current() == languages.ENGLISH:
         return str(fault)
-    from sprag.service.fault_meanings import MEANINGS
-    from sprag.service.languages.ranges import allowed_text
+    from sprag.service.reading.faults import allowed_text, fault_text
 
     details = []
     if fault.value is not None:
@@ -105,10 +110,8 @@ def fault_line(fault: Fault) -> str:
         details.append(_("allowed: {allowed}", allowed=allowed_text(fault.allowed)))
     if fault.unit is not None and (fault.allowed is None or fault.unit not in fault.allowed):
         details.append(_("unit {unit}", unit=fault.unit))
-    where, message = fault.where or _("(the whole spec)"), _(fault.message)
-    if message == fault.message:
-        message = _(MEANINGS.get(fault.code, message)).removesuffix(".")
-    return f"{where}: {message}" + (f" ({'; '.join(details)})" if details else "")
+    where = fault.where or _("(the whole spec)")
+    return f"{where}: {fault_text(fault)}" + (f" ({'; '.join(details)})" if details else "")
 
 
 class WrongInputError(CommandFailureError):

@@ -17,13 +17,10 @@ _RANGES: Final = (
 )
 
 
-def allowed_text(allowed: str | None) -> str:
-    """What is allowed: words and ranges in the reader's language; names of choices are the same in all."""
-    text = allowed or ""
-    if current() == ENGLISH or not text:
+def with_range(text: str) -> str:
+    """What is allowed, in a text without a translation, with its range in the reader's language."""
+    if current() == ENGLISH:
         return text
-    if (words := gettext(text)) != text:
-        return words
     for pattern, template in _RANGES:
         found = pattern.search(text)
         if found is None:

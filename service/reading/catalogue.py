@@ -43,9 +43,9 @@ def result_of(infos: Iterable[ResultInfo], name: str) -> ResultInfo | None:
     return next((info for info in infos if info.name == name), None)
 
 
-def unknown_result(infos: Iterable[ResultInfo], name: str) -> str:
+def unknown_result(infos: Iterable[ResultInfo], name: str) -> Sentence:
     """Message about an unknown result name, with the closest known one."""
-    return f"unknown result{did_you_mean(name, [info.name for info in infos])}"
+    return Sentence("unknown result{hint}", hint=did_you_mean(name, [info.name for info in infos]))
 
 
 def axes_json(study: Study) -> list[AxisInfo]:

@@ -149,9 +149,13 @@ def with_decimal(text: str, cell: str) -> str:
     )
 
 
-def question(text: str) -> str:
+def question(text: str) -> Sentence:
     """What the user has to decide about a text with a point in doubt."""
-    return "is {} or {} meant? no number of the table shows what its points are".format(*_readings(text))
+    small, large = _readings(text)
+    return Sentence(
+        "is {small} or {large} meant? no number of the table shows what its points are",
+        small=Amount(float(small), digits=6), large=large,
+    )  # fmt: skip
 
 
 def assumption(text: str) -> Sentence:

@@ -7,6 +7,8 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from sprag.sentences import Sentence
+
 _LONGEST_TEXT = 60
 _LONGEST_LIST = 6
 
@@ -16,13 +18,13 @@ def quantity_text(number: float, unit: str) -> str:
     return f"{number:.10g}" + ("" if unit == "1" else f" {unit}")
 
 
-def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """ "; did you mean 'x'?" for the known word closest to ``word``, or "" where none is close."""
+def did_you_mean(word: str, known: Iterable[str]) -> Sentence:
+    """ "; did you mean 'x'?" for the known word closest to ``word``, or an empty phrase where none is close."""
     if len(word) > 2 * _LONGEST_TEXT:
-        return ""
+        return Sentence("")
     by_lower = {name.lower(): name for name in known}
     near = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)
-    return f"; did you mean '{by_lower[near[0]]}'?" if near else ""
+    return Sentence("; did you mean '{word}'?", word=by_lower[near[0]]) if near else Sentence("")
 
 
 def shorten_text(text: str) -> str:

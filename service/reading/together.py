@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Final
 
+from sprag.sentences import Sentence, Typed, joined
 from sprag.service.faults import Code
 from sprag.service.reading.cyrillic import latin
 from sprag.service.reading.units import PERIOD_NAMES, QuantityError, measure, parse_exact, split_typed
@@ -90,19 +91,25 @@ def questions(values: Sequence[object], units: Sequence[str]) -> list[Question]:
     for place, (value, own) in enumerate(zip(values, typed, strict=True)):
         number = _bare(value, own) if others else None
         if number is not None:
-            names = list(dict.fromkeys([units[place], *(_carried(*other, units[place]) for other in others)]))[:_LISTED]
-            choice = f"{', '.join(f'in {name}' for name in names[:-1])} or in {names[-1]}"
-            message = f"has no unit beside values that have one: {number} {choice}?"
-            asked.append(Question(place, message, ", ".join(f"{number} {name}" for name in names)))
+            every = [Typed(units[place]), *(_carried(*other, units[place]) for other in others)]
+            names = list(dict.fromkeys(every))[:_LISTED]
+            *first, last = (Sentence("in {unit}", unit=name) for name in names)
+            message = Sentence(
+                "has no unit beside values that have one: {number} {units} or {unit}?",
+                number=number, units=joined(", ", first), unit=last,
+            )  # fmt: skip
+            asked.append(Question(place, message, joined(", ", (joined(" ", (number, name)) for name in names))))
     return asked
 
 
-def _carried(name: str, unit: str, wanted: str) -> str:
+def _carried(name: str, unit: str, wanted: str) -> Typed | Sentence:
     """The unit of another coefficient that goes with a typed one: "N*mm/rad^2" (of N*m/rad^2) for N*m is "N*mm"."""
     if unit == wanted:
-        return name
+        return Typed(name)
     per, wanted_per = (text[len(text.partition("/")[0]) :] for text in (unit, wanted))
-    return name.removesuffix(per) + wanted_per if name.endswith(per) else f"another unit, as {name}"
+    if name.endswith(per):
+        return Typed(name.removesuffix(per) + wanted_per)
+    return Sentence("another unit, as {unit}", unit=Typed(name))
 
 
 def _bare(value: object, unit: str | None) -> str | None:

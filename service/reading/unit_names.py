@@ -11,6 +11,9 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Final
 
+from sprag.sentences import Sentence
+from sprag.service.languages import N_
+
 #: Twice pi to 50 digits, so that its rounding never affects a double.
 TWO_PI: Final = "6.2831853071795864769252867665590057683943387987502"
 
@@ -79,8 +82,9 @@ _WORDS: Final = (
 )
 _WITH_PLURAL: Final = ("lb", "lbf", "oz", "ozf", "hr", "sec", "min", "deg", "rad", "rev", "bar", "kg")
 _WORD_LENGTH: Final = 4
-_QUESTIONS: Final = dict.fromkeys(("grad", "Grad", "GRAD"), "could be degrees or gons: deg or gon?") | {
-    "кгсм": "could be kg*cm or kgf*m: кг*см or кгс*м?"
+_QUESTIONS: Final = {
+    **dict.fromkeys(("grad", "Grad", "GRAD"), N_("has the unit '{unit}', which could be degrees or gons: deg or gon?")),
+    "кгсм": N_("has the unit '{unit}', which could be kg*cm or kgf*m: кг*см or кгс*м?"),
 }
 
 
@@ -119,10 +123,12 @@ def resolved(name: str) -> tuple[Fraction, str] | None:
     return found if word or one in _WITH_PLURAL else None
 
 
-def refusal(name: str) -> str:
+def refusal(name: str) -> Sentence:
     """Why a name is that of no unit, with the nearest one."""
     if name in _QUESTIONS:
-        return f"has the unit '{name}', which {_QUESTIONS[name]}"
+        return Sentence(_QUESTIONS[name], unit=name)
     known = {own.lower(): own for own in (*sorted(_defined()[0], reverse=True), "kN", "km", "cm", "mm", "kg")}
     near = difflib.get_close_matches(name.lower(), known, n=1, cutoff=0.5)
-    return f"has an unknown unit '{name}'" + (f" (did you mean '{known[near[0]]}'?)" if near else "")
+    if not near:
+        return Sentence("has an unknown unit '{unit}'", unit=name)
+    return Sentence("has an unknown unit '{unit}' (did you mean '{near}'?)", unit=name, near=known[near[0]])

@@ -19,7 +19,9 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
+from sprag.sentences import Amount, Sentence, Typed, joined, plural
 from sprag.service.faults import Code
+from sprag.service.languages import N_
 from sprag.service.reading.cyrillic import latin
 from sprag.service.reading.numbers import is_ambiguous, with_point
 from sprag.service.reading.printed import keyboard
@@ -33,21 +35,21 @@ if TYPE_CHECKING:
 PERIOD_NAMES: Final = frozenset({"period", "periods", "cycle", "cycles"})
 
 _EXAMPLES: Final = {
-    "Hz": '"25 Hz", "1500 rpm" or "157 rad/s"',
-    "m": '"2 mm"',
-    "rad": '"0.3 deg" or "0.005 rad"',
-    "rad/s": '"10 rad/s" or "95 rpm"',
-    "kg": '"0.5 kg"',
-    "kg*m^2": '"1e-3 kg*m^2"',
-    "N/m": '"9000 N/m"',
-    "N*m": '"0.1 N*m"',
-    "N*m*s/rad": '"0.01 N*m*s/rad"',
-    "m/s^2": '"9.81 m/s^2"',
-    "s": '"2 s"',
-    "N": '"20 kN"',
-    "Pa": '"6 bar" or "0.6 MPa"',
-    "m^2": '"50 cm^2"',
-    "1": "0.05",
+    "Hz": ("25 Hz", "1500 rpm", "157 rad/s"),
+    "m": ("2 mm",),
+    "rad": ("0.3 deg", "0.005 rad"),
+    "rad/s": ("10 rad/s", "95 rpm"),
+    "kg": ("0.5 kg",),
+    "kg*m^2": ("1e-3 kg*m^2",),
+    "N/m": ("9000 N/m",),
+    "N*m": ("0.1 N*m",),
+    "N*m*s/rad": ("0.01 N*m*s/rad",),
+    "m/s^2": ("9.81 m/s^2",),
+    "s": ("2 s",),
+    "N": ("20 kN",),
+    "Pa": ("6 bar", "0.6 MPa"),
+    "m^2": ("50 cm^2",),
+    "1": ("0.05",),
 }
 
 _PER_MINUTE: Final = Fraction(1, 60)
@@ -74,13 +76,15 @@ _SIGNS: Final = str.maketrans("\u2212\u2013·⋅×\u2219μ\u00a0\u202f\u2009", "
 
 
 class QuantityError(ValueError):
-    """A value that is not a quantity of the expected unit. ``str()`` is a sentence without the value, ``code`` is
-    stable.
+    """A value that is not a quantity of the expected unit.
+
+    ``message`` is a phrase, or a text of the catalogue, without the value; ``code`` is stable.
     """
 
     def __init__(self, code: Code, message: str) -> None:
         super().__init__(message)
         self.code: Code = code
+        self.message = message
 
 
 class AmbiguousCommaError(QuantityError):
@@ -89,13 +93,28 @@ class AmbiguousCommaError(QuantityError):
     def __init__(self) -> None:
         super().__init__(
             "ambiguous-comma",
-            "has a comma that could be decimal or separate thousands: write a decimal point, or no comma",
+            N_("has a comma that could be decimal or separate thousands: write a decimal point, or no comma"),
         )
 
 
-def example(unit: str) -> str:
-    """A quoted example of a quantity in ``unit``."""
-    return _EXAMPLES.get(unit, f'"200 {unit}"')
+def examples(unit: str) -> tuple[str, ...]:
+    """Quantities in ``unit``, as a spec may have them."""
+    return _EXAMPLES.get(unit, (f"200 {unit}",))
+
+
+def example(unit: str) -> Sentence:
+    """Quoted examples of a quantity in ``unit``: ``"25 Hz", "1500 rpm" or "157 rad/s"``."""
+    if unit == "1":
+        return joined("", (Typed(text) for text in examples(unit)))
+    *others, last = (joined("", ('"', _amount(text), '"')) for text in examples(unit))
+    return Sentence("{first} or {last}", first=joined(", ", others), last=last) if others else last
+
+
+def _amount(text: str) -> Amount | Typed:
+    """An example as an amount, where that is written the same."""
+    number, unit = text.split(" ")
+    amount = Amount(float(number), unit)
+    return amount if str(amount) == text else Typed(text)
 
 
 def parse_quantity(value: object, unit: str) -> float:
@@ -130,8 +149,12 @@ def parse_exact(value: object, unit: str) -> Fraction:
         number, text = split_quantity(value)
         if not text:
             raise QuantityError(
-                "missing-unit", f"a text needs its unit, for example {example(unit)}; a plain number is taken in {unit}"
-            )
+                "missing-unit",
+                Sentence(
+                    "a text needs its unit, for example {example}; a plain number is taken in {unit}",
+                    example=example(unit), unit=Typed(unit),
+                ),
+            )  # fmt: skip
         return number * _factor(text, unit)
     return exact_number(value, unit)
 
@@ -142,8 +165,12 @@ def exact_number(value: object, unit: str) -> Fraction:
         if unit == "1":
             raise QuantityError("wrong-type", "must be a plain number")
         raise QuantityError(
-            "wrong-type", f"must be a number in {unit} or a text with its unit, for example {example(unit)}"
-        )
+            "wrong-type",
+            Sentence(
+                "must be a number in {unit} or a text with its unit, for example {example}",
+                unit=Typed(unit), example=example(unit),
+            ),
+        )  # fmt: skip
     if isinstance(value, int):
         if value.bit_length() > 1024:
             raise QuantityError("out-of-range", "is too large for a number")
@@ -176,7 +203,10 @@ def split_quantity(text: str) -> tuple[Fraction, str]:
 def split_typed(text: str) -> tuple[Fraction, str]:
     """As `split_quantity`, the unit in the letters in which it was typed."""
     if len(text) > MAX_QUANTITY_LENGTH:
-        raise QuantityError("too-long", f"is longer than {MAX_QUANTITY_LENGTH} characters")
+        raise QuantityError(
+            "too-long",
+            plural("is longer than {count} character", "is longer than {count} characters", MAX_QUANTITY_LENGTH),
+        )
     text = keyboard(text.strip()).translate(_SIGNS).strip()
     _refuse_ambiguous(text)
     match = _QUANTITY.fullmatch(with_point(text))
@@ -249,11 +279,11 @@ def _registry() -> pint.UnitRegistry[Fraction]:
 @lru_cache(maxsize=1024)
 def _factor(text: str, unit: str) -> Fraction:
     """Factor from ``text`` to ``unit``; QuantityError when their dimensions differ."""
-    expected = f"expected {unit}, for example {example(unit)}"
+    expected = Sentence("expected {unit}, for example {example}", unit=Typed(unit), example=example(unit))
     try:
         factor, dimensions = _measure(text)
     except QuantityError as error:
-        raise QuantityError(error.code, f"{error}; {expected}") from None
+        raise QuantityError(error.code, joined("; ", (error.message, expected))) from None
     wanted_factor, wanted = _wanted(unit)
     angle = dimensions.pop("radian", 0)
     if {**dimensions, "radian": 0} == {**wanted, "radian": 0}:
@@ -265,7 +295,8 @@ def _factor(text: str, unit: str) -> Fraction:
             return factor / wanted_factor * Fraction(TWO_PI)  # min^-1 of nameplates are revolutions
         if unit == "N*m*s/rad" and angle == 0:
             return factor / wanted_factor  # N*m*s, the usual notation in textbooks
-    raise QuantityError("wrong-unit", f"is in '{text}', which is not a unit of this field; {expected}")
+    message = Sentence("is in '{unit}', which is not a unit of this field; {expected}", unit=text, expected=expected)
+    raise QuantityError("wrong-unit", message)
 
 
 def _measure(text: str) -> tuple[Fraction, dict[str, int]]:
@@ -275,7 +306,10 @@ def _measure(text: str) -> tuple[Fraction, dict[str, int]]:
     it compute anything.
     """
     if len(text) > _LONGEST_UNIT:
-        raise QuantityError("wrong-unit", f"has a unit longer than {_LONGEST_UNIT} characters")
+        message = plural(
+            "has a unit longer than {count} character", "has a unit longer than {count} characters", _LONGEST_UNIT
+        )
+        raise QuantityError("wrong-unit", message)
     tokens: list[str] = []
     position = 0
     spelled = _SUPERSCRIPT.sub(lambda found: "^" + found[0].translate(_SUPERSCRIPTS), text)
@@ -287,14 +321,18 @@ def _measure(text: str) -> tuple[Fraction, dict[str, int]]:
     while position < len(spelled):
         match = _TOKEN.match(spelled, position)
         if match is None:
-            raise QuantityError("wrong-unit", f"has a unit that cannot be read: '{text}'")
+            raise _unreadable(text)
         tokens.append(f"^{match['power']}" if match["power"] else match[0].strip())
         position = match.end()
     tokens.reverse()
     factor, powers = _product(tokens, text)
     if tokens:
-        raise QuantityError("wrong-unit", f"has a unit that cannot be read: '{text}'")
+        raise _unreadable(text)
     return factor, {name: power for name, power in powers.items() if power}
+
+
+def _unreadable(text: str) -> QuantityError:
+    return QuantityError("wrong-unit", Sentence("has a unit that cannot be read: '{unit}'", unit=text))
 
 
 def _torque(found: re.Match[str]) -> str:
@@ -335,7 +373,7 @@ def _operand(tokens: list[str], text: str) -> tuple[Fraction, Counter[str]]:
         power = int(tokens.pop()[1:]) if tokens and tokens[-1][0] == "^" else 1
         factor, root = _named(first)
         return factor**power, Counter({name: power * of_one for name, of_one in root})
-    raise QuantityError("wrong-unit", f"has a unit that cannot be read: '{text}'")
+    raise _unreadable(text)
 
 
 @lru_cache(maxsize=1024)

@@ -11,12 +11,16 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, Final
 
+from sprag.sentences import Sentence, plural
 from sprag.service.faults import Fault
+from sprag.service.languages import N_
+from sprag.service.reading.catalogue import range_sentence
+from sprag.service.reading.limits import characters
 from sprag.service.reading.numbers import parse_number, settled
 from sprag.service.reading.printed import could_be_several, could_be_values
 from sprag.service.reading.together import AMBIGUOUS_UNIT, questions
 from sprag.service.reading.units import QuantityError
-from sprag.service.spec.csv_text import read_csv, refuse_mixed_column, unescape
+from sprag.service.spec.csv_text import in_cell, read_csv, refuse_mixed_column, unescape
 from sprag.service.spec.fields import exact, read_object
 from sprag.service.spec.labels import LINES_ALLOWED, printable_lines
 from sprag.service.spec.report import Report, SpecError, join
@@ -27,6 +31,15 @@ from sprag.worker.models.parameters import placed
 
 SPRING, CLUTCH, MOTOR = "spring", "clutch", "motor"
 KINDS: Final = (SPRING, CLUTCH, MOTOR)
+#: What is said about components of each kind.
+_TWICE: Final = {
+    SPRING: N_("the spring is given twice"), CLUTCH: N_("the clutch is given twice"),
+    MOTOR: N_("the motor is given twice"),
+}  # fmt: skip
+_NO_FIELD: Final = {
+    SPRING: N_("is not a field of this spring"), CLUTCH: N_("is not a field of this clutch"),
+    MOTOR: N_("is not a field of this motor"),
+}  # fmt: skip
 #: Field of a motor with the kind of its characteristic, and the parameters of each.
 CHARACTERISTIC: Final = "characteristic"
 CHARACTERISTICS: Final = {
@@ -121,14 +134,20 @@ def read_components(data: object) -> list[Component]:
     places: dict[tuple[str, str], str] = {}
     for where, one in made:
         if places.setdefault((one.kind, one.name), where) != where:
-            report.fault(where, "repeated", f"the {one.kind} is given twice", one.name, allowed="each once")
+            message = Sentence(_TWICE[one.kind])
+            report.fault(where, "repeated", message, one.name, allowed="each once")
     report.raise_if_any()
     return [one for _, one in made]
 
 
 def _read_list(report: Report, items: object) -> list[tuple[str, Component]]:
     if not isinstance(items, list) or not 1 <= len(items) <= MAX_COMPONENTS:
-        report.fault("/components", "wrong-type", "must be a list", allowed=f"1 to {MAX_COMPONENTS:,} components")
+        report.fault(
+            "/components",
+            "wrong-type",
+            "must be a list",
+            allowed=Sentence("1 to {high} components", high=MAX_COMPONENTS),
+        )
         return []
     made = []
     for index, item in enumerate(items):
@@ -149,7 +168,7 @@ def _checked(report: Report, where: str, found: Mapping[str, Any], fields: objec
         )
     if not isinstance(name, str) or not 0 < len(name.strip()) <= MAX_NAME_LENGTH or not name.isprintable():
         report.fault(join(where, "name"), "invalid-text", "must be a printable text in one line", name,
-                     allowed=f"1 to {MAX_NAME_LENGTH} characters")  # fmt: skip
+                     allowed=characters(1, MAX_NAME_LENGTH))  # fmt: skip
     text = printable_lines(note)
     if text is None:
         report.fault(join(where, "note"), "invalid-text", "must be a printable text", note, allowed=LINES_ALLOWED)
@@ -178,7 +197,7 @@ def faults_of(kind: str, fields: Mapping[str, str]) -> list[Fault]:
     for name, text in fields.items():
         if name not in known or (kind == MOTOR and name in others):
             allowed = ", ".join(one for one in known if kind != MOTOR or one not in others)
-            found.append(Fault(name, "unknown-field", f"is not a field of this {kind}", text, allowed))
+            found.append(Fault(name, "unknown-field", Sentence(_NO_FIELD[kind]), text, allowed))
         elif name == CHARACTERISTIC:
             if text not in CHARACTERISTICS:
                 allowed = ", ".join(CHARACTERISTICS)
@@ -194,13 +213,15 @@ def _faults_of_field(kind: str, name: str, text: str) -> list[Fault]:
     if name != COEFFICIENTS:
         pairs = [(text, parameter)]
     elif could_be_several(text) or could_be_values(list_text(text)) is not None:
-        message = "could be one coefficient or several"
-        return [Fault(name, "invalid-text", message, text, "semicolons between coefficients, or no blanks")]
+        allowed = N_("semicolons between coefficients, or no blanks")
+        return [Fault(name, "invalid-text", "could be one coefficient or several", text, allowed)]
     else:
         items = list_text(text)
         if not 1 <= len(items) <= models.MAX_COEFFICIENTS:
-            allowed = f"1 to {models.MAX_COEFFICIENTS} coefficients, separated by semicolons"
-            return [Fault(name, "too-many", f"has {len(items)} coefficients", text, allowed)]
+            most = str(models.MAX_COEFFICIENTS)
+            message = plural("has {count} coefficient", "has {count} coefficients", len(items))
+            limits = Sentence("1 to {high} coefficients, separated by semicolons", high=most)
+            return [Fault(name, "too-many", message, text, limits)]
         pairs = [(item, placed(parameter, f"{COEFFICIENTS}.{index}")) for index, item in enumerate(items)]
     found = [
         Fault(name, AMBIGUOUS_UNIT, asked.message, pairs[asked.place][0], asked.allowed, pairs[asked.place][1].unit)
@@ -211,12 +232,12 @@ def _faults_of_field(kind: str, name: str, text: str) -> list[Fault]:
         try:
             exact(item if number is None else number, one)
         except QuantityError as error:
-            found.append(Fault(name, error.code, str(error), item, one.range_text(), one.unit))
+            found.append(Fault(name, error.code, error.message, item, range_sentence(one), one.unit))
     return found
 
 
 def _read_csv(report: Report, text: object) -> list[tuple[str, Component]]:
-    example = "columns kind, name, note and the fields"
+    example = N_("columns kind, name, note and the fields")
     rows = read_csv(report, "/csv", text, (MAX_COMPONENTS, 40), example, texts=_TEXTS)
     if rows is None:
         return []
@@ -225,8 +246,11 @@ def _read_csv(report: Report, text: object) -> list[tuple[str, Component]]:
     known = {*COLUMNS, *(name for kind in KINDS for name in fields_of(kind))}
     for name, cell in zip(names, rows[0].cells, strict=True):
         if name not in known or names.count(name) > 1:
-            message = "is a column twice" if name in known else "has a column that is no field"
-            report.fault("/csv", "unknown-field", message, cell, allowed=", ".join(sorted(known)))
+            report.fault(
+                "/csv", "unknown-field",
+                "is a column twice" if name in known else "has a column that is no field",
+                cell, allowed=", ".join(sorted(known)),
+            )  # fmt: skip
     parameters = {name: one for kind in KINDS for name, one in fields_of(kind).items() if name != COEFFICIENTS}
     for place, (name, unit) in enumerate(headings):
         parameter = parameters.get(name)
@@ -245,7 +269,7 @@ def _read_csv(report: Report, text: object) -> list[tuple[str, Component]]:
         fields = {name: cell for name, cell in cells.items() if name not in COLUMNS}
         one = _checked(line, "", cells, fields, "")
         for fault in line.faults:
-            message = f"line {row.line}, column {(fault.where or '').strip('/')}: {fault.message}"
+            message = in_cell(row.line, fault.message, (fault.where or "").strip("/"))
             report.fault("/csv", fault.code, message, fault.value, allowed=fault.allowed, unit=fault.unit)
         made += [(f"/csv line {row.line}", one)] if one is not None else []
     return made

@@ -9,6 +9,9 @@ import csv
 import re
 from typing import TYPE_CHECKING, Final
 
+from sprag.sentences import Sentence, joined, plural
+from sprag.service.languages import N_
+from sprag.service.reading.limits import at_most
 from sprag.service.reading.numbers import WITHOUT_DOUBT, assumption, of_line, question
 from sprag.service.reading.together import AMBIGUOUS_UNIT, questions
 from sprag.service.spec.table_text import MAX_HEADING, CsvRow, Split, settled_table, split, with_units
@@ -20,6 +23,11 @@ if TYPE_CHECKING:
 
 #: Beginnings of text that a spreadsheet would interpret as a formula.
 _FORMULA_STARTS: Final = ("=", "+", "-", "@", "\t", "\r")
+#: What Python says of quotes that are not closed, and of signs behind them.
+_OF_CSV: Final = (
+    N_("unexpected end of data"), N_("',' expected after '\"'"), N_("';' expected after '\"'"),
+    N_("'\t' expected after '\"'"),
+)  # fmt: skip
 #: A unit behind a number. Of most cells there is none, and reading one as a quantity takes longer.
 _WITH_UNIT: Final = re.compile(r"[0-9.]\s*(?:[^\W\d_eE]|[eE](?![-+0-9])|[^\w\s.,;+-])")
 
@@ -43,37 +51,62 @@ def read_csv(
     says what the text is, for its absence. Cells under the headings ``texts`` stay as they are written.
     """
     if not isinstance(text, str):
-        message = "is required" if text is None else "must be the text of a CSV file"
-        report.fault(where, "required" if text is None else "wrong-type", message, text, allowed=example)
+        report.fault(
+            where, "required" if text is None else "wrong-type",
+            "is required" if text is None else "must be the text of a CSV file", text, allowed=example,
+        )  # fmt: skip
         return None
     try:
         table = split(text)
     except csv.Error as error:
-        report.fault(where, "unreadable", f"is not CSV: {error}")
+        report.fault(where, "unreadable", not_csv(error))
         return None
     rows = with_units(table.rows)
     columns = len(rows[0].cells) if rows else 0
     if not 2 <= len(rows) <= most[0] + 1 or not 1 <= columns <= most[1]:
-        under = f"has {len(rows) - 1} lines of {columns} columns under its headings"
+        size = {"lines": str(len(rows) - 1), "columns": str(columns)}
+        under = Sentence("has {lines} lines of {columns} columns under its headings", **size)
         report.fault(
-            where, "out-of-range",
+            where,
+            "out-of-range",
             "is empty" if not rows else "has no lines under its headings" if len(rows) == 1 else under,
-            allowed=f"1 to {most[0]:,} lines of 1 to {most[1]:,} columns",
-        )  # fmt: skip
+            allowed=Sentence("1 to {lines} lines of 1 to {columns} columns", lines=most[0], columns=most[1]),
+        )
         return None
     before = report.found
     for place, cell in enumerate(rows[0].cells, 1):
         if len(cell) > MAX_HEADING:
-            message = f"the heading of column {place} has {len(cell):,} characters"
-            report.fault(where, "out-of-range", message, allowed=f"at most {MAX_HEADING}")
+            message = plural(
+                "the heading of column {place} has {count} character",
+                "the heading of column {place} has {count} characters",
+                len(cell), place=str(place),
+            )  # fmt: skip
+            report.fault(where, "out-of-range", message, allowed=at_most(MAX_HEADING))
     for row in rows[1:]:
         if len(row.cells) != columns:
-            hint = "; with decimal commas, columns are separated by semicolons" if len(row.cells) > columns else ""
-            message = f"line {row.line} has {len(row.cells)} cells"
-            report.fault(where, "unequal-lengths", message, allowed=f"{columns} cells{hint}")
+            message = plural(
+                "line {line} has {count} cell", "line {line} has {count} cells", len(row.cells), line=str(row.line)
+            )
+            allowed = plural("{count} cell", "{count} cells", columns)
+            if len(row.cells) > columns:
+                hint = Sentence("with decimal commas, columns are separated by semicolons")
+                allowed = joined("; ", (allowed, hint))
+            report.fault(where, "unequal-lengths", message, allowed=allowed)
         if report.full:
             break
     return None if report.found > before else _settled(report, where, table._replace(rows=rows), texts)
+
+
+def not_csv(error: csv.Error) -> Sentence:
+    """The message about a text whose quotes are not closed."""
+    return Sentence("is not CSV: {error}", error=Sentence(str(error)))
+
+
+def in_cell(line: int, message: str, column: str = "") -> Sentence:
+    """A message about a line of a table, or about a cell of it."""
+    if not column:
+        return Sentence("line {line}: {message}", line=str(line), message=message)
+    return Sentence("line {line}, column {column}: {message}", line=str(line), column=column, message=message)
 
 
 def has_units(text: str) -> bool:
@@ -96,8 +129,8 @@ def refuse_mixed_column(report: Report, where: str, rows: Sequence[CsvRow], colu
     if asked is None:
         return False
     line = rows[cells.index(values[asked.place])].line
-    message = f"line {line}, column {heading}: {asked.message}"
-    allowed = f"a unit in the heading, as in {heading} [{unit}], or in each cell"
+    allowed = Sentence("a unit in the heading, as in {heading} [{unit}], or in each cell", heading=heading, unit=unit)
+    message = in_cell(line, asked.message, heading)
     report.fault(where, AMBIGUOUS_UNIT, message, heading, allowed=allowed, unit=unit)
     return True
 
@@ -108,7 +141,7 @@ def _settled(report: Report, where: str, table: Split, texts: Collection[str]) -
     rows, doubt = settled_table(table._replace(rows=table.rows[1:]), kept)
     if doubt is not None and not doubt.likely:
         report.fault(
-            where, "ambiguous-point", f"line {doubt.line}: {question(doubt.text)}", doubt.text, allowed=WITHOUT_DOUBT
+            where, "ambiguous-point", in_cell(doubt.line, question(doubt.text)), doubt.text, allowed=WITHOUT_DOUBT
         )
         return None
     if doubt is not None:

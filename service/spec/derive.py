@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.sentences import Amount, Part, Sentence, joined
+from sprag.service.reading.catalogue import range_sentence
 from sprag.service.reading.texts import did_you_mean, quantity_text
 from sprag.service.spec.draws.unit import unit_sample
 from sprag.service.spec.formulas import Formula, FormulaError, UnknownNameError, read_formula
@@ -82,7 +84,7 @@ def _matches(key: str, path: str) -> bool:
 
 def _read_given(report: Report, data: object, base: object) -> dict[str, tuple[str, str]]:
     """Path -> (pointer, text) of every formula, those with ``*`` once for each item of their list."""
-    allowed = f"an object of at most {MAX_DERIVED} paths with their formulas"
+    allowed = Sentence("an object of at most {count} paths with their formulas", count=str(MAX_DERIVED))
     if not isinstance(data, Mapping):
         report.fault("/derive", "wrong-type", "must be an object", data, allowed=allowed)
         return {}
@@ -90,19 +92,25 @@ def _read_given(report: Report, data: object, base: object) -> dict[str, tuple[s
     for key, text in data.items():
         pointer = join("/derive", key)
         if not isinstance(text, str):
-            allowed = f"such as '{next(iter(EXAMPLE.values()))}'; in TOML the path is in quotation marks"
-            report.fault(pointer, "wrong-type", "must be a formula, as text", text, allowed=allowed)
+            such = Sentence(
+                "such as '{formula}'; in TOML the path is in quotation marks", formula=next(iter(EXAMPLE.values()))
+            )
+            report.fault(pointer, "wrong-type", "must be a formula, as text", text, allowed=such)
             continue
         for path, own in _expanded(report, pointer, key, text, base):
             if path in found:
-                report.fault(pointer, "repeated", f"derives {path} a second time", text, allowed="one formula for each")
+                message = Sentence("derives {path} a second time", path=path)
+                report.fault(pointer, "repeated", message, text, allowed="one formula for each")
                 continue
             given = _at(base, path)
             if given is not _MISSING:
                 report.fault(
-                    pointer, "conflict", f"{path} is derived and cannot be given in `base` too", given,
+                    pointer,
+                    "conflict",
+                    Sentence("{path} is derived and cannot be given in `base` too", path=path),
+                    given,
                     allowed="either a formula in `derive`, or a number in `base`",
-                )  # fmt: skip
+                )
             # An axis of that path has a fault of its own, which is reported at once.
             if not isinstance(given, Mapping | list):
                 found[path] = pointer, own
@@ -120,9 +128,11 @@ def _expanded(report: Report, pointer: str, key: str, text: str, base: object) -
     prefix = key.partition(".*")[0]
     items = _at(base, prefix)
     if not isinstance(items, list) or key.split(".").count("*") > 1:
-        allowed = "`*` once, for the number of a pendulum or a step, as in 'pendulums.*.inertia'"
-        hint = did_you_mean(prefix, _lists(base))
-        report.fault(pointer, "invalid-path", f"`base` has no list at {prefix}{hint}", key, allowed=allowed)
+        message = Sentence("`base` has no list at {path}{hint}", path=prefix, hint=did_you_mean(prefix, _lists(base)))
+        report.fault(
+            pointer, "invalid-path", message, key,
+            allowed="`*` once, for the number of a pendulum or a step, as in 'pendulums.*.inertia'",
+        )  # fmt: skip
         return
     for index in range(min(len(items), MAX_DERIVED + 1)):
         yield key.replace("*", str(index)), text.replace(f"{prefix}.*.", f"{prefix}.{index}.")
@@ -197,8 +207,9 @@ def _read_derived(
         entry = machine.parameters[path]
         if not entry.accepts(value):
             report.fault(
-                given[path][0], "out-of-range", f"gives {path} a value out of range with the numbers of `base`",
-                quantity_text(value, entry.unit), allowed=entry.range_text(), unit=entry.unit,
+                given[path][0], "out-of-range",
+                Sentence("gives {path} a value out of range with the numbers of `base`", path=path),
+                quantity_text(value, entry.unit), allowed=range_sentence(entry), unit=entry.unit,
             )  # fmt: skip
     if report.found > before:
         return machine
@@ -227,16 +238,19 @@ def _read_formulas(report: Report, machine: Machine, given: Mapping[str, tuple[s
             formula = read_formula(text, units, units[path])
         except UnknownNameError as error:
             starred = _STARRED.search(text) is not None
-            why = "`*` in a formula needs one in its path" if starred else machine.why_not(error.name)
-            report.fault(pointer, "invalid-path", f"{error}: {why}", text, allowed="paths of numbers, and functions")
+            why = Sentence("`*` in a formula needs one in its path") if starred else machine.why_not(error.name)
+            message = Sentence("{what}: {why}", what=error.message, why=why)
+            report.fault(pointer, "invalid-path", message, text, allowed="paths of numbers, and functions")
             continue
         except FormulaError as error:
             entry = machine.parameters[path]
-            report.fault(pointer, error.code, str(error), text, allowed=entry.range_text(), unit=entry.unit)
+            report.fault(pointer, error.code, error.message, text, allowed=range_sentence(entry), unit=entry.unit)
             continue
         for name in sorted(formula.uses - machine.values.keys() - given.keys()):
             if not report.found:
-                report.fault(pointer, "required", f"uses {name}, which has no value in `base`", text)
+                report.fault(
+                    pointer, "required", Sentence("uses {path}, which has no value in `base`", path=name), text
+                )
         found[path] = formula
     return found
 
@@ -246,7 +260,8 @@ def _is_ordered(report: Report, formulas: Mapping[str, Formula], given: Mapping[
         evaluation_order({path: formula.uses for path, formula in formulas.items()})
     except CircularError as error:
         pointer = given[error.paths[0]][0]
-        report.fault(pointer, "circular", f"needs its own value: {error}", allowed="formulas without a circle")
+        message = Sentence("needs its own value: {circle}", circle=str(error))
+        report.fault(pointer, "circular", message, allowed="formulas without a circle")
         return False
     return True
 
@@ -281,13 +296,20 @@ def check_derived(report: Report, derive: object, machine: Machine, study: Study
             continue
         values = part.case_parameters(first)
         units = {name: machine.parameters[name].unit for name in part.axis_paths}
-        where = [f"{name} = {quantity_text(values[name], unit)}" for name, unit in units.items()]
+        where = [joined(" = ", (name, Amount(values[name], unit, 10))) for name, unit in units.items()]
         each = 1 if ranges else study.cases // part.cases
-        cases_text = f"{wrong * each:,} of {part.cases * each:,} " + ("points tried" if ranges else "cases")
+        parts: dict[str, Part] = {
+            "path": path, "wrong": wrong * each, "all": part.cases * each,
+            "where": joined(", ", where[:4]) if where else Sentence("the base"),
+        }  # fmt: skip
+        in_cases = Sentence("gives {path} a value out of range in {wrong} of {all} cases, first with {where}", **parts)
+        of_points = Sentence(
+            "gives {path} a value out of range in {wrong} of {all} points tried, first with {where}", **parts
+        )
         report.fault(
             pointer_of(derive if isinstance(derive, Mapping) else {}, path), "out-of-range",
-            f"gives {path} a value out of range in {cases_text}, first with " + (", ".join(where[:4]) or "the base"),
-            quantity_text(values[path], entry.unit), allowed=entry.range_text(), unit=entry.unit,
+            of_points if ranges else in_cases,
+            quantity_text(values[path], entry.unit), allowed=range_sentence(entry), unit=entry.unit,
         )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from sprag.sentences import Sentence
 from sprag.service.reading.numbers import WITHOUT_DOUBT, assumption, question, settle
 from sprag.service.reading.part_names import RUN_LABELS
 from sprag.service.spec.fields import read_choice, read_flag, read_number, read_periods, read_plain, read_whole
@@ -21,6 +22,10 @@ from sprag.worker.limits import (
     MIN_TOLERANCE,
 )
 from sprag.worker.models import MAX_COEFFICIENTS, SETTLED, Parameter
+
+#: What is said about a list that is none, and what is allowed; the catalogue has these texts for the items of each.
+NO_LIST: Final = "must be a list of {items}"
+A_LIST: Final = "a list of {{low}} to {{high}} {items}{{note}}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,9 +122,14 @@ class Listed:
         report.fault(
             pointer,
             "required" if missing else "wrong-type",
-            "is required" if missing else f"must be a list of {self.items}",
+            "is required" if missing else Sentence(NO_LIST.format(items=self.items)),
             data,
-            allowed=f"a list of {self.low} to {self.high:,} {self.items}{self.note}",
+            allowed=Sentence(
+                A_LIST.format(items=self.items),
+                low=self.low,
+                high=self.high,
+                note=Sentence(self.note),
+            ),
         )
         return None
 

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.sentences import Sentence
+from sprag.service.reading.limits import characters, quoted
 from sprag.service.reading.texts import did_you_mean
 from sprag.service.spec.axes.design import read_design
 from sprag.service.spec.axes.sweep import read_sweep, with_sweep
@@ -128,9 +130,12 @@ def parse_spec(data: object) -> ParsedSpec:
 def _read_version(report: Report, found: Mapping[str, Any]) -> None:
     version = found.get("sprag")
     if version is None or isinstance(version, bool) or version != VERSION or not isinstance(version, int):
-        message = "is required: the version of the spec" if version is None else "is not a supported spec version"
         report.fault(
-            "/sprag", "required" if version is None else "unsupported-version", message, version, allowed=str(VERSION)
+            "/sprag",
+            "required" if version is None else "unsupported-version",
+            "is required: the version of the spec" if version is None else "is not a supported spec version",
+            version,
+            allowed=str(VERSION),
         )
 
 
@@ -142,7 +147,7 @@ def _read_name(report: Report, value: object) -> str:
         "invalid-text",
         "must be a printable text in one line",
         value,
-        allowed=f"1 to {MAX_NAME_LENGTH} characters",
+        allowed=characters(1, MAX_NAME_LENGTH),
     )
     return UNNAMED
 
@@ -151,14 +156,13 @@ def _read_model(report: Report, found: Mapping[str, Any]) -> str | None:
     model, known = found.get("model"), models.model_names()
     if isinstance(model, str) and model in known:
         return model
-    hint = did_you_mean(model, known) if isinstance(model, str) else ""
-    message = "is required" if model is None else f"is not a known model{hint}"
+    hint = did_you_mean(model, known) if isinstance(model, str) else Sentence("")
     report.fault(
         "/model",
         "required" if model is None else "unknown-name",
-        message,
+        "is required" if model is None else Sentence("is not a known model{hint}", hint=hint),
         model,
-        allowed=", ".join(f"'{name}'" for name in known),
+        allowed=quoted(known),
     )
     return None
 

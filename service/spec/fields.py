@@ -6,6 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any, Final
 
+from sprag.sentences import Amount, Sentence, plural
+from sprag.service.reading.catalogue import range_sentence
+from sprag.service.reading.limits import one_of, quoted, span
 from sprag.service.reading.texts import did_you_mean
 from sprag.service.reading.units import PERIOD_NAMES, QuantityError, example, parse_exact, split_quantity, to_float
 from sprag.service.spec.report import Report, join
@@ -32,7 +35,7 @@ def read_exact(report: Report, pointer: str, value: object, parameter: Parameter
     try:
         return exact(value, parameter)
     except QuantityError as error:
-        report.fault(pointer, error.code, str(error), value, allowed=parameter.range_text(), unit=parameter.unit)
+        report.fault(pointer, error.code, error.message, value, allowed=range_sentence(parameter), unit=parameter.unit)
         return None
 
 
@@ -45,17 +48,17 @@ def read_number(report: Report, pointer: str, value: object, parameter: Paramete
 def read_whole(report: Report, pointer: str, value: object, low: int, high: int) -> int | None:
     """Read an integer from ``low`` to ``high``; None, with a fault recorded, for anything else."""
     if isinstance(value, bool) or not isinstance(value, int):
-        report.fault(pointer, "wrong-type", "must be a whole number", value, allowed=f"{low} to {high:,}")
+        report.fault(pointer, "wrong-type", "must be a whole number", value, allowed=span(low, high))
         return None
     if not low <= value <= high:
-        report.fault(pointer, "out-of-range", "is out of range", value, allowed=f"{low} to {high:,}")
+        report.fault(pointer, "out-of-range", "is out of range", value, allowed=span(low, high))
         return None
     return value
 
 
 def read_plain(report: Report, pointer: str, value: object, low: float, high: float) -> float | None:
     """A number without a unit from ``low`` to ``high``; None, and a problem noted, when it is not one."""
-    allowed = f"{low:g} to {high:g}, a plain number"
+    allowed = Sentence("{low} to {high}, a plain number", low=Amount(low, digits=6), high=Amount(high, digits=6))
     if isinstance(value, bool) or not isinstance(value, int | float):
         report.fault(pointer, "wrong-type", "must be a plain number", value, allowed=allowed)
         return None
@@ -67,11 +70,11 @@ def read_plain(report: Report, pointer: str, value: object, low: float, high: fl
 
 def read_periods(report: Report, pointer: str, value: object, low: int, high: int) -> int | None:
     """A text with a whole number of excitation periods; None, and a problem noted, when it is not one."""
-    allowed = f'{low} to {high:,} whole excitation periods, as in "1000 periods"'
+    allowed = Sentence('{low} to {high} whole excitation periods, as in "1000 periods"', low=low, high=high)
     try:
         number, unit = split_quantity(value) if isinstance(value, str) else (None, "")
     except QuantityError as error:
-        report.fault(pointer, error.code, str(error), value, allowed=allowed)
+        report.fault(pointer, error.code, error.message, value, allowed=allowed)
         return None
     if number is None or unit not in PERIOD_NAMES:
         report.fault(pointer, "wrong-type", "must be a number of excitation periods", value, allowed=allowed)
@@ -96,12 +99,14 @@ def read_choice(
     """Read one of ``choices``; None, with a fault recorded, for anything else. Unless ``given``, None means missing."""
     if isinstance(value, str) and value in choices:
         return value
-    allowed = ", ".join(f"'{choice}'" for choice in choices)
+    allowed = quoted(choices)
     if value is None and not given:
         report.fault(pointer, "required", "is required", allowed=allowed)
     else:
-        hint = did_you_mean(value, choices) if isinstance(value, str) else ""
-        report.fault(pointer, "invalid-choice", f"is not a valid choice{hint}", value, allowed=allowed)
+        hint = did_you_mean(value, choices) if isinstance(value, str) else Sentence("")
+        report.fault(
+            pointer, "invalid-choice", Sentence("is not a valid choice{hint}", hint=hint), value, allowed=allowed
+        )
     return None
 
 
@@ -110,9 +115,15 @@ def read_one(report: Report, pointer: str, found: Mapping[str, Any], names: Sequ
     given = [name for name in names if name in found]
     if len(given) == 1:
         return given[0]
-    count = f"{len(given)} are given: {', '.join(given)}" if given else "none is given"
     listed = ", ".join(names)
-    report.fault(pointer, "exactly-one", f"needs exactly one of {listed}; {count}", allowed=f"one of {listed}")
+    message = Sentence("needs exactly one of {names}; none is given", names=listed)
+    if given:
+        message = plural(
+            "needs exactly one of {names}; {count} is given: {given}",
+            "needs exactly one of {names}; {count} are given: {given}",
+            len(given), names=listed, given=", ".join(given),
+        )  # fmt: skip
+    report.fault(pointer, "exactly-one", message, allowed=one_of(names))
     return None
 
 
@@ -131,7 +142,7 @@ def read_object(
             "required" if missing else "wrong-type",
             "is required" if missing else "must be an object",
             value,
-            allowed="an object with the fields " + ", ".join(known),
+            allowed=Sentence("an object with the fields {names}", names=", ".join(known)),
         )
         return None
     report.unknown_fields(pointer, value, known)
@@ -166,7 +177,11 @@ def missing(report: Report, pointer: str, parameter: Parameter) -> None:
     report.fault(
         pointer,
         "required",
-        f"is required ({parameter.help}, for example {example(parameter.unit)})",
-        allowed=parameter.range_text(),
+        Sentence(
+            "is required ({help}, for example {example})",
+            help=Sentence(parameter.help),
+            example=example(parameter.unit),
+        ),
+        allowed=range_sentence(parameter),
         unit=parameter.unit,
     )

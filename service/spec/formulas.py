@@ -14,7 +14,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Final
 
+from sprag.sentences import Part, Sentence, Typed, joined, plural
 from sprag.service.faults import Code
+from sprag.service.languages import N_
 from sprag.service.reading.cyrillic import latin
 from sprag.service.reading.units import QuantityError, is_unit, measure, plain_signs, to_float
 from sprag.worker.models.formulas import MAX_LENGTH, RESERVED, Expression, ExpressionError, Node
@@ -51,22 +53,26 @@ _OF_ANGLE: Final = frozenset({"sin", "cos", "tan"})
 _TO_PLAIN: Final = frozenset({"sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "floor"})
 _TO_ANGLE: Final = frozenset({"asin", "acos", "atan"})
 _COMPARISONS: Final = frozenset({"<", "<=", ">", ">="})
-_HZ_HINT: Final = "one revolution is 2 pi rad: write '1 rev * frequency', or 'speed / 1 rev'"
+_HZ_HINT: Final = N_("one revolution is 2 pi rad: write '1 rev * frequency', or 'speed / 1 rev'")
+#: What joins two quantities whose units do not go together.
+_JOINS: Final = {"+": N_("adds {one} and {other}{hint}"), "-": N_("subtracts {one} and {other}{hint}")}
+_COMPARES: Final = N_("'{function}' compares {one} and {other}{hint}")
 
 
 class FormulaError(ValueError):
-    """A formula that cannot be used. ``str()`` is a sentence without the formula; ``code`` is stable."""
+    """A formula that cannot be used. ``message`` is a phrase without the formula; ``code`` is stable."""
 
     def __init__(self, code: Code, message: str) -> None:
         super().__init__(message)
         self.code: Code = code
+        self.message = message
 
 
 class UnknownNameError(FormulaError):
     """A formula that uses ``name``, which is not a parameter."""
 
     def __init__(self, name: str) -> None:
-        super().__init__("invalid-path", f"uses '{name[:60]}'")
+        super().__init__("invalid-path", Sentence("uses '{name}'", name=name[:60]))
         self.name = name
 
 
@@ -101,7 +107,10 @@ def read_formula(text: str, units: dict[str, str], unit: str) -> Formula:
         When it cannot be read, uses something else, or its value is of another dimension.
     """
     if len(text) > MAX_LENGTH:
-        raise FormulaError("too-long", f"is longer than {MAX_LENGTH} characters")
+        message = plural(
+            "is longer than {count} character", "is longer than {count} characters", MAX_LENGTH, count=str(MAX_LENGTH)
+        )
+        raise FormulaError("too-long", message)
     scan = _Scan(plain_signs(text), units.keys())
     try:
         expression = Expression(scan.converted, units)
@@ -110,7 +119,8 @@ def read_formula(text: str, units: dict[str, str], unit: str) -> Formula:
     found = _Dimensions(scan, units).of(expression.root)
     wanted = _powers(unit)
     if not _alike(found, wanted):
-        raise FormulaError("wrong-unit", f"gives {_text(found)}, expected {unit}{_hint(found, wanted)}")
+        parts: dict[str, Part] = {"unit": _text(found), "expected": Typed(unit), "hint": _hint(found, wanted)}
+        raise FormulaError("wrong-unit", Sentence("gives {unit}, expected {expected}{hint}", **parts))
     return Formula(scan.converted, expression.used)
 
 
@@ -170,15 +180,19 @@ class _Scan:
         if _OTHER_POWER.match(after):
             raise FormulaError(
                 "invalid-formula",
-                f"'{number}{unit}' has an exponent that is no whole number behind its unit, to which it would belong: "
-                f"write '({number}{unit})^ ..' for a power of the quantity",
+                Sentence(
+                    "'{quantity}' has an exponent that is no whole number behind its unit, to which it would belong: "
+                    "write '({quantity})^ ..' for a power of the quantity",
+                    quantity=f"{number}{unit}",
+                ),
             )
         try:
             text = _POWER.sub(lambda power: f"^{power[1] or power[2]}", unit.strip())
             factor, powers = _measured(text)
             value = to_float(Fraction(number) * factor)
         except QuantityError as error:
-            raise FormulaError(error.code, f"'{number}{unit}' {error}") from None
+            message = Sentence("'{quantity}' {error}", quantity=f"{number}{unit}", error=error.message)
+            raise FormulaError(error.code, message) from None
         return repr(value), powers
 
     def _check_name(self, name: str) -> None:
@@ -226,8 +240,10 @@ class _Dimensions:
         base, exponent = node.parts
         inner = exponent.parts[0] if exponent.kind == "negative" else exponent
         if inner.kind == "number" and self._quantities.get(inner.position) == _ANGLE:
-            text = "an exponent has the unit that follows it: put the power in brackets, as in '(x^2) * 1 deg'"
-            raise FormulaError("wrong-unit", text)
+            raise FormulaError(
+                "wrong-unit",
+                "an exponent has the unit that follows it: put the power in brackets, as in '(x^2) * 1 deg'",
+            )
         self._require_plain("^", self.of(exponent))
         unit = self.of(base)
         if unit is None or not any(unit.values()):
@@ -236,24 +252,35 @@ class _Dimensions:
         if number is None:
             if not _without_angle(unit):
                 return _PLAIN
-            raise FormulaError("wrong-unit", f"raises {_text(unit)} to a power that is not a plain number")
+            raise FormulaError(
+                "wrong-unit", Sentence("raises {unit} to a power that is not a plain number", unit=_text(unit))
+            )
         return {name: power * number for name, power in unit.items()}
 
     @staticmethod
     def _require_plain(kind: str, unit: Powers) -> None:
         if kind in _OF_ANGLE and unit is not None and not _without_angle(unit) and not _alike(unit, _ANGLE):
-            raise FormulaError("wrong-unit", f"{kind} takes an angle, not {_text(unit)}; {_HZ_HINT}")
+            message = Sentence(
+                "{function} takes an angle, not {unit}; {hint}",
+                function=kind,
+                unit=_text(unit),
+                hint=Sentence(_HZ_HINT),
+            )
+            raise FormulaError("wrong-unit", message)
         if not _alike(unit, _PLAIN):
-            what = "the exponent" if kind == "^" else kind
-            raise FormulaError("wrong-unit", f"{what} takes a plain number or an angle, not {_text(unit)}")
+            what = Sentence("the exponent") if kind == "^" else kind
+            message = Sentence("{what} takes a plain number or an angle, not {unit}", what=what, unit=_text(unit))
+            raise FormulaError("wrong-unit", message)
 
     @staticmethod
     def _same(kind: str, units: list[Powers]) -> Powers:
         given = [unit for unit in units if unit is not None]
         for unit in given[1:]:
             if not _alike(unit, given[0]):
-                what = {"+": "adds", "-": "subtracts"}.get(kind, f"'{kind}' compares")
-                raise FormulaError("wrong-unit", f"{what} {_text(given[0])} and {_text(unit)}{_hint(unit, given[0])}")
+                parts: dict[str, Part] = {
+                    "one": _text(given[0]), "other": _text(unit), "hint": _hint(unit, given[0]), "function": kind
+                }  # fmt: skip
+                raise FormulaError("wrong-unit", Sentence(_JOINS.get(kind, _COMPARES), **parts))
         return next((unit for unit in given if _cycles(unit)), given[0]) if given else None
 
 
@@ -313,13 +340,13 @@ def _per_second(unit: dict[str, Fraction]) -> bool:
     return _without_angle(unit) == {"second": Fraction(-1)}
 
 
-def _hint(one: Powers, other: Powers) -> str:
+def _hint(one: Powers, other: Powers) -> Sentence:
     if one is None or other is None or _without_angle(one) != _without_angle(other):
-        return ""
-    return f"; {_HZ_HINT}"
+        return Sentence("")
+    return joined("; ", ("", Sentence(_HZ_HINT)))
 
 
-def _text(unit: Powers) -> str:
+def _text(unit: Powers) -> Sentence | Typed:
     """A unit for a message, such as "kg*m^2/s"."""
     names = {"gram": "kg", "meter": "m", "second": "s", "radian": "rad"}
     present = [(names[name], (unit or {}).get(name, Fraction())) for name in names]
@@ -331,5 +358,7 @@ def _text(unit: Powers) -> str:
     above, below = "*".join(powers(1)), "/".join(["", *powers(-1)])
     cycles = _cycles(unit or {})
     if cycles and not _without_angle(unit or {}):
-        return "a number of periods (Hz times s)" if cycles == 1 and not above else f"{above or '1'}{below} beside Hz*s"
-    return f"{above or '1'}{below}" if above or below else "a plain number"
+        if cycles == 1 and not above:
+            return Sentence("a number of periods (Hz times s)")
+        return Sentence("{unit} beside Hz*s", unit=Typed(f"{above or '1'}{below}"))
+    return Typed(f"{above or '1'}{below}") if above or below else Sentence("a plain number")

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from sprag.sentences import Sentence
+from sprag.service.reading.limits import printable_line
 from sprag.service.spec.described import Listed
 from sprag.service.spec.fields import read_flag, read_object
 from sprag.service.spec.report import Report, join
@@ -18,8 +20,8 @@ _LISTS: Final = {
     "remove_tags": Listed("tags", 0, MAX_TAGS, "tags that it loses"),
 }
 _TAG: Final[dict[str, Any]] = {"type": "string", "minLength": 1, "maxLength": MAX_TAG_LENGTH}
-_TAG_ALLOWED: Final = f"1 to {MAX_TAG_LENGTH} printable characters without a comma"
-LINES_ALLOWED: Final = f"at most {MAX_NOTES_LENGTH:,} printable characters in lines"
+_TAG_ALLOWED: Final = Sentence("{low} to {high} printable characters without a comma", low=1, high=MAX_TAG_LENGTH)
+LINES_ALLOWED: Final = Sentence("at most {high} printable characters in lines", high=MAX_NOTES_LENGTH)
 
 #: JSON Schema of a change.
 SCHEMA: Final[dict[str, Any]] = {
@@ -69,7 +71,7 @@ def _read_line(report: Report, found: Mapping[str, Any], field: str, longest: in
     value = found[field]
     if isinstance(value, str) and value.isprintable() and 1 <= len(value.strip()) <= longest:
         return value.strip()
-    allowed = f"1 to {longest} printable characters in one line"
+    allowed = printable_line(longest)
     report.fault(f"/{field}", _text_code(value), "must be a printable text in one line", value, allowed=allowed)
     return None
 

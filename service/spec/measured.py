@@ -17,10 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.sentences import Amount, Sentence, WarningText
+from sprag.sentences import Amount, Sentence, WarningText, plural
 from sprag.service.faults import Fault, FaultError
 from sprag.service.languages import N_
 from sprag.service.reading.numbers import WITHOUT_DOUBT, assumption, is_ambiguous, of_line, parse_number, question
+from sprag.service.reading.units import QuantityError
+from sprag.service.spec.csv_text import not_csv
 from sprag.service.spec.table_text import (
     CsvRow,
     Split,
@@ -90,7 +92,7 @@ def parse_measured(text: str, convert: Callable[[str, str], float]) -> MeasuredD
     try:
         table = _split(text)
     except csv.Error as error:
-        raise MeasuredDataError([Fault("data", "unreadable", f"is not CSV: {error}")]) from None
+        raise MeasuredDataError([Fault("data", "unreadable", not_csv(error))]) from None
     rows = [CsvRow(row.line, [_unquoted(cell) for cell in row.cells]) for row in table.rows]
     if not rows:
         raise MeasuredDataError([Fault("line 1", "empty", "there are no data", allowed="rows of angle and torque")])
@@ -127,9 +129,13 @@ def _is_header(cells: list[str]) -> bool:
 def _factors(row: CsvRow, convert: Callable[[str, str], float]) -> tuple[float | None, float | None]:
     """Factors of the two columns to SI from the units in the header; None for a column without a unit."""
     if len(row.cells) != len(_QUANTITIES):
-        text = "the header does not have two columns"
         given = ", ".join(row.cells)[:80]
-        raise MeasuredDataError([Fault(f"line {row.line}", "unequal-lengths", text, given, allowed="angle, torque")])
+        raise MeasuredDataError([
+            Fault(
+                f"line {row.line}", "unequal-lengths", "the header does not have two columns", given,
+                allowed="angle, torque",
+            )
+        ])  # fmt: skip
     factors: list[float | None] = []
     problems = []
     for cell, (name, unit), words in zip(row.cells, _QUANTITIES, _WORDS, strict=True):
@@ -137,7 +143,9 @@ def _factors(row: CsvRow, convert: Callable[[str, str], float]) -> tuple[float |
             factors.append(_factor(cell, unit, words, convert))
         except ValueError as error:
             where = f"line {row.line}"
-            problems.append(Fault(where, "wrong-unit", f"column {name}: {error}", cell, allowed=_UNITS[unit]))
+            what = getattr(error, "message", str(error))
+            message = Sentence("column {column}: {message}", column=Sentence(name), message=what)
+            problems.append(Fault(where, "wrong-unit", message, cell, allowed=_UNITS[unit]))
     if problems:
         raise MeasuredDataError(problems)
     return factors[0], factors[1]
@@ -149,7 +157,8 @@ def _factor(heading: str, unit: str, words: frozenset[str], convert: Callable[[s
     if text.lower() in words:
         return None
     if found is None and len(text) < 2:
-        raise ValueError(f"'{heading}' names neither the quantity nor its unit")
+        message = Sentence("'{heading}' names neither the quantity nor its unit", heading=heading)
+        raise QuantityError("wrong-unit", message)
     return convert(f"1 {text}", unit)
 
 
@@ -188,10 +197,11 @@ def _numbers(table: Split, factors: tuple[float | None, float | None]) -> Measur
     if problems:
         raise MeasuredDataError(problems)
     if not 1 <= len(rows) <= MAX_CLUTCH_ROWS:
-        message = "there are no rows under the header" if not rows else f"{len(rows)} rows"
-        raise MeasuredDataError(
-            [Fault("data", "empty" if not rows else "too-many", message, len(rows), f"1 .. {MAX_CLUTCH_ROWS} rows")]
-        )
+        message = Sentence("there are no rows under the header")
+        if rows:
+            message = plural("{count} row", "{count} rows", len(rows), count=str(len(rows)))
+        allowed = Sentence("1 .. {high} rows", high=str(MAX_CLUTCH_ROWS))
+        raise MeasuredDataError([Fault("data", "empty" if not rows else "too-many", message, len(rows), allowed)])
     numbers = np.array([[parse_number(cell) for cell in row.cells] for row in rows], dtype=np.float64)
     scaled = numbers * np.array([1.0 if factor is None else factor for factor in factors])
     warnings = list(_assumed(factors, numbers))
@@ -204,7 +214,7 @@ def _numbers(table: Split, factors: tuple[float | None, float | None]) -> Measur
 def _wrong_rows(written: Split, rows: Sequence[CsvRow]) -> Iterator[Fault]:
     for given, (number, cells) in zip(written.rows, rows, strict=True):
         if len(cells) != 2:
-            few = f"{len(cells)} column" + ("" if len(cells) == 1 else "s")
+            few = plural("{count} column", "{count} columns", len(cells))
             yield Fault(
                 f"line {number}", "unequal-lengths", few, written.separator.join(given.cells)[:80],
                 allowed="two columns: angle, torque; decimal commas only where tabs, semicolons or quotes separate the "
@@ -214,15 +224,15 @@ def _wrong_rows(written: Split, rows: Sequence[CsvRow]) -> Iterator[Fault]:
         for cell, (name, _) in zip(cells, _QUANTITIES, strict=True):
             value = parse_number(cell)
             if is_ambiguous(cell):
-                message = f"the comma of the {name} could be decimal or separate thousands"
+                message = Sentence(
+                    "the comma of the {name} could be decimal or separate thousands", name=Sentence(name)
+                )
                 yield Fault(
                     f"line {number}", "ambiguous-comma", message, cell[:80], allowed="a decimal point, or no comma"
                 )
             elif value is None:
-                yield Fault(
-                    f"line {number}", "not-a-number", f"the {name} is not a number", cell[:80], allowed="a number"
-                )
+                message = Sentence("the {name} is not a number", name=Sentence(name))
+                yield Fault(f"line {number}", "not-a-number", message, cell[:80], allowed="a number")
             elif not math.isfinite(value):
-                yield Fault(
-                    f"line {number}", "not-finite", f"the {name} is not finite", cell[:80], allowed="a finite number"
-                )
+                message = Sentence("the {name} is not finite", name=Sentence(name))
+                yield Fault(f"line {number}", "not-finite", message, cell[:80], allowed="a finite number")

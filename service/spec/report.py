@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from sprag.sentences import Place, WarningText
+from sprag.sentences import Place, Sentence, WarningText, plural
 from sprag.service.faults import Code, Fault, FaultError, WarningCode
 from sprag.service.reading.texts import did_you_mean, shorten, shorten_text
 from sprag.worker.limits import MAX_PROBLEMS
@@ -38,7 +38,10 @@ class Report:
         allowed: str | None = None,
         unit: str | None = None,
     ) -> None:
-        """Record a fault, unless there are `MAX_PROBLEMS` already; numbers appear as the user wrote them."""
+        """Record a fault, unless there are `MAX_PROBLEMS` already; numbers appear as the user wrote them.
+
+        ``message`` and ``allowed`` are phrases, texts of the catalogue, or names that are the same in all languages.
+        """
         self.found += 1
         if not self.full:
             shown = _as_written(value, _at(self._source, pointer))
@@ -79,9 +82,9 @@ class Report:
                 self.fault(
                     join(pointer, key),
                     "unknown-field",
-                    f"unknown field{did_you_mean(key, known)}",
+                    Sentence("unknown field{hint}", hint=did_you_mean(key, known)),
                     found[key],
-                    allowed="the fields " + ", ".join(known),
+                    allowed=Sentence("the fields {names}", names=", ".join(known)),
                 )
 
     def raise_if_any(self) -> None:
@@ -91,8 +94,8 @@ class Report:
 
     def error(self) -> SpecError:
         """The error with all faults recorded so far."""
-        more = [Fault("", "too-many-faults", f"only the first {MAX_PROBLEMS} faults are listed")] if self.full else []
-        return SpecError([*self.faults, *more])
+        message = plural("only the first fault is listed", "only the first {count} faults are listed", MAX_PROBLEMS)
+        return SpecError([*self.faults, *([Fault("", "too-many-faults", message)] if self.full else [])])
 
 
 def _at(source: object, pointer: str) -> object:

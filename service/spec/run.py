@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.sentences import Amount, Sentence, plural
+from sprag.service.languages import N_
 from sprag.service.reading.units import PERIOD_NAMES, QuantityError, exact_number, parse_exact, split_quantity, to_float
 from sprag.service.spec.described import ANY_RUN, SETTLED_RUN
 from sprag.service.spec.fields import read_object
@@ -26,7 +27,7 @@ _ANY_DEFAULTS: Final[dict[str, Any]] = {name: field.default for name, field in A
 #: Defaults of missing fields. A run without a field of `TIMED_FIELDS` lasts until it is settled.
 SETTLED_DEFAULTS: Final[dict[str, Any]] = {name: field.default for name, field in SETTLED_RUN.items()} | _ANY_DEFAULTS
 TIMED_DEFAULTS: Final[dict[str, Any]] = {"duration": [60.0, "periods"], "window": None, **_ANY_DEFAULTS}
-_TIME: Final = 'seconds (2.0 or "2 s") or excitation periods ("60 periods")'
+_TIME: Final = N_('seconds (2.0 or "2 s") or excitation periods ("60 periods")')
 _MAX_SECONDS: Final = 1e9
 #: Ends that are equal but for the rounding of a conversion between seconds and periods count as equal.
 _ROUNDING: Final = 1e-9
@@ -62,7 +63,7 @@ def read_run(report: Report, data: object, frequencies: NDArray[np.float64]) -> 
     return run
 
 
-def refuse_run(report: Report, data: object, why: str = "is not used: this model has no run") -> dict[str, Any]:
+def refuse_run(report: Report, data: object, why: str = N_("is not used: this model has no run")) -> dict[str, Any]:
     """The empty run of a model without a run; every given field is recorded as a fault."""
     if not isinstance(data, Mapping):
         report.fault(
@@ -96,13 +97,17 @@ def _warn_of_few_periods(report: Report, at_most: int | None) -> None:
 
 def _refuse_settled(report: Report, found: Mapping[str, Any]) -> None:
     """Record the fields that contradict a duration or a window."""
-    timed = " and ".join(f"`{name}`" for name in TIMED_FIELDS if name in found)
+    given = [f"`{name}`" for name in TIMED_FIELDS if name in found]
+    timed = Sentence("{low} and {high}", low=given[0], high=given[1]) if len(given) == 2 else given[0]
     for name in SETTLED_FIELDS:
         if name in found:
             report.fault(
-                f"/run/{name}", "conflict", f"contradicts {timed}: a run lasts until it is settled or for a given time",
-                found[name], allowed=f"no `{name}`, or neither `duration` nor `window`",
-            )  # fmt: skip
+                f"/run/{name}",
+                "conflict",
+                Sentence("contradicts {fields}: a run lasts until it is settled or for a given time", fields=timed),
+                found[name],
+                allowed=Sentence("no `{field}`, or neither `duration` nor `window`", field=name),
+            )
 
 
 def in_periods(time: Time, frequency: float) -> float:
@@ -116,7 +121,7 @@ def time_text(time: Time) -> str:
 
 
 def _read_time(report: Report, pointer: str, value: object, *, positive: bool = False) -> Time | None:
-    allowed = ("> 0" if positive else ">= 0") + f", in {_TIME}"
+    allowed = Sentence("{range}, in {units}", range="> 0" if positive else ">= 0", units=Sentence(_TIME))
     try:
         unit = "s"
         if isinstance(value, str):
@@ -131,7 +136,7 @@ def _read_time(report: Report, pointer: str, value: object, *, positive: bool = 
             number = exact_number(value, "s")
         seconds = to_float(number)
     except QuantityError as error:
-        report.fault(pointer, error.code, str(error), value, allowed=allowed)
+        report.fault(pointer, error.code, error.message, value, allowed=allowed)
         return None
     if seconds < 0.0 or (positive and seconds == 0.0) or seconds > _MAX_SECONDS:
         report.fault(pointer, "out-of-range", "is out of range", value, allowed=allowed)
@@ -160,15 +165,19 @@ def _check_times(
 ) -> None:
     """Compare duration and window at the lowest and the highest frequency; in between both are linear."""
     for frequency in dict.fromkeys((float(frequencies.min()), float(frequencies.max()))):
-        at = "" if _one_unit(run) else f" at {frequency:.6g} Hz"
+        at = Sentence("") if _one_unit(run) else Sentence(" at {frequency}", frequency=Amount(frequency, "Hz", 6))
         duration = in_periods(run["duration"], frequency)
         if duration > MAX_RUN_PERIODS:
             report.fault(
                 "/run/duration",
                 "out-of-range",
-                f"is {duration:.8g} excitation periods at {frequency:.6g} Hz",
+                Sentence(
+                    "is {periods} excitation periods at {frequency}",
+                    periods=Amount(duration, digits=8),
+                    frequency=Amount(frequency, "Hz", 6),
+                ),
                 given.get("duration"),
-                allowed=f"at most {MAX_RUN_PERIODS:,.0f} periods in any case",
+                allowed=Sentence("at most {periods} periods in any case", periods=int(MAX_RUN_PERIODS)),
             )
             return
         if run["window"] is None:
@@ -189,15 +198,16 @@ def _check_times(
             report.fault(
                 "/run/window",
                 "invalid-range",
-                f"starts at or after its end{at}",
+                Sentence("starts at or after its end{at}", at=at),
                 given["window"],
                 allowed="start < end",
             )
             return
         if end > duration * (1.0 + _ROUNDING):
             report.fault(
-                "/run/window/1", "out-of-range", f"the window ends after the run{at}", given["window"][1],
-                allowed=f"at most the duration, {time_text(run['duration'])}",
+                "/run/window/1", "out-of-range", Sentence("the window ends after the run{at}", at=at),
+                given["window"][1],
+                allowed=Sentence("at most the duration, {time}", time=time_text(run["duration"])),
             )  # fmt: skip
             return
         if end - start < 1.0 - _ROUNDING:

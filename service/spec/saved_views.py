@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import parse_qsl, urlencode
 
+from sprag.sentences import Sentence
+from sprag.service.reading.limits import characters, printable_line, span
 from sprag.service.spec.fields import read_flag, read_object
 from sprag.service.spec.report import Report
 from sprag.worker.limits import MAX_NAME_LENGTH, MAX_REPORT_FIGURES, MAX_VIEW_QUERY
@@ -107,14 +109,18 @@ def read_view(data: object) -> View:
     if page not in PAGES:
         report.fault("/page", "invalid-choice", "is not a page with views", page, allowed=", ".join(PAGES))
     elif page in STUDY_PAGES and study is None:
-        report.fault("/study", "required", f"is required for the page {page}", allowed="the id of a study")
+        report.fault(
+            "/study", "required", Sentence("is required for the page {page}", page=page), allowed="the id of a study"
+        )
     elif page in OWN_PAGES and study is not None:
-        report.fault("/study", "not-used", f"does not go with the page {page}", study, allowed="null")
+        report.fault(
+            "/study", "not-used", Sentence("does not go with the page {page}", page=page), study, allowed="null"
+        )
     if study is not None and not (isinstance(study, str) and _STUDY.fullmatch(study)):
         report.fault("/study", "invalid-text", "is not an id of a study", study, allowed="the id of a study")
     name, query = _read_name(report, found), _read_query(report, found)
     if "name" not in found:
-        report.fault("/name", "required", "is required", allowed=f"1 to {MAX_NAME_LENGTH} characters")
+        report.fault("/name", "required", "is required", allowed=characters(1, MAX_NAME_LENGTH))
     in_report = _read_in_report(report, found, str(page)) or False
     report.raise_if_any()
     return View(str(page), name or "", query or "", study, in_report)
@@ -127,7 +133,7 @@ def read_view_change(data: object, page: str) -> ViewChange:
     name, query, in_report = _read_name(report, found), _read_query(report, found), _read_in_report(report, found, page)
     place = found.get("place")
     if "place" in found:
-        allowed = f"1 to {MAX_REPORT_FIGURES}"
+        allowed = span(1, MAX_REPORT_FIGURES)
         if type(place) is not int:
             report.fault("/place", "wrong-type", "must be an integer", place, allowed=allowed)
         elif not 1 <= place <= MAX_REPORT_FIGURES:
@@ -145,7 +151,7 @@ def _read_name(report: Report, found: Mapping[str, Any]) -> str | None:
     if isinstance(name, str) and name.isprintable() and 1 <= len(name.strip()) <= MAX_NAME_LENGTH:
         return name.strip()
     code: Any = "invalid-text" if isinstance(name, str) else "wrong-type"
-    allowed = f"1 to {MAX_NAME_LENGTH} printable characters in one line"
+    allowed = printable_line(MAX_NAME_LENGTH)
     report.fault("/name", code, "must be a printable text in one line", name, allowed=allowed)
     return None
 
@@ -160,7 +166,7 @@ def _read_query(report: Report, found: Mapping[str, Any]) -> str | None:
         if all((name + value).isprintable() for name, value in pairs):
             return urlencode(pairs)
     code: Any = "invalid-text" if isinstance(query, str) else "wrong-type"
-    allowed = f"at most {MAX_VIEW_QUERY:,} characters, such as x=shaft.load&y=efficiency"
+    allowed = Sentence("at most {high} characters, such as x=shaft.load&y=efficiency", high=MAX_VIEW_QUERY)
     report.fault("/query", code, "must be the query of an address", query, allowed=allowed)
     return None
 
@@ -170,5 +176,11 @@ def _read_in_report(report: Report, found: Mapping[str, Any], page: str) -> bool
         return None
     wanted = read_flag(report, "/in_report", found["in_report"])
     if wanted and page not in FIGURES:
-        report.fault("/in_report", "not-used", "is for figures", wanted, allowed=f"views of {', '.join(FIGURES)}")
+        report.fault(
+            "/in_report",
+            "not-used",
+            "is for figures",
+            wanted,
+            allowed=Sentence("views of {pages}", pages=", ".join(FIGURES)),
+        )
     return wanted

@@ -7,6 +7,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.sentences import Sentence, joined, plural
+from sprag.service.languages import N_
+from sprag.service.reading.catalogue import range_sentence
+from sprag.service.reading.limits import at_most
 from sprag.service.spec.axes.axes import varied_values
 from sprag.service.spec.described import Described, named, schemas
 from sprag.service.spec.draws.tolerances import expanded
@@ -29,7 +33,7 @@ SETTINGS: Final = named(
     Described("seed", "", "seed of the initial values, which are those of a scrambled Sobol sequence", "whole", 0,
               2**32 - 1, 1),
 )  # fmt: skip
-_ALLOWED: Final = (
+_ALLOWED: Final = N_(
     'ranges of initial values, as in {"shaft.initial_speed": ["0 rad/s", "30 rad/s"]}; `*` stands for every pendulum'
 )
 
@@ -85,16 +89,19 @@ def _read_ranges(report: Report, data: object, machine: Machine) -> dict[str, li
         paths = expanded(name, initial) if isinstance(name, str) else []
         if not paths:
             if not machine.assumed(name):
-                message = "is not an initial value" if name in machine.parameters else machine.why_not(name)
                 report.fault(
-                    pointer, "invalid-path", message, name, allowed=", ".join(initial) or "none: no initial values"
-                )
+                    pointer, "invalid-path",
+                    "is not an initial value" if name in machine.parameters else machine.why_not(name),
+                    name, allowed=", ".join(initial) if initial else "none: no initial values",
+                )  # fmt: skip
             continue
         _add_range(report, pointer, ends, {path: initial[path] for path in paths}, machine, ranges)
     if len(ranges) > MAX_START_RANGES:
         report.fault(
-            "/starts/ranges", "too-many", f"has {len(ranges)} initial values", allowed=f"at most {MAX_START_RANGES}"
-        )
+            "/starts/ranges", "too-many",
+            plural("has {count} initial value", "has {count} initial values", len(ranges)),
+            allowed=at_most(MAX_START_RANGES),
+        )  # fmt: skip
     return ranges
 
 
@@ -128,7 +135,7 @@ def _add_range(
     """Add the range of some initial values; faults are recorded."""
     for path, entry in parameters.items():
         if path in machine.derive:
-            report.fault(pointer, "conflict", f"{path} is derived from other parameters", path)
+            report.fault(pointer, "conflict", Sentence("{path} is derived from other parameters", path=path), path)
             return
         if path in ranges:
             report.fault(pointer, "repeated", "has two ranges", path, allowed="each initial value once")
@@ -136,7 +143,7 @@ def _add_range(
         if not isinstance(ends, list) or len(ends) != 2:
             report.fault(
                 pointer, "wrong-type", "must be a list of two ends", ends,
-                allowed=f"[low, high], {entry.range_text()}", unit=entry.unit,
+                allowed=joined(", ", ("[low, high]", range_sentence(entry))), unit=entry.unit,
             )  # fmt: skip
             return
         if refuse_mixed(report, [(join(pointer, k), end) for k, end in enumerate(ends)], entry.unit):

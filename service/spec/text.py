@@ -8,13 +8,23 @@ import re
 import tomllib
 from typing import Any, Final, Literal
 
+from sprag.sentences import Sentence, plural
 from sprag.service.faults import Fault
+from sprag.service.languages import N_
 from sprag.service.spec.report import Report, SpecError, join
 from sprag.worker.limits import MAX_BODY_BYTES, MAX_DEPTH, MAX_INTEGER_DIGITS
 
 _LONGEST_BITS: Final = math.ceil(MAX_INTEGER_DIGITS * math.log2(10))
 
 Format = Literal["json", "toml"]
+
+#: What Python says of a text that is no JSON.
+_OF_JSON: Final = (
+    N_("Expecting value"), N_("Expecting ',' delimiter"), N_("Expecting ':' delimiter"), N_("Extra data"),
+    N_("Expecting property name enclosed in double quotes"), N_("Illegal trailing comma before end of object"),
+    N_("Illegal trailing comma before end of array"), N_("Unterminated string starting at"),
+    N_("Invalid control character at"), N_("Invalid \\escape"), N_("Invalid \\uXXXX escape"),
+)  # fmt: skip
 
 # Both patterns consume a whole string, closed or not, so that a scan visits each character once.
 _JSON_TOKEN: Final = re.compile(r'"(?:[^"\\]|\\.)*+"?|[\[{]|[\]}]', re.DOTALL)
@@ -74,19 +84,26 @@ def load_spec(text: str | bytes, format: Format) -> object:
 def _decode(text: str | bytes) -> str:
     raw = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
     if len(raw) > MAX_BODY_BYTES:
-        raise _fault(f"the spec is {len(raw):,} bytes long", allowed=f"at most {MAX_BODY_BYTES:,} bytes")
+        message = plural("the spec is {count} byte long", "the spec is {count} bytes long", len(raw))
+        raise _fault(
+            message,
+            allowed=plural("at most {count} byte", "at most {count} bytes", MAX_BODY_BYTES),
+        )
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise _fault(f"the spec is not UTF-8 text: byte {error.start} is wrong") from None
+        raise _fault(Sentence("the spec is not UTF-8 text: byte {place} is wrong", place=str(error.start))) from None
 
 
-def _fault(message: str, allowed: str | None = None) -> SpecError:
+def _fault(message: Sentence, allowed: str | None = None) -> SpecError:
     return SpecError([Fault("", "unreadable", message, allowed=allowed)])
 
 
 def _too_deep() -> SpecError:
-    return _fault("lists and objects are nested too deeply", allowed=f"at most {MAX_DEPTH} levels")
+    return _fault(
+        Sentence("lists and objects are nested too deeply"),
+        plural("at most {count} level", "at most {count} levels", MAX_DEPTH),
+    )
 
 
 def _json(source: str) -> object:
@@ -98,7 +115,9 @@ def _json(source: str) -> object:
     try:
         return json.loads(source, object_pairs_hook=_pairs, parse_int=_integer)
     except json.JSONDecodeError as error:
-        raise _fault(f"not JSON: {error.msg} in line {error.lineno}, column {error.colno}") from None
+        place = {"line": str(error.lineno), "column": str(error.colno)}
+        message = Sentence("not JSON: {error} in line {line}, column {column}", error=Sentence(error.msg), **place)
+        raise _fault(message) from None
 
 
 def _pairs(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -119,10 +138,10 @@ def _toml(source: str) -> object:
     try:
         return tomllib.loads(source)
     except tomllib.TOMLDecodeError as error:
-        raise _fault(f"not TOML: {str(error)[:200]}") from None
+        raise _fault(Sentence("not TOML: {error}", error=str(error)[:200])) from None
     except ValueError:
         # The TOML grammar accepts numbers and dates that Python does not.
-        raise _fault("not TOML that can be read: a number or a date is out of range") from None
+        raise _fault(Sentence("not TOML that can be read: a number or a date is out of range")) from None
     except RecursionError:
         raise _too_deep() from None
 

@@ -21,7 +21,7 @@ from sprag.service.http.work import Attended
 from sprag.service.jobs import checks
 from sprag.service.json_text import to_bytes
 from sprag.service.languages import N_
-from sprag.service.reading.units import example
+from sprag.service.reading.units import examples
 from sprag.service.reading.wording import words
 from sprag.service.spec.components import (
     CHARACTERISTICS,
@@ -61,8 +61,8 @@ def _columns(kind: str) -> list[_Column]:
         elif name == COEFFICIENTS:
             found.append(_Column(name, words(name), "", "0; 200; 0; 20000", (), must))
         else:
-            shown = example(parameter.unit).split('"')
-            found.append(_Column(name, words(name), parameter.unit, shown[1] if len(shown) > 1 else "", (), must))
+            shown = "" if parameter.unit == "1" else examples(parameter.unit)[0]
+            found.append(_Column(name, words(name), parameter.unit, shown, (), must))
     return found
 
 

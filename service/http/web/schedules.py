@@ -27,10 +27,9 @@ from sprag.service.http.work import Attended, Work
 from sprag.service.jobs import checks
 from sprag.service.jobs.nights import HOURS, MOST_HOURS, night
 from sprag.service.languages import N_, gettext
-from sprag.service.languages.ranges import allowed_text
 from sprag.service.presets import preset_names
+from sprag.service.reading.faults import allowed_text, fault_text
 from sprag.service.reading.phrases import meanings
-from sprag.service.results.fault_texts import fault_text
 from sprag.service.schedules.fields import ScheduleFields, change_fields
 from sprag.service.schedules.report_to import require_deliverable
 from sprag.service.schedules.trouble import usual_flags

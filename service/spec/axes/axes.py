@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sprag.sentences import Amount, Place, Sentence
+from sprag.sentences import Amount, Place, Sentence, joined
+from sprag.service.reading.catalogue import range_sentence
+from sprag.service.reading.limits import at_most, at_most_cases, unit_list
 from sprag.service.reading.texts import quantity_text
 from sprag.service.spec.axes.blocks import first_rows
-from sprag.service.spec.axes.values import PLANS, Plan, count_text
+from sprag.service.spec.axes.values import PLANS, Plan, any_count, count_text
 from sprag.service.spec.described import Listed
 from sprag.service.spec.fields import read_object, read_one
 from sprag.service.spec.machine.machine import Machine
@@ -103,7 +105,9 @@ def read_paths(report: Report, pointer: str, data: object, machine: Machine) -> 
             "required" if data is None else "wrong-type",
             "must name what varies" if data is not None else "is required",
             data,
-            allowed=f"a path such as 'excitation.frequency', or a list of 1 to {MAX_TIED_PATHS} of them",
+            allowed=Sentence(
+                "a path such as 'excitation.frequency', or a list of 1 to {high} of them", high=str(MAX_TIED_PATHS)
+            ),
         )
         return None
     found: list[Parameter] = []
@@ -128,9 +132,8 @@ def read_paths(report: Report, pointer: str, data: object, machine: Machine) -> 
         return None
     units = list(dict.fromkeys(entry.unit for entry in found))
     if len(units) > 1:
-        report.fault(
-            pointer, "wrong-unit", f"ties parameters of different units: {', '.join(units)}", data, allowed="one unit"
-        )
+        message = Sentence("ties parameters of different units: {units}", units=unit_list(units))
+        report.fault(pointer, "wrong-unit", message, data, allowed="one unit")
         return None
     return tuple(entry.path for entry in found)
 
@@ -144,7 +147,8 @@ def check_paths(report: Report, axes: Sequence[tuple[str, ...]], pointer: str = 
                 report.fault(join(pointer, index, "path"), "repeated", "names the same path twice", path)
             if path in taken:
                 report.fault(
-                    join(pointer, index, "path"), "repeated", f"this path is already on axis {taken[path]}", path,
+                    join(pointer, index, "path"), "repeated",
+                    Sentence("this path is already on axis {axis}", axis=str(taken[path])), path,
                     allowed="each path on one axis",
                 )  # fmt: skip
             taken.setdefault(path, index)
@@ -158,15 +162,15 @@ def _sizes_fit(report: Report, plans: list[Plan], combine: Combine) -> bool:
             report.fault(
                 plan.pointer,
                 "too-many",
-                f"asks for {count_text(plan.count)} values",
-                allowed=f"at most {MAX_AXIS_VALUES:,} values",
+                Sentence("asks for {values} values", values=any_count(plan.count)),
+                allowed=Sentence("at most {high} values", high=MAX_AXIS_VALUES),
             )
     if report.found == before and sum(counts) > MAX_AXIS_VALUES:
         report.fault(
             "/axes",
             "too-many",
-            f"the axes ask for {count_text(sum(counts))} values together",
-            allowed=f"at most {MAX_AXIS_VALUES:,}",
+            Sentence("the axes ask for {values} values together", values=any_count(sum(counts))),
+            allowed=at_most(MAX_AXIS_VALUES),
         )
     if combine == "zip":
         if len(set(counts)) > 1:
@@ -174,13 +178,17 @@ def _sizes_fit(report: Report, plans: list[Plan], combine: Combine) -> bool:
                 "/axes",
                 "unequal-lengths",
                 "axes that are zipped must have equally many values",
-                [count_text(count) for count in counts],
+                [count_text(number) for number in counts],
                 allowed="axes of one length, or combine: 'grid'",
             )
     elif report.found == before and math.prod(counts) > MAX_CASES:
         report.fault(
-            "/axes", "too-many", f"the grid has {count_text(math.prod(counts))} cases "
-            f"({' x '.join(count_text(count) for count in counts)})", allowed=f"at most {MAX_CASES:,} cases",
+            "/axes", "too-many",
+            Sentence(
+                "the grid has {cases} cases ({product})",
+                cases=any_count(math.prod(counts)), product=joined(" x ", map(any_count, counts)),
+            ),
+            allowed=at_most_cases(MAX_CASES),
         )  # fmt: skip
     return report.found == before
 
@@ -204,14 +212,16 @@ def expand(report: Report, plan: Plan, parameters: list[Parameter], combine: Com
     if refused <= repeated:
         refusing = next(entry for entry in parameters if not accepted[entry.path][index])
         report.fault(
-            where, "out-of-range", f"value {index} is out of range for {refusing.path}", _shown(plan, value, refusing),
-            allowed=refusing.range_text(), unit=refusing.unit,
+            where, "out-of-range",
+            Sentence("value {place} is out of range for {path}", place=str(index), path=refusing.path),
+            _shown(plan, value, refusing), allowed=range_sentence(refusing), unit=refusing.unit,
         )  # fmt: skip
     else:
         before = _first(values == value)
         report.fault(
-            where, "repeated", f"value {index} repeats value {before}", _shown(plan, value, parameters[0]),
-            allowed="each value once", unit=parameters[0].unit,
+            where, "repeated",
+            Sentence("value {place} repeats value {earlier}", place=str(index), earlier=str(before)),
+            _shown(plan, value, parameters[0]), allowed="each value once", unit=parameters[0].unit,
         )  # fmt: skip
     return None
 
@@ -246,10 +256,11 @@ def _rows_differ(report: Report, axes: list[Axis], machine: Machine) -> bool:
     before = _first(np.logical_and.reduce([axis.array == axis.array[case] for axis in axes]))
     pairs = [(axis.paths[0], float(axis.array[case])) for axis in axes]
     values = [f"{path} = {quantity_text(value, machine.parameters[path].unit)}" for path, value in pairs]
-    report.fault(
-        "/axes", "repeated", f"cases {before} and {case} are the same: every zipped axis repeats its value", values,
-        allowed="each combination of values once",
+    message = Sentence(
+        "cases {earlier} and {case} are the same: every zipped axis repeats its value",
+        earlier=str(before), case=str(case),
     )  # fmt: skip
+    report.fault("/axes", "repeated", message, values, allowed="each combination of values once")
     return False
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 
+from sprag.sentences import Sentence, plural
 from sprag.service.reading.texts import quantity_text
 from sprag.service.spec.axes.axes import check_paths, expand, read_axes, read_axis
 from sprag.service.spec.axes.blocks import (
@@ -29,7 +30,7 @@ from sprag.service.spec.axes.blocks import (
 from sprag.service.spec.axes.exclude import kept, read_exclude
 from sprag.service.spec.axes.points import read_points
 from sprag.service.spec.axes.sample import read_sample
-from sprag.service.spec.axes.values import count_text
+from sprag.service.spec.axes.values import any_count, count_text
 from sprag.service.spec.described import Listed, choice
 from sprag.service.spec.fields import read_object
 from sprag.service.spec.report import Report, join
@@ -87,8 +88,12 @@ def _as_axes(
 ) -> tuple[Axis, ...] | None:
     count = _length(columns)
     if not count:
-        message = "every case is excluded" if excluded else "nothing varies"
-        report.fault("/exclude" if excluded else "/axes", "empty", message, allowed="at least one case that is left")
+        report.fault(
+            "/exclude" if excluded else "/axes",
+            "empty",
+            "every case is excluded" if excluded else "nothing varies",
+            allowed="at least one case that is left",
+        )
         return None
     first = first_rows(columns)
     if first.size < count:
@@ -97,9 +102,11 @@ def _as_axes(
         units = {path: machine.parameters[path].unit for path in columns}
         values = [f"{path} = {quantity_text(column[again], units[path])}" for path, column in columns.items()]
         before = int(np.flatnonzero(alike)[0])
-        message = f"cases {before} and {again}, counted from 0, are the same"
+        places = {"earlier": str(before), "later": str(again)}
+        message = Sentence("cases {earlier} and {later}, counted from 0, are the same", **places)
         if lines:
-            message = f"lines {lines[before]} and {lines[again]} are the same"
+            places = {"earlier": str(lines[before]), "later": str(lines[again])}
+            message = Sentence("lines {earlier} and {later} are the same", **places)
         where = "/axes/0/points" if lines else "/axes"
         report.fault(where, "repeated", message, values, allowed="each combination of values once")
         return None
@@ -138,7 +145,7 @@ def _group(report: Report, pointer: str, items: object, combine: str | None, mac
             where,
             "unequal-lengths",
             "axes that are zipped must have equally many values",
-            [count_text(count) for count in counts],
+            [count_text(number) for number in counts],
             allowed="axes of one length, or combine: 'grid'",
         )
         return None
@@ -169,7 +176,9 @@ def _make(
         report.fault(
             where,
             "required",
-            f"varies {path} in a part of the cases only, and `base` does not give it for the others",
+            Sentence(
+                "varies {path} in a part of the cases only, and `base` does not give it for the others", path=path
+            ),
             allowed="its value in `base` too",
         )
     return None if lacking else one_after_another(tables, counts, machine.values)
@@ -210,9 +219,11 @@ def _axis(report: Report, pointer: str, data: object, combine: Combine, machine:
 def _fits(report: Report, block: Block) -> bool:
     """Whether the table is small enough: all its numbers are stored with the study."""
     if len(block.paths) > MAX_COLUMNS:
-        report.fault(
-            "/axes", "too-many", f"{len(block.paths)} parameters vary", allowed=f"at most {MAX_COLUMNS} parameters"
+        message = plural(
+            "{count} parameter varies", "{count} parameters vary", len(block.paths), count=str(len(block.paths))
         )
+        allowed = plural("at most {count} parameter", "at most {count} parameters", MAX_COLUMNS)
+        report.fault("/axes", "too-many", message, allowed=allowed)
         return False
     most = MAX_AXIS_VALUES // max(len(block.paths), 1)
     if block.count <= most:
@@ -220,7 +231,15 @@ def _fits(report: Report, block: Block) -> bool:
     report.fault(
         "/axes",
         "too-many",
-        f"needs a table of {count_text(block.count)} cases with {len(block.paths)} parameters each",
-        allowed=f"at most {MAX_AXIS_VALUES:,} numbers, here {most:,} cases; a plain grid may have more",
+        Sentence(
+            "needs a table of {cases} cases with {parameters} parameters each",
+            cases=any_count(block.count),
+            parameters=str(len(block.paths)),
+        ),
+        allowed=Sentence(
+            "at most {numbers} numbers, here {cases} cases; a plain grid may have more",
+            numbers=MAX_AXIS_VALUES,
+            cases=most,
+        ),
     )
     return False

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.service.reading.catalogue import range_sentence
 from sprag.service.spec.axes.axes import read_paths
 from sprag.service.spec.draws.described import DISTRIBUTION, read_measured, read_plus_minus
 from sprag.service.spec.draws.distributions import Distribution
@@ -91,6 +92,11 @@ def _read_nominal(
     values = {machine.values.get(parameter.path) for parameter in parameters}
     if len(values) == 1 and None not in values:
         return values.pop()
-    message = "is required: the tied parameters differ in `base`" if len(values) > 1 else "is required"
-    report.fault(where, "required", message, allowed=parameters[0].range_text(), unit=parameters[0].unit)
+    report.fault(
+        where,
+        "required",
+        "is required: the tied parameters differ in `base`" if len(values) > 1 else "is required",
+        allowed=range_sentence(parameters[0]),
+        unit=parameters[0].unit,
+    )
     return None

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.reading.limits import one_of
 from sprag.service.reading.together import split_list
 from sprag.service.spec.fields import read_number, read_object
 from sprag.service.spec.lists import read_list_text, refuse_blanks, refuse_mixed
@@ -63,7 +64,7 @@ def _parts(report: Report, pointer: str, path: str, data: object, machine: Machi
     if found is None:
         return []
     if not found:
-        report.fault(pointer, "required", "has no condition", data, allowed="one of " + ", ".join(FIELDS))
+        report.fault(pointer, "required", "has no condition", data, allowed=one_of(FIELDS))
     if refuse_mixed(report, _quantities(pointer, found), parameter.unit):
         return []
     listed = found.get("is")
@@ -80,8 +81,10 @@ def _parts(report: Report, pointer: str, path: str, data: object, machine: Machi
             values = [read_number(report, where, item, parameter) for item in items]
         elif isinstance(given, list):
             if name != "is" or not 1 <= len(given) <= MAX_AXIS_VALUES:
-                allowed = "one quantity" if name != "is" else "1 value or more"
-                report.fault(join(pointer, name), "wrong-type", "must be a quantity", given, allowed=allowed)
+                report.fault(
+                    join(pointer, name), "wrong-type", "must be a quantity", given,
+                    allowed="one quantity" if name != "is" else "1 value or more",
+                )  # fmt: skip
                 continue
             values = [read_number(report, join(pointer, name, i), item, parameter) for i, item in enumerate(given)]
         else:

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
+from sprag.service.reading.catalogue import range_sentence
 from sprag.service.reading.numbers import parse_number
 from sprag.service.reading.texts import shorten_text
 from sprag.service.reading.units import QuantityError, to_float
 from sprag.service.spec.axes.axes import read_paths
 from sprag.service.spec.axes.blocks import Block
-from sprag.service.spec.csv_text import read_csv, refuse_mixed_column
+from sprag.service.spec.csv_text import in_cell, read_csv, refuse_mixed_column
 from sprag.service.spec.fields import exact, read_object
 from sprag.service.spec.report import Report, join
 from sprag.service.spec.table_text import CsvRow, heading_of
@@ -89,8 +90,8 @@ def _read_cells(
             except QuantityError as error:
                 written = f"{cell.strip()} {heading.unit}" if heading.unit and _is_number(cell) else cell.strip()
                 report.fault(
-                    where, error.code, f"line {line}, column {shorten_text(str(heading))}: {error}", written,
-                    allowed=heading.parameter.range_text(), unit=heading.parameter.unit,
+                    where, error.code, in_cell(line, error.message, shorten_text(str(heading))), written,
+                    allowed=range_sentence(heading.parameter), unit=heading.parameter.unit,
                 )  # fmt: skip
         if report.full:
             break

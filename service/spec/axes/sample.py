@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
+from sprag.sentences import Sentence
 from sprag.service.spec.axes.axes import read_paths
 from sprag.service.spec.axes.blocks import Block
 from sprag.service.spec.axes.drawn import SampleDistribution, is_distribution, read_distribution
@@ -78,13 +79,16 @@ def read_sample(report: Report, pointer: str, data: Mapping[str, Any], machine: 
         report.fault(
             join(pointer, "count"),
             "out-of-range",
-            f"a {method} sample fills its ranges evenly only with a power of two",
+            Sentence("a {method} sample fills its ranges evenly only with a power of two", method=method),
             count,
             allowed="a power of 2",
         )
     if second_order and method != "saltelli":
         report.fault(
-            join(pointer, "second_order"), "conflict", f"is given for a {method} sample", allowed="saltelli samples"
+            join(pointer, "second_order"),
+            "conflict",
+            Sentence("is given for a {method} sample", method=method or ""),
+            allowed="saltelli samples",
         )
     elif second_order and len(items) < 3:
         report.fault(join(pointer, "ranges"), "out-of-range", "two parameters interact by what total exceeds first "
@@ -113,7 +117,7 @@ def _check_trajectories(report: Report, pointer: str, count: int | None, items: 
                      allowed="at least 2 ranges")  # fmt: skip
     if count is not None and count > MOST_TRAJECTORIES:
         report.fault(join(pointer, "count"), "out-of-range", "is more than elementary effects need", count,
-                     allowed=f"at most {MOST_TRAJECTORIES:,} trajectories")  # fmt: skip
+                     allowed=Sentence("at most {high} trajectories", high=MOST_TRAJECTORIES))  # fmt: skip
 
 
 def _read_part(report: Report, pointer: str, item: object, machine: Machine) -> Part | None:
@@ -129,7 +133,8 @@ def _read_correlations(
     if "correlations" not in found:
         return None
     if method in {"saltelli", "morris"}:
-        report.fault(where, "conflict", f"a {method} sample needs independent parameters", allowed="another sample")
+        message = Sentence("a {method} sample needs independent parameters", method=method)
+        report.fault(where, "conflict", message, allowed="another sample")
         return None
     columns = {path: index for index, part in enumerate(parts) for path in part.paths}
     return read_correlations(report, found["correlations"], columns, len(parts), where)[0]

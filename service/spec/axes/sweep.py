@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.sentences import Sentence
+from sprag.service.languages import N_
+from sprag.service.reading.limits import at_most_cases
 from sprag.service.spec.described import choice
 from sprag.service.spec.plan.outline import chooses
 from sprag.service.spec.report import Report, join
@@ -27,7 +30,7 @@ SWEPT: Final = choice(
     "both",
 )
 _DIRECTIONS: Final = {"up": (UP,), "down": (DOWN,), "both": (UP, DOWN)}
-_PLAIN: Final = "one axis of a plain grid"
+_PLAIN: Final = N_("one axis of a plain grid")
 
 
 def read_sweep(report: Report, found: Mapping[str, Any]) -> tuple[int, str] | None:
@@ -45,17 +48,17 @@ def read_sweep(report: Report, found: Mapping[str, Any]) -> tuple[int, str] | No
     for other in marked[1:]:
         report.fault(join("/axes", other), "repeated", "is a second swept axis", allowed="`sweep` on at most one axis")
     conflicts = {
-        "`refine`, `goal` or `calibrate`, or an adaptive axis": chooses(found),
+        Sentence("`refine`, `goal` or `calibrate`, or an adaptive axis"): chooses(found),
         "`tolerances`": "tolerances" in found,
         "`starts`": "starts" in found,
         "`exclude`": "exclude" in found,
         f"combine: {found.get('combine')!r}": found.get("combine", "grid") != "grid",
-        "samples, points or groups": any(
+        Sentence("samples, points or groups"): any(
             isinstance(item, Mapping) and {"sample", "points", "axes"} & set(item) for item in items
         ),
     }
     for what in (what for what, conflict in conflicts.items() if conflict):
-        report.fault(where, "conflict", f"`sweep` cannot be combined with {what}", allowed=_PLAIN)
+        report.fault(where, "conflict", Sentence("`sweep` cannot be combined with {what}", what=what), allowed=_PLAIN)
     way = SWEPT.read(report, join("/axes", marked[0]), items[marked[0]]) if own else None
     return None if way is None or report.found > before else (marked[0], way)
 
@@ -80,7 +83,9 @@ def with_sweep(report: Report, study: Study, swept: tuple[int, str]) -> Study:
     initial = [path for path in axis.paths if is_initial(path)]
     if initial:
         report.fault(
-            where, "conflict", f"{initial[0]} is an initial value: a case that starts from its neighbour has none", way,
+            where, "conflict",
+            Sentence("{path} is an initial value: a case that starts from its neighbour has none", path=initial[0]),
+            way,
             allowed="`sweep` on another axis",
         )  # fmt: skip
     if len(axis) < 2:
@@ -88,8 +93,9 @@ def with_sweep(report: Report, study: Study, swept: tuple[int, str]) -> Study:
     directions = _DIRECTIONS[way]
     if study.cases * len(directions) > MAX_CASES:
         report.fault(
-            where, "too-many", f"asks for {study.cases * len(directions):,} cases in both directions", way,
-            allowed=f"at most {MAX_CASES:,} cases",
+            where, "too-many",
+            Sentence("asks for {cases} cases in both directions", cases=study.cases * len(directions)), way,
+            allowed=at_most_cases(MAX_CASES),
         )  # fmt: skip
     report.raise_if_any()
     own = Axis((SWEEP,), [float(one) for one in directions])

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.sentences import Sentence
 from sprag.service.languages import N_
+from sprag.service.reading.limits import values_to
 from sprag.service.reading.units import QuantityError, parse_exact, to_float
 from sprag.service.spec.fields import read_exact, read_number, read_whole
 from sprag.service.spec.lists import read_list, read_list_text, read_together
@@ -59,9 +61,12 @@ def plan_values(report: Report, pointer: str, data: object, parameter: Parameter
     """The plan of a plain list of quantities, or of one text with all of them."""
     if not isinstance(data, list | str) or not data or not str(data).strip():
         empty = isinstance(data, list | str)
-        message = "has no values" if empty else "must be a list of values"
         report.fault(
-            pointer, "empty" if empty else "wrong-type", message, data, allowed=f"1 to {MAX_AXIS_VALUES:,} values"
+            pointer,
+            "empty" if empty else "wrong-type",
+            "has no values" if empty else "must be a list of values",
+            data,
+            allowed=values_to(MAX_AXIS_VALUES),
         )
         return None
     plain = _plain_numbers(data) if isinstance(data, list) else None
@@ -134,15 +139,18 @@ def plan_range(report: Report, pointer: str, data: object, parameter: Parameter)
     try:
         step = parse_exact(items[2], parameter.unit)
     except QuantityError as error:
-        report.fault(join(pointer, 2), error.code, str(error), items[2], unit=parameter.unit)
+        report.fault(join(pointer, 2), error.code, error.message, items[2], unit=parameter.unit)
         return None
     if start is None or stop is None:
         return None
     if step == 0 or (stop - start) * step < 0:
-        message = "is 0" if step == 0 else "leads away from the end"
-        allowed = "a step greater than 0" if stop >= start else "a step less than 0, since the range goes down"
         report.fault(
-            join(pointer, 2), "invalid-range", f"the step {message}", items[2], allowed=allowed, unit=parameter.unit
+            join(pointer, 2),
+            "invalid-range",
+            "the step is 0" if step == 0 else "the step leads away from the end",
+            items[2],
+            allowed="a step greater than 0" if stop >= start else "a step less than 0, since the range goes down",
+            unit=parameter.unit,
         )
         return None
     whole = math.floor((stop - start) / step + _STEP_ROUNDING)
@@ -157,9 +165,17 @@ PLANS: Final[dict[str, Callable[[Report, str, object, Parameter], Plan | None]]]
 }
 
 
-def count_text(count: int) -> str:
+def any_count(number: int) -> int | Sentence:
     """A count of any size for a message."""
-    return f"{count:,}" if count < 10**15 else f"about 10^{round(count.bit_length() * math.log10(2))}"
+    if number < 10**15:
+        return number
+    return Sentence("about {number}", number=f"10^{round(number.bit_length() * math.log10(2))}")
+
+
+def count_text(number: int) -> str:
+    """A count of any size as the value of a fault."""
+    counted = any_count(number)
+    return f"{counted:,}" if isinstance(counted, int) else str(counted)
 
 
 def _three(report: Report, pointer: str, data: object, allowed: str) -> Sequence[Any] | None:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.sentences import Amount, Sentence
+from sprag.service.languages import N_
 from sprag.service.spec.draws.described import COEFFICIENT, CORRELATIONS
 from sprag.service.spec.fields import read_object
 from sprag.service.spec.report import Report, join
@@ -49,8 +51,10 @@ def read_correlations(
             continue
         for a, b in pairs:
             if a == b or matrix[a, b]:
-                message = "share one draw" if a == b else "are correlated already"
-                report.fault(join(where, "between"), "repeated", message, found["between"], allowed="each pair once")
+                report.fault(
+                    join(where, "between"), "repeated", "share one draw" if a == b else "are correlated already",
+                    found["between"], allowed="each pair once",
+                )  # fmt: skip
                 break
             matrix[a, b] = matrix[b, a] = coefficient
         described.append({"between": list(found["between"]), "coefficient": coefficient})
@@ -59,15 +63,19 @@ def read_correlations(
         if least < _LEAST:
             report.fault(
                 pointer, "conflict",
-                f"contradict each other: the matrix of the correlations is not positive definite, its least eigenvalue "
-                f"is {least:.3g}", [one["coefficient"] for one in described], allowed="coefficients closer to 0",
+                Sentence(
+                    "contradict each other: the matrix of the correlations is not positive definite, its least "
+                    "eigenvalue is {least}",
+                    least=Amount(least, digits=3),
+                ),
+                [one["coefficient"] for one in described], allowed="coefficients closer to 0",
             )  # fmt: skip
     return matrix, described
 
 
 def _read_pairs(report: Report, pointer: str, data: object, columns: Mapping[str, int]) -> list[tuple[int, int]]:
     """The pairs of draws of two paths; two paths with ``*`` are paired number by number."""
-    allowed = "two paths with tolerances, as in ['pendulums.0.mass', 'pendulums.0.inertia']"
+    allowed = N_("two paths with tolerances, as in ['pendulums.0.mass', 'pendulums.0.inertia']")
     if not isinstance(data, list) or len(data) != 2 or not all(isinstance(path, str) for path in data):
         report.fault(pointer, "wrong-type", "must be a list of two paths", data, allowed=allowed)
         return []

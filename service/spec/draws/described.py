@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.sentences import Amount, Sentence
+from sprag.service.languages import N_
 from sprag.service.reading.together import split_list
 from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.spec.described import Described, Listed, choice, named
@@ -29,7 +31,7 @@ DISTRIBUTION: Final = choice(
 )  # fmt: skip
 PLUS_MINUS: Final = Described(
     "plus_minus", "", "how far the value lies from the nominal one", "text",
-    limits='a share of the nominal value, as in "5 %", or a quantity, as in "0.2 mm"',
+    limits=N_('a share of the nominal value, as in "5 %", or a quantity, as in "0.2 mm"'),
 )  # fmt: skip
 MEASURED: Final = Listed("values", 1, 100_000, "measured values, each of which is drawn equally often")
 SHARED: Final = Described("shared", "", "whether all its parameters share one draw", "flag", default=False)
@@ -65,19 +67,20 @@ def read_plus_minus(
     share = in_percent(value)
     if share is not None:
         if not _LEAST <= share <= _MOST:
-            report.fault(
-                where, "out-of-range", "is out of range", value, allowed=f"{100 * _LEAST:g} % to {100 * _MOST:g} %"
+            allowed = Sentence(
+                "{low} % to {high} %", low=Amount(100 * _LEAST, digits=6), high=Amount(100 * _MOST, digits=6)
             )
+            report.fault(where, "out-of-range", "is out of range", value, allowed=allowed)
             return None
         return True, share
     try:
         number = parse_quantity(value, parameter.unit)
     except QuantityError as error:
-        report.fault(where, error.code, str(error), value, allowed=PLUS_MINUS.limits, unit=parameter.unit)
+        report.fault(where, error.code, error.message, value, allowed=PLUS_MINUS.limits, unit=parameter.unit)
         return None
     most = min(parameter.high - parameter.low, _LARGEST)
     if not 0.0 < number <= most:
-        allowed = f"above 0, at most {most:g}"
+        allowed = Sentence("above 0, at most {high}", high=Amount(most, digits=6))
         report.fault(where, "out-of-range", "is out of range", value, allowed=allowed, unit=parameter.unit)
         return None
     return False, number

@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag.sentences import Amount, Place, Sentence
+from sprag.service.languages import N_
 from sprag.service.reading.catalogue import range_sentence
+from sprag.service.reading.limits import unit_list
 from sprag.service.reading.together import AMBIGUOUS_UNIT, question
 from sprag.service.spec.draws.correlations import read_correlations
 from sprag.service.spec.draws.described import (
@@ -92,8 +94,15 @@ def read_tolerances(
     drives = settings["drives"]
     if len(drawn) > MAX_TOLERANCES or drives * len(drawn) > MAX_AXIS_VALUES:
         report.fault(
-            "/drives", "too-many", f"asks for {drives:,} draws of {len(drawn):,} tolerances", drives,
-            allowed=f"at most {MAX_AXIS_VALUES:,} draws and {MAX_TOLERANCES:,} tolerances together",
+            "/drives", "too-many",
+            Sentence(
+                "asks for {draws} draws of {tolerances} tolerances", draws=drives, tolerances=len(drawn)
+            ),
+            drives,
+            allowed=Sentence(
+                "at most {draws} draws and {tolerances} tolerances together",
+                draws=MAX_AXIS_VALUES, tolerances=MAX_TOLERANCES,
+            ),
         )  # fmt: skip
         return None
     for one in drawn:
@@ -111,16 +120,19 @@ def with_drives(report: Report, study: Study, spread: Spread) -> Study:
     numbers = cases * (len(study.axes) + 1)
     if combine == "zip" and numbers > MAX_AXIS_VALUES:
         most = MAX_AXIS_VALUES // (study.cases * (len(study.axes) + 1)) - 1
-        allowed = f"at most {most:,} drives of this table; a plain grid may have more"
+        allowed = Sentence("at most {drives} drives of this table; a plain grid may have more", drives=most)
     elif cases > MAX_CASES or sum(map(len, study.axes)) + drives.size > MAX_AXIS_VALUES:
-        allowed = f"at most {MAX_CASES // study.cases - 1:,} drives"
+        allowed = Sentence("at most {drives} drives", drives=MAX_CASES // study.cases - 1)
     elif combine == "grid":
         return replace(study, axes=(*study.axes, Axis((DRIVE,), drives)), combine=combine, spread=spread)
     else:
         axes = [Axis(axis.paths, np.repeat(axis.array, drives.size)) for axis in study.axes]
         own = Axis((DRIVE,), np.tile(drives, study.cases))
         return replace(study, axes=(*axes, own), spread=spread)
-    message = f"asks for {cases:,} cases: {study.cases:,} with the nominal drive and {spread.drives:,} drawn ones each"
+    message = Sentence(
+        "asks for {cases} cases: {places} with the nominal drive and {drives} drawn ones each",
+        cases=cases, places=study.cases, drives=spread.drives,
+    )  # fmt: skip
     report.fault("/drives", "too-many", message, spread.drives, allowed=allowed)
     raise report.error()
 
@@ -178,10 +190,12 @@ def _read_paths(report: Report, pointer: str, data: object, machine: Machine) ->
     """The parameters of an item; None, and faults recorded, where one is unknown or derived."""
     items = data if isinstance(data, list) else [data]
     names = [item for item in items if isinstance(item, str)]
-    allowed = "a path such as 'pendulums.*.backlash', or a list of paths; `*` stands for every pendulum or step"
+    allowed = N_("a path such as 'pendulums.*.backlash', or a list of paths; `*` stands for every pendulum or step")
     if not items or len(names) < len(items):
-        message = "is required" if data is None else "must be a path, as text"
-        report.fault(pointer, "required" if data is None else "wrong-type", message, data, allowed=allowed)
+        report.fault(
+            pointer, "required" if data is None else "wrong-type",
+            "is required" if data is None else "must be a path, as text", data, allowed=allowed,
+        )  # fmt: skip
         return None
     before = report.found
     paths: list[str] = []
@@ -193,7 +207,8 @@ def _read_paths(report: Report, pointer: str, data: object, machine: Machine) ->
         for path in known:
             if path in machine.derive:
                 report.fault(
-                    pointer, "conflict", f"{path} is derived from other parameters, whose tolerances it has", item,
+                    pointer, "conflict",
+                    Sentence("{path} is derived from other parameters, whose tolerances it has", path=path), item,
                     allowed="a path without a formula in `derive`",
                 )  # fmt: skip
     return None if report.found > before else paths
@@ -216,7 +231,8 @@ def _measured(
     varied = [path for path, one in zip(paths, nominal, strict=True) if one.varies]
     if varied:
         report.fault(
-            join(pointer, "values"), "conflict", f"gives {varied[0]} its values, but an axis varies it",
+            join(pointer, "values"), "conflict",
+            Sentence("gives {path} its values, but an axis varies it", path=varied[0]),
             allowed="plus_minus, which changes the values of the axis",
         )  # fmt: skip
     values = read_measured(report, join(pointer, "values"), found["values"], [one.parameter for one in nominal])
@@ -257,12 +273,14 @@ def _around(
     where = join(pointer, "plus_minus")
     if not share and len(units) > 1:
         report.fault(
-            where, "wrong-unit", f"is shared by parameters of different units: {', '.join(units)}",
+            where, "wrong-unit",
+            Sentence("is shared by parameters of different units: {units}", units=unit_list(units)),
             found["plus_minus"], allowed='a share, as in "5 %"',
         )  # fmt: skip
         return []
     if any(not one.values.size for one in nominal):
-        report.fault(join(pointer, "path"), "required", f"{name} has no nominal value in `base`", found["path"])
+        message = Sentence("{path} has no nominal value in `base`", path=name)
+        report.fault(join(pointer, "path"), "required", message, found["path"])
         return []
     values = np.unique(np.concatenate([one.values for one in nominal]))
     if kind == "lognormal":
@@ -276,7 +294,8 @@ def _around(
         share, half = True, half if share else half / float(values[0])
     if share and not values.any():
         report.fault(
-            where, "out-of-range", f"is a share of the nominal value of {name}, which is 0", found["plus_minus"],
+            where, "out-of-range",
+            Sentence("is a share of the nominal value of {path}, which is 0", path=name), found["plus_minus"],
             allowed="a quantity", unit=units[0],
         )  # fmt: skip
         return []

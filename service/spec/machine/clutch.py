@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sprag.sentences import Sentence
 from sprag.service.reading.texts import quantity_text
 from sprag.service.spec.described import FIT, Listed
 from sprag.service.spec.fields import missing, read_number, read_object
@@ -98,8 +99,12 @@ def read_clutch(report: Report, pointer: str, data: object, prefix: str, backlas
         report.fault(
             pointer,
             "conflict",
-            f"is given both as a law ({', '.join(by_law)}) and as measured data ({', '.join(by_data)})",
-            allowed=f"either {', '.join(_BY_LAW)} or {', '.join(_BY_DATA)}",
+            Sentence(
+                "is given both as a law ({law}) and as measured data ({data})",
+                law=", ".join(by_law),
+                data=", ".join(by_data),
+            ),
+            allowed=Sentence("either {first} or {second}", first=", ".join(_BY_LAW), second=", ".join(_BY_DATA)),
         )
         return None
     if by_data:
@@ -211,8 +216,14 @@ def _check_zipped(report: Report, clutch: Clutch, varied: Mapping[str, tuple[flo
         report.fault(
             pointer,
             "too-many",
-            f"zips {len(laws):,} different clutch laws, too many to check one by one for negative torque",
-            allowed=f"at most {MAX_CLUTCH_LAWS:,} different laws, or coefficients that never make it negative",
+            Sentence(
+                "zips {laws} different clutch laws, too many to check one by one for negative torque",
+                laws=len(laws),
+            ),
+            allowed=Sentence(
+                "at most {laws} different laws, or coefficients that never make it negative",
+                laws=MAX_CLUTCH_LAWS,
+            ),
         )
         return
     for law in laws:

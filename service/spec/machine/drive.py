@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from sprag.sentences import Sentence
 from sprag.service.reading.texts import did_you_mean
 from sprag.service.spec.described import Listed
 from sprag.service.spec.fields import read_number, read_object, read_parameters
@@ -56,29 +57,40 @@ class Drive(Machine):
         """Whether ``path`` may belong to a part of the base that could not be read."""
         return not self.clutches and assumed_clutch(path)
 
-    def why_not(self, path: str) -> str:
+    def why_not(self, path: str) -> Sentence:
         """A sentence that explains why an axis cannot vary ``path``, and what it can vary."""
         inside = _PENDULUM_PATH.fullmatch(path)
         if inside and self.pendulums is not None and int(inside[1]) >= self.pendulums:
-            return f"there is no pendulum {inside[1]}: pendulums are numbered from 0 to {self.pendulums - 1}"
+            return Sentence(
+                "there is no pendulum {number}: pendulums are numbered from 0 to {last}",
+                number=inside[1], last=str(self.pendulums - 1),
+            )  # fmt: skip
         clutch_path = _CLUTCH_PATH.fullmatch(path)
         if clutch_path:
             return self._why_not_clutch(path, clutch_path[1])
         return super().why_not(path)
 
-    def _why_not_clutch(self, path: str, rest: str) -> str:
+    def _why_not_clutch(self, path: str, rest: str) -> Sentence:
         prefix = path.removesuffix(rest)
         clutch = next((clutch for clutch in self.clutches if clutch.prefix == prefix), None)
         if clutch is None and self.clutches:
             if self.clutches[0].prefix == "clutch.":
-                return f"the clutch is common to all pendulums: its paths begin with 'clutch.', as in 'clutch.{rest}'"
-            return f"each pendulum has its own clutch: its paths begin as in 'pendulums.0.clutch.{rest}'"
+                return Sentence(
+                    "the clutch is common to all pendulums: its paths begin with 'clutch.', as in '{path}'",
+                    path=f"clutch.{rest}",
+                )
+            return Sentence(
+                "each pendulum has its own clutch: its paths begin as in '{path}'", path=f"pendulums.0.clutch.{rest}"
+            )
         if clutch is not None and clutch.fit is not None:
-            return "the clutch law comes from measured data and is not varied; give coefficients to vary it"
+            return Sentence("the clutch law comes from measured data and is not varied; give coefficients to vary it")
         if clutch is not None and rest.startswith("coefficients."):
             last = len(clutch.coefficients) - 1
-            return f"the clutch has no such coefficient: they are numbered from 0 (c_1) to {last} (c_{last + 1})"
-        return "is not a numeric parameter of the clutch" + did_you_mean(path, self.parameters)
+            return Sentence(
+                "the clutch has no such coefficient: they are numbered from 0 (c_1) to {last} (c_{index})",
+                last=str(last), index=str(last + 1),
+            )  # fmt: skip
+        return Sentence("is not a numeric parameter of the clutch{hint}", hint=did_you_mean(path, self.parameters))
 
 
 def read_drive(report: Report, data: object) -> Drive:
@@ -91,11 +103,10 @@ def read_drive(report: Report, data: object) -> Drive:
         _assume_everything(catalogue, machine)
         return machine
     if START in found:
-        message = "refers to a study of a service, which replaces it by initial values"
         report.fault(
             f"/base/{START}",
             "not-used",
-            message,
+            "refers to a study of a service, which replaces it by initial values",
             found[START],
             allowed=_WHERE_STARTS,
         )
@@ -126,7 +137,12 @@ def _read_section(
     names = (*parameters, "clutch") if prefix.startswith("pendulums.") else tuple(parameters)
     if data is None:
         required = [name for name, entry in parameters.items() if entry.default is None]
-        report.fault(pointer, "required", f"is required, with at least {', '.join(required)}", allowed="an object")
+        report.fault(
+            pointer,
+            "required",
+            Sentence("is required, with at least {names}", names=", ".join(required)),
+            allowed="an object",
+        )
         return
     found = read_object(report, pointer, data, names)
     if found is not None:
@@ -164,7 +180,10 @@ def _read_clutches(report: Report, base: Mapping[str, Any], machine: Drive) -> N
             report.fault(
                 "/base/clutch",
                 "conflict",
-                f"is common to all pendulums, but pendulums {', '.join(map(str, own))} also have their own",
+                Sentence(
+                    "is common to all pendulums, but pendulums {numbers} also have their own",
+                    numbers=", ".join(map(str, own)),
+                ),
                 allowed="one clutch in `base`, or one in each pendulum",
             )
         _add(machine, read_clutch(report, "/base/clutch", base["clutch"], "clutch.", known))
@@ -186,7 +205,7 @@ def _read_clutches(report: Report, base: Mapping[str, Any], machine: Drive) -> N
             report.fault(
                 pointer,
                 "required",
-                f"is required, since pendulum {own[0]} has its own",
+                Sentence("is required, since pendulum {number} has its own", number=str(own[0])),
                 allowed="one clutch in `base`, or one in each pendulum",
             )
 

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from sprag.sentences import Sentence
 from sprag.service.reading.texts import did_you_mean
 from sprag.service.spec.fields import missing, read_number, read_object
 from sprag.service.spec.report import Report, join
@@ -44,10 +45,11 @@ class Machine:
         """Whether ``path`` may belong to a part of the base that could not be read."""
         return False
 
-    def why_not(self, path: str) -> str:
+    def why_not(self, path: str) -> Sentence:
         """A sentence that explains why an axis cannot vary ``path``, and what it can vary."""
         known = tuple(self.parameters)
-        return "is not a numeric parameter of the base" + did_you_mean(path.removeprefix("base."), known)
+        hint = did_you_mean(path.removeprefix("base."), known)
+        return Sentence("is not a numeric parameter of the base{hint}", hint=hint)
 
 
 def read_plain(report: Report, data: object, catalogue: tuple[Parameter, ...]) -> Machine:

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from sprag.sentences import Sentence
+from sprag.service.languages import N_
 from sprag.service.spec.axes.axes import varied_values
 from sprag.service.spec.derive import case_table, layout
 from sprag.service.spec.machine.choices import Choice, drive_choices, shaft_choices
@@ -91,7 +93,8 @@ def _drive_check(report: Report, machine: Machine, axes: Axes, combine: Combine)
         states = [path for path in axis.paths if path.endswith(".initial_clutch")]
         if states and (axis.array % 1.0).any():
             report.fault(
-                f"/axes/{k}", "invalid-choice", f"has values of {states[0]} that are not the number of a state",
+                f"/axes/{k}", "invalid-choice",
+                Sentence("has values of {path} that are not the number of a state", path=states[0]),
                 allowed=machine.parameters[states[0]].help,
             )  # fmt: skip
     if not report.faults:
@@ -106,7 +109,7 @@ def _drive_check(report: Report, machine: Machine, axes: Axes, combine: Combine)
 
 
 def _shaft_run(report: Report, data: object, *_: object) -> dict[str, Any]:
-    why = "belongs to the vibration drive: a machine shaft is solved for its whole cycle at once"
+    why = N_("belongs to the vibration drive: a machine shaft is solved for its whole cycle at once")
     return refuse_run(report, data, why)
 
 

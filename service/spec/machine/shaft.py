@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from sprag.sentences import Sentence
+from sprag.service.languages import N_
 from sprag.service.reading.texts import did_you_mean
 from sprag.service.spec.described import choice
 from sprag.service.spec.fields import read_object
@@ -38,6 +39,11 @@ FIELDS: Final = (
 _MEAN_HELP: Final = "which mean of the speed the given mean speed and the irregularity refer to"
 MEAN_SPEED_IS: Final = choice("mean_speed_is", _MEAN_HELP, "midrange", "angle", "time", default="midrange")
 _INDEXED = re.compile(r"(?:parts\.[0-9]{1,9}\.)?(operation\.steps|drive\.stages)\.([0-9]{1,9})\.")
+#: What is said about a step or a stage that there is not.
+_NO_ITEM: Final = {
+    "steps": N_("there is no step {number}: steps are numbered from 0 to {last}"),
+    "stages": N_("there is no stage {number}: stages are numbered from 0 to {last}"),
+}
 _PART: Final = re.compile(r"parts\.([0-9]{1,9})\.")
 
 
@@ -58,13 +64,16 @@ class ShaftMachine(Machine):
         general = re.sub(r"^constants\..*", "constants.NAME", path)
         return self.structure is None and model_parameter(models.MACHINE_SHAFT, general) is not None
 
-    def why_not(self, path: str) -> str:
+    def why_not(self, path: str) -> Sentence:
         """A sentence that explains why an axis cannot vary ``path``, and what it can vary."""
         structure = self.structure or {}
         several = structure.get("parts", ())
         part = _PART.match(path)
         if part and int(part[1]) >= len(several) > 0:
-            return f"there is no part {part[1]}: parts are numbered from 0 to {len(several) - 1}"
+            return Sentence(
+                "there is no part {number}: parts are numbered from 0 to {last}",
+                number=part[1], last=str(len(several) - 1),
+            )  # fmt: skip
         item = _INDEXED.match(path)
         if item and self.structure is not None:
             name = item[1].rpartition(".")[2]
@@ -73,11 +82,12 @@ class ShaftMachine(Machine):
                 "steps": int(owner["operation"]["steps"]), "stages": len(structure["drive"].get("stages", ())),
             }  # fmt: skip
             if int(item[2]) >= counts[name] > 0:
-                return f"there is no {name[:-1]} {item[2]}: {name} are numbered from 0 to {counts[name] - 1}"
+                return Sentence(_NO_ITEM[name], number=item[2], last=str(counts[name] - 1))
         if path.startswith("constants.") and self.structure is not None:
-            return "is not a constant of this machine" + did_you_mean(path, self.parameters)
+            return Sentence("is not a constant of this machine{hint}", hint=did_you_mean(path, self.parameters))
         if model_parameter(models.MACHINE_SHAFT, path) is not None:
-            return "is not a parameter of this machine, which has other parts" + did_you_mean(path, self.parameters)
+            hint = did_you_mean(path, self.parameters)
+            return Sentence("is not a parameter of this machine, which has other parts{hint}", hint=hint)
         return super().why_not(path)
 
 
@@ -150,7 +160,7 @@ def _refuse_both(report: Report, found: Mapping[str, Any]) -> None:
     """Record a mechanism or an operation beside a list of parts."""
     for name in ("mechanism", "operation"):
         if found.get("parts") is not None and found.get(name) is not None:
-            allowed = f"{name} in each of the parts, or no parts"
+            allowed = Sentence("{name} in each of the parts, or no parts", name=name)
             report.fault(f"/base/{name}", "conflict", "cannot be given beside parts, which have their own", found[name],
                          allowed=allowed)  # fmt: skip
 
@@ -175,7 +185,6 @@ def _unused(report: Report, found: Mapping[str, Any], structure: Mapping[str, An
             "/base/drive/flywheel/poisson_ratio",
             Sentence("is not used: the stress of a rim does not depend on it"),
         )
-    text = "selects strokes, but this diagram is over the angle"
     owners = [("/base", found, structure)]
     several = zip(found.get("parts") or (), structure.get("parts", ()), strict=True)
     owners += [(f"/base/parts/{k}", given, own) for k, (given, own) in enumerate(several)]
@@ -185,5 +194,7 @@ def _unused(report: Report, found: Mapping[str, Any], structure: Mapping[str, An
             sense = Sentence("is not used: a positive torque always resists; `sense` is for forces")
             report.warn("no-effect", f"{pointer}/operation/sense", sense)
         if isinstance(operation, Mapping) and own["operation"]["over"] == "angle" and "during" in operation:
-            report.fault(f"{pointer}/operation/during", "not-used", text,
-                           operation["during"], allowed='with `over` "stroke" only')  # fmt: skip
+            report.fault(
+                f"{pointer}/operation/during", "not-used", "selects strokes, but this diagram is over the angle",
+                operation["during"], allowed='with `over` "stroke" only',
+            )  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
+from sprag.sentences import Sentence
 from sprag.service.spec.described import Listed, choice
 from sprag.service.spec.fields import read_object, read_one
 from sprag.service.spec.machine.shaft_parts import (
@@ -63,8 +64,10 @@ def read_balance(report: Report, found: Mapping[str, Any], drive: Mapping[str, A
         )
         return None
     if balance == "scale" and side == "operation" and not acts:
-        text = 'is required by the balance "scale" on its side, which multiplies it by a factor'
-        report.fault("/base/operation", "required", text, allowed="an operation")
+        report.fault(
+            "/base/operation", "required",
+            'is required by the balance "scale" on its side, which multiplies it by a factor', allowed="an operation",
+        )  # fmt: skip
         return None
     if balance == "scale" and not given:
         report.fault(
@@ -138,7 +141,7 @@ def _read_stages(report: Report, data: object) -> list[str] | None:
         if found is None or kind is None:
             continue
         own = numbers_of({"drive": {"stages": [kind]}}, "drive.stages.0.")
-        refuse_foreign(report, pointer, found, ("kind", *own), f"a stage of the kind {kind}")
+        refuse_foreign(report, pointer, found, ("kind", *own), Sentence("a stage of the kind {kind}", kind=str(kind)))
         kinds.append(kind)
     return None if report.found > before else kinds
 
@@ -153,7 +156,7 @@ def _read_motor(report: Report, data: object, drive: dict[str, Any], places: dic
         return None
     own = numbers_of({"balance": "motor", "drive": {"motor": kind}}, "drive.motor.")
     fields = ("kind", *own, *(_OF_TABLE if kind == "table" else ()))
-    refuse_foreign(report, pointer, found, fields, f"a {kind} motor")
+    refuse_foreign(report, pointer, found, fields, Sentence("a {kind} motor", kind=str(kind)))
     if kind != "table":
         return drive | {"motor": kind}
     form = read_one(report, pointer, found, ("table", "csv"))

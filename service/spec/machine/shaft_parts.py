@@ -7,6 +7,9 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from sprag.sentences import Sentence, plural
+from sprag.service.languages import N_
+from sprag.service.reading.catalogue import range_sentence
 from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.spec.described import Described, Listed, choice, named
 from sprag.service.spec.fields import read_number, read_object, read_one
@@ -85,6 +88,10 @@ def numbers_under(prefix: str) -> dict[str, Parameter]:
     return {name: entry for name, entry in below.items() if "." not in name}
 
 
+def _revolutions(most: int) -> Sentence:
+    return plural("1 to {count} revolution", "1 to {count} revolutions", most)
+
+
 def read_cycle(report: Report, value: object) -> int | None:
     """Read the revolutions of a cycle."""
     most = max(machine_shaft.REVOLUTIONS)
@@ -93,22 +100,25 @@ def read_cycle(report: Report, value: object) -> int | None:
         try:
             turns = parse_quantity(value, "rad") / (2.0 * math.pi)
         except QuantityError as error:
-            report.fault("/base/cycle", error.code, str(error), value, allowed=f"1 to {most} revolutions")
+            report.fault("/base/cycle", error.code, error.message, value, allowed=_revolutions(most))
             return None
     elif isinstance(value, int | float) and not isinstance(value, bool):
         turns = float(value)
     for known in machine_shaft.REVOLUTIONS:
         if turns is not None and math.isclose(turns, known, rel_tol=1e-12):
             return known
-    report.fault("/base/cycle", "wrong-type", "must be a whole number of revolutions", value,
-                   allowed=f'"1 revolution" to "{most} revolutions", or 1 to {most}')  # fmt: skip
+    report.fault(
+        "/base/cycle", "wrong-type", "must be a whole number of revolutions", value,
+        allowed=Sentence('"1 revolution" to "{most} revolutions", or 1 to {most}', most=str(most)),
+    )  # fmt: skip
     return None
 
 
 def read_constants(report: Report, data: object) -> list[str] | None:
     """Read the names of the constants of formulas."""
     if not isinstance(data, Mapping) or len(data) > machine_shaft.MAX_CONSTANTS:
-        allowed = f"an object of at most {machine_shaft.MAX_CONSTANTS} names with their numbers"
+        most = str(machine_shaft.MAX_CONSTANTS)
+        allowed = Sentence("an object of at most {count} names with their numbers", count=most)
         report.fault(
             "/base/constants", "wrong-type", "must be an object of names with their numbers", data, allowed=allowed
         )
@@ -124,12 +134,13 @@ def numbers_of(structure: Mapping[str, Any], prefix: str) -> list[str]:
     return [path.removeprefix(prefix) for path in machine_shaft.parameters_of(structure) if path.startswith(prefix)]
 
 
-def refuse_foreign(report: Report, pointer: str, found: Mapping[str, Any], own: Sequence[str], what: str) -> None:
+def refuse_foreign(report: Report, pointer: str, found: Mapping[str, Any], own: Sequence[str], what: Sentence) -> None:
     for name in found:
         if name not in own:
             report.fault(
-                join(pointer, name), "unknown-field", f"is not a field of {what}", found[name], allowed=", ".join(own)
-            )
+                join(pointer, name), "unknown-field",
+                Sentence("is not a field of {what}", what=what), found[name], allowed=", ".join(own),
+            )  # fmt: skip
 
 
 def _place(prefix: str, name: str) -> str:
@@ -157,8 +168,9 @@ def read_mechanism(report: Report, data: object, places: dict[str, str], prefix:
             else {"kind": diagram["form"], "table": diagram["table"], "formula": diagram["formula"]}
         )
     if "interpolation" in found:
-        text = "applies to a table, and there is none"
-        report.fault(join(where, "interpolation"), "not-used", text, found["interpolation"])
+        report.fault(
+            join(where, "interpolation"), "not-used", "applies to a table, and there is none", found["interpolation"]
+        )
     choices = MECHANISM_CHOICES[kind]
     own = read_object(report, pointer, found[kind], (*choices, *numbers_under(f"mechanism.{kind}.")))
     if own is None:
@@ -177,10 +189,10 @@ def read_mechanism(report: Report, data: object, places: dict[str, str], prefix:
     return None if unused else made
 
 
-_MASSES: Final = 'is not used with `bodies` "two_mass": it follows from the centre of mass'
+_MASSES: Final = N_('is not used with `bodies` "two_mass": it follows from the centre of mass')
 _UNUSED: Final = {
     "rod_inertia": _MASSES, "coupler_inertia": _MASSES,
-    "inclination": 'is not used without `weights` "all": nothing of this mechanism has a weight',
+    "inclination": N_('is not used without `weights` "all": nothing of this mechanism has a weight'),
 }  # fmt: skip
 
 
@@ -227,10 +239,14 @@ def read_operation(report: Report, data: object, places: dict[str, str], prefix:
 def _beside(report: Report, where: str, found: Mapping[str, Any], form: str) -> bool:
     """Whether there are fields beside a gas or an indicator diagram that do not belong to it; each is a fault."""
     foreign = [name for name in found if name not in {form, "scale", "efficiency"}]
-    what = "a gas" if form == "gas" else "an indicator diagram"
     for name in foreign:
-        text = f"does not belong to {what}, which acts on the working part over the whole cycle"
-        report.fault(join(where, name), "not-used", text, found[name], allowed=f"{form}, scale, efficiency")
+        report.fault(
+            join(where, name), "not-used",
+            "does not belong to a gas, which acts on the working part over the whole cycle"
+            if form == "gas"
+            else "does not belong to an indicator diagram, which acts on the working part over the whole cycle",
+            found[name], allowed=f"{form}, scale, efficiency",
+        )  # fmt: skip
     return bool(foreign)
 
 
@@ -260,17 +276,24 @@ def read_recorded_at(report: Report, where: str, found: Mapping[str, Any], over:
     pointer = join(where, "recorded_at")
     if over != "time":
         if "recorded_at" in found:
-            text = "belongs to a diagram over time, and this one is not"
-            report.fault(pointer, "not-used", text, found["recorded_at"], allowed='with `over` "time" only')
+            report.fault(
+                pointer, "not-used", "belongs to a diagram over time, and this one is not", found["recorded_at"],
+                allowed='with `over` "time" only',
+            )  # fmt: skip
             return None
         return 1.0
     if form not in {"table", "csv"}:
-        text = f"is possible for what was recorded, a table or csv, and not for {form}; a formula may use the time t"
+        text = Sentence(
+            "is possible for what was recorded, a table or csv, and not for {form}; a formula may use the time t",
+            form=form,
+        )
         report.fault(join(where, "over"), "conflict", text, over, allowed='"angle" or "stroke"')
         return None
     if "recorded_at" not in found:
-        text = "is required by a diagram over time: the angle is this speed times the time"
-        report.fault(pointer, "required", text, allowed=RECORDED_AT.range_text(), unit=RECORDED_AT.unit)
+        report.fault(
+            pointer, "required", "is required by a diagram over time: the angle is this speed times the time",
+            allowed=range_sentence(RECORDED_AT), unit=RECORDED_AT.unit,
+        )  # fmt: skip
         return None
     return read_number(report, pointer, found["recorded_at"], RECORDED_AT)
 

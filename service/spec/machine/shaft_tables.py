@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from typing import Final
 
+from sprag.sentences import Sentence, Typed
+from sprag.service.reading.catalogue import range_sentence
 from sprag.service.reading.numbers import is_ambiguous, parse_number
 from sprag.service.reading.units import AmbiguousCommaError, QuantityError, has_unit, parse_exact, to_float
-from sprag.service.spec.csv_text import read_csv, refuse_mixed_column
+from sprag.service.spec.csv_text import in_cell, read_csv, refuse_mixed_column
 from sprag.service.spec.fields import exact
 from sprag.service.spec.report import Report
 from sprag.service.spec.table_text import heading_of
@@ -23,30 +25,41 @@ def read_csv_rows(report: Report, where: str, text: object, *columns: Parameter)
     A heading is a name and, in brackets or as its last word, a unit, which is SI where there is none: ``angle
     [deg],torque_kNm``. A fraction may be in percent.
     """
-    example = "headings, then at least two lines, as in " + ",".join(f"{c.path} [{c.unit}]" for c in columns)
+    such = ",".join(f"{column.path} [{column.unit}]" for column in columns)
+    example = Sentence("headings, then at least two lines, as in {headings}", headings=such)
     rows = read_csv(report, where, text, (machine_shaft.MAX_ROWS, len(columns)), example)
     if rows is None:
         return []
     headings = [heading_of(cell) for cell in rows[0].cells]
     if len(headings) != len(columns) or None in headings:
-        report.fault(where, "wrong-type", f"must have {len(columns)} columns with headings", allowed=example)
+        report.fault(
+            where,
+            "wrong-type",
+            Sentence("must have {count} columns with headings", count=str(len(columns))),
+            allowed=example,
+        )
         return []
     if any(parse_number(cell.replace(",", ".")) is not None for cell in rows[0].cells):
-        text = "must begin with headings: its first line has a number, which would be lost"
-        report.fault(where, "wrong-type", text, ", ".join(rows[0].cells), allowed=example)
+        report.fault(
+            where, "wrong-type", "must begin with headings: its first line has a number, which would be lost",
+            ", ".join(rows[0].cells), allowed=example,
+        )  # fmt: skip
         return []
     units = [_unit_of(*(heading or ("", "")), column) for heading, column in zip(headings, columns, strict=True)]
     before = report.found
     for unit, column in zip(units, columns, strict=True):
         if column.unit == "1":
             if unit not in {"", "1", "%"}:
-                message = f"the heading of column {column.path} has a unit, but its numbers have none"
+                message = Sentence(
+                    "the heading of column {column} has a unit, but its numbers have none", column=column.path
+                )
                 report.fault(where, "wrong-unit", message, unit, allowed="no unit, or %")
             continue
         try:
             parse_exact(f"1 {unit}" if unit else 1, column.unit)
         except QuantityError as error:
-            report.fault(where, error.code, f"the heading of column {column.path} {error}", unit, unit=column.unit)
+            message = Sentence("the heading of column {column} {error}", column=column.path, error=error.message)
+            report.fault(where, error.code, message, unit, unit=column.unit)
     for place, (unit, column) in enumerate(zip(units, columns, strict=True)):
         if not unit:
             refuse_mixed_column(report, where, rows[1:], (place, rows[0].cells[place].strip()), column.unit)
@@ -89,7 +102,12 @@ def _read_cell(report: Report, where: str, line: int, cell: str, unit: str, colu
             value = number / 100 if unit == "%" else number
         return to_float(exact(value, column))
     except QuantityError as error:
-        message = f"; without a unit in the heading it is in {column.unit}" if not unit and column.unit != "1" else ""
-        report.fault(where, error.code, f"line {line}, column {column.path}: {error}{message}", cell,
-                       allowed=column.range_text(), unit=column.unit)  # fmt: skip
+        message = error.message
+        if not unit and column.unit != "1":
+            message = Sentence(
+                "{error}; without a unit in the heading it is in {unit}",
+                error=message, unit=Typed(column.unit),
+            )  # fmt: skip
+        report.fault(where, error.code, in_cell(line, message, column.path), cell,
+                       allowed=range_sentence(column), unit=column.unit)  # fmt: skip
         return None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.sentences import Sentence, plural
 from sprag.service.spec.axes.axes import check_paths
 from sprag.service.spec.described import Described, Listed, choice, named
 from sprag.service.spec.draws.tolerances import expanded
@@ -108,8 +109,11 @@ def read_plan(report: Report, infos: Sequence[ResultInfo], calibration: Calibrat
     count, least = sum(len(one.values) for one in measured), len(calibration.unknown) + 1
     if not least <= count <= MOST_MEASURED:
         report.fault(
-            where, "out-of-range", f"has {count:,} measured values", count,
-            allowed=f"{least} to {MOST_MEASURED:,}: more values than unknown parameters",
+            where, "out-of-range",
+            plural("has {count} measured value", "has {count} measured values", count), count,
+            allowed=Sentence(
+                "{low} to {high}: more values than unknown parameters", low=str(least), high=MOST_MEASURED
+            ),
         )  # fmt: skip
         return None
     try:

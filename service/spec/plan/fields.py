@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from sprag.sentences import Sentence, Typed
 from sprag.service.reading.catalogue import result_of, unknown_result
+from sprag.service.reading.limits import quoted
 from sprag.service.reading.texts import quantity_text
 from sprag.service.reading.units import QuantityError, example, parse_quantity
 from sprag.service.spec.axes.axes import read_paths
@@ -54,11 +56,13 @@ def read_path_of(report: Report, pointer: str, data: object, machine: Machine) -
 def read_result(report: Report, pointer: str, value: object, infos: Sequence[ResultInfo]) -> ResultInfo | None:
     """The result of that name; None, and a fault recorded, where there is none."""
     some = next((info.name for info in infos if info.kind == "real"), "")
-    allowed = f"the name of a result of this study, such as '{some}'"
+    allowed = Sentence("the name of a result of this study, such as '{name}'", name=some)
     if not isinstance(value, str):
         missing = value is None
-        message = "is required" if missing else "must be the name of a result"
-        report.fault(pointer, "required" if missing else "wrong-type", message, value, allowed=allowed)
+        report.fault(
+            pointer, "required" if missing else "wrong-type",
+            "is required" if missing else "must be the name of a result", value, allowed=allowed,
+        )  # fmt: skip
         return None
     info = result_of(infos, value)
     if info is None:
@@ -71,14 +75,13 @@ def read_value(report: Report, pointer: str, value: object, info: ResultInfo) ->
     if info.kind == "category":
         if value in info.categories:
             return float(info.categories.index(str(value)))
-        allowed = ", ".join(f"'{name}'" for name in info.categories)
-        report.fault(pointer, "invalid-choice", "is not a valid choice", value, allowed=allowed)
+        report.fault(pointer, "invalid-choice", "is not a valid choice", value, allowed=quoted(info.categories))
         return None
     try:
         return parse_quantity(value, info.unit)
     except QuantityError as error:
-        allowed = f"a number of {info.unit}, for example {example(info.unit)}"
-        report.fault(pointer, error.code, str(error), value, allowed=allowed, unit=info.unit)
+        such = Sentence("a number of {unit}, for example {example}", unit=Typed(info.unit), example=example(info.unit))
+        report.fault(pointer, error.code, error.message, value, allowed=such, unit=info.unit)
         return None
 
 

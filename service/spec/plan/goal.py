@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.sentences import Place, Sentence
+from sprag.sentences import Place, Sentence, joined
+from sprag.service.reading.limits import at_most_cases
 from sprag.service.reading.texts import did_you_mean
 from sprag.service.spec.axes.axes import check_paths, expand
 from sprag.service.spec.axes.values import plan_values
@@ -99,8 +100,8 @@ def read_points(
             if path in machine.derive:
                 report.fault(place, "conflict", "is derived from other parameters", path, allowed="a path of `base`")
             elif path not in machine.parameters:
-                known = did_you_mean(path, machine.parameters)
-                report.fault(place, "invalid-path", f"names no parameter{known}", path, allowed="a path of `base`")
+                message = Sentence("names no parameter{hint}", hint=did_you_mean(path, machine.parameters))
+                report.fault(place, "invalid-path", message, path, allowed="a path of `base`")
             elif path in varied:
                 report.fault(place, "repeated", "varies already", path, allowed="each path once")
             else:
@@ -117,7 +118,8 @@ def read_points(
             )  # fmt: skip
         elif point in points[:index]:
             report.fault(
-                join("/goal/at", index), "repeated", f"repeats point {points.index(point)}", items[index],
+                join("/goal/at", index), "repeated",
+                Sentence("repeats point {number}", number=str(points.index(point))), items[index],
                 allowed="each point once",
             )  # fmt: skip
     return None if report.found > before else points
@@ -163,11 +165,13 @@ def read_goal(
         return None
     most = search["population"] * search["generations"] * max(len(points), 1) * (1 + drives)
     if most > MAX_PLANNED_CASES:
-        each = f", with {drives:,} drawn drives of each design and the nominal one" if drives else ""
+        message = Sentence("the generations have {cases} cases together", cases=most)
+        if drives:
+            each = Sentence("with {drives} drawn drives of each design and the nominal one", drives=drives)
+            message = joined(", ", (message, each))
         report.fault(
-            "/goal/generations", "too-many", f"the generations have {most:,} cases together{each}",
-            search["generations"], allowed=f"at most {MAX_PLANNED_CASES:,} cases",
-        )  # fmt: skip
+            "/goal/generations", "too-many", message, search["generations"], allowed=at_most_cases(MAX_PLANNED_CASES)
+        )
         return None
     plan = {"kind": "goal", "vary": variables, "best": best, "subject_to": constraints, "at": points, **search}
     return plan | ({"drives": drives} if drives else {})
@@ -292,7 +296,8 @@ def _read_within(
         missing = "within" not in fields
         report.fault(
             join(where, "within"), "required" if missing else "out-of-range",
-            f"{'is required' if missing else 'must be a quantity'}: a share of 0 is no width", fields.get("within"),
+            "is required: a share of 0 is no width" if missing else "must be a quantity: a share of 0 is no width",
+            fields.get("within"),
             allowed="a quantity greater than 0", unit=info.unit,
         )  # fmt: skip
         return None

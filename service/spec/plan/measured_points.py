@@ -7,11 +7,13 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from sprag.service.reading.catalogue import result_of
+from sprag.sentences import Sentence, Typed
+from sprag.service.languages import N_
+from sprag.service.reading.catalogue import range_sentence, result_of
 from sprag.service.reading.numbers import parse_number
 from sprag.service.reading.texts import did_you_mean, shorten_text
 from sprag.service.reading.units import QuantityError, parse_quantity, to_float
-from sprag.service.spec.csv_text import read_csv, refuse_mixed_column
+from sprag.service.spec.csv_text import in_cell, read_csv, refuse_mixed_column
 from sprag.service.spec.fields import exact
 from sprag.service.spec.report import Report
 from sprag.service.spec.table_text import CsvRow, heading_of
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
 SIGMA: Final = "sigma"
 #: Columns at most.
 MOST_COLUMNS: Final = 32
-_EXAMPLE: Final = "as in shaft.load [N*m],shaft.speed.mean [rad/s],sigma"
+_EXAMPLE: Final = N_("as in shaft.load [N*m],shaft.speed.mean [rad/s],sigma")
 
 
 class Column(NamedTuple):
@@ -67,7 +69,7 @@ class MeasuredTable:
 
 def read_table(report: Report, where: str, text: object, machine: Machine) -> MeasuredTable | None:
     """Read headings and conditions; None, and the faults recorded, where they are invalid."""
-    example = f"headings, then a line for each point, {_EXAMPLE}"
+    example = Sentence("headings, then a line for each point, {example}", example=Sentence(_EXAMPLE))
     rows = read_csv(report, where, text, (MOST_MEASURED, MOST_COLUMNS), example)
     if rows is None:
         return None
@@ -139,7 +141,8 @@ def _check_unit(report: Report, where: str, column: Column, unit: str) -> bool:
     try:
         _number("1", column.unit, unit)
     except QuantityError as error:
-        report.fault(where, error.code, f"column {shorten_text(str(column))}: {error}", column.unit, unit=unit)
+        message = Sentence("column {column}: {message}", column=shorten_text(str(column)), message=error.message)
+        report.fault(where, error.code, message, column.unit, unit=unit)
         return False
     return True
 
@@ -155,7 +158,7 @@ def _conditions(report: Report, where: str, rows: Sequence[CsvRow], column: Colu
         try:
             values.append(to_float(exact(_quantity(cell, column.unit), entry)) + 0.0)
         except QuantityError as error:
-            _fault(report, where, row, column, error, entry.range_text(), entry.unit)
+            _fault(report, where, row, column, error, range_sentence(entry), entry.unit)
             values.append(math.nan)
         if report.full:
             break
@@ -175,7 +178,7 @@ def read_results(
         info = result_of(infos, column.name)
         if info is None or info.kind == "category":
             known = did_you_mean(column.name, [*(one.name for one in infos), SIGMA])
-            message = f"has a column that is neither a parameter nor a result{known}"
+            message = Sentence("has a column that is neither a parameter nor a result{hint}", hint=known)
             if info is None:
                 report.fault(where, "unknown-name", message, column.name, allowed=_EXAMPLE)
             else:
@@ -188,7 +191,9 @@ def read_results(
         rows = [(row, at) for row, at in zip(table.rows, table.at, strict=True) if row.cells[column.place].strip()]
         values = [_value(report, where, row, column, info.unit) for row, _ in rows]
         if not rows:
-            report.fault(where, "empty", f"has no value in the column {column}", allowed="a number")
+            report.fault(
+                where, "empty", Sentence("has no value in the column {column}", column=str(column)), allowed="a number"
+            )
         deviations: list[float] = []
         if sigma is not None and not (sigma.unit or column.unit):
             refuse_mixed_column(report, where, table.rows, (sigma.place, sigma.name), info.unit)
@@ -205,7 +210,7 @@ def _value(report: Report, where: str, row: CsvRow, column: Column, unit: str) -
     try:
         return _number(row.cells[column.place].strip(), column.unit, unit) + 0.0
     except QuantityError as error:
-        _fault(report, where, row, column, error, f"a number of {unit}", unit)
+        _fault(report, where, row, column, error, Sentence("a number of {unit}", unit=Typed(unit)), unit)
         return math.nan
 
 
@@ -229,7 +234,8 @@ def _deviation(report: Report, where: str, row: CsvRow, column: Column, value: f
             raise QuantityError("out-of-range", "is not a standard deviation greater than 0")
         return deviation
     except QuantityError as error:
-        _fault(report, where, row, column, error, f"greater than 0, in {unit}, or as a share [%] of the value", unit)
+        such = Sentence("greater than 0, in {unit}, or as a share [%] of the value", unit=Typed(unit))
+        _fault(report, where, row, column, error, such, unit)
         return math.nan
 
 
@@ -253,5 +259,5 @@ def _fault(
 ) -> None:
     cell = row.cells[column.place].strip()
     written = f"{cell} {column.unit}" if column.unit and parse_number(cell) is not None else cell
-    message = f"line {row.line}, column {shorten_text(str(column))}: {error}"
+    message = in_cell(row.line, error.message, shorten_text(str(column)))
     report.fault(where, error.code, message, written, allowed=allowed, unit=unit)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.sentences import Sentence
 from sprag.service.spec.fields import read_object
 from sprag.service.spec.plan import calibrate, goal, refine
 from sprag.service.spec.report import Report
@@ -54,9 +55,8 @@ def read_outline(report: Report, found: Mapping[str, Any], machine: Machine) -> 
     for name in ("exclude", "combine", *FIELDS, *(() if kind == "refine" else ("axes",))):
         if name == kind or name not in found or (name == "combine" and found[name] == "grid"):
             continue
-        report.fault(
-            f"/{name}", "conflict", f"cannot be combined with `{kind}`", found[name], allowed=f"without `{name}`"
-        )
+        message = Sentence("cannot be combined with `{kind}`", kind=kind)
+        report.fault(f"/{name}", "conflict", message, found[name], allowed=Sentence("without `{field}`", field=name))
     read = {"refine": _refine, "goal": _goal, "calibrate": _calibrate}[kind]
     outline = read(report, found, machine)
     return None if report.found > before else outline

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
+from sprag.sentences import Sentence, plural
 from sprag.service.spec.axes.axes import AXES, axis_values, check_paths
 from sprag.service.spec.described import Described, Listed
 from sprag.service.spec.fields import read_object, read_whole
@@ -95,10 +96,11 @@ def read_refined_axes(
     check_paths(report, every)
     count = sum(map(is_adaptive, items))
     if count not in {1, 2} and not any(kind in item for item in items if isinstance(item, Mapping) for kind in _OTHER):
-        counted = "no axis is adaptive" if not count else f"{count} axes are adaptive"
         report.fault(
-            "/axes", "exactly-one", counted, allowed='one axis with "adaptive": [from, to] for curves, two for a map'
-        )
+            "/axes", "exactly-one",
+            plural("{count} axis is adaptive", "{count} axes are adaptive", count) if count else "no axis is adaptive",
+            allowed='one axis with "adaptive": [from, to] for curves, two for a map',
+        )  # fmt: skip
     return None if report.found > before else (tuple(fixed), tuple(adaptive))
 
 
@@ -163,9 +165,9 @@ def read_refine(
         report.fault(
             "/refine/finest",
             "too-many",
-            f"may need {plan.most_cases:,} cases",
+            plural("may need {count} case", "may need {count} cases", plan.most_cases),
             found.get("finest", FINEST.default),
-            allowed=f"at most {MAX_PLANNED_CASES:,}; `most` limits them",
+            allowed=Sentence("at most {high}; `most` limits them", high=MAX_PLANNED_CASES),
         )
         return None
     return plan
@@ -173,7 +175,8 @@ def read_refine(
 
 def _read_finest(report: Report, value: object) -> int | None:
     """The number of intervals of the finest grid, from "1/256" or 256."""
-    allowed = f'"1/{MIN_FINEST}" to "1/{MAX_FINEST}" of the axis, a power of 2'
+    ends = {"low": f"1/{MIN_FINEST}", "high": f"1/{MAX_FINEST}"}
+    allowed = Sentence('"{low}" to "{high}" of the axis, a power of 2', **ends)
     match = re.fullmatch(r"\s*1\s*/\s*([0-9]{1,6})\s*", value) if isinstance(value, str) else None
     number = int(match[1]) if match else value
     if isinstance(value, str) and match is None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
-from sprag.service.reading.units import example
+from sprag.service.reading.units import examples
 from sprag.service.spec.described import Listed
 from sprag.worker.limits import MAX_QUANTITY_LENGTH
 from sprag.worker.models import Parameter
@@ -95,7 +95,7 @@ def quantity_schema(parameter: Parameter) -> Schema:
     schema: Schema = {
         "anyOf": [{"type": "number", **_bounds(parameter)}, _TEXT],
         "description": f"{parameter.help} ({parameter.symbol}), {parameter.unit}",
-        "examples": [text.strip('"') for text in example(parameter.unit).replace(" or ", ", ").split(", ")],
+        "examples": list(examples(parameter.unit)),
         "x-unit": parameter.unit,
         "x-range": parameter.range_text(),
     }

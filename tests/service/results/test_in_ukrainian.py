@@ -15,11 +15,10 @@ from sprag.service import languages
 from sprag.service.faults import Fault
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.languages.elsewhere import speak
-from sprag.service.languages.ranges import allowed_text
+from sprag.service.reading.faults import allowed_text, fault_text
 from sprag.service.reading.phrases import Amount, Phrase, joined, part_label, plural, shown, term, titled
 from sprag.service.reading.reader import CODES, Reading
 from sprag.service.reading.wording import typed_text, unit_text
-from sprag.service.results.fault_texts import fault_text
 from sprag.service.results.figures.branch import special_text
 from sprag.service.results.figures.figure import Figure, Line, Note, Panel, Quantity
 from sprag.service.results.figures.orders import motion_text
@@ -128,7 +127,7 @@ def test_every_ending_has_a_sentence_of_its_own() -> None:
     assert not {ending.sentence for ending in Ending} & set(said)
 
 
-def test_a_fault_is_the_meaning_of_its_code_with_value_and_range() -> None:
+def test_a_fault_of_a_service_is_the_meaning_of_its_code_with_value_and_range() -> None:
     fault = Fault("/base/shaft/load", "out-of-range", "is too small", -1.0, ">= 0", "N*m")
     with languages.language("uk"):
         assert fault_text(fault) == "Значення поза дозволеними межами"
@@ -141,15 +140,6 @@ def test_a_fault_is_the_meaning_of_its_code_with_value_and_range() -> None:
         assert allowed_text("grid, zip") == "grid, zip"
         assert allowed_text(None) == ""
     assert fault_text(fault) == "is too small"
-
-
-def test_a_fault_of_a_table_has_its_line_and_column() -> None:
-    cell = Fault("/csv", "wrong-unit", "line 3, column spring_rate: is no stiffness", "9 N")
-    short = Fault("/csv", "unequal-lengths", "line 4 has 2 cells", allowed="3 cells")
-    with languages.language("uk"):
-        assert fault_text(cell).startswith("рядок 3, стовпець spring_rate: ")
-        assert fault_text(short).startswith("рядок 4: ")
-    assert fault_text(cell) == cell.message
     assert allowed_text("0.05 to 1.5 m") == "0.05 to 1.5 m"
 
 

@@ -13,7 +13,7 @@ from sprag.service.faults import FaultError
 from sprag.service.http.web.form.check import check_form
 from sprag.service.http.web.form.spec import spec_of, values_of
 from sprag.service.languages import language
-from sprag.service.languages.ranges import allowed_text
+from sprag.service.reading.faults import allowed_text
 from sprag.service.reading.reader import Reading
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.extend import parse_extended

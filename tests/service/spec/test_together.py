@@ -17,11 +17,11 @@ from sprag.service.http.web.form.entries import list_of
 from sprag.service.http.web.form.shaft_spec import base_of
 from sprag.service.http.web.form.spec import spec_of, values_of
 from sprag.service.languages import language
+from sprag.service.reading.faults import fault_text
 from sprag.service.reading.reader import Reading
 from sprag.service.reading.together import question, questions, with_last_unit
 from sprag.service.results.branches import range_of
 from sprag.service.results.explore import ExploreQuery, plan_of
-from sprag.service.results.fault_texts import fault_text
 from sprag.service.results.selection import locate_values
 from sprag.service.results.tolerances.conditions import read_conditions
 from sprag.service.results.trajectories import span
@@ -129,7 +129,7 @@ def test_items_of_a_spec_are_asked_about(changes: dict[str, Any], pointer: str) 
     assert fault.code == "ambiguous-unit"
     assert " or in " in fault.message
     with language("uk"):
-        assert fault_text(fault).startswith("Число без одиниці")
+        assert fault_text(fault).startswith("без одиниці поруч зі значеннями, що її мають: ")
 
 
 def test_the_question_names_number_and_units() -> None:

@@ -172,7 +172,7 @@ EXAMPLES: Final = sorted(
         for text in (
             *(text for field in fields() for text in (field.example, field.default, field.unit and f"1 {field.unit}")),
             *(text for _, text in templates()),
-            *(text.strip('" ') for one in units._EXAMPLES.values() for text in re.split(r", | or ", one)),
+            *(text for one in units._EXAMPLES.values() for text in one),
         )
         if text and _is_quantity(text)
     }

@@ -17,14 +17,13 @@ from sprag.service.http.web.form.shaft_spec import step_of
 from sprag.service.http.web.form.spec import WAYS, clutch_pointers, field_of, pendulums_of, spec_of
 from sprag.service.jobs.preview import preview_json
 from sprag.service.languages import _, gettext
-from sprag.service.languages.ranges import allowed_text
+from sprag.service.reading.faults import allowed_text, fault_text
 from sprag.service.reading.numbers import assumption, in_language, settle, settled
 from sprag.service.reading.quantities import TYPED
 from sprag.service.reading.reader import CLUTCH, Choice, Reading, reading_for
 from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.reading.wording import duration, unit_text
 from sprag.service.results.draft_words import draft_words
-from sprag.service.results.fault_texts import fault_text
 from sprag.service.results.figures.linkage import Drawing, drawings
 from sprag.service.results.fits import fit_json
 from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at

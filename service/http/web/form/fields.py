@@ -12,7 +12,7 @@ from typing import Final
 
 from sprag.service.languages import ENGLISH, N_, _, current
 from sprag.service.reading.reader import Reading
-from sprag.service.reading.units import example
+from sprag.service.reading.units import examples
 from sprag.service.reading.wording import number, words
 from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN, Described
 from sprag.service.spec.plan import goal, refine
@@ -87,7 +87,6 @@ def pendulum(index: int) -> Section:
 
 def field_for(entry: Parameter, path: str) -> Field:
     """The field of a parameter at ``path`` of the base."""
-    text = example(entry.unit).split('"')
     return Field(
         name="/base/" + path.replace(".", "/"),
         label=_(words(path.rsplit(".", maxsplit=1)[-1])),
@@ -98,7 +97,7 @@ def field_for(entry: Parameter, path: str) -> Field:
         range=range_words(entry),
         required=entry.default is None,
         default=_default_text(entry.default),
-        example=text[1] if len(text) > 1 else "",
+        example="" if entry.unit == "1" else examples(entry.unit)[0],
     )
 
 

@@ -39,13 +39,12 @@ from sprag.service.http.web.form.shaft_spec import base_of, field_of_base, value
 from sprag.service.http.web.form.tolerances import FIELDS as TOLERANT
 from sprag.service.http.web.form.tolerances import field_of_tolerance, tolerance_values, tolerances_of
 from sprag.service.languages import _, gettext
-from sprag.service.languages.ranges import allowed_text
+from sprag.service.reading.faults import allowed_text, fault_text
 from sprag.service.reading.phrases import lower_first
 from sprag.service.reading.printed import could_be_several
 from sprag.service.reading.together import with_last_unit
 from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.reading.wording import unit_text
-from sprag.service.results.fault_texts import fault_text
 from sprag.service.spec.axes.sweep import SWEPT
 from sprag.service.spec.derive import formulas_of, with_values
 from sprag.service.spec.measured import MeasuredDataError, parse_measured

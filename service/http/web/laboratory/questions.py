@@ -9,7 +9,6 @@ from sprag.service.http.web.figures.shaft import overridden
 from sprag.service.http.web.form.shaft import part_of
 from sprag.service.http.web.laboratory.sliders import quantity_text
 from sprag.service.languages import N_, _, gettext
-from sprag.service.languages.ranges import allowed_text
 from sprag.service.reading.numbers import parse_number
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.report import SpecError
@@ -88,9 +87,8 @@ def _estimate(text: str) -> tuple[float | None, str]:
     value = parse_number(text)
     if value is None or not 0.0 <= value <= 2.0:
         what = _("must be a number") if value is None else _("is out of range")
-        return None, "; ".join(
-            (what, gettext("got {value}", value=text), gettext("allowed: {allowed}", allowed=allowed_text("0 to 2")))
-        )
+        allowed = gettext("allowed: {allowed}", allowed=gettext("{low} to {high}", low=0, high=2))
+        return None, "; ".join((what, gettext("got {value}", value=text), allowed))
     return value, ""
 
 

@@ -132,7 +132,7 @@ _HEAD = "shaft.load,shaft.speed.mean,sigma\n"
         (_HEAD + "0.1,20,1\n0.2,19\n", "unequal-lengths", "line 3"),
         (_HEAD + "0.1,20,0\n", "out-of-range", "line 2, column sigma"),
         (_HEAD + "-0.1,20,1\n", "out-of-range", "line 2, column shaft.load"),
-        (_HEAD + "0.1,20,1\n", "out-of-range", "1 measured values"),
+        (_HEAD + "0.1,20,1\n", "out-of-range", "1 measured value"),
         (_HEAD, "out-of-range", "0 lines"),
         ("shaft.load [N],shaft.speed.mean\n0.1,20\n", "wrong-unit", "column shaft.load [N]"),
         ("shaft.load,shaft.speed.mean [N]\n0.1,20\n", "wrong-unit", "column shaft.speed.mean [N]"),

@@ -1,0 +1,44 @@
+"""Faults in the reader's language.
+
+What a fault says is a phrase with its values, or a text of the catalogue. One that is neither, such as that of a
+running service, which is English, is told by the meaning of its code (`sprag.service.fault_meanings`).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sprag.sentences import Sentence
+from sprag.service.fault_meanings import MEANINGS
+from sprag.service.languages import ENGLISH, current, gettext
+from sprag.service.languages.ranges import with_range
+from sprag.service.reading.phrases import shown
+
+if TYPE_CHECKING:
+    from sprag.service.faults import Fault
+
+
+def fault_text(fault: Fault) -> str:
+    """What is wrong, without its place and value."""
+    if is_translated(fault):
+        return translated(fault.message)
+    meaning = MEANINGS.get(fault.code)
+    return gettext(meaning).removesuffix(".") if meaning else fault.message
+
+
+def is_translated(fault: Fault) -> bool:
+    """Whether the reader's language has the sentence of a fault, and not only the meaning of its code."""
+    return current() == ENGLISH or translated(fault.message) != fault.message
+
+
+def allowed_text(allowed: str | None) -> str:
+    """What a fault says is allowed; names of choices are the same in all languages."""
+    said = translated(allowed or "")
+    return said if said != allowed else with_range(said)
+
+
+def translated(text: str) -> str:
+    """A sentence, or a text of the catalogue, in the reader's language; in English as programs have it."""
+    if current() == ENGLISH:
+        return text
+    return shown(text) if isinstance(text, Sentence) else gettext(text)
