@@ -121,6 +121,7 @@ class Digests(StudyDigests):
     def require_undamaged(self, study_id: str, cases: NDArray[np.int64] | None = None, *, anew: bool = False) -> None:
         """Raise DatabaseError where rows of a study are not those that were stored; they are run again.
 
+        Where all rows are looked at, its numbers of cases are compared with them, and counted again where they differ.
         With ``cases`` only the chunks with these cases are looked at where the study is under way or has more than
         `LOOKED_OVER`, and none where these chunks have more than that, too. What was sound counts for ten minutes,
         unless ``anew``.
@@ -140,6 +141,7 @@ class Digests(StudyDigests):
             again = StudyState(now.state) not in _CANCELLED
             rest = "they are run again" if again else "the study was cancelled, so submit it as a new one"
             raise DatabaseError(f"{damaged[0]}: {rest}", "database-damaged")
+        self.count_endings_again(study_id)
         with self._looking:
             self._looked_at[study_id] = now.revision
 

@@ -13,7 +13,7 @@ from sprag.service.storage import digests
 from sprag.service.storage.errors import DatabaseError, NothingToRetryError
 from sprag.service.storage.row_hashes import as_kept, digest_of, digests_of, row_words
 from sprag.service.storage.store import Store
-from sprag.service.storage.tables import CASE_KEYS, CHUNKS, ENDINGS, results_table
+from sprag.service.storage.tables import CASE_KEYS, CHUNKS, ENDINGS, STUDIES, results_table
 from sprag.worker import models
 from sprag.worker.ports import Chunk
 from sprag.worker.states import StudyState
@@ -109,6 +109,17 @@ def test_no_answer_is_made_of_damaged_rows(store: Store, most: int, monkeypatch:
     finish(store, record)
     for answer in answers:
         answer()
+
+
+def test_numbers_of_cases_are_counted_again_where_all_rows_are_looked_at(store: Store) -> None:
+    record = create(store, 25)
+    finish(store, record)
+    with store.session.write() as connection:
+        connection.execute(sa.update(ENDINGS).values(cases=24))
+        connection.execute(sa.update(STUDIES).values(ok=24))
+    store.require_undamaged(record.id, anew=True)
+    found, progress = store.look(record.id)
+    assert (found.done, found.ok, progress.endings) == (25, 25, {"ok": 25})
 
 
 def test_columns_of_all_rows_are_looked_over(store: Store) -> None:

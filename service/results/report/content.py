@@ -136,8 +136,10 @@ def report_of(
 
     Its answers are those of the chosen curves, and at the working ``point`` as typed.
 
-    Raises StudyNotFoundError, and SelectionError for curves, points and units that the study does not have.
+    Raises StudyNotFoundError, SelectionError for curves, points and units that the study does not have, and
+    DatabaseError where its rows are not those that were stored.
     """
+    store.require_undamaged(study_id, anew=True)
     record, progress = store.look(study_id)
     spec, study = store.spec(study_id), store.study(study_id)
     report = make_report(

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+import sqlalchemy as sa
 
 from sprag.service.faults import FaultError
 from sprag.service.presets import preset_text
@@ -23,7 +24,11 @@ from sprag.service.results.report.document import Document, Image, Section, Tabl
 from sprag.service.results.report.pdf import pdf_report
 from sprag.service.results.report.sketch import sketches
 from sprag.service.spec.document import load_spec, parse_spec
+from sprag.service.storage import digests
+from sprag.service.storage.errors import DatabaseError
+from sprag.service.storage.tables import results_table
 from sprag.worker import models
+from tests.faults import refused
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -49,6 +54,22 @@ def test_ranges_are_those_of_the_rows(service: Service) -> None:
         assert (row.least, row.largest) == (np.nanmin(column), np.nanmax(column))
         assert (row.least_case, row.largest_case) == (np.nanargmin(column), np.nanargmax(column))
         assert row.mean == pytest.approx(np.nanmean(column), rel=1e-12)
+
+
+def test_rows_of_any_number_are_those_that_were_stored(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A report has the ranges of all rows, also of a study whose answers look over the rows that they need only."""
+    study_id = service.submit()
+    service.fill(study_id)
+    monkeypatch.setattr(digests, "LOOKED_OVER", 2)
+    record = service.store.get_study(study_id)
+    table = results_table(record.model, record.variant)
+    speed = sa.update(table).where(table.c.case_number == 1).values(shaft_speed_mean=1e9)
+    with service.store.session.write() as connection:
+        assert connection.execute(speed).rowcount == 1
+    with refused(DatabaseError, "database-damaged"):
+        report_of(service.store, study_id)
+    service.fill(study_id)
+    assert report_of(service.store, study_id).ranges[0].largest < 1e9
 
 
 def test_the_page_holds_everything_and_needs_nothing_else(service: Service, spec: dict[str, Any]) -> None:
