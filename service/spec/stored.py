@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag.service.reading.numbers import has_doubtful_point, with_decimal, with_decimals
-from sprag.service.reading.together import AMBIGUOUS_UNIT
+from sprag.service.reading.printed import could_be_values, keyboard
+from sprag.service.reading.together import AMBIGUOUS_UNIT, split_list
 from sprag.service.spec.csv_text import has_units
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.report import SpecError
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 #: Numbers farther apart than this (relative) were read differently, and not only computed by another version.
 _APART: Final = 1e-3
+#: Code of a list whose items could also be several values between blanks.
+_BLANKS: Final = "invalid-text"
 #: Fields with the text of a table.
 _TABLES: Final = frozenset({"points", "csv"})
 
@@ -33,7 +36,8 @@ def accepted(spec: Mapping[str, Any], study: Study | None = None) -> dict[str, A
 
     Earlier versions read bare numbers beside quantities of another scale as SI, and points that could separate
     thousands as decimal points, so that is what they are: their unit, in the heading of a column where it is a table,
-    and a further decimal are written. Beside decimal commas such points separate thousands, unless the ``study`` that
+    and a further decimal are written. Blanks in the values of a list separated thousands, and are left out. Beside
+    decimal commas such points separate thousands, unless the ``study`` that
     is stored with the spec shows that they were decimal.
     """
     settled = _settled(spec)
@@ -58,6 +62,8 @@ def _settled(spec: Mapping[str, Any]) -> dict[str, Any]:
                 place[index] = _with_heading(place[index], str(fault.value), str(fault.unit))
             elif fault.code == AMBIGUOUS_UNIT:
                 place[index] = f"{place[index]!r} {fault.unit}"
+            elif fault.code == _BLANKS:
+                place[index] = "; ".join(map(keyboard, split_list(place[index])))
             else:
                 place[index] = with_decimal(place[index], str(fault.value))
     return settled
@@ -69,14 +75,24 @@ def _with_heading(table: str, heading: str, unit: str) -> str:
 
 
 def _unclear(spec: Mapping[str, Any]) -> list[Fault]:
-    """The faults of bare numbers beside quantities of another scale, and of points that could separate thousands."""
-    doubtful = any(has_doubtful_point(text) or has_units(text.partition("\n")[2]) for text in _texts(spec))
+    """The faults of bare numbers beside quantities of another scale, and of points and blanks that could separate
+    thousands.
+    """
+    doubtful = any(
+        has_doubtful_point(text) or has_units(text.partition("\n")[2]) or could_be_values(split_list(text)) is not None
+        for text in _texts(spec)
+    )
     if not _mixed(spec) and not doubtful:
         return []
     try:
         parse_spec(spec)
     except SpecError as error:
-        return [fault for fault in error.faults if fault.code in {AMBIGUOUS_UNIT, "ambiguous-point"}]
+        return [
+            fault
+            for fault in error.faults
+            if fault.code in {AMBIGUOUS_UNIT, "ambiguous-point"}
+            or (fault.code == _BLANKS and could_be_values(split_list(str(fault.value))) is not None)
+        ]
     return []
 
 

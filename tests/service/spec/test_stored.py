@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from sprag.service.spec.document import parse_spec
+from sprag.service.spec.report import SpecError
 from sprag.service.spec.stored import accepted
 from sprag.worker.axis import Axis
 from tests.service.conftest import API, Service
@@ -97,3 +98,13 @@ def test_it_is_extended_cloned_selected_and_scheduled_as_it_was(service: Service
     assert service.http.post("/schedules/new", data=form).status_code == 303
     (schedule,) = service.store.list_schedules()
     assert gravity(schedule.fields.spec) == pytest.approx([0.020, 0.025])
+
+
+@pytest.mark.parametrize("values", [["100 200 N*mm", "300 400 N*mm", "0.5 N*m"], "100 200; 300 400; 500 N*mm"])
+def test_blanks_in_a_list_separated_thousands(values: Any) -> None:
+    spec = changed({"/axes": [{"path": "shaft.load", "values": values}]})
+    with pytest.raises(SpecError, match="could be one value or several"):
+        parse_spec(spec)
+    then = accepted(spec)
+    assert parse_spec(then).study.axes[0].array.tolist() == pytest.approx([100.2, 300.4, 0.5])
+    assert accepted(then) == then
