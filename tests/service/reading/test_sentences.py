@@ -14,12 +14,24 @@ from typing import get_args
 import pytest
 
 from docs.catalogues import of_code
-from sprag.sentences import Amount, Name, Place, Sentence, WarningText, joined, plural, sentence_of
+from sprag.sentences import (
+    Amount,
+    Clause,
+    Name,
+    Place,
+    Sentence,
+    Typed,
+    WarningText,
+    Whole,
+    joined,
+    plural,
+    sentence_of,
+)
 from sprag.service.cli.console import warning_lines
 from sprag.service.faults import FaultError, WarningCode
 from sprag.service.http.handlers import as_api_error
 from sprag.service.languages import gettext, language
-from sprag.service.languages.recorded import MANY_STUDIES
+from sprag.service.languages.recorded import MANY_STUDIES, NOT_IN_TIME
 from sprag.service.reading.phrases import Phrase, shown, told
 from sprag.service.reading.quantities import Units
 from sprag.service.reading.reader import Reading
@@ -45,6 +57,7 @@ SENTENCES = [
     Sentence("no values"),
     plural("{count} row of {all}", "{count} rows of {all}", 20_000, all=1),
     joined(": ", (Place("/axes/0", "shaft.load"), Name("shaft.load", within=True), "x", PLACED)),
+    joined("", (Whole(PLACED), " ", Clause(Sentence(NOT_IN_TIME)), " ", Whole("x"), " ", Typed("20.000 N*mm"))),
     Sentence("{a} {b}", a=Amount(None), b=Amount(307.2, digits=3, form=".0f")),
 ]
 
