@@ -14,12 +14,13 @@ _SERVICE: Final = Path(__file__).resolve().parents[1] / "service"
 #: Functions that take the message of a fault, and its place among their arguments.
 _MESSAGE: Final = {
     **dict.fromkeys(("fault", "Fault", "ParameterFault", "refused", "parameter_error"), 2),
-    **dict.fromkeys(("FormulaError", "QuantityError"), 1),
+    **dict.fromkeys(("FinishError", "FormulaError", "QuantityError", "TimingError"), 1),
+    "check_size": 0,  # what there is too much of
 }
 #: Those that take what is allowed without a keyword.
 _ALLOWED: Final = dict.fromkeys(("Fault", "ParameterFault", "parameter_error"), 4)
 #: Where every message is translated as it is.
-_WHOLE: Final = ("service/reading/", "service/spec/")
+_WHOLE: Final = ("service/reading/", "service/results/", "service/schedules/", "service/spec/")
 #: What is the same in all languages: code, names of fields, formats.
 _CODE: Final = re.compile(r"`[^`]*`|'[^']*'|\"[^\"]*\"|\[[^\]]*\]|--\S+|\b(?:csv|json|pdf|html|null|true|PATH|VALUE)\b")
 _WORDS: Final = re.compile(r"[a-z]{3}|\b(?:as|in|no|or)\b")
@@ -47,7 +48,7 @@ def _texts(call: ast.Call, where: str) -> Iterator[str]:
             yield from _constants(note)
     for value in message:
         if isinstance(value, ast.JoinedStr) and where.startswith(_WHOLE):
-            raise ValueError(f"{where}:{value.lineno}: an f-string cannot be translated; a Phrase can")
+            raise ValueError(f"{where}:{value.lineno}: an f-string cannot be translated; a Sentence can")
         yield from _constants(value)
     for value in allowed:
         yield from (text for text in _constants(value) if _WORDS.search(_CODE.sub("", text)))

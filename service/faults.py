@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypedDict, TypeVar
 
+from sprag.sentences import Sentence
 from sprag.worker.errors import SpragError
 
 if TYPE_CHECKING:
@@ -186,7 +187,7 @@ class Fault:
     code : str
         One of `Code`.
     message : str
-        Description of the fault, without the value.
+        Description of the fault, without the value: a `Sentence`, or a text of the catalogue.
     value : object
         The value received, shortened, always plain JSON data.
     allowed : str or None
@@ -302,7 +303,7 @@ def choice_of(name: str, value: str, choices: Iterable[Choice]) -> Choice:
     known = list(choices)
     if value in known:
         return value
-    raise parameter_error(name, "invalid-choice", f"unknown {name}", value, ", ".join(known))
+    raise parameter_error(name, "invalid-choice", Sentence("unknown {name}", name=name), value, ", ".join(known))
 
 
 class Warned(TypedDict):

@@ -102,6 +102,7 @@ def fault_line(fault: Fault) -> str:
     if languages.current() == languages.ENGLISH:
         return str(fault)
     from sprag.service.reading.faults import allowed_text, fault_text
+    from sprag.service.reading.wording import unit_text
 
     details = []
     if fault.value is not None:
@@ -109,7 +110,7 @@ def fault_line(fault: Fault) -> str:
     if fault.allowed is not None:
         details.append(_("allowed: {allowed}", allowed=allowed_text(fault.allowed)))
     if fault.unit is not None and (fault.allowed is None or fault.unit not in fault.allowed):
-        details.append(_("unit {unit}", unit=fault.unit))
+        details.append(_("unit {unit}", unit=unit_text(fault.unit)))
     where = fault.where or _("(the whole spec)")
     return f"{where}: {fault_text(fault)}" + (f" ({'; '.join(details)})" if details else "")
 

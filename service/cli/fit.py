@@ -95,7 +95,7 @@ def _quantity(option: str, text: str, unit: str) -> float:
     try:
         return parse_quantity(text if number is None else number, unit)
     except QuantityError as error:
-        raise wrong_option(option, error.code, str(error), text, unit=unit) from error
+        raise wrong_option(option, error.code, error.message, text, unit=unit) from error
 
 
 def _measured(path: str) -> MeasuredData:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from sprag.sentences import Sentence
+from sprag.service.reading.limits import span
 from sprag.service.spec.fields import read_object, read_whole
 from sprag.service.spec.machine.drive import START
 from sprag.service.spec.machine.shaft_check import NotCompiledError, compiles_here
@@ -65,12 +67,18 @@ def _source(report: Report, store: Store, data: object, spec: Mapping[str, Any])
         report.fault(f"{_POINTER}/study", "unknown-name", "is not a study of this service", study_id, allowed="its id")
         return None
     if study.model != spec.get("model"):
-        report.fault(f"{_POINTER}/study", "conflict", f"is of the model {study.model}", study_id, allowed="one model")
+        report.fault(
+            f"{_POINTER}/study",
+            "conflict",
+            Sentence("is of the model {model}", model=study.model),
+            study_id,
+            allowed="one model",
+        )
     if case is not None and case >= study.cases:
-        report.fault(f"{_POINTER}/case", "out-of-range", "is out of range", case, allowed=f"0 to {study.cases - 1:,}")
+        report.fault(f"{_POINTER}/case", "out-of-range", "is out of range", case, allowed=span(0, study.cases - 1))
     count = count_of(study.run)
     if start is not None and start >= count:
-        report.fault(f"{_POINTER}/start", "out-of-range", "is out of range", start, allowed=f"0 to {count - 1:,}")
+        report.fault(f"{_POINTER}/start", "out-of-range", "is out of range", start, allowed=span(0, count - 1))
     if report.found or case is None or start is None:
         return None
     return motion_of(study, case, start)
@@ -81,7 +89,7 @@ def _check_pendulums(report: Report, base: Mapping[str, Any], values: Mapping[st
     count = len({path.split(".")[1] for path in values if path.startswith("pendulums.")})
     own = base.get("pendulums")
     if isinstance(own, list) and 0 < count < len(own):
-        message = f"the base has {len(own)} pendulums, the case has {count}"
+        message = Sentence("the base has {own} pendulums, the case has {count}", own=str(len(own)), count=str(count))
         report.fault("/base/pendulums", "conflict", message, allowed="as many as the case")
 
 
@@ -93,13 +101,15 @@ def _put(report: Report, base: dict[str, Any], path: str, value: float) -> None:
         key: Any = int(part) if isinstance(place, list) else part
         inside = key < len(place) if isinstance(place, list) else key in place
         if not inside or not isinstance(place[key], Mapping | list):
-            report.fault(_POINTER, "conflict", f"has a value of {path}, which the base has no place for", base)
+            message = Sentence("has a value of {path}, which the base has no place for", path=path)
+            report.fault(_POINTER, "conflict", message, base)
             return
         place[key] = list(place[key]) if isinstance(place[key], list) else dict(place[key])
         place = place[key]
     if name in place:
         report.fault(
-            f"/base/{path.replace('.', '/')}", "conflict", f"is given by `base.{START}`", place[name],
-            allowed=f"either it or `base.{START}`",
+            f"/base/{path.replace('.', '/')}", "conflict", Sentence("is given by `{field}`", field=f"base.{START}"),
+            place[name],
+            allowed=Sentence("either it or `{field}`", field=f"base.{START}"),
         )  # fmt: skip
     place[name] = value

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.sentences import Sentence
 from sprag.service.faults import refused
 from sprag.service.reading.catalogue import result_of, unit_of
 from sprag.service.reading.cyrillic import latin
@@ -130,7 +131,9 @@ def read_units(text: str) -> tuple[bool, dict[str, str]]:
         About ``units``, for what is neither a unit nor a kind of quantity, and for a unit of another kind.
     """
     if len(text) > _LONGEST:
-        raise refused("units", "too-long", "is too long", allowed=f"<= {_LONGEST} characters")
+        raise refused(
+            "units", "too-long", "is too long", allowed=Sentence("<= {count} characters", count=str(_LONGEST))
+        )
     typed, chosen = False, dict[str, str]()
     for part in latin(plain_signs(text)).replace("rev/min", "rpm").split(","):
         name, separator, unit = (piece.strip() for piece in part.partition("="))
@@ -155,8 +158,10 @@ def _kind_with(unit: str, given: str) -> Kind:
     found = next((kind for kind in KINDS if unit in (kind.unit, *kind.others)), None)
     if found is None:
         known = ", ".join(dict.fromkeys(unit for kind in KINDS for unit in (kind.unit, *kind.others)))
-        message = "is neither si, typed nor a unit that quantities are shown in"
-        raise refused("units", "invalid-choice", message, given, allowed=f"si, typed, {known}")
+        raise refused(
+            "units", "invalid-choice", "is neither si, typed nor a unit that quantities are shown in", given,
+            allowed=f"si, typed, {known}",
+        )  # fmt: skip
     return found
 
 

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.sentences import Sentence, Typed
 from sprag.service.answers.results import BasinData, RegimeRow
 from sprag.service.faults import FaultError, parameter_error
 from sprag.service.json_text import to_bytes
+from sprag.service.reading.catalogue import range_sentence
 from sprag.service.reading.texts import quantity_text
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.service.results.exports import table_csv
@@ -115,7 +117,9 @@ def _ends(
     for place, text in zip(("from", "to"), ends, strict=True):
         if text is None:
             if drawn is None:
-                allowed = f"a quantity in {entry.unit}: the study has no starts with a range of it"
+                allowed = Sentence(
+                    "a quantity in {unit}: the study has no starts with a range of it", unit=Typed(entry.unit)
+                )
                 raise parameter_error(f"{name}_{place}", "required", "is required", None, allowed)
             values.append(drawn[len(values)])
             continue
@@ -123,9 +127,9 @@ def _ends(
             number, unit = split_quantity(text)
             value = parse_quantity(text, entry.unit) if unit else to_float(number)
         except QuantityError as error:
-            raise parameter_error(f"{name}_{place}", error.code, str(error), text, entry.range_text()) from error
+            raise parameter_error(f"{name}_{place}", error.code, error.message, text, range_sentence(entry)) from error
         if not entry.accepts(value):
-            raise parameter_error(f"{name}_{place}", "out-of-range", "is out of range", text, entry.range_text())
+            raise parameter_error(f"{name}_{place}", "out-of-range", "is out of range", text, range_sentence(entry))
         values.append(value)
     if not values[0] < values[1]:
         raise parameter_error(f"{name}_to", "invalid-range", "is not above the first value", given[1], "above it")

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sprag.sentences import Amount, Sentence, Typed
 from sprag.service.answers import filled
 from sprag.service.answers.results import Branch, BranchContact
 from sprag.service.faults import choice_of, parameter_error
 from sprag.service.json_text import numbers, to_bytes
+from sprag.service.languages import N_
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.service.results.directions import case_values
@@ -33,7 +35,7 @@ if TYPE_CHECKING:
     from sprag.worker.models.branches import CaseBranch
     from sprag.worker.study import Study
 
-_OUTSIDE = "outside the range of the parameter"
+_OUTSIDE = N_("outside the range of the parameter")
 
 
 def ranged_axes(study: Study, *, initial: bool = False) -> list[str]:
@@ -59,8 +61,10 @@ def along_of(study: Study, case: int, along: str, low: str | None = None, high: 
     for path in (part.strip() for part in along.split(",")):
         axis = study.axis_of(path)
         if any(map(is_initial, (path,) if axis is None else study.axes[axis].paths)):
-            message = "is an initial value: a periodic motion does not depend on how it began"
-            raise parameter_error("along", "conflict", message, path, ", ".join(free_parameters(study, case)))
+            raise parameter_error(
+                "along", "conflict", "is an initial value: a periodic motion does not depend on how it began", path,
+                ", ".join(free_parameters(study, case)),
+            )  # fmt: skip
     return range_of(study, case, along, low, high, initial=False)
 
 
@@ -90,9 +94,11 @@ def range_of(
     paths: list[str] = []
     for path in filter(None, (part.strip() for part in along.split(","))):
         if path not in own or path in study.derive:
-            message = "is derived from others" if path in study.derive else "is not a numeric parameter of the study"
-            free = ", ".join(free_parameters(study, case, initial=initial))
-            raise parameter_error("along", "unknown-name", message, path, free)
+            raise parameter_error(
+                "along", "unknown-name",
+                "is derived from others" if path in study.derive else "is not a numeric parameter of the study",
+                path, ", ".join(free_parameters(study, case, initial=initial)),
+            )  # fmt: skip
         axis = study.axis_of(path)
         paths += [path] if axis is None else study.axes[axis].paths
     if not paths:
@@ -101,9 +107,10 @@ def range_of(
     value = own[paths[0]]
     for path in paths:
         if own[path] != value:
-            raise parameter_error(
-                "along", "conflict", f"{path} has another value in case {case} than {paths[0]}", along, f"{value!r}"
+            message = Sentence(
+                "{path} has another value in case {case} than {first}", path=path, case=str(case), first=paths[0]
             )
+            raise parameter_error("along", "conflict", message, along, f"{value!r}")
     ends = _axis_ends(study, paths[0])
     unit = unit_of(study, paths[0])
     low, high = ends_of_range(("from", "to"), low, high, unit)
@@ -114,7 +121,8 @@ def range_of(
         if not least <= number <= most:
             raise parameter_error(name, "out-of-range", _OUTSIDE, text, f"{least:g} .. {most:g}")
     if not first <= value <= last or first == last:
-        message = f"the range {first:g} .. {last:g} must contain the value of the case, {value:g}"
+        parts = {"first": Amount(first, digits=6), "last": Amount(last, digits=6), "value": Amount(value, digits=6)}
+        message = Sentence("the range {first} .. {last} must contain the value of the case, {value}", **parts)
         raise parameter_error("from", "invalid-range", message, low, f"from <= {value:g} <= to")
     return Along(tuple(paths), first, last)
 
@@ -139,14 +147,20 @@ def _axis_ends(study: Study, path: str) -> tuple[float, float] | None:
 def _value(name: str, text: str | None, unit: str, usual: float | None) -> float:
     if text is None or not text.strip():
         if usual is None:
-            message = "is required, because the parameter is not on an axis of the study with a range"
-            raise parameter_error(name, "required", message, text, f"a value in {unit}")
+            raise parameter_error(
+                name, "required", "is required, because the parameter is not on an axis of the study with a range",
+                text, _value_in(unit),
+            )  # fmt: skip
         return usual
     try:
         number, given = split_quantity(text)
         return parse_quantity(text, unit) if given else to_float(number)
     except QuantityError as error:
-        raise parameter_error(name, error.code, str(error), text, f"a value in {unit}") from error
+        raise parameter_error(name, error.code, error.message, text, _value_in(unit)) from error
+
+
+def _value_in(unit: str) -> Sentence:
+    return Sentence("a value in {unit}", unit=Typed(unit))
 
 
 def branch_file(study: Study, case: int, along: Along, form: Format, start: int | None = None) -> bytes:

@@ -9,6 +9,7 @@ import numpy as np
 
 from sprag.service.faults import Fault, FaultError
 from sprag.service.json_text import numbers
+from sprag.service.languages import N_
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.results import exports
 from sprag.service.results.calibration_words import sentences
@@ -76,7 +77,7 @@ class Calibration:
 def plan_of(study: Study) -> CalibratePlan:
     """The calibration of a study; FaultError for a study without one."""
     if study.plan is None or study.plan.get("kind") != CALIBRATE:
-        message = "the study is not a calibration"
+        message = N_("the study is not a calibration")
         fault = Fault(None, "conflict", message, allowed="a study whose spec has `calibrate`")
         raise FaultError("invalid-selection", message, [fault])
     return CalibratePlan.from_json(study.plan)

@@ -82,8 +82,13 @@ def figure_query(study: Study, view: View) -> CurveQuery | MapQuery:
     find = map_query if view.page == "map" else curve_query
     query = find(study, models.study_results(study), Address(view.query))
     if query is None:
-        least = "two parameters vary" if view.page == "map" else "a parameter varies"
-        raise refused("page", "nothing-varies", f"needs a study in which {least}", view.page)
+        raise refused(
+            "page", "nothing-varies",
+            "needs a study in which two parameters vary"
+            if view.page == "map"
+            else "needs a study in which a parameter varies",
+            view.page,
+        )  # fmt: skip
     return query
 
 

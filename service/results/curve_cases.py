@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.sentences import Sentence
 from sprag.service.faults import ParameterFault, SelectionError, refused
+from sprag.service.languages import N_
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.results.curves import Curve, CurveQuery, Curves, Fetch, Line, Map, Selection, not_run
 from sprag.service.results.listed_cases import cases_with, left_open, machines
@@ -22,6 +24,7 @@ from sprag.service.results.refined import families, plan_along, refined_curves
 from sprag.service.results.refined_maps import draw_refined_map, map_plan
 from sprag.service.results.regimes import kind_columns, kinds_of
 from sprag.service.results.selection import (
+    LEFT_OPEN,
     Fixed,
     axis_name,
     held_texts,
@@ -136,7 +139,7 @@ def draw_map(
     fixed = locate_axes(study, at)
     _no_axis_twice({x: x_axis}, "y", {y: y_axis}, fixed)
     fixed = with_nominal(study, fixed, {x_axis, y_axis})
-    x_values, lines = _grid_lines(study, x_axis, {y: y_axis}, fixed, 1, way_out="give")
+    x_values, lines = _grid_lines(study, x_axis, {y: y_axis}, fixed, 1, way_out=LEFT_OPEN)
     rows = list(lines)
     cases = np.stack([row.cases for row in rows])
     regime = models.regime_info(infos)
@@ -172,15 +175,23 @@ def _no_axis_twice(x: dict[str, int], second: str, others: dict[str, int], fixed
     uses += [("at", path, axis) for axis, (path, _) in fixed.items()]
     for parameter, path, axis in uses:
         if axis in taken:
-            message = f"the axis is already taken by {taken[axis]}; one axis can have one role only"
+            message = Sentence("the axis is already taken by {role}; one axis can have one role only", role=taken[axis])
             raise refused(parameter, "repeated", message, path)
         taken[axis] = f"{parameter}={path}"
 
 
 def _check_size(points: int, results: int) -> None:
     if points * results > MAX_CURVE_VALUES:
-        message = f"{points} points of {results} results are requested; select fewer with at=, or export the results"
-        raise refused("at", "too-many", message, allowed=f"<= {MAX_CURVE_VALUES} numbers")
+        message = Sentence(
+            "{points} points of {results} results are requested; select fewer with at=, or export the results",
+            points=str(points), results=str(results),
+        )  # fmt: skip
+        raise refused("at", "too-many", message, allowed=most_numbers())
+
+
+def most_numbers() -> Sentence:
+    """How many numbers may be asked for at once."""
+    return Sentence("<= {high} numbers", high=str(MAX_CURVE_VALUES))
 
 
 def _grid_lines(
@@ -189,7 +200,7 @@ def _grid_lines(
     by: dict[str, int],
     fixed: Fixed,
     results: int,
-    way_out: str = "name it in by=, or give",
+    way_out: str = N_("the axis {path} is left open: name it in by=, or give its value as at={path}=VALUE"),
     *,
     only: Mapping[int, Sequence[int]] = NOTHING,
 ) -> tuple[tuple[float, ...], Iterator[Line]]:
@@ -199,7 +210,7 @@ def _grid_lines(
         ParameterFault(
             "at",
             "not-fixed",
-            f"the axis {axis.paths[0]} is left open: {way_out} its value as at={axis.paths[0]}=VALUE",
+            Sentence(way_out, path=axis.paths[0]),
             allowed=listed(axis.values),
             unit=unit_of(study, axis.paths[0]),
         )
@@ -243,8 +254,9 @@ def _listed_lines(
     wanted |= {i: [axes[i].value(index) for index in indices] for i, indices in only.items()}
     cases = cases_with(study, wanted)
     if cases.size == 0:
-        message = "no case has all these values together"
-        raise refused("at", "unknown-value", message, listed(p for p, _ in fixed.values()))
+        raise refused(
+            "at", "unknown-value", "no case has all these values together", listed(p for p, _ in fixed.values())
+        )
     _check_size(cases.size, results)
     by = _with_open(study, x_axis, by, cases)
     at = {path: axes[i].value(index) for i, (path, index) in fixed.items()}
@@ -268,10 +280,11 @@ def _with_open(study: Study, x_axis: int, by: dict[str, int], cases: NDArray[np.
         faults = []
         for axis in (study.axes[position] for position in left):
             path, values = axis.paths[0], np.unique(axis.array[cases]).tolist()
-            message = (
-                f"of which {path} should the curve be? It has {len(values):,} values in these cases, and a curve is of "
-                f"one machine: give its value as at={path}=VALUE, or name it in by="
-            )
+            message = Sentence(
+                "of which {path} should the curve be? It has {count} values in these cases, and a curve is of one "
+                "machine: give its value as at={path}=VALUE, or name it in by=",
+                path=path, count=len(values),
+            )  # fmt: skip
             faults.append(ParameterFault("at", "not-fixed", message, None, listed(values), unit_of(study, path)))
         raise SelectionError(faults)
     return by | {study.axes[position].paths[0]: position for position in left}

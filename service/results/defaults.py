@@ -12,7 +12,7 @@ import numpy as np
 from sprag.service.faults import refused
 from sprag.service.languages import N_
 from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.phrases import Name, Part, Phrase, joined, lower_first, plural
+from sprag.service.reading.phrases import Name, Part, Phrase, joined, plural
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.listed_cases import MOST_CURVES, cases_with, left_open, longest, open_axes, usual_machine
 from sprag.service.results.refined import curve_plan, families
@@ -172,7 +172,12 @@ def completed(
         return CurveQuery(x, drawn_results(study, infos), by, at, of=of)
     main = main_query(study, infos)
     if main is None:
-        raise refused("x", "not-an-axis", lower_first(no_curves(study)).removesuffix("."))
+        raise refused(
+            "x", "not-an-axis",
+            "no two cases of this study differ in one parameter only, so there is no curve"
+            if varying_axes(study)
+            else "nothing varies in this study, so there is no curve",
+        )  # fmt: skip
     taken = {study.axis_of(path) for path in (*by, *(path for path, _ in (*at, *of)))}
     families = by or tuple(path for path in main.by if study.axis_of(path) not in taken)
     return CurveQuery(

@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.sentences import Sentence, joined, plural
 from sprag.service.answers.explore import Exploration, ExploredCase, Histogram
 from sprag.service.faults import refused
+from sprag.service.languages import N_
 from sprag.service.reading.catalogue import result_of, unit_of
+from sprag.service.reading.limits import at_most
 from sprag.service.reading.texts import did_you_mean
 from sprag.service.reading.units import plain_signs
 from sprag.service.results import exports
@@ -32,7 +35,7 @@ if TYPE_CHECKING:
     from sprag.worker.study import Study
 
 #: What a range may look like.
-EXAMPLES: Final = "for instance shaft.load <= 2 N*m or efficiency >= 0.5"
+EXAMPLES: Final = N_("for instance shaft.load <= 2 N*m or efficiency >= 0.5")
 #: Most ranges and quantities of one question.
 MOST_RANGES, MOST_SHOWN = 40, 12
 ROWS: Final = 50
@@ -139,14 +142,24 @@ def plan_of(study: Study, query: ExploreQuery) -> Plan:
     infos = models.study_results(study)
     regime = models.regime_info(infos)
     if len(query.where) > MOST_RANGES:
-        raise refused("where", "too-many", f"{len(query.where)} ranges are given", allowed=f"at most {MOST_RANGES}")
+        raise refused(
+            "where",
+            "too-many",
+            plural("{count} range is given", "{count} ranges are given", len(query.where)),
+            allowed=at_most(MOST_RANGES),
+        )
     if len(query.show) > MOST_SHOWN:
-        raise refused("show", "too-many", f"{len(query.show)} quantities are given", allowed=f"at most {MOST_SHOWN}")
+        raise refused(
+            "show",
+            "too-many",
+            plural("{count} quantity is given", "{count} quantities are given", len(query.show)),
+            allowed=at_most(MOST_SHOWN),
+        )
     pairs = [(parts[1], parts[3]) for text in query.where if (parts := _FORM.fullmatch(plain_signs(text)))]
     refuse_mixed_texts("where", pairs, {name: unit for name, unit in quantities(study).items() if pairs})
     ranges = tuple(_range(study, infos, text) for text in query.where)
     if query.regime and (regime is None or query.regime not in regime.categories):
-        allowed = "no regime: this study has none" if regime is None else listed(regime.categories)
+        allowed = Sentence("no regime: this study has none") if regime is None else listed(regime.categories)
         raise refused("regime", "invalid-choice", "is not a regime", query.regime, allowed=allowed)
     _kind("ending", query.ending, models.endings_of(study.model))
     _kind("flag", query.flag, models.flags_of(study.model))
@@ -268,20 +281,25 @@ def _numeric(infos: Sequence[ResultInfo], name: str) -> bool:
 def _require(study: Study, infos: Sequence[ResultInfo], parameter: str, name: str, others: Sequence[str] = ()) -> None:
     if name not in study.column_paths and not _numeric(infos, name):
         names = [*others, *study.column_paths, *(info.name for info in infos if info.kind != "category")]
-        message = "is neither a parameter that varies nor a numeric result" + did_you_mean(name, names)
+        hint = did_you_mean(name, names)
+        message = Sentence("is neither a parameter that varies nor a numeric result{hint}", hint=hint)
         raise refused(parameter, "unknown-name", message, name, allowed=listed(names))
 
 
 def _kind(parameter: str, name: str, known: dict[str, str]) -> None:
     if name and name not in known:
-        raise refused(parameter, "invalid-choice", f"is not {'an' if parameter == 'ending' else 'a'} {parameter}",
-                      name, allowed=listed(known) or "none")  # fmt: skip
+        raise refused(
+            parameter, "invalid-choice", "is not an ending" if parameter == "ending" else "is not a flag", name,
+            allowed=listed(known) if known else "none",
+        )  # fmt: skip
 
 
 def _range(study: Study, infos: Sequence[ResultInfo], text: str) -> Range:
     parts = _FORM.fullmatch(plain_signs(text))
     if parts is None:
-        raise refused("where", "invalid-text", "is not a range", text, allowed=f"NAME >= VALUE, {EXAMPLES}")
+        raise refused(
+            "where", "invalid-text", "is not a range", text, allowed=joined(", ", ("NAME >= VALUE", Sentence(EXAMPLES)))
+        )
     name, sign, value = parts.groups()
     _require(study, infos, "where", name)
     info = result_of(infos, name)

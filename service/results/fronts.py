@@ -11,6 +11,7 @@ import numpy as np
 from sprag.service.answers.goals import Design, DesignGoal, DesignLimit, DesignVariable, FrontReport, Generation
 from sprag.service.faults import Fault, FaultError
 from sprag.service.json_text import numbers
+from sprag.service.languages import N_
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.results import exports
 from sprag.service.results.regimes import kind_columns
@@ -103,7 +104,7 @@ def goal_units(study: Study) -> tuple[str, ...]:
 def goal_of(study: Study) -> GoalPlan:
     """The search of a study; FaultError for a study without a goal."""
     if study.plan is None or study.plan.get("kind") != GOAL:
-        message = "the study has no goal, so that its cases are no designs"
+        message = N_("the study has no goal, so that its cases are no designs")
         raise FaultError(
             "invalid-selection", message, [Fault(None, "conflict", message, allowed="a study whose spec has `goal`")]
         )

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.sentences import Sentence
 from sprag.service.faults import refused
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.phrases import Phrase
 from sprag.service.reading.wording import percent
 from sprag.service.results.curves import Fetch, Map, not_run
 from sprag.service.results.refined import reached, refine_plan
-from sprag.service.results.selection import axis_name, held_texts, listed, locate_axes, numeric_results
+from sprag.service.results.selection import LEFT_OPEN, axis_name, held_texts, listed, locate_axes, numeric_results
 from sprag.worker import models
 from sprag.worker.codes import PENDING
 from sprag.worker.planning.refine import describe_maps
@@ -146,7 +147,7 @@ def _fixed_values(study: Study, plan: RefinePlan, at: Sequence[tuple[str, str]])
     for own in plan.fixed:
         path = own.paths[0]
         if path not in given and len(own.values) > 1:
-            message = f"the axis {path} is left open: give its value as at={path}=VALUE"
+            message = Sentence(LEFT_OPEN, path=path)
             raise refused("at", "not-fixed", message, allowed=listed(own.values), unit=unit_of(study, path))
         axis = study.axis_of(path)
         held[path] = own.values[0] if axis is None or path not in given else study.axes[axis].value(given[path])
@@ -159,10 +160,10 @@ def _sides(plan: RefinePlan, x: str, y: str) -> tuple[int, int]:
     for parameter, path in (("x", x), ("y", y)):
         side = next((place for place, axis in enumerate(plan.adaptive) if path in axis.paths), None)
         if side is None or side in found:
-            message = "a refined map is drawn over its two adaptive axes"
             raise refused(
-                parameter, "not-an-axis", message, path, allowed=listed(axis.paths[0] for axis in plan.adaptive)
-            )
+                parameter, "not-an-axis", "a refined map is drawn over its two adaptive axes", path,
+                allowed=listed(axis.paths[0] for axis in plan.adaptive),
+            )  # fmt: skip
         found.append(side)
     return found[0], found[1]
 

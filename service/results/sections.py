@@ -43,7 +43,7 @@ def phase_of(text: str | None) -> float:
         number, given = split_quantity(text)
         angle = parse_quantity(text, "rad") if given else to_float(number)
     except QuantityError as error:
-        raise parameter_error("phase", error.code, str(error), text, "an angle in rad or deg") from error
+        raise parameter_error("phase", error.code, error.message, text, "an angle in rad or deg") from error
     if not 0.0 <= angle <= 2.0 * math.pi * (1.0 + 1e-12):
         raise parameter_error("phase", "out-of-range", "outside one period", text, "0 .. 360 deg")
     return min(angle / (2.0 * math.pi), 1.0)

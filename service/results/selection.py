@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sprag.sentences import Amount, Sentence, joined
 from sprag.service.faults import Fault, ParameterFault, SelectionError, parameter_error, refused, shown
+from sprag.service.languages import N_
 from sprag.service.reading.catalogue import result_of, unit_of, unknown_result
 from sprag.service.reading.numbers import in_language
-from sprag.service.reading.phrases import Amount, Name, Phrase, term
-from sprag.service.reading.texts import did_you_mean, quantity_text
+from sprag.service.reading.phrases import Name, Phrase, term
+from sprag.service.reading.texts import did_you_mean
 from sprag.service.reading.together import AMBIGUOUS_UNIT, question, with_unit_of_end
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
 Fixed = dict[int, tuple[str, int]]
 
 _LISTED = 24
+#: Of an axis without a value.
+LEFT_OPEN = N_("the axis {path} is left open: give its value as at={path}=VALUE")
 
 
 def numeric_results(infos: Sequence[ResultInfo], parameter: str, names: Sequence[str]) -> tuple[ResultInfo, ...]:
@@ -48,12 +52,13 @@ def numeric_results(infos: Sequence[ResultInfo], parameter: str, names: Sequence
     return tuple(found.values())
 
 
-def listed(values: Iterable[object]) -> str:
+def listed(values: Iterable[object]) -> Sentence:
     """Values for a message; the middle of a long list is left out."""
     texts = [f"{value!r}" if isinstance(value, float) else str(value) for value in values]
-    if len(texts) > _LISTED:
-        texts = [*texts[: _LISTED - 4], f"… {len(texts) - _LISTED} more", *texts[-4:]]
-    return ", ".join(texts)
+    if len(texts) <= _LISTED:
+        return joined(", ", texts)
+    more = Sentence("… {count} more", count=str(len(texts) - _LISTED))
+    return joined(", ", (*texts[: _LISTED - 4], more, *texts[-4:]))
 
 
 def require_axis(study: Study, parameter: str, path: str) -> int:
@@ -61,19 +66,17 @@ def require_axis(study: Study, parameter: str, path: str) -> int:
     position = study.axis_of(path)
     if position is not None:
         return position
+    known: str = listed(study.axis_paths) if study.axis_paths else N_("no axis at all")
     if path in study.derive:
-        message = "not an axis: it is derived from other parameters"
-        raise refused(parameter, "not-an-axis", message, path, allowed=listed(study.axis_paths) or "no axis at all")
+        raise refused(parameter, "not-an-axis", "not an axis: it is derived from other parameters", path, allowed=known)
     if study.spread is not None and path in study.spread.paths:
-        message = "not an axis: it differs from drive to drive"
-        raise refused(parameter, "not-an-axis", message, path, allowed=listed(study.axis_paths))
-    fixed = path in study.base
-    message = (
-        f"not an axis: it is {quantity_text(study.base[path], unit_of(study, path))} in every case"
-        if fixed
-        else "not an axis of this study"
-    ) + did_you_mean(path, study.axis_paths)
-    raise refused(parameter, "not-an-axis", message, path, allowed=listed(study.axis_paths) or "no axis at all")
+        raise refused(parameter, "not-an-axis", "not an axis: it differs from drive to drive", path, allowed=known)
+    hint = did_you_mean(path, study.axis_paths)
+    message = Sentence("not an axis of this study{hint}", hint=hint)
+    if path in study.base:
+        value = Amount(study.base[path], unit_of(study, path), 10)
+        message = Sentence("not an axis: it is {value} in every case{hint}", value=value, hint=hint)
+    raise refused(parameter, "not-an-axis", message, path, allowed=known)
 
 
 def own_paths(study: Study) -> list[str]:
@@ -145,8 +148,9 @@ def locate_axes(study: Study, at: Sequence[tuple[str, str]], parameter: str = "a
         if index is None:
             values = np.unique(study.axes[position].array).tolist()
             known = listed(map(direction, values) if path == SWEEP else values)
-            message = "the axis has no such value"
-            raise refused(parameter, "unknown-value", message, f"{path}={text}", allowed=known, unit=unit)
+            raise refused(
+                parameter, "unknown-value", "the axis has no such value", f"{path}={text}", allowed=known, unit=unit
+            )
         if fixed.setdefault(position, (path, index))[1] != index:
             raise refused(parameter, "repeated", "the axis is given two values", f"{path}={text}")
     return fixed
@@ -198,6 +202,14 @@ def value_of(path: str, text: str, unit: str, parameter: str = "at") -> float:
         return parse_quantity(text, unit) if unit_text else to_float(number)
     except QuantityError as error:
         if path == SWEEP:
-            message, allowed = "is not a direction", ", ".join(DIRECTIONS)
-            raise refused(parameter, "unknown-value", message, f"{path}={text}", allowed=allowed) from error
-        raise refused(parameter, error.code, f"{path} {error}", f"{path}={text}", unit=unit) from error
+            allowed = ", ".join(DIRECTIONS)
+            raise refused(
+                parameter, "unknown-value", "is not a direction", f"{path}={text}", allowed=allowed
+            ) from error
+        message = of_name(path, error.message)
+        raise refused(parameter, error.code, message, f"{path}={text}", unit=unit) from error
+
+
+def of_name(name: str, message: str) -> Sentence:
+    """A message about the value of a name."""
+    return Sentence("{name} {message}", name=name, message=message)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
+from sprag.sentences import Sentence
 from sprag.service.answers import filled
 from sprag.service.answers.results import AxisEffect, PairEffect, ResultSensitivity
 from sprag.service.faults import Fault, SelectionError, refused
@@ -126,7 +127,7 @@ def sensitivity(study: Study, spec: Mapping[str, Any], names: Sequence[str], fet
     if not varying:
         raise refused("y", "nothing-varies", "nothing varies in this study")
     if study.cases > MOST_CASES:
-        allowed = f"<= {MOST_CASES:,} cases"
+        allowed = Sentence("<= {count} cases", count=MOST_CASES)
         raise SelectionError([Fault(None, "too-many", "the study is too large for it", study.cases, allowed)])
     regime = models.regime_info(infos)
     kinds = kind_columns(regime)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sprag.service.faults import parameter_error
+from sprag.service.reading.limits import span
+from sprag.service.results.selection import of_name
 from sprag.worker.models.starts import count_of
 from sprag.worker.models.vibration_drive.start_states import impossible_starts, is_state
 
@@ -30,15 +32,17 @@ def refuse_impossible(
     """
     for corner in corners:
         for path in filter(is_state, corner):
-            message = "is the state of a clutch, whose numbers have nothing in between"
-            raise parameter_error(names[path], "conflict", message, path, "the path of another number")
+            raise parameter_error(
+                names[path], "conflict", "is the state of a clutch, whose numbers have nothing in between", path,
+                "the path of another number",
+            )  # fmt: skip
         for found in impossible_starts({**machine, **corner}):
             name = names.get(found.path, next(iter(names.values())))
-            raise parameter_error(name, found.code, f"{found.path} {found.message}", found.value, found.allowed)
+            raise parameter_error(name, found.code, of_name(found.path, found.message), found.value, found.allowed)
 
 
 def check_start(study: Study, start: int | None) -> None:
     """Refuse a number of a start that the cases of the study do not have."""
     count = count_of(study.run)
     if start is not None and start >= count:
-        raise parameter_error("start", "out-of-range", "there is no such start", start, f"0 to {count - 1}")
+        raise parameter_error("start", "out-of-range", "there is no such start", start, span("0", str(count - 1)))

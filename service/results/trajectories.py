@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
+from sprag.sentences import Part, Sentence, Typed, joined
 from sprag.service.faults import parameter_error
 from sprag.service.json_text import numbers, to_bytes
+from sprag.service.languages import N_
 from sprag.service.reading.quantities import Units
 from sprag.service.reading.units import PERIOD_NAMES, QuantityError, parse_quantity, split_quantity, to_float
 from sprag.service.results.directions import case_values
@@ -37,14 +39,14 @@ def span(study: Study, case: int, start: str | None, end: str | None) -> tuple[f
     # A client that gives the end in periods or degrees cannot know its last digit.
     if math.isclose(last, extent.end, rel_tol=1e-12):
         last = extent.end
-    whole = {"time": "the run", "angle": "the cycle"}[extent.along]
     if not 0.0 <= first < extent.end:
+        parts: dict[str, Part] = {"end": repr(extent.end), "unit": Typed(extent.unit)}
         raise parameter_error(
-            "from", "out-of-range", f"outside {whole}", start, f"0 .. {extent.end!r} {extent.unit}, before `to`"
+            "from", "out-of-range", _OUTSIDE[extent.along], start, Sentence("0 .. {end} {unit}, before `to`", **parts)
         )
     if not first < last <= extent.end:
-        message = f"outside {whole}, or not after `from`"
-        raise parameter_error("to", "out-of-range", message, end, f"{first!r} .. {extent.end!r} {extent.unit}")
+        allowed = joined(" ", (f"{first!r} .. {extent.end!r}", Typed(extent.unit)))
+        raise parameter_error("to", "out-of-range", _NOT_AFTER[extent.along], end, allowed)
     return first, last
 
 
@@ -55,8 +57,15 @@ def _place(name: str, text: str, extent: Extent) -> float:
             return to_float(number) * extent.period
         return parse_quantity(text, extent.unit) if unit else to_float(number)
     except QuantityError as error:
-        kind = {"time": "a time in s or periods", "angle": "an angle in rad, deg or cycles"}[extent.along]
-        raise parameter_error(name, error.code, str(error), text, kind) from error
+        raise parameter_error(name, error.code, error.message, text, _ALLOWED[extent.along]) from error
+
+
+#: What is said about the ends of a part of a run or of a cycle.
+_OUTSIDE: Final = {"time": N_("outside the run"), "angle": N_("outside the cycle")}
+_NOT_AFTER: Final = {
+    "time": N_("outside the run, or not after `from`"), "angle": N_("outside the cycle, or not after `from`"),
+}  # fmt: skip
+_ALLOWED: Final = {"time": N_("a time in s or periods"), "angle": N_("an angle in rad, deg or cycles")}
 
 
 def trajectory_file(

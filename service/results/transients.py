@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
+from sprag.sentences import Amount, Sentence, Typed
 from sprag.service.faults import FaultError, choice_of, parameter_error
 from sprag.service.json_text import to_bytes
+from sprag.service.reading.limits import span
 from sprag.service.reading.numbers import in_language
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.service.results.trajectories import timed_values, trajectory_csv
@@ -62,15 +64,20 @@ def course_of(study: Study, case: int, kind: str, given: Mapping[str, str | None
     motor, end = has_motor(study), models.extent(study, case).end
     found = {name: _value(name, text, end, motor) for name, text in given.items() if text and text.strip()}
     if chosen == "load-step" and "load" not in found:
-        message = "a load step needs the factor on the load after it"
-        raise parameter_error("load", "required", message, None, "0 to 1e+06")
+        allowed = span("0", Amount(1e6, digits=6))
+        raise parameter_error("load", "required", "a load step needs the factor on the load after it", None, allowed)
     torque = found.get("torque")
     if torque is not None and (motor or chosen != "run-up"):
-        why = "the motor gives it" if motor else "only a run-up has one"
-        raise parameter_error("torque", "conflict", f"cannot be given: {why}", given["torque"], "none")
+        raise parameter_error(
+            "torque", "conflict",
+            "cannot be given: the motor gives it" if motor else "cannot be given: only a run-up has one",
+            given["torque"], "none",
+        )  # fmt: skip
     if torque is None and chosen == "run-up" and not motor:
-        message = "the run-up of a machine without a motor needs a constant driving torque"
-        raise parameter_error("torque", "required", message, None, "a torque in N*m above 0")
+        raise parameter_error(
+            "torque", "required", "the run-up of a machine without a motor needs a constant driving torque", None,
+            "a torque in N*m above 0",
+        )  # fmt: skip
     within = found.get("within", _DEVIATION if motor else 0.0)
     return Course(
         chosen, found.get("load", 1.0), found.get("angle", 0.0), torque, within, found.get("revolutions", 1000.0)
@@ -80,17 +87,18 @@ def course_of(study: Study, case: int, kind: str, given: Mapping[str, str | None
 def _value(name: str, text: str | None, end: float, motor: bool) -> float:
     unit, low, high = _RANGES[name]
     high = end if name == "angle" else high
-    shown = "a number" if unit == "1" else f"a value in {unit}"
+    shown = Sentence("a number") if unit == "1" else Sentence("a value in {unit}", unit=Typed(unit))
     try:
         text = in_language(text or "")
         number, own = split_quantity(text)
         value = parse_quantity(text, unit) if own else to_float(number)
     except QuantityError as error:
-        raise parameter_error(name, error.code, str(error), text, shown) from error
+        raise parameter_error(name, error.code, error.message, text, shown) from error
     least = 1e-9 if name == "within" and motor else low
     above = name in _OPEN
     if not (least < value if above else least <= value) or not value <= high:
-        allowed = f"{'above ' if above else ''}{least:g} to {high:g}{'' if unit == '1' else f' {unit}'}"
+        ends = {"low": Amount(least, digits=6), "high": Amount(high, unit, 6)}
+        allowed = Sentence("above {low} to {high}", **ends) if above else Sentence("{low} to {high}", **ends)
         raise parameter_error(name, "out-of-range", "is outside its range", text, allowed)
     return value
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Amount, Sentence, WarningText
+from sprag.sentences import Amount, Sentence, WarningText, plural
 from sprag.service.faults import Code
 from sprag.service.languages import N_
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity
@@ -38,11 +38,12 @@ ALLOWED_OF_RUNS: Final = N_(
 
 
 class FinishError(ValueError):
-    """An invalid deadline; the message is one clause."""
+    """An invalid deadline; ``message`` is one clause, a sentence or a text of the catalogue."""
 
     def __init__(self, code: Code, message: str) -> None:
         super().__init__(message)
         self.code: Code = code
+        self.message = message
 
 
 def finish_at(text: str, now: datetime) -> datetime:
@@ -61,27 +62,25 @@ def finish_at(text: str, now: datetime) -> datetime:
     except OverflowError:
         raise FinishError("out-of-range", "is too far away") from None
     if ahead <= 0.0:
-        raise FinishError(
-            "out-of-range", f"is in the past; it is {now.astimezone(UTC).isoformat(timespec='seconds')} now"
-        )
+        present = now.astimezone(UTC).isoformat(timespec="seconds")
+        raise FinishError("out-of-range", Sentence("is in the past; it is {time} now", time=present))
     _require_near(ahead)
     return moment
 
 
 def duration_seconds(text: str) -> float:
     """Seconds of a duration with its unit, 1 s to `MAX_FINISH_DAYS`; raises FinishError."""
-    seconds = _seconds(text, "is not a duration with a unit")
+    seconds = _seconds(text, N_("is not a duration with a unit"))
     if not _LEAST_SECONDS <= seconds <= _MOST_SECONDS:
-        limit = (
-            f"shorter than {_LEAST_SECONDS:g} s" if seconds < _LEAST_SECONDS else f"longer than {MAX_FINISH_DAYS} days"
-        )
-        raise FinishError("out-of-range", f"is {limit}")
+        short = Sentence("is shorter than {time}", time=Amount(_LEAST_SECONDS, "s"))
+        long = plural("is longer than {count} day", "is longer than {count} days", MAX_FINISH_DAYS)
+        raise FinishError("out-of-range", short if seconds < _LEAST_SECONDS else long)
     return seconds
 
 
 def _seconds_ahead(text: str) -> float:
     """Seconds to a deadline that is given as a duration; raises FinishError."""
-    seconds = _seconds(text, "is neither a time nor a duration with a unit")
+    seconds = _seconds(text, N_("is neither a time nor a duration with a unit"))
     if seconds <= 0.0:
         raise FinishError("out-of-range", "is not in the future")
     _require_near(seconds)

@@ -6,7 +6,9 @@ from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.sentences import Sentence
 from sprag.service.languages import N_
+from sprag.service.reading.limits import characters
 from sprag.service.reading.texts import did_you_mean
 from sprag.service.schedules.deadline import ALLOWED_OF_RUNS, FinishError, check_run_finish, run_finish_at
 from sprag.service.schedules.policies import GRACE_ALLOWED, CatchUp, Overlap, Policies, check_grace
@@ -198,7 +200,10 @@ def _require_open_window(report: Report, fields: ScheduleFields, now: datetime) 
         report.fault(
             "/window",
             "conflict",
-            f"is closed from each due time to its deadline ({finish_by}), so that no case would be run",
+            Sentence(
+                "is closed from each due time to its deadline ({deadline}), so that no case would be run",
+                deadline=finish_by,
+            ),
             [f"{window.begin:%H:%M}", f"{window.end:%H:%M}"],
             allowed=_WINDOW_ALLOWED,
         )
@@ -227,7 +232,7 @@ def _read_name(report: Report, value: object, title: str) -> str:
             "invalid-text",
             "must be a printable text in one line",
             value,
-            allowed=f"1 to {MAX_NAME_LENGTH} characters",
+            allowed=characters(1, MAX_NAME_LENGTH),
         )
         return ""
     return value
@@ -236,10 +241,11 @@ def _read_name(report: Report, value: object, title: str) -> str:
 def _read_zone(report: Report, value: object) -> str:
     if isinstance(value, str) and value in zones():
         return value
-    near = did_you_mean(value, zones()) if isinstance(value, str) else ""
+    hint = did_you_mean(value, zones()) if isinstance(value, str) else Sentence("")
     report.fault(
-        "/zone", "unknown-name", f"is not a time zone{near}", value, allowed='a name such as "Europe/Berlin" or "UTC"'
-    )
+        "/zone", "unknown-name", Sentence("is not a time zone{hint}", hint=hint), value,
+        allowed='a name such as "Europe/Berlin" or "UTC"',
+    )  # fmt: skip
     return "UTC"
 
 
@@ -248,8 +254,10 @@ def _read_timing(
 ) -> Timing | None:
     cron, at = found.get("cron"), found.get("at")
     if (cron is None) == (at is None):
-        message = "is required: the time to run" if cron is None else "is given beside `at`"
-        report.fault("/cron", "exactly-one", message, cron, allowed=_WHEN_ALLOWED)
+        report.fault(
+            "/cron", "exactly-one", "is required: the time to run" if cron is None else "is given beside `at`", cron,
+            allowed=_WHEN_ALLOWED,
+        )  # fmt: skip
         return None
     if cron is not None:
         try:
@@ -257,7 +265,7 @@ def _read_timing(
                 raise TimingError("invalid-time", "is not a cron expression")
             check_cron(cron)
         except TimingError as error:
-            report.fault("/cron", error.code, str(error), cron, allowed=_CRON_ALLOWED)
+            report.fault("/cron", error.code, error.message, cron, allowed=_CRON_ALLOWED)
             return None
         return Timing(" ".join(cron.split()), None, zone)
     try:
@@ -267,7 +275,7 @@ def _read_timing(
         if moment <= now and not (old is not None and old.timing.at == moment):
             raise TimingError("out-of-range", "is in the past")
     except TimingError as error:
-        report.fault("/at", error.code, str(error), at, allowed=_AT_ALLOWED)
+        report.fault("/at", error.code, error.message, at, allowed=_AT_ALLOWED)
         return None
     return Timing(None, moment, zone)
 
@@ -282,7 +290,7 @@ def _read_pause(report: Report, value: object, zone: str, now: datetime, old: Sc
         if moment <= now and not (old is not None and old.policies.paused_until == moment):
             raise TimingError("out-of-range", "is in the past")
     except TimingError as error:
-        report.fault("/paused_until", error.code, str(error), value, allowed=_AT_ALLOWED)
+        report.fault("/paused_until", error.code, error.message, value, allowed=_AT_ALLOWED)
         return None
     return moment
 
@@ -298,7 +306,7 @@ def _read_duration(
             raise FinishError("wrong-type", "must be a text")
         return check(value)
     except FinishError as error:
-        report.fault(f"/{name}", error.code, str(error), value, allowed=allowed)
+        report.fault(f"/{name}", error.code, error.message, value, allowed=allowed)
         return None
 
 
@@ -313,6 +321,6 @@ def _read_window(report: Report, value: object, zone: str) -> Window | None:
         if begin == end:
             raise TimingError("invalid-range", "begins and ends at the same time")
     except TimingError as error:
-        report.fault("/window", error.code, str(error), value, allowed=_WINDOW_ALLOWED)
+        report.fault("/window", error.code, error.message, value, allowed=_WINDOW_ALLOWED)
         return None
     return Window(begin, end, zone)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.sentences import Sentence, plural
 from sprag.service.delivery import is_mail_address, origin_of
 from sprag.service.languages import N_
 from sprag.service.spec.report import Report
@@ -55,7 +56,12 @@ def read_report_to(report: Report, found: Mapping[str, Any], when: str | None) -
         report.fault("/report_email", "wrong-type", "must be a list of addresses", email, allowed=EMAIL_ALLOWED)
         email = []
     elif len(email) > MOST_RECIPIENTS:
-        report.fault("/report_email", "too-many", f"has {len(email)} addresses", allowed=EMAIL_ALLOWED)
+        report.fault(
+            "/report_email",
+            "too-many",
+            plural("has {count} address", "has {count} addresses", len(email)),
+            allowed=EMAIL_ALLOWED,
+        )
         email = []
     for number, address in enumerate(email):
         where = f"/report_email/{number}"
@@ -84,7 +90,7 @@ def require_deliverable(wanted: ReportTo, delivery: Delivery) -> None:
         report.fault("/report_email", "conflict", "no mail is sent here", allowed="[], until SPRAG_SMTP_URL is set")
     for number, address in enumerate(wanted.email):
         if not mail_allowed(address, delivery):
-            allowed = f"addresses of {', '.join(delivery.domains)} (SPRAG_MAIL_DOMAINS)"
+            allowed = Sentence("addresses of {domains} (SPRAG_MAIL_DOMAINS)", domains=", ".join(delivery.domains))
             report.fault(
                 f"/report_email/{number}",
                 "invalid-choice",
@@ -93,13 +99,13 @@ def require_deliverable(wanted: ReportTo, delivery: Delivery) -> None:
                 allowed=allowed,
             )
     if wanted.webhook is not None and origin_of(wanted.webhook) not in delivery.origins:
-        known = ", ".join(delivery.origins) or "none"
+        known = ", ".join(delivery.origins) if delivery.origins else Sentence("none")
         report.fault(
             "/report_webhook",
             "invalid-choice",
             "has an origin to which no webhooks go",
             wanted.webhook,
-            allowed=f"addresses at {known} (SPRAG_WEBHOOK_ORIGINS)",
+            allowed=Sentence("addresses at {origins} (SPRAG_WEBHOOK_ORIGINS)", origins=known),
         )
     report.raise_if_any()
 

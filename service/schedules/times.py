@@ -36,11 +36,12 @@ MOST_COUNTED = 1000
 
 
 class TimingError(ValueError):
-    """A cron expression or a time that is invalid; the message is one clause."""
+    """A cron expression or a time that is invalid; ``message`` is one clause, a sentence or a text of the catalogue."""
 
     def __init__(self, code: Code, message: str) -> None:
         super().__init__(message)
         self.code: Code = code
+        self.message = message
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,8 +94,11 @@ def check_cron(expression: str) -> None:
     if len(expression.split()) != 5:
         raise TimingError(
             "invalid-time",
-            "a cron expression has five fields: minute, hour, day of the month, month, day of the week; or it is one "
-            f"of {', '.join(ALIASES)}",
+            Sentence(
+                "a cron expression has five fields: minute, hour, day of the month, month, day of the week; or it is "
+                "one of {names}",
+                names=", ".join(ALIASES),
+            ),
         )
     try:
         next(CronSim(expression, datetime(2024, 1, 1, tzinfo=UTC)))
@@ -133,7 +137,8 @@ def read_moment(text: str, zone: str) -> datetime:
         local = moment.replace(tzinfo=ZoneInfo(zone))
         found = local.astimezone(UTC)
         if found.astimezone(ZoneInfo(zone)).replace(tzinfo=None) != moment:
-            raise TimingError("invalid-time", f"there is no such time in {zone}: the clocks are put forward then")
+            message = Sentence("there is no such time in {zone}: the clocks are put forward then", zone=zone)
+            raise TimingError("invalid-time", message)
     except OverflowError:
         raise TimingError("out-of-range", "is too far away") from None
     return found

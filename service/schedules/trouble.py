@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from sprag.sentences import Sentence
 from sprag.service.reading.texts import did_you_mean
 from sprag.service.spec.report import Report
 from sprag.worker import models
@@ -32,7 +33,7 @@ def read_trouble_flags(report: Report, found: Mapping[str, Any], model: str | No
     known = () if model is None else tuple(models.flags_of(model))
     names = ", ".join(known)
     if not isinstance(value, list):
-        allowed = f"a list of {names}" if known else "an empty list"
+        allowed = Sentence("a list of {names}", names=names) if known else Sentence("an empty list")
         report.fault(_FIELD, "wrong-type", "must be a list of flags", value, allowed=allowed)
         return None
     seen: set[str] = set()
@@ -41,12 +42,14 @@ def read_trouble_flags(report: Report, found: Mapping[str, Any], model: str | No
         if report.full:
             break
         if not isinstance(flag, str):
-            report.fault(where, "wrong-type", "must be the name of a flag", flag, allowed=names or "no flag")
+            report.fault(where, "wrong-type", "must be the name of a flag", flag, allowed=names if known else "no flag")
         elif flag in seen:
-            report.fault(where, "repeated", "is given twice", flag, allowed=names or "no flag")
+            report.fault(where, "repeated", "is given twice", flag, allowed=names if known else "no flag")
         elif model is not None and flag not in known:
-            message = f"is not a flag of the model {model}{did_you_mean(flag, known)}"
-            message += "" if known else ", which has none"
+            hint = did_you_mean(flag, known)
+            message = Sentence("is not a flag of the model {model}{hint}", model=model, hint=hint)
+            if not known:
+                message = Sentence("is not a flag of the model {model}, which has none", model=model)
             report.fault(where, "unknown-name", message, flag, allowed=names if known else "no flag")
         else:
             seen.add(flag)

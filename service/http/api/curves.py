@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 from fastapi import Query
 from starlette.responses import Response
 
+from sprag.sentences import Sentence
 from sprag.service import formats, languages
 from sprag.service.answers import results as m
 from sprag.service.faults import FaultError, choice_of, parameter_error
@@ -253,7 +254,11 @@ async def get_results(
     """Every finished case with all its results, in order of the cases: as a table, a labelled grid, or JSON."""
     chosen = choose_format(work.request, form, _ROW_FORMATS)
     if units and chosen not in _IN_UNITS:
-        raise parameter_error("units", "not-used", f"{chosen} files are in SI", units, f"in {', '.join(_IN_UNITS)}")
+        message, allowed = (
+            Sentence("{form} files are in SI", form=chosen),
+            Sentence("in {unit}", unit=", ".join(_IN_UNITS)),
+        )
+        raise parameter_error("units", "not-used", message, units, allowed)
     if header and chosen != "csv":
         raise parameter_error("header", "not-used", "only CSV has it", header, "in csv")
     heads: formats.Header = choice_of("header", "names" if header is None else header, formats.HEADERS)

@@ -78,7 +78,7 @@ def _finish(context: Context, text: str | None) -> datetime | None:
     try:
         return finish_at(text, context.store.clock.now())
     except FinishError as error:
-        raise parameter_error("finish_by", error.code, str(error), text, ALLOWED) from None
+        raise parameter_error("finish_by", error.code, error.message, text, ALLOWED) from None
 
 
 @router.post(

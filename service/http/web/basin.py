@@ -21,6 +21,7 @@ from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.jobs.reading import reading_of
+from sprag.service.reading.limits import span
 from sprag.service.results import basins
 from sprag.worker.limits import MAX_BASIN_POINTS
 
@@ -84,7 +85,7 @@ def _parameters(texts: Mapping[str, str]) -> BasinParameters:
     """What the form gives; FaultError about the number of points."""
     points = texts["points"] or str(USUAL_POINTS)
     if not (points.isdecimal() and points.isascii() and 2 <= int(points) <= MAX_BASIN_POINTS):
-        message, allowed = "is not a number of values", f"2 to {MAX_BASIN_POINTS}"
-        raise parameter_error("points", "out-of-range", message, points, allowed)
+        allowed = span(2, MAX_BASIN_POINTS)
+        raise parameter_error("points", "out-of-range", "is not a number of values", points, allowed)
     x_from, x_to, y_from, y_to = (texts[name] or None for name in ("x_from", "x_to", "y_from", "y_to"))
     return BasinParameters(texts["x"] or None, texts["y"] or None, (x_from, x_to), (y_from, y_to), int(points))

@@ -10,6 +10,7 @@ from urllib.parse import urlencode
 from fastapi import Request
 from starlette.responses import Response
 
+from sprag.sentences import Sentence
 from sprag.service.answers.differing import MOST_COMPARED, common_axes, unique_names
 from sprag.service.faults import SelectionError, refused
 from sprag.service.formats import MEDIA_TYPES
@@ -26,6 +27,7 @@ from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended, Work
 from sprag.service.jobs.reading import reading_of
 from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.limits import at_most
 from sprag.service.reading.reader import reading_for
 from sprag.service.results.choice import held
 from sprag.service.results.curve_cases import draw, select
@@ -103,10 +105,12 @@ def chosen_studies(context: Context, given: QueryParams) -> list[StudyRecord]:
     """The studies of a URL; SelectionError where there is none or too many, StudyNotFoundError for unknown ones."""
     ids = list(dict.fromkeys(name for name in given.getlist("study") if name))
     if len(ids) > MOST_COMPARED:
-        allowed = f"at most {MOST_COMPARED}"
+        allowed = at_most(MOST_COMPARED)
         raise refused("study", "too-many", "too many studies are compared at once", len(ids), allowed=allowed)
     if not ids:
-        raise refused("study", "required", "is missing", allowed=f"1 to {MOST_COMPARED} ids of studies")
+        raise refused(
+            "study", "required", "is missing", allowed=Sentence("1 to {high} ids of studies", high=MOST_COMPARED)
+        )
     return [context.store.get_study(study_id) for study_id in ids]
 
 
@@ -117,9 +121,12 @@ def comparison(context: Context, given: QueryParams, records: list[StudyRecord])
     known = [{info.name for info in models.study_results(study)} for study in studies]
     results = [info for info in models.study_results(studies[0]) if all(info.name in names for names in known)]
     if not axes or not results:
-        what = "result" if axes else "varying parameter"
-        message = f"these studies have no {what} in common against which to draw results"
-        raise refused("study", "nothing-in-common", message)
+        raise refused(
+            "study", "nothing-in-common",
+            "these studies have no result in common against which to draw results"
+            if axes
+            else "these studies have no varying parameter in common against which to draw results",
+        )  # fmt: skip
     main = main_query(studies[0], models.study_results(studies[0]))
     x = given.get("x") or (main.x if main and main.x in axes else axes[0])
     names = {info.name for info in results}

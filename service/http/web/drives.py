@@ -9,6 +9,7 @@ from urllib.parse import urlencode
 from fastapi import Request
 from starlette.responses import RedirectResponse, Response
 
+from sprag.sentences import plural
 from sprag.service.faults import SelectionError, refused
 from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
@@ -26,6 +27,7 @@ from sprag.service.http.work import Attended, Work
 from sprag.service.jobs import answers, batch_answers
 from sprag.service.jobs.batch_answers import RibbonQuery, YieldQuery
 from sprag.service.jobs.reading import reading_of
+from sprag.service.reading.limits import at_most
 from sprag.service.results.choice import held
 from sprag.service.results.defaults import drawn_results, main_query
 from sprag.service.results.tolerances.batch import Asked
@@ -148,7 +150,12 @@ def _quantiles(texts: list[str]) -> tuple[float, ...]:
             raise refused("quantile", "out-of-range", "is no probability", part, allowed="such as 5 % or 0.05")
         found.append(value)
     if len(found) > MOST_QUANTILES:
-        raise refused("quantile", "too-many", f"{len(found)} are given", allowed=f"at most {MOST_QUANTILES}")
+        raise refused(
+            "quantile",
+            "too-many",
+            plural("{count} is given", "{count} are given", len(found)),
+            allowed=at_most(MOST_QUANTILES),
+        )
     return tuple(found) or QUANTILES
 
 

@@ -28,6 +28,7 @@ from sprag.service.jobs.answers import FEW
 from sprag.service.jobs.explore import explored, selection_spec
 from sprag.service.jobs.reading import reading_of
 from sprag.service.languages import _
+from sprag.service.reading.limits import span
 from sprag.service.reading.numbers import parse_number
 from sprag.service.reading.phrases import meanings
 from sprag.service.reading.reader import Choice, Reading
@@ -103,7 +104,7 @@ def read_choice(given: QueryParams, study: Study, reading: Reading) -> tuple[Exp
     text = given.get("limit", "").strip() or str(ROWS)
     limit = parse_number(text)
     if limit is None or not 1 <= limit <= _MOST_ON_PAGE or limit != int(limit):
-        allowed = f"1 to {_MOST_ON_PAGE}"
+        allowed = span("1", str(_MOST_ON_PAGE))
         faults.append(ParameterFault("limit", "out-of-range", "is not a number of rows", shown(text), allowed))
         limit = ROWS
     return replace(query, limit=int(limit)), tuple(faults)

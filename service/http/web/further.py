@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from fastapi import Request
 from starlette.responses import RedirectResponse, Response
 
-from sprag.sentences import Place, WarningText
+from sprag.sentences import Place, Sentence, WarningText
 from sprag.service.faults import FaultError, parameter_error
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.routers import page_router
@@ -38,7 +38,7 @@ def change_priority(context: Ctx, study_id: StudyId, values: Form) -> Response:
     text = values.get("priority", "").strip()
     number = parse_number(text)
     if number is None or not abs(number) <= MAX_PRIORITY or number != int(number):
-        allowed = f"a whole number from {-MAX_PRIORITY} to {MAX_PRIORITY}"
+        allowed = Sentence("a whole number from {low} to {high}", low=-MAX_PRIORITY, high=MAX_PRIORITY)
         raise parameter_error("priority", "out-of-range", "is not a priority", text, allowed)
     context.store.prioritize_study(study_id, int(number))
     return RedirectResponse(f"/studies/{study_id}", status_code=303)

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Final
 from fastapi import Request
 from starlette.responses import Response
 
+from sprag.sentences import plural
 from sprag.service.faults import SelectionError, refused
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.limits import at_most, span
 from sprag.service.reading.numbers import parse_number
 from sprag.service.results.directions import case_values
 from sprag.service.results.selection import own_paths
@@ -46,12 +48,13 @@ class Line:
 def read_cases(given: Sequence[str], study: Study) -> list[int]:
     """Numbers of cases in the order of the address; raises SelectionError about ``case``."""
     if len(given) > _MOST:
-        raise refused("case", "too-many", f"{len(given)} cases are given", allowed=f"at most {_MOST}")
+        message = plural("{count} case is given", "{count} cases are given", len(given))
+        raise refused("case", "too-many", message, allowed=at_most(_MOST))
     numbers = []
     for text in given:
         number = parse_number(text)
         if number is None or not 0 <= number < study.cases or number != int(number):
-            raise refused("case", "out-of-range", "is not a case", text, allowed=f"0 to {study.cases - 1:,}")
+            raise refused("case", "out-of-range", "is not a case", text, allowed=span(0, study.cases - 1))
         numbers.append(int(number))
     return list(dict.fromkeys(numbers))
 

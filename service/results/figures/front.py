@@ -48,8 +48,10 @@ def chosen(found: Designs, x: str | None, y: str | None) -> tuple[str, str]:
     first, second = [*goals, NUMBER, names[0]][:2] if len(goals) != 1 else (NUMBER, goals[0])
     for parameter, name in (("x", x), ("y", y)):
         if name is not None and name not in names:
-            message = "is not a goal, a variable or a numeric limit of this study"
-            raise refused(parameter, "unknown-name", message, name, allowed=", ".join(names))
+            raise refused(
+                parameter, "unknown-name", "is not a goal, a variable or a numeric limit of this study", name,
+                allowed=", ".join(names),
+            )  # fmt: skip
     return x or first, y or second
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 
+from sprag.sentences import Sentence
 from sprag.service.faults import refused
 from sprag.service.results.figures.basin import basin_figure
 from sprag.service.results.figures.curves import curves_figure
@@ -180,8 +181,12 @@ def paint_figure(figure: Figure, drawn: Described, title: str) -> None:
 def check_size(what: str, count: int, most: int, parameter: str = "format") -> None:
     """SelectionError when a picture would show more than ``most``."""
     if count > most:
-        message = f"{count} {what} are too many for one picture; choose fewer, or take the numbers"
-        raise refused(parameter, "too-many", message, allowed=f"<= {most} {what}")
+        message = Sentence(
+            "{count} {what} are too many for one picture; choose fewer, or take the numbers",
+            count=str(count), what=Sentence(what),
+        )  # fmt: skip
+        allowed = Sentence("<= {count} {what}", count=str(most), what=Sentence(what))
+        raise refused(parameter, "too-many", message, allowed=allowed)
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.sentences import plural
 from sprag.service.faults import refused
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.results.curve_cases import select
@@ -139,7 +140,7 @@ def _single(study: Study, at: Sequence[tuple[str, str]]) -> Line:
     values = {path: study.axes[axis].value(index) for axis, (path, index) in fixed.items()}
     cases = study.cases_at(values)
     if cases.size != 1:
-        message = f"{cases.size} places have these values"
+        message = plural("{count} place has these values", "{count} places have these values", int(cases.size))
         raise refused("at", "not-fixed" if cases.size else "unknown-value", message, allowed="values of a single place")
     return Line({}, values, (), cases)
 

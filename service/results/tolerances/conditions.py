@@ -9,12 +9,15 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
+from sprag.sentences import Sentence, joined, plural
 from sprag.service.faults import refused
+from sprag.service.languages import N_
 from sprag.service.reading.catalogue import result_of
+from sprag.service.reading.limits import at_most
 from sprag.service.reading.numbers import in_language
 from sprag.service.reading.phrases import Amount, Name, Phrase, term
 from sprag.service.reading.units import QuantityError, parse_quantity, plain_signs, split_quantity, to_float
-from sprag.service.results.selection import listed, numeric_results, refuse_mixed_texts
+from sprag.service.results.selection import listed, numeric_results, of_name, refuse_mixed_texts
 from sprag.worker import models
 from sprag.worker.models.usable import against
 
@@ -27,7 +30,7 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.float64]
 
 #: What a condition may look like.
-EXAMPLES: Final = "for instance shaft.speed.mean >= 7 rad/s, torque.max <= 110 % of nominal or regime = periodic"
+EXAMPLES: Final = N_("for instance shaft.speed.mean >= 7 rad/s, torque.max <= 110 % of nominal or regime = periodic")
 #: Most conditions of a yield.
 MOST: Final = 16
 
@@ -87,7 +90,8 @@ def read_conditions(infos: Sequence[ResultInfo], texts: Sequence[str]) -> tuple[
     if not texts:
         raise refused("condition", "required", "is required", allowed=EXAMPLES)
     if len(texts) > MOST:
-        raise refused("condition", "too-many", f"{len(texts)} conditions are given", allowed=f"at most {MOST}")
+        message = plural("{count} condition is given", "{count} conditions are given", len(texts))
+        raise refused("condition", "too-many", message, allowed=at_most(MOST))
     pairs = [(parts[1], parts[3]) for text in texts if (parts := _FORM.fullmatch(plain_signs(text)))]
     units = {
         info.name: info.unit for info in infos if info.kind == "real" and any(name == info.name for name, _ in pairs)
@@ -99,7 +103,13 @@ def read_conditions(infos: Sequence[ResultInfo], texts: Sequence[str]) -> tuple[
 def _read(infos: Sequence[ResultInfo], text: str) -> Condition:
     parts = _FORM.fullmatch(plain_signs(text))
     if parts is None:
-        raise refused("condition", "invalid-text", "is not a condition", text, allowed=f"RESULT >= VALUE, {EXAMPLES}")
+        raise refused(
+            "condition",
+            "invalid-text",
+            "is not a condition",
+            text,
+            allowed=joined(", ", ("RESULT >= VALUE", Sentence(EXAMPLES))),
+        )
     name, sign, value = parts.groups()
     kind: Kind = _SIGNS[sign]  # type: ignore[assignment]
     info = result_of(infos, name)
@@ -107,7 +117,7 @@ def _read(infos: Sequence[ResultInfo], text: str) -> Condition:
         return _category(info, kind, value, text)
     (info,) = numeric_results(infos, "condition", (name,))
     if kind == "is" and info.kind != "count":
-        message = f"{name} is a real number, which equals no value exactly"
+        message = Sentence("{name} is a real number, which equals no value exactly", name=name)
         raise refused("condition", "invalid-choice", message, text, allowed=">= and <=")
     value = in_language(value)
     given = _PART.fullmatch(value)
@@ -120,7 +130,7 @@ def _read(infos: Sequence[ResultInfo], text: str) -> Condition:
         number, unit = split_quantity(value)
         limit = parse_quantity(value, info.unit) if unit else to_float(number)
     except QuantityError as error:
-        raise refused("condition", error.code, f"{name} {error}", text, unit=info.unit) from error
+        raise refused("condition", error.code, of_name(name, error.message), text, unit=info.unit) from error
     amount = Amount(limit, info.unit, 6)
     shown = Phrase("{name} {sign} {limit}", name=_name(info), sign=_SHOWN[kind], limit=amount)
     return Condition(info, kind, limit, False, shown)
@@ -128,7 +138,7 @@ def _read(infos: Sequence[ResultInfo], text: str) -> Condition:
 
 def _category(info: ResultInfo, kind: Kind, value: str, text: str) -> Condition:
     if kind != "is" or value not in info.categories:
-        allowed = f"{info.name} = one of {listed(info.categories)}"
+        allowed = Sentence("{name} = one of {names}", name=info.name, names=listed(info.categories))
         raise refused("condition", "invalid-choice", "is not a category of this result", text, allowed=allowed)
     shown = Phrase("{name} = {value}", name=_name(info), value=term(value))
     return Condition(info, kind, float(info.categories.index(value)), False, shown)

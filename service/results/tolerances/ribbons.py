@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.sentences import Sentence
 from sprag.service.faults import refused
+from sprag.service.results.curve_cases import most_numbers
 from sprag.service.results.curves import Fetch, Line
 from sprag.service.results.selection import numeric_results
 from sprag.service.results.tolerances.batch import Asked, Places, Rows, places_of, read
@@ -103,8 +105,8 @@ def ribbon(
     places = places_of(study, infos, asked)
     numbers = sum(line.cases.size for line in places.lines) * len(results) * (3 * len(wanted) + 1)
     if numbers > MAX_CURVE_VALUES:
-        message = f"{numbers} numbers are requested; select fewer places with at="
-        raise refused("at", "too-many", message, allowed=f"<= {MAX_CURVE_VALUES} numbers")
+        message = Sentence("{count} numbers are requested; select fewer places with at=", count=str(numbers))
+        raise refused("at", "too-many", message, allowed=most_numbers())
     lines = tuple(_line(places, line, results, wanted, fetch) for line in places.lines)
     return Ribbon(places, results, wanted, lines)
 

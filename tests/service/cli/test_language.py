@@ -334,7 +334,7 @@ def test_a_fault_without_a_translation_is_told_by_its_code() -> None:
     with languages.language("uk"):
         meaning = languages.gettext(MEANINGS["out-of-range"]).removesuffix(".")
         assert list(failure.lines())[1:] == [
-            f"  /base/shaft/load: {meaning} (задано -1.5; дозволено: від 0 до 1e9; одиниця N*m)",
+            f"  /base/shaft/load: {meaning} (задано -1.5; дозволено: від 0 до 1e9; одиниця Н·м)",
             "    must not be so small",
         ]
         own = WrongInputError("invalid-parameter", "x", [Fault("--case", "unknown-name", "there is no such case", 7)])

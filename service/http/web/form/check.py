@@ -102,7 +102,7 @@ def look_over(
     try:
         finish = finish_at(text, now) if text else None
     except FinishError as error:
-        fault = message(Fault("/finish_by", error.code, str(error), allowed=ALLOWED))
+        fault = message(Fault("/finish_by", error.code, error.message, allowed=ALLOWED))
     left = None if finish is None else (finish - now).total_seconds()
     if "/text" in values:
         checked = check_text(values["/text"], values.get("format", "json"), chunking, known, left)

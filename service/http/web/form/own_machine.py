@@ -13,6 +13,7 @@ from sprag.service.faults import Fault
 from sprag.service.http.problems import ApiError
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form.check import message
+from sprag.service.languages import N_
 from sprag.service.spec.derive import with_values
 from sprag.service.spec.design import design_spec
 from sprag.service.spec.document import parse_spec
@@ -94,8 +95,8 @@ def laboratory_address(spec: Mapping[str, Any], **further: str) -> str:
     given = {"machine": OWN, **{name: text for name, text in texts.items() if text}, **further}
     address = f"{_PAGES[made['model']]}?{urlencode(given)}"
     if not fits(address):
-        message = "is too long for the address of the laboratory: give its tables fewer rows"
-        allowed = f"an address of at most {MAX_ADDRESS_BYTES:,} characters"
+        message = N_("is too long for the address of the laboratory: give its tables fewer rows")
+        allowed = Sentence("an address of at most {count} characters", count=MAX_ADDRESS_BYTES)
         raise SpecError([Fault("/base", "out-of-range", message, f"{len(address):,} characters", allowed)])
     return address
 

@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import parse_qsl, urlencode
 
+from sprag.sentences import Amount
 from sprag.service.faults import Fault, shown
 from sprag.service.http.problems import ApiError
 from sprag.service.http.views import preset_of
@@ -18,6 +19,7 @@ from sprag.service.http.web.form.own_machine import case_page, machine_of, read_
 from sprag.service.http.web.form.shaft import group_of
 from sprag.service.http.web.laboratory.sliders import Slider, faults_by_field, in_order, is_own, slider_of
 from sprag.service.presets import preset_names
+from sprag.service.reading.limits import span
 from sprag.service.reading.quantities import TYPED
 from sprag.service.reading.reader import Choice, reading_for
 from sprag.service.reading.units import QuantityError, parse_quantity
@@ -149,11 +151,11 @@ def _angle(text: str, faults: dict[str, list[str]]) -> float:
         found = float(value) if isinstance(value, int | float) else math.degrees(parse_quantity(value, "rad"))
     except QuantityError as error:
         faults["angle"] = [
-            message(Fault("/angle", error.code, str(error), shown(value), allowed="an angle in degrees"))
+            message(Fault("/angle", error.code, error.message, shown(value), allowed="an angle in degrees"))
         ]
         return 0.0
     if abs(found) > 1e6:
-        allowed = "-1000000 to 1000000 deg"
+        allowed = span("-1000000", Amount(1000000, "deg", form="d"))
         faults["angle"] = [message(Fault("/angle", "out-of-range", "out of range", f"{found:g}", allowed=allowed))]
         return 0.0
     return found
