@@ -165,7 +165,7 @@ class ProcessComputer:
         """The pieces that the function yields. It waits while they are not taken, and ends with this generator."""
         wall = WALL_TIMES * self._limits.seconds
         pieces = _Pieces(asyncio.get_running_loop())
-        with self._turn(wall):
+        with self._turn(wall, again=False):
             with self._lock:
                 job = self._started().stream(
                     wall, pieces.receive, within_processor_time, self._limits.seconds, _send_all, function, args
@@ -220,8 +220,8 @@ class ProcessComputer:
         await asyncio.shield(future)
 
     @contextmanager
-    def _turn(self, timeout: float) -> Iterator[None]:
-        """Admit one waiting computation; convert its failures to ApiErrors."""
+    def _turn(self, timeout: float, *, again: bool = True) -> Iterator[None]:
+        """Admit one waiting computation, run twice where its process dies (``again``); failures become ApiErrors."""
         if self._waiting >= self._limits.waiting:
             raise ApiError("unavailable", Sentence("Too many computations are waiting already."), headers=_LATER)
         self._waiting += 1
@@ -240,12 +240,9 @@ class ProcessComputer:
                 raise ApiError(self._limits.problem, self._over_time()) from error
             killed = error.exitcode in (-signal.SIGKILL, -signal.SIGTERM)
             kind: Kind = "unavailable" if killed else self._limits.died
-            detail = (
-                Sentence("The process that ran the computation was killed, and when it was run once more, too.")
-                if killed
-                else Sentence("The process that ran the computation died, and when it was run once more, too.")
-            )
-            raise ApiError(kind, detail, headers=_LATER if kind == "unavailable" else None) from error
+            raise ApiError(
+                kind, _of_death(killed=killed, again=again), headers=_LATER if kind == "unavailable" else None
+            ) from error
         except ProcessStartError as error:
             raise ApiError(
                 "unavailable", Sentence("The process for computations cannot be started."), headers=_LATER
@@ -286,6 +283,20 @@ class ProcessComputer:
             pool, self._pool, self._closed = self._pool, None, True
         if pool is not None:
             pool.close()
+
+
+def _of_death(*, killed: bool, again: bool) -> Sentence:
+    if again:
+        return (
+            Sentence("The process that ran the computation was killed, and when it was run once more, too.")
+            if killed
+            else Sentence("The process that ran the computation died, and when it was run once more, too.")
+        )
+    return (
+        Sentence("The process that ran the computation was killed.")
+        if killed
+        else Sentence("The process that ran the computation died.")
+    )
 
 
 def _too_long(error: ProcessDiedError) -> bool:

@@ -229,6 +229,27 @@ def test_who_leaves_ends_the_pieces_and_frees_the_process(portal: BlockingPortal
         made.close()
 
 
+def test_a_killed_process_of_pieces_is_told_to_have_run_once(portal: BlockingPortal) -> None:
+    made = ProcessComputer(Limits(600.0, 2**30), prepare=fakes.prepare_nothing)
+
+    async def kill() -> None:
+        process = await made.run(os.getpid)
+        pieces = made.stream(fakes.numbered, 0, 2**17)
+        assert await anext(pieces)
+        os.kill(process, signal.SIGKILL)
+        with pytest.raises(ApiError) as killed:
+            await taken(pieces, [])
+        assert (killed.value.code, str(killed.value.detail)) == (
+            "unavailable",
+            "The process that ran the computation was killed.",
+        )
+
+    try:
+        portal.call(kill)
+    finally:
+        made.close()
+
+
 def test_pieces_end_with_the_service(portal: BlockingPortal) -> None:
     made = ProcessComputer(Limits(600.0, 2**30), prepare=fakes.prepare_nothing)
 
