@@ -101,6 +101,7 @@ KIND_MEANINGS: Final[dict[Kind, str]] = {
 #: Of warnings.
 WARNING_MEANINGS: Final[dict[WarningCode, str]] = {
     "ambiguous-point": "Points are read as decimal points, though each of them could separate thousands.",
+    "angular-frequency": "A formula gives a frequency by a root without a factor pi, which is an angular frequency.",
     "assumed-units": "The file of measured data does not name every unit.",
     "exceeds-chunk-timeout": "One case takes longer than `SPRAG_CHUNK_TIMEOUT` allows.",
     "falls-over": "The spring does not hold the pendulum up against gravity.",

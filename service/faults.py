@@ -74,6 +74,7 @@ Code = Literal[
 #: Codes of warnings: what is allowed but probably unintended.
 WarningCode = Literal[
     "ambiguous-point",
+    "angular-frequency",
     "assumed-units",
     "exceeds-chunk-timeout",
     "falls-over",

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.sentences import Amount, Part, Sentence, joined
+from sprag.sentences import Amount, Part, Place, Sentence, joined
 from sprag.service.reading.catalogue import range_sentence
 from sprag.service.reading.texts import did_you_mean, quantity_text
 from sprag.service.spec.draws.unit import unit_sample
@@ -246,6 +246,12 @@ def _read_formulas(report: Report, machine: Machine, given: Mapping[str, tuple[s
             entry = machine.parameters[path]
             report.fault(pointer, error.code, error.message, text, allowed=range_sentence(entry), unit=entry.unit)
             continue
+        if formula.angular:
+            sentence = Sentence(
+                "a root of this kind is an angular frequency in rad/s, and is taken as Hz: divide it by 2*pi, or "
+                "multiply it by 1 Hz*s if that is meant"
+            )
+            report.warn("angular-frequency", Place("/derive", path), sentence)
         for name in sorted(formula.uses - machine.values.keys() - given.keys()):
             if not report.found:
                 report.fault(

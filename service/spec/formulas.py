@@ -86,10 +86,14 @@ class Formula:
         The formula in SI numbers.
     uses : frozenset of str
         The parameters in it.
+    angular : bool
+        Whether it gives a frequency by the root of something like a stiffness over a mass, and no factor pi: that is an
+        angular frequency.
     """
 
     text: str
     uses: frozenset[str]
+    angular: bool = False
 
 
 def read_formula(text: str, units: dict[str, str], unit: str) -> Formula:
@@ -116,12 +120,14 @@ def read_formula(text: str, units: dict[str, str], unit: str) -> Formula:
         expression = Expression(scan.converted, units)
     except ExpressionError as error:
         raise FormulaError("invalid-formula", scan.located(error)) from None
-    found = _Dimensions(scan, units).of(expression.root)
+    dimensions = _Dimensions(scan, units)
+    found = dimensions.of(expression.root)
     wanted = _powers(unit)
     if not _alike(found, wanted):
         parts: dict[str, Part] = {"unit": _text(found), "expected": Typed(unit), "hint": _hint(found, wanted)}
         raise FormulaError("wrong-unit", Sentence("gives {unit}, expected {expected}{hint}", **parts))
-    return Formula(scan.converted, expression.used)
+    unmarked = found is not None and not any(found.get(name) for name in _BESIDE)
+    return Formula(scan.converted, expression.used, dimensions.rooted and unmarked and _cycles(wanted) == 1)
 
 
 class _Scan:
@@ -205,6 +211,8 @@ class _Dimensions:
 
     def __init__(self, scan: _Scan, units: dict[str, str]) -> None:
         self._quantities, self._unit_of = scan.quantities, units
+        #: Whether a root is a time, or one over it.
+        self.rooted = False
 
     def of(self, node: Node) -> Powers:
         """The unit of the value of a node; FormulaError where units do not go together."""
@@ -214,7 +222,7 @@ class _Dimensions:
         if kind.startswith("name "):
             return _powers(self._unit_of[kind[5:]])
         if kind == "^":
-            return self._power(node)
+            return self._rooted(self._power(node), _constant(node.parts[1]))
         parts = [self.of(part) for part in node.parts]
         if kind in {"*", "/"}:
             sign = 1 if kind == "*" else -1
@@ -227,7 +235,8 @@ class _Dimensions:
         if kind in {"sign", "step"}:
             return _PLAIN
         if kind == "sqrt":
-            return None if parts[0] is None else {name: power / 2 for name, power in parts[0].items()}
+            unit = None if parts[0] is None else {name: power / 2 for name, power in parts[0].items()}
+            return self._rooted(unit, Fraction(1, 2))
         if kind in _TO_PLAIN | _TO_ANGLE:
             self._require_plain(kind, parts[0])
             return _ANGLE if kind in _TO_ANGLE else _PLAIN
@@ -235,6 +244,12 @@ class _Dimensions:
             return self._same(kind, parts[1:])
         unit = self._same(kind, parts)
         return _PLAIN if kind in _COMPARISONS else _ANGLE if kind == "atan2" else unit
+
+    def _rooted(self, unit: Powers, exponent: Fraction | None) -> Powers:
+        """Note a root that is a time, or one over it."""
+        if unit is not None and exponent is not None and exponent.denominator > 1:
+            self.rooted |= _without_angle(unit).keys() == {"second"}
+        return unit
 
     def _power(self, node: Node) -> Powers:
         base, exponent = node.parts

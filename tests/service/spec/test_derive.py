@@ -258,6 +258,26 @@ def test_warnings_see_the_values_of_the_cases() -> None:
     assert not any("J < M l^2" in warning for warning in parsed({**spec, "/derive": {INERTIA: FORMULA}}).warnings)
 
 
+@pytest.mark.parametrize(
+    ("formula", "angular"),
+    [
+        ("sqrt(pendulums.0.spring_rate / pendulums.0.mass)", True),
+        ("1 / (pendulums.0.mass / pendulums.0.spring_rate)^0.5", True),
+        ("sqrt(9.81 m/s^2 / (1 m))", True),
+        ("sqrt(pendulums.0.spring_rate / pendulums.0.mass) / (2*pi)", False),
+        ("sqrt(pendulums.0.spring_rate / pendulums.0.mass) * 1 Hz*s", False),
+        ("25 Hz * sqrt(4)", False),
+        ("1 / (40 ms)", False),
+    ],
+)
+def test_a_natural_frequency_without_pi_is_asked_about(formula: str, angular: bool) -> None:
+    """The root of a stiffness over a mass is in rad/s: 30 N/m and 0.5 kg are 1.23 Hz, not 7.75."""
+    made = parsed({"/base/excitation/frequency": ..., "/axes": [], "/derive": {"excitation.frequency": formula}})
+    told = [str(warning) for warning in made.warnings if warning.code == "angular-frequency"]
+    assert len(told) == angular
+    assert all(text.startswith("/derive (excitation.frequency): a root of this kind") for text in told)
+
+
 def test_studies_without_formulas_stay_as_they_are() -> None:
     plain, empty = parsed({}).study, parsed({"/derive": {}}).study
     assert plain == empty

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 #: A sentence of each code, as earlier versions stored it, about places of every part of a spec.
 DRIVE: dict[WarningCode, str] = {
     "ambiguous-point": "/points: line 3: `20.000` is taken as 20, with a decimal point",
+    "angular-frequency": "/derive (excitation.frequency): a root of this kind is an angular frequency in rad/s",
     "assumed-units": "/base/clutch/data: the file does not name every unit: angles are taken in rad",
     "exceeds-chunk-timeout": "One case takes about 70 s, and 60 s are allowed (SPRAG_CHUNK_TIMEOUT)",
     "falls-over": "/base/pendulums/0: c a^2 < M g l: the spring's 0.5 N*m/rad do not hold the pendulum up against "
