@@ -42,8 +42,10 @@ def of_drives() -> Iterator[str]:
     weak = [{"path": "pendulums.0.spring_rate", "values": [40, 60]}, {"path": "gravity", "values": [0, 5, 9.81]}]
     many = [{"path": f"pendulums.0.{name}", "linspace": [0.01, 1, 700]} for name in ("spring_rate", "spring_arm")]
     derived = {"pendulums.0.inertia": "1e-4 kg*m^2/rad * (pendulums.0.backlash - 0.003 rad) * 1000"}
+    natural = {"excitation.frequency": "sqrt(pendulums.0.spring_rate / pendulums.0.mass)"}
     for changes in (
         {"/axes": [load]},
+        {"/axes": [], "/base/excitation/frequency": ..., "/derive": natural},
         {"/axes": [], "/base/clutch": {"data": [["1.000 deg", 2.0], ["2.000 deg", 5.0]], "accuracy": 0.1}},
         {"/axes": weak},
         {"/axes": many},
