@@ -15,12 +15,13 @@ from cachetools import LRUCache
 from sprag.sentences import Sentence, WarningText
 from sprag.service.storage.case_keys import KEYED, any_below, newest_with
 from sprag.service.storage.cases import conditions
+from sprag.service.storage.damage import undecodable
 from sprag.service.storage.digests import Digests
 from sprag.service.storage.errors import DatabaseError, StudyNotFoundError
 from sprag.service.storage.origins import HOSTS_BETWEEN
-from sprag.service.storage.round_table import latest_round
+from sprag.service.storage.round_table import latest_place
 from sprag.service.storage.stored_sentences import read_warnings, write_warnings
-from sprag.service.storage.study_digests import WITH_DIGEST, is_sound, undecodable
+from sprag.service.storage.study_digests import WITH_DIGEST, is_sound
 from sprag.service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, further_table, results_table
 from sprag.worker import fingerprint, models
 from sprag.worker.case_keys import case_keys
@@ -146,7 +147,7 @@ class Reuse(Digests):
                     sa.select(STUDIES.c.kin_hash, STUDIES.c.fresh).where(STUDIES.c.number == number)
                 ).one()
                 # The rows of earlier rounds are there already.
-                first = 0 if fresh or study.plan is None else latest_round(connection, number).cases.start
+                first = 0 if fresh or study.plan is None else latest_place(connection, number)[1]
                 asked = taken(study, np.arange(first, study.cases)) if first else study
                 found = None if fresh else _find(connection, self._spans, asked, kin, number)
             self._found[number] = found and _Found(found.cases + first, found.studies, found.there)

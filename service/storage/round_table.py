@@ -1,18 +1,29 @@
-"""The rows of the table of rounds."""
+"""The rows of the table of rounds.
+
+A summary has a digest of its round beside it, in the same text, which is taken out when it is read: a flipped bit would
+be told as an error of a curve or as the best design. Those from before have none and count as sound.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
+from sprag.service.storage.damage import changed, readable
+from sprag.service.storage.errors import DatabaseError
 from sprag.service.storage.part import moment
 from sprag.service.storage.records import RoundRecord
-from sprag.service.storage.tables import ROUNDS
+from sprag.service.storage.tables import ROUNDS, STUDIES
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
+
+_PLACE: Final = (ROUNDS.c.round, ROUNDS.c.first, ROUNDS.c["count"], ROUNDS.c.planned_at)
+#: Name of the digest among those of a summary.
+_DIGEST: Final = "digest"
 
 
 def add_round(
@@ -28,20 +39,34 @@ def add_round(
             round=rounds,
             first=first,
             count=count,
-            summary=json.dumps(summary, allow_nan=False),
+            summary=json.dumps({**summary, _DIGEST: _digest(rounds, first, count, summary)}, allow_nan=False),
             planned_at=now,
         )
     )
 
 
 def rounds_of(connection: sa.Connection, number: int) -> list[RoundRecord]:
-    """Every round of a study, in order."""
-    return [_record(row) for row in connection.execute(_query(number).order_by(ROUNDS.c.round))]
+    """Every round of a study, in order; DatabaseError where one is not as it was stored."""
+    return list(_records(connection, number, _query(number).order_by(ROUNDS.c.round)))
 
 
 def latest_round(connection: sa.Connection, number: int) -> RoundRecord:
-    """The latest round of a study that has rounds."""
-    return _record(connection.execute(_query(number).order_by(ROUNDS.c.round.desc()).limit(1)).one())
+    """The latest round of a study that has rounds; without its summary where that is not as it was stored."""
+    query = _query(number).order_by(ROUNDS.c.round.desc()).limit(1)
+    try:
+        (latest,) = _records(connection, number, query)
+    except DatabaseError:
+        round_, first, cases, at = connection.execute(query.with_only_columns(*_PLACE)).one()
+        return RoundRecord(round_, range(first, first + cases), {}, moment(at))
+    return latest
+
+
+def latest_place(connection: sa.Connection, number: int) -> tuple[int, int]:
+    """Number and first case of the latest round of a study that has rounds, whatever its summary is."""
+    c = ROUNDS.c
+    query = sa.select(c.round, c.first).where(c.study == number).order_by(c.round.desc()).limit(1)
+    latest = connection.execute(query).one()
+    return latest.round, latest.first
 
 
 def _query(number: int) -> sa.Select[Any]:
@@ -50,6 +75,21 @@ def _query(number: int) -> sa.Select[Any]:
     return sa.select(*columns).where(c.study == number)
 
 
-def _record(row: sa.Row[Any]) -> RoundRecord:
-    cases = range(row.first, row.first + row.cases)
-    return RoundRecord(row.round, cases, json.loads(row.summary), moment(row.planned_at))
+def _records(connection: sa.Connection, number: int, query: sa.Select[Any]) -> Iterable[RoundRecord]:
+    study_id = connection.execute(sa.select(STUDIES.c.id).where(STUDIES.c.number == number)).scalar_one()
+    with readable(study_id):
+        rows = connection.execute(query).all()
+    for row in rows:
+        try:
+            summary: dict[str, Any] = json.loads(row.summary)
+            known = summary.pop(_DIGEST, None)
+        except (ValueError, AttributeError):
+            raise DatabaseError(changed(study_id, "rounds"), "database-damaged") from None
+        if known not in {None, _digest(row.round, row.first, row.cases, summary)}:
+            raise DatabaseError(changed(study_id, "rounds"), "database-damaged")
+        yield RoundRecord(row.round, range(row.first, row.first + row.cases), summary, moment(row.planned_at))
+
+
+def _digest(number: int, first: int, count: int, summary: Mapping[str, Any]) -> str:
+    text = json.dumps([number, first, count, summary], allow_nan=False)
+    return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()

@@ -7,13 +7,14 @@ from the rows, and are counted again.
 from __future__ import annotations
 
 import hashlib
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
+from sprag.service.storage.damage import changed, readable
 from sprag.service.storage.errors import DatabaseError
 from sprag.service.storage.order import Orders
+from sprag.service.storage.round_table import rounds_of
 from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES, results_table
 from sprag.worker import models
 from sprag.worker.states import ChunkState, StudyState
@@ -48,30 +49,6 @@ def require_as_stored(row: Any) -> None:
     """Raise DatabaseError where a study is not as it was stored; of its row `WITH_DIGEST`."""
     if not is_sound(row):
         raise DatabaseError(changed(row.id, "inputs"), "database-damaged")
-
-
-def undecodable(error: sa.exc.DBAPIError) -> bool:
-    """Whether a text that was read is none: a bit of it was flipped."""
-    return "Could not decode" in str(error.orig)
-
-
-@contextmanager
-def readable(study_id: str) -> Iterator[None]:
-    """Raise DatabaseError for a text of a study that is none."""
-    try:
-        yield
-    except sa.exc.DBAPIError as error:
-        if not undecodable(error):
-            raise
-        raise DatabaseError(changed(study_id, "inputs"), "database-damaged") from error
-
-
-def changed(study_id: str, what: str) -> str:
-    """A sentence on that part of a study."""
-    return (
-        f"the {what} of the study {study_id} changed on the disk: put a backup in place, or delete the study and "
-        "submit it again"
-    )
 
 
 def grown_digest(connection: sa.Connection, number: int, **values: object) -> int | None:
@@ -125,6 +102,7 @@ class StudyDigests(Orders):
             try:
                 with self.session.read() as connection:
                     self.require_whole(connection, study_id)
+                    rounds_of(connection, self._row(connection, study_id, _C.number).number)
                     differ = self.counts_differ(connection, study_id)
             except DatabaseError as error:
                 yield str(error)

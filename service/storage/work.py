@@ -9,13 +9,14 @@ import sqlalchemy as sa
 
 from sprag.sentences import Sentence
 from sprag.service.languages import grouped, recorded
+from sprag.service.storage.damage import readable
 from sprag.service.storage.dispatchers import WAITING, return_claims
 from sprag.service.storage.errors import DatabaseError
 from sprag.service.storage.part import add_chunks, moment, optional_moment
 from sprag.service.storage.reserve import makes_room
-from sprag.service.storage.round_table import add_round, latest_round
+from sprag.service.storage.round_table import add_round, latest_place
 from sprag.service.storage.storing import Storing, is_chunk
-from sprag.service.storage.study_digests import WITH_DIGEST, readable
+from sprag.service.storage.study_digests import WITH_DIGEST
 from sprag.service.storage.tables import (
     CHUNKS,
     ENDINGS,
@@ -175,7 +176,7 @@ class Work(Storing):
                 covered = self._coverage(connection, number, cases)
                 part = covered.sentence if covered else None
                 if most_rounds is not None:
-                    rounds = latest_round(connection, number).round + (done == cases)
+                    rounds = latest_place(connection, number)[0] + (done == cases)
                     done_rounds = Sentence(recorded.ROUNDS_DONE, round=rounds, most=most_rounds)
                     part = done_rounds if rounds else Sentence(recorded.NO_ROUND)
                 numbers = {"done": grouped(done), "cases": grouped(cases)}

@@ -12,7 +12,7 @@ import pytest
 import sqlalchemy as sa
 from numpy.typing import NDArray
 
-from sprag.service.storage.errors import StudyNotFoundError
+from sprag.service.storage.errors import DatabaseError, StudyNotFoundError
 from sprag.service.storage.part import SystemClock
 from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.store import Store
@@ -26,6 +26,7 @@ from sprag.worker.rounds import PlanError, Rounds
 from sprag.worker.states import StudyState
 from sprag.worker.study import Study
 from tests.contract.filling import SPEC
+from tests.faults import refused
 from tests.worker import fakes
 from tests.worker.planning import toy
 
@@ -360,3 +361,52 @@ def test_no_round_is_chosen_from_rows_that_changed_on_the_disk(store: Store) -> 
     assert store.get_study(record.id).done < store.get_study(record.id).cases
     finish(store, record)
     assert whole(store, record) == whole(store, whole_one)
+
+
+def chosen(store: Store) -> StudyRecord:
+    """A study that chose its cases, round by round, and has ended."""
+    record = create(store)
+    finish(store, record)
+    return record
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [("summary", '{"told": 3, "digest": "00"}'), ("count", 24), ("first", 49), ("summary", '{"told": 2')],
+)
+def test_a_round_that_changed_is_named_and_its_summary_not_told(store: Store, column: str, value: object) -> None:
+    """A summary has the error of a curve, and the best design, as numbers."""
+    record = chosen(store)
+    assert not [problem for problem in store.check().problems if record.id in problem]
+    assert [found.summary.get("told") for found in store.rounds(record.id)] == [None, 1, 2, 3, 4]
+    with store.session.write() as connection:
+        this = (ROUNDS.c.study == record.number) & (ROUNDS.c.round == 2)
+        connection.execute(sa.update(ROUNDS).where(this).values({column: value}))
+    named = f"the rounds of the study {record.id} changed on the disk"
+    assert any(problem.startswith(named) for problem in store.check().problems)
+    with refused(DatabaseError, "database-damaged"):
+        store.rounds(record.id)
+    assert store.look(record.id)[0].done == 100
+
+
+def test_progress_has_no_numbers_of_a_summary_that_changed(store: Store) -> None:
+    record = chosen(store)
+    progress = store.look(record.id)[1].rounds
+    assert progress is not None
+    assert progress.latest.summary["told"] == 4
+    with store.session.write() as connection:
+        this = (ROUNDS.c.study == record.number) & (ROUNDS.c.round == 4)
+        text = connection.execute(sa.select(ROUNDS.c.summary).where(this)).scalar_one()
+        connection.execute(sa.update(ROUNDS).where(this).values(summary=text.replace('"told": 4', '"told": 5')))
+    progress = store.look(record.id)[1].rounds
+    assert progress is not None
+    assert (progress.latest.summary, progress.latest.cases) == ({}, range(100, 100))
+
+
+def test_summaries_from_before_have_no_digest(store: Store) -> None:
+    record = chosen(store)
+    with store.session.write() as connection:
+        connection.execute(
+            sa.update(ROUNDS).where(ROUNDS.c.study == record.number, ROUNDS.c.round == 3).values(summary='{"told": 30}')
+        )
+    assert [found.summary.get("told") for found in store.rounds(record.id)] == [None, 1, 2, 30, 4]
