@@ -75,15 +75,16 @@ def test_what_only_scripts_can_do_is_told_where_scripts_run(service: Service) ->
     assert all("script" in classes.split() for classes in told)
 
 
-def test_a_fault_of_a_page_is_the_meaning_of_its_code(service: Service) -> None:
+def test_a_fault_of_a_page_is_a_whole_sentence(service: Service) -> None:
     study_id = service.submit()
     answer = service.http.get(f"/studies/{study_id}/curves?x=nope", headers=UKRAINIAN)
     assert answer.status_code == 422
     alert = answer.text.partition('role="alert"')[2].partition("</div>")[0]
-    assert "Шлях не є віссю дослідження" in alert
+    assert "не є віссю цього дослідження" in alert
     assert "nope" in alert
+    assert "допустимо: excitation.frequency, shaft.load" in alert
     english = service.http.get(f"/studies/{study_id}/curves?x=nope", headers={"Accept": "text/html"}).text
-    assert "Шлях" not in english
+    assert "віссю" not in english
 
 
 def test_the_working_point_and_the_date_of_the_report_are_as_written(service: Service) -> None:
