@@ -82,6 +82,7 @@ _WORDS: Final = (
 )
 _WITH_PLURAL: Final = ("lb", "lbf", "oz", "ozf", "hr", "sec", "min", "deg", "rad", "rev", "bar", "kg")
 _WORD_LENGTH: Final = 4
+_IRREGULAR_PLURALS: Final = {"inches": "inch", "feet": "foot"}
 _QUESTIONS: Final = {
     **dict.fromkeys(("grad", "Grad", "GRAD"), N_("has the unit '{unit}', which could be degrees or gons: deg or gon?")),
     "кгсм": N_("has the unit '{unit}', which could be kg*cm or kgf*m: кг*см or кгс*м?"),
@@ -107,6 +108,7 @@ def resolved(name: str) -> tuple[Fraction, str] | None:
     The case of letters counts.
     """
     names, prefixes = _defined()
+    name = _IRREGULAR_PLURALS.get(name, name)
     if name in names:
         return Fraction(1), name
     unit = name[1:]

@@ -156,6 +156,8 @@ _LB: Final = 4.4482216152605
         ),
         *(("3 " + text, "N*m", 3.0 * 0.0254 * _LB / 16.0) for text in ("oz-in", "ozf-in", "in-oz", "in-ozf")),
         *(("3 " + text, "N*m", 3.0 * 0.3048 * _LB) for text in ("ft-lb", "ft-lbf", "lb-ft", "lbf-ft")),
+        ("3 inches", "m", 3.0 * 0.0254),
+        ("2 feet", "m", 2.0 * 0.3048),
         ("3 in-lb/rad", "N*m/rad", 3.0 * 0.0254 * _LB),
         ("3 in-lb-s^2", "kg*m^2", 3.0 * 0.0254 * _LB),
         ("3 lb-in^2", "kg*m^2", 3.0 * 0.45359237 * 0.0254**2),
