@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
-from sprag.service.storage.damage import changed, readable
+from sprag.service.storage.damage import changed, undecodable
 from sprag.service.storage.errors import DatabaseError
 from sprag.service.storage.part import moment
 from sprag.service.storage.records import RoundRecord
@@ -21,7 +21,6 @@ from sprag.service.storage.tables import ROUNDS, STUDIES
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-_PLACE: Final = (ROUNDS.c.round, ROUNDS.c.first, ROUNDS.c["count"], ROUNDS.c.planned_at)
 #: Name of the digest among those of a summary.
 _DIGEST: Final = "digest"
 
@@ -52,12 +51,13 @@ def rounds_of(connection: sa.Connection, number: int) -> list[RoundRecord]:
 
 def latest_round(connection: sa.Connection, number: int) -> RoundRecord:
     """The latest round of a study that has rounds; without its summary where that is not as it was stored."""
-    query = _query(number).order_by(ROUNDS.c.round.desc()).limit(1)
     try:
-        (latest,) = _records(connection, number, query)
+        (latest,) = _records(connection, number, _query(number).order_by(ROUNDS.c.round.desc()).limit(1))
     except DatabaseError:
-        round_, first, cases, at = connection.execute(query.with_only_columns(*_PLACE)).one()
-        return RoundRecord(round_, range(first, first + cases), {}, moment(at))
+        c = ROUNDS.c
+        place = sa.select(c.round, c.first, c["count"].label("cases"), c.planned_at).where(c.study == number)
+        row = connection.execute(place.order_by(c.round.desc()).limit(1)).one()
+        return RoundRecord(row.round, range(row.first, row.first + row.cases), {}, moment(row.planned_at))
     return latest
 
 
@@ -76,18 +76,26 @@ def _query(number: int) -> sa.Select[Any]:
 
 
 def _records(connection: sa.Connection, number: int, query: sa.Select[Any]) -> Iterable[RoundRecord]:
-    study_id = connection.execute(sa.select(STUDIES.c.id).where(STUDIES.c.number == number)).scalar_one()
-    with readable(study_id):
+    try:
         rows = connection.execute(query).all()
+    except sa.exc.DBAPIError as error:
+        if not undecodable(error):
+            raise
+        raise _damaged(connection, number) from error
     for row in rows:
         try:
             summary: dict[str, Any] = json.loads(row.summary)
             known = summary.pop(_DIGEST, None)
         except (ValueError, AttributeError):
-            raise DatabaseError(changed(study_id, "rounds"), "database-damaged") from None
+            raise _damaged(connection, number) from None
         if known not in {None, _digest(row.round, row.first, row.cases, summary)}:
-            raise DatabaseError(changed(study_id, "rounds"), "database-damaged")
+            raise _damaged(connection, number)
         yield RoundRecord(row.round, range(row.first, row.first + row.cases), summary, moment(row.planned_at))
+
+
+def _damaged(connection: sa.Connection, number: int) -> DatabaseError:
+    study_id = connection.execute(sa.select(STUDIES.c.id).where(STUDIES.c.number == number)).scalar_one()
+    return DatabaseError(changed(study_id, "rounds"), "database-damaged")
 
 
 def _digest(number: int, first: int, count: int, summary: Mapping[str, Any]) -> str:
