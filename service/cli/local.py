@@ -384,7 +384,7 @@ def _finish(text: str | None) -> datetime | None:
     try:
         return None if text is None else finish_at(text, datetime.now(UTC))
     except FinishError as error:
-        raise wrong_option("--finish-by", error.code, str(error), text, allowed=ALLOWED) from None
+        raise wrong_option("--finish-by", error.code, error.message, text, allowed=ALLOWED) from None
 
 
 def _rows(done: LocalRun, form: Format | ReportFormat, header: Header) -> Iterator[bytes]:

@@ -26,14 +26,15 @@ _CLOCK_UNITS: Final[dict[str, float]] = {
     **dict.fromkeys(("d", "day", "days", "д", "дн", "день", "дні", "днів", "доба", "доби", "діб"), 86400.0),
     **dict.fromkeys(("w", "wk", "week", "weeks", "тиж", "тиждень", "тижні", "тижнів"), 604800.0),
 }
-# The days of these texts are `MAX_FINISH_DAYS`.
-ALLOWED: Final = N_(
+ALLOWED: Final = Sentence(
     'a future time with its offset, such as "2027-01-31T06:00+01:00", or a duration from the submission, such as '
-    '"8 h" or "2 days"; 1 s to 366 days ahead'
+    '"8 h" or "2 days"; 1 s to {days} days ahead',
+    days=MAX_FINISH_DAYS,
 )
-ALLOWED_OF_RUNS: Final = N_(
+ALLOWED_OF_RUNS: Final = Sentence(
     'a time of day, such as "06:00", or a duration from the beginning of the run, such as "8 h" or "2 days"; 1 s to '
-    "366 days"
+    "{days} days",
+    days=MAX_FINISH_DAYS,
 )
 
 

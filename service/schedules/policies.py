@@ -7,8 +7,9 @@ from datetime import datetime, timedelta
 from enum import StrEnum
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.languages import N_
+from sprag.sentences import Sentence
 from sprag.service.schedules.deadline import duration_seconds
+from sprag.worker.limits import MAX_FINISH_DAYS
 
 if TYPE_CHECKING:
     from sprag.service.schedules.times import Timing
@@ -17,8 +18,9 @@ if TYPE_CHECKING:
 ON_TIME: Final = timedelta(minutes=1)
 #: Most due times that `CatchUp.ALL` makes up for, the latest ones.
 MOST_CAUGHT_UP: Final = 50
-#: The days are `MAX_FINISH_DAYS`.
-GRACE_ALLOWED: Final = N_('a duration with a unit, such as "30 min" or "2 days"; 1 s to 366 days')
+GRACE_ALLOWED: Final = Sentence(
+    'a duration with a unit, such as "30 min" or "2 days"; 1 s to {days} days', days=MAX_FINISH_DAYS
+)
 
 
 class Overlap(StrEnum):

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sprag.sentences import Sentence, plural
 from sprag.service.delivery import is_mail_address, origin_of
-from sprag.service.languages import N_
 from sprag.service.spec.report import Report
 
 if TYPE_CHECKING:
@@ -18,9 +17,12 @@ if TYPE_CHECKING:
 
 MOST_RECIPIENTS: Final = 10
 LONGEST_WEBHOOK: Final = 500
-# Their numbers are `MOST_RECIPIENTS` and `LONGEST_WEBHOOK`.
-EMAIL_ALLOWED: Final = N_('a list of at most 10 different addresses, such as ["dora@example.com"]')
-WEBHOOK_ALLOWED: Final = N_("an address of http or https without user and fragment, at most 500 characters")
+EMAIL_ALLOWED: Final = Sentence(
+    'a list of at most {count} different addresses, such as ["dora@example.com"]', count=MOST_RECIPIENTS
+)
+WEBHOOK_ALLOWED: Final = Sentence(
+    "an address of http or https without user and fragment, at most {count} characters", count=LONGEST_WEBHOOK
+)
 
 
 class ReportWhen(StrEnum):

@@ -181,6 +181,16 @@ def test_a_refused_command_line_has_no_text_without_a_translation(sprag: Sprag, 
     assert unmarked(refused.err, (*given, *choices, "sprag")) == []
 
 
+@pytest.mark.usefixtures("files")
+def test_a_deadline_is_refused_in_a_whole_sentence(sprag: Sprag) -> None:
+    line = ("run", "study.json", "-o", "rows.csv", "--finish-by", "2020-01-01T00:00Z")
+    assert "--finish-by: is in the past; it is 20" in sprag(*line).err
+    refused = sprag("--language", "uk", *line).err
+    assert "--finish-by: у минулому; тепер 20" in refused
+    assert "від 1 с до 366 днів наперед" in refused
+    assert "past" not in refused
+
+
 def test_an_unknown_refusal_stays_as_it_is(pseudo: None) -> None:
     with languages.language("xx"):
         assert refusal("Something else.") == "Something else."
