@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Iterator
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,6 +14,8 @@ from sprag.service.cli.app import app
 from sprag.service.cli.console import ExitCode
 
 FOLDER: Final = Path(__file__).parent / "man"
+#: Of these sources; the installed one may be older.
+VERSION: Final = tomllib.loads((FOLDER.parents[1] / "pyproject.toml").read_text("utf-8"))["project"]["version"]
 
 
 def pages() -> dict[str, str]:
@@ -33,7 +35,7 @@ def _page(command: Any, context: Any, parent: Any) -> Iterator[str]:
     title = context.command_path.replace(" ", "-")
     commands = getattr(command, "commands", {})
     yield '.\\" Made from the help of the command by python -m docs.reference.'
-    yield f'.TH "{roff(title.upper())}" "1" "" "Sprag {version("sprag")}" "Sprag manual"'
+    yield f'.TH "{roff(title.upper())}" "1" "" "Sprag {VERSION}" "Sprag manual"'
     paragraphs = [" ".join(part.split()) for part in (command.help or "").split("\n\n")]
     yield from (".SH NAME", rf"{roff(title)} \- {roff(command.get_short_help_str(limit=400).rstrip('.'))}")
     yield from (".SH SYNOPSIS", f".B {roff(context.command_path)}")

@@ -2,7 +2,9 @@
 
 import ast
 import re
+import tomllib
 from collections.abc import Iterator
+from datetime import date
 from pathlib import Path
 
 import pytest
@@ -132,3 +134,17 @@ def test_the_waiting_loop_of_the_readme_ends_in_every_state_that_a_study_does_no
 def test_benchmarks_are_called_as_modules() -> None:
     for page in [*PAGES, *(ROOT / "benchmarks").rglob("*.py")]:
         assert not re.search(r"python benchmarks/", page.read_text()), page
+
+
+def test_the_newest_version_of_the_change_log_is_that_of_the_project() -> None:
+    headings = re.findall(r"(?m)^## (.+)$", (ROOT / "CHANGELOG.md").read_text("utf-8"))
+    assert headings[0] == "Unreleased"
+    releases = [re.fullmatch(r"(\d+)\.(\d+)\.(\d+) \((\d{4}-\d\d-\d\d)\)", heading) for heading in headings[1:]]
+    assert None not in releases, headings
+    versions = [
+        (tuple(map(int, release.groups()[:3])), date.fromisoformat(release[4])) for release in releases if release
+    ]
+    assert versions == sorted(versions, reverse=True)
+    assert len({version for version, _ in versions}) == len(versions)
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    assert ".".join(map(str, versions[0][0])) == project["version"]
