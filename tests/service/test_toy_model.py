@@ -31,6 +31,7 @@ from sprag.worker.models.model import Model
 from sprag.worker.models.presentation import Presentation
 from sprag.worker.models.registry import model_of
 from sprag.worker.study import Study
+from tests.service.http.web.controls import Controls
 from tests.service.registered import create_table, registered
 
 if TYPE_CHECKING:
@@ -181,6 +182,21 @@ def test_the_form_has_a_section_for_each_part_of_a_machine() -> None:
         "Body": ["/base/body/mass", "/base/body/spring_rate"],
         "Other parameters": ["/base/damping"],
     }
+
+
+def test_the_form_of_an_unknown_model_says_which_there_are(service: Service) -> None:
+    answer = service.http.get("/new?model=perpetual-motion")
+    assert answer.status_code == 404
+    assert f"vibration-drive, machine-shaft, {NAME}" in answer.text
+
+
+def test_a_study_without_fields_in_the_form_is_text_and_the_page_says_so(service: Service) -> None:
+    said = "The form has no fields for all of this study"
+    page = service.http.get(f"/new?model={NAME}").text
+    assert said in page
+    assert Controls(page).values["/text"].startswith('{\n  "sprag": 1,\n  "model": "damped-oscillator"')
+    assert said not in service.http.get("/new?mode=text").text
+    assert said in service.http.get(f"/new?clone={service.submit(SPEC)}").text
 
 
 def test_a_new_parameter_of_a_drive_is_in_the_form_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:

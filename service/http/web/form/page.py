@@ -115,23 +115,30 @@ async def new_study(
     """
     spec = await in_thread(_start, context, preset, clone, case, along)
     if spec is None:
-        return form_page(request, _empty(mode, model), None)
+        if model not in models.model_names():
+            known = ", ".join(models.model_names())
+            raise ApiError("not-found", Sentence("Unknown model; known models: {models}.", models=known))
+        values = _empty(mode, model)
+        return form_page(request, values, None, fields="/text" not in values or mode == "text")
+    fields = True
     try:
         values = values_of(spec)
     except ValueError:
-        mode = "text"
-    if mode == "text":
+        fields = mode == "text"
+    if mode == "text" or not fields:
         values = {"/text": spec_text(spec), "format": "json"}
     if clone is not None and case is None and "/name" in values:
         values["/name"] = f"{values['/name']} (copy)"
     checked = await look_over(context, work, values)
-    return await in_thread(form_page, request, values, checked)
+    return await in_thread(form_page, request, values, checked, fields=fields)
 
 
 def _empty(mode: str, model: str) -> Values:
     """The values of a form that begins with nothing."""
     if mode == "text":
         return {"/text": "", "format": "json"}
+    if model not in {FORM_MODEL, models.MACHINE_SHAFT}:
+        return {"/text": spec_text({"sprag": 1, "model": model, "base": {}, "axes": []}), "format": "json"}
     return dict(EMPTY_SHAFT) if model == models.MACHINE_SHAFT else with_clutch_defaults(dict(EMPTY_FORM))
 
 
@@ -275,14 +282,20 @@ def _adapt_formulas(values: Values, index: int) -> None:
             values[name] = text.replace(f"pendulums.{index - 1}.", f"pendulums.{index}.")
 
 
-def form_page(request: Request, values: Values, checked: Checked | None, status: int = 200) -> Response:
-    """The page with the form filled in with ``values``; ``checked`` is None where they were not checked."""
+def form_page(
+    request: Request, values: Values, checked: Checked | None, status: int = 200, *, fields: bool = True
+) -> Response:
+    """The page with the form filled in with ``values``; ``checked`` is None where they were not checked.
+
+    ``fields`` is False where the form has no fields for the study, so that its spec is shown as text.
+    """
     text_mode, shaft = "/text" in values, is_shaft(values)
     model = models.MACHINE_SHAFT if shaft else FORM_MODEL
     return page(
         "new_text.html" if text_mode else "new.html",
         status=status,
         values=values,
+        with_fields=fields,
         faults={} if checked is None else checked.faults,
         checked=checked or Checked({}),
         begun=checked is not None,
@@ -321,11 +334,13 @@ def form_page(request: Request, values: Values, checked: Checked | None, status:
 
 async def spec_in_form(work: Work, spec: dict[str, Any]) -> Response:
     """A spec in the form, or as text where the form cannot show it."""
+    fields = True
     try:
         values = values_of(spec)
     except ValueError:
-        values = {"/text": spec_text(spec), "format": "json"}
-    return await in_thread(form_page, work.request, values, await look_over(work.context, work, values))
+        values, fields = {"/text": spec_text(spec), "format": "json"}, False
+    checked = await look_over(work.context, work, values)
+    return await in_thread(form_page, work.request, values, checked, fields=fields)
 
 
 def _choices(values: Values) -> Groups:
