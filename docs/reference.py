@@ -1,4 +1,4 @@
-"""The tables of docs/reference.md and docs/theory.md, and the manual pages, from what the program says of itself.
+"""Tables of reference, HTTP interface, faults and theory, and the manual pages, from what the program says of itself.
 
 The sentences between the tables are by hand.
 
@@ -14,6 +14,7 @@ from collections.abc import Container, Iterable, Iterator
 from pathlib import Path
 
 import typer
+from fastapi.routing import APIRoute
 
 from docs import manual
 from sprag.engine.formulas.expressions import MAX_LENGTH
@@ -22,6 +23,8 @@ from sprag.service.cli.app import app
 from sprag.service.cli.console import ExitCode
 from sprag.service.cli.settings import VARIABLES
 from sprag.service.fault_meanings import KIND_MEANINGS, MEANINGS, WARNING_MEANINGS
+from sprag.service.http.app import ROUTED
+from sprag.service.http.problems import PROBLEM_TYPES
 from sprag.service.settings import table
 from sprag.worker import limits as limit
 from sprag.worker import models
@@ -44,6 +47,15 @@ def commands(command: object | None = None, name: str = "") -> Iterator[Row]:
 def _sentence(text: str) -> str:
     """The first paragraph, its options as code."""
     return re.sub(r"(--[a-z-]+)", r"`\1`", " ".join(text.partition("\n\n")[0].split()))
+
+
+def operations() -> Iterator[Row]:
+    """Every operation of the HTTP interface with its description."""
+    for module in ROUTED:
+        for route in module.router.routes:
+            if isinstance(route, APIRoute) and route.include_in_schema:
+                for method in sorted(route.methods):
+                    yield method, f"`{route.path_format}`", " ".join(route.description.split())
 
 
 def settings() -> Iterator[Row]:
@@ -172,6 +184,13 @@ TABLES: dict[str, tuple[str, Iterable[Row]]] = {
 #: The tables of each page.
 PAGES: dict[str, dict[str, tuple[str, Iterable[Row]]]] = {
     "reference.md": TABLES,
+    "http.md": {
+        "operations": ("method | address | ", operations()),
+        "problems": (
+            "type | status | title | ",
+            ((f"`{kind.uri}`", str(kind.status), kind.title, kind.help) for kind in PROBLEM_TYPES.values()),
+        ),
+    },
     "faults.md": {
         "codes of faults": ("code | meaning ", meanings({**MEANINGS})),
         "kinds of faults": ("code | meaning ", meanings({**KIND_MEANINGS})),

@@ -88,6 +88,11 @@ MAX_PAGE_SIZE: Final = 1_000
 MIN_TRAJECTORY_POINTS: Final = 2
 MAX_TRAJECTORY_POINTS: Final = 20_000
 
+#: Values of the parameter of a bifurcation diagram, and strobes of each; strobes of a section.
+MAX_DIAGRAM_VALUES: Final = 500
+MAX_DIAGRAM_STROBES: Final = 200
+MAX_SECTION_STROBES: Final = 5_000
+
 #: Priorities of studies lie between this and its negative.
 MAX_PRIORITY: Final = 100
 

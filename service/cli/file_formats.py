@@ -14,6 +14,8 @@ from sprag.service.languages import N_, _
 
 #: Formats of a whole study: case rows (`sprag.service.results.exports`) and documents (`sprag.service.results.report`).
 TableFormat = Literal[Format, ReportFormat]
+#: Formats of pictures.
+PICTURES: Final = ("svg", "png", "pdf")
 #: Endings of their files.
 _TABLES: Final = (*(ending for endings in SUFFIXES.values() for ending in endings), *REPORT_FORMATS)
 
@@ -38,10 +40,10 @@ def table_format(form: TableFormat | None, file: str | None, as_json: bool) -> T
     return found
 
 
-def value_format(form: ValueFormat | None, file: str | None, as_json: bool) -> Literal["csv", "json"]:
-    """The format of values of one case; WrongInputError where only the file's name tells it, by an unknown ending."""
+def value_format(form: ValueFormat | None, file: str | None, as_json: bool, pictures: Sequence[str] = ()) -> str:
+    """The format of a view of one case; WrongInputError where only the file's name tells it, by an unknown ending."""
     if form is None and file is not None and _has_ending(file):
-        form = ValueFormat(file_format(file, tuple(ValueFormat)))
+        return file_format(file, (*ValueFormat, *pictures))
     return "json" if (as_json if form is None else form is ValueFormat.JSON) else "csv"
 
 

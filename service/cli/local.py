@@ -28,8 +28,8 @@ from sprag.service.cli.console import (
     write_text,
     wrong_option,
 )
-from sprag.service.cli.file_formats import TableFormat, require_csv, table_format, value_format
-from sprag.service.cli.files import output, read_study, require_cases, to_file
+from sprag.service.cli.file_formats import TableFormat, require_csv, table_format
+from sprag.service.cli.files import output, read_study, to_file
 from sprag.service.cli.options import (
     ChunkCases,
     CsvHeader,
@@ -41,12 +41,10 @@ from sprag.service.cli.options import (
     Processes,
     SpecFile,
     TableFiles,
-    ValueFormatOption,
 )
 from sprag.service.cli.running import run_parsed
-from sprag.service.faults import Fault, warned
+from sprag.service.faults import warned
 from sprag.service.languages import N_, _, decimal
-from sprag.worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -57,8 +55,6 @@ if TYPE_CHECKING:
     from sprag.service.settings import Settings
     from sprag.service.spec.document import ParsedSpec
     from sprag.service.storage.records import Progress, StudyRecord
-    from sprag.worker.models import Trajectory
-    from sprag.worker.study import Study
 
 
 #: Rough start time (s) of the program and its pool of processes.
@@ -162,68 +158,6 @@ def _reusable(settings: Settings, parsed: ParsedSpec) -> int:
         return 0
     with Store.open(settings.database_url, create=False) as store:
         return store.reusable(parsed.study)
-
-
-def trajectory(
-    spec: SpecFile,
-    case: Annotated[int, typer.Option("--case", min=0, metavar="N", help="Number of the case, from 0.")] = 0,
-    tables: TableFiles = None,
-    file: OutputFile = None,
-    form: ValueFormatOption = None,
-    start: Annotated[
-        str | None, typer.Option("--from", metavar="TIME", help='First time, in s, or as "40 periods"; default: 0.')
-    ] = None,
-    end: Annotated[
-        str | None, typer.Option("--to", metavar="TIME", help="Last time, likewise; default: the end.")
-    ] = None,
-    points: Annotated[
-        int, typer.Option(min=MIN_TRAJECTORY_POINTS, max=MAX_TRAJECTORY_POINTS, help="Equally spaced times.")
-    ] = 1000,
-    as_json: JsonFlag = False,
-) -> None:
-    """Write the instantaneous values of one case: angles, speeds, torques, powers, states."""
-    from sprag.worker.models import ENDING_SENTENCES, OK
-
-    written = value_format(form, file, as_json)
-    study = read_study(spec, files=tables).study
-    with output(file) as write:
-        made = _trajectory(study, case, start, end, points)
-        write(_trajectory_bytes(made, study, case, written == "json"))
-    way = _("{count} points in time") if made.along == "time" else _("{count} points over the angle")
-    text = way.format(count=points)
-    if not len(made.values):
-        text = _("no points: {why}", why=_(ENDING_SENTENCES[made.ending]))
-    say(_("case {case}: {text}", case=case, text=f"{made.ending}, {text}"))
-    if as_json and to_file(file):
-        write_json({"file": file, "case": case, "ending": made.ending, "points": len(made.values)})
-    if made.ending != OK:
-        raise typer.Exit(ExitCode.NOT_ALL_OK)
-
-
-def _trajectory(study: Study, case: int, start: str | None, end: str | None, points: int) -> Trajectory:
-    from sprag.service.faults import FaultError
-    from sprag.service.results.trajectories import span
-    from sprag.worker.models import run_trajectory
-
-    require_cases(study, [case])
-    try:
-        first, last = span(study, case, start, end)
-    except FaultError as error:
-        problems = [
-            Fault(f"--{item.where}", item.code, item.message, item.value, item.allowed) for item in error.faults
-        ]
-        raise WrongInputError("invalid-parameter", _("invalid option"), problems) from error
-    return run_trajectory(study, case, first, last, points)
-
-
-def _trajectory_bytes(made: Trajectory, study: Study, case: int, as_json: bool) -> bytes:
-    from sprag.service.json_text import to_bytes
-    from sprag.service.results.directions import case_values
-    from sprag.service.results.trajectories import trajectory_csv, trajectory_json
-
-    if not as_json:
-        return trajectory_csv(made)
-    return to_bytes(trajectory_json(made, case, case_values(study, case))) + b"\n"
 
 
 def presets(

@@ -40,15 +40,6 @@ StartOption = Annotated[
     int | None,
     typer.Option("--start", min=0, max=MAX_STARTS - 1, metavar="K", help="Start of a case with many; default: 0."),
 ]
-AlongOption = Annotated[
-    str, typer.Option("--along", metavar="PATH", help="Parameter, or several joined by commas with one value.")
-]
-FromOption = Annotated[
-    str | None, typer.Option("--from", metavar="VALUE", help="Start of the range; default: that of its axis.")
-]
-ToOption = Annotated[
-    str | None, typer.Option("--to", metavar="VALUE", help="End of the range; default: that of its axis.")
-]
 ValueFormatOption = Annotated[
     ValueFormat | None, typer.Option("--format", help="Default: by the ending of FILE; csv where it has none.")
 ]

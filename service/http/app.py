@@ -18,12 +18,9 @@ from starlette.types import ASGIApp
 from sprag.service.http import handlers
 from sprag.service.http.access import Access
 from sprag.service.http.api import (
-    basins,
     batches,
     calibrations,
-    case_branches,
-    case_tables,
-    case_transients,
+    case_views,
     cases,
     catalogues,
     clutch_fits,
@@ -89,6 +86,7 @@ from sprag.service.http.web import (
 from sprag.service.http.web import transient as transient_pages
 from sprag.service.http.web import units as unit_pages
 from sprag.service.http.web import workers as worker_pages
+from sprag.service.http.web.figures import cases as case_figures
 from sprag.service.http.web.form import page as form
 from sprag.service.http.web.laboratory import drive as drive_laboratory
 from sprag.service.http.web.laboratory import pages as laboratory
@@ -148,7 +146,7 @@ TAGS = [
 ]
 
 #: Modules with routes; the first route that fits a request answers it.
-_ROUTED = (
+ROUTED = (
     studies,
     study_list,
     events,
@@ -160,10 +158,7 @@ _ROUTED = (
     explore,
     key_answers,
     cases,
-    case_branches,
-    case_tables,
-    case_transients,
-    basins,
+    case_views,
     clutch_fits,
     schedules,
     components,
@@ -187,6 +182,7 @@ _ROUTED = (
     results,
     table,
     case,
+    case_figures,
     engagement_pages,
     branch_pages,
     diagram_pages,
@@ -345,7 +341,7 @@ def create_app(
 
 def _routes() -> Iterator[APIRoute]:
     """All routes. They are independent of the application: their signatures are analysed once per process."""
-    for module in _ROUTED:
+    for module in ROUTED:
         for route in module.router.routes:
             assert isinstance(route, APIRoute)
             yield route

@@ -10,24 +10,23 @@ from starlette.responses import Response
 from sprag.service.answers import results as m
 from sprag.service.faults import parameter_error
 from sprag.service.http.api.curves import pairs
-from sprag.service.http.api.document import Ranges, files, format_query, next_page, one_of, problems
-from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, study_with
-from sprag.service.http.drawing import TABLE_FORMATS, table
-from sprag.service.http.respond import choose_format, json_response, page_response
+from sprag.service.http.api.document import Ranges, next_page, problems
+from sprag.service.http.asked import one_of
+from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
+from sprag.service.http.respond import json_response, page_response
 from sprag.service.http.routers import api_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.views import study_address
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs.answers import FEW
 from sprag.service.jobs.case_pages import by_number, case_page
-from sprag.service.results import trajectories
 from sprag.service.results.directions import case_units, case_values
 from sprag.service.results.explore import ExploreQuery
 from sprag.service.results.exports import row_json, rows_json
 from sprag.service.storage.records import CaseRow
 from sprag.worker import models
 from sprag.worker.codes import FLAG_MASKS, PENDING
-from sprag.worker.limits import MAX_PAGE_SIZE, MAX_PAGE_TOKEN, MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
+from sprag.worker.limits import MAX_PAGE_SIZE, MAX_PAGE_TOKEN
 from sprag.worker.models.abilities import has_transients
 
 if TYPE_CHECKING:
@@ -143,52 +142,3 @@ def _regimes(context: Context, study_id: str, study: Study, case: int) -> list[m
     numbered = models.numbered_by(study.model, models.variant_of(study))
     rows = () if numbered is None else context.store.all_rows(study_id, case)
     return [{"number": number, "flags": list(row.flags), "results": row.results} for number, row in enumerate(rows)]
-
-
-@router.get(
-    "/{case:case}/trajectory",
-    response_model=m.Trajectory | m.AngleTable,
-    responses={
-        **files("Instantaneous values, as JSON or CSV.", TABLE_FORMATS.values()),
-        **problems(*_CASE_PROBLEMS, "not-acceptable", "not-computed", "timed-out", "too-many-requests", "unavailable"),
-    },
-)
-async def get_trajectory(
-    work: Attended,
-    study_id: StudyId,
-    case: CaseNumber,
-    start: Annotated[
-        str | None,
-        Query(
-            alias="from",
-            description="first time, in s or with a unit (s, periods), or angle, in rad or with a unit; by default 0, "
-            "of a settled study `max_period` periods before the end",
-            examples=["0"],
-        ),
-    ] = None,
-    end: Annotated[
-        str | None,
-        Query(
-            alias="to",
-            description="last time or angle, likewise; by default the end of the run (`at_most` of a settled study) "
-            "or cycle",
-            examples=["2.5 periods"],
-        ),
-    ] = None,
-    points: Annotated[
-        int,
-        Query(
-            ge=MIN_TRAJECTORY_POINTS,
-            le=MAX_TRAJECTORY_POINTS,
-            description="equally spaced times or angles",
-            examples=[50],
-        ),
-    ] = 1000,
-    which: StartNumber = None,
-    form: Annotated[str | None, format_query(TABLE_FORMATS)] = None,
-) -> Response:
-    """Every variable, torque, power and state of one case over time (or the angle). The case is run again for this."""
-    chosen = choose_format(work.request, form, TABLE_FORMATS)
-    study, span = await work.case_of(study_id, case, lambda study: trajectories.span(study, case, start, end), which)
-    content = await work.run_case(trajectories.trajectory_file, study, case, *span, points, chosen, which)
-    return table(content, chosen, f"{study_id}-case-{case}")

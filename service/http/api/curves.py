@@ -15,9 +15,10 @@ from sprag.sentences import Sentence
 from sprag.service import formats, languages
 from sprag.service.answers import results as m
 from sprag.service.faults import FaultError, choice_of, parameter_error
-from sprag.service.http.api.document import CONTENT_RANGE, files, format_query, one_of, problems
+from sprag.service.http.api.document import CONTENT_RANGE, files, format_query, problems
 from sprag.service.http.api.document import not_modified as documented_304
 from sprag.service.http.api.drawn_format import DrawnFormat, language_query
+from sprag.service.http.asked import one_of
 from sprag.service.http.context import StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture, placed, tag_of
 from sprag.service.http.kept_files import asks_for_part, file_response

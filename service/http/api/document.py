@@ -15,6 +15,7 @@ from sprag.service.faults import Fault, Kind, ParameterFault
 from sprag.service.http.api.answer_examples import add_answers
 from sprag.service.http.api.links import add_links
 from sprag.service.http.api.plain_schema import plain_schema
+from sprag.service.http.asked import one_of
 from sprag.service.http.problems import PROBLEM_MEDIA_TYPE, PROBLEM_TYPES, Problem, ProblemType, problem_json
 from sprag.service.http.views import API_PREFIX
 
@@ -138,11 +139,6 @@ def next_page() -> Responses:
     """Documentation of the header of a page that is not the last one."""
     link = {"description": 'address of the next page, with `rel="next"`; none on the last', "schema": _TEXT}
     return {200: {"headers": {"Link": link}}}
-
-
-def one_of(names: Iterable[str]) -> dict[str, Any]:
-    """``json_schema_extra`` of a text with these values only; generated clients still treat it as a text."""
-    return {"pattern": f"^({'|'.join(names)})$"}
 
 
 def format_query(names: Iterable[str], example: str = "json") -> Any:

@@ -14,8 +14,9 @@ from sprag.service.faults import parameter_error, warned
 from sprag.service.http import views
 from sprag.service.http.api import examples
 from sprag.service.http.api.curves import pairs
-from sprag.service.http.api.document import body, key_header, located, one_of, problems
+from sprag.service.http.api.document import body, key_header, located, problems
 from sprag.service.http.api.document import not_modified as documented_304
+from sprag.service.http.asked import one_of
 from sprag.service.http.context import Context, Ctx, StudyId
 from sprag.service.http.requests import Body, read_body
 from sprag.service.http.respond import JSON, json_response, not_modified, tagged

@@ -10,8 +10,8 @@ from fastapi import Query
 from sprag.service.http.reading import read_as
 from sprag.service.http.web.study import study_frame
 from sprag.service.languages import _
-from sprag.service.results.branches import free_parameters, ranged_axes
 from sprag.service.results.selection import axis_name
+from sprag.service.views.branch import free_parameters, ranged_axes
 
 if TYPE_CHECKING:
     from sprag.service.http.context import Context

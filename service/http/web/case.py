@@ -15,7 +15,7 @@ from sprag.service.http.reading import CHOICE, FileChoice, address_pairs
 from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
-from sprag.service.http.web.figures.answers import SAMPLES, motion_figures, strobes_figure
+from sprag.service.http.web.figures.answers import SAMPLES, motion_figures
 from sprag.service.http.web.form.own_machine import case_address, has_laboratory
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
@@ -25,14 +25,13 @@ from sprag.service.languages import _
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.phrases import meanings, shown
 from sprag.service.reading.wording import number
-from sprag.service.results import trajectories
 from sprag.service.results.defaults import main_results
 from sprag.service.results.pictures.curves import draw_motion
-from sprag.service.results.portraits import require_strobes
 from sprag.service.results.regimes import ORDER, motion_sentence
 from sprag.service.results.selection import axis_name, own_paths
 from sprag.service.results.start_states import check_start
 from sprag.service.results.sweeps import direction_texts
+from sprag.service.views import trajectory
 from sprag.worker import models
 from sprag.worker.codes import PENDING
 from sprag.worker.models.abilities import has_transients
@@ -60,7 +59,7 @@ End = Annotated[str, Query(alias="to", max_length=80)]
 def _span(study: Study, case: int, begin: str, end: str) -> tuple[float, float]:
     """First and last time shown (s): as requested, otherwise the last periods of the window."""
     if begin.strip() or end.strip():
-        return trajectories.span(study, case, begin.strip() or None, end.strip() or None)
+        return trajectory.span(study, case, begin.strip() or None, end.strip() or None)
     extent = models.extent(study, case)
     if extent.along == "angle":
         return 0.0, extent.end
@@ -221,24 +220,5 @@ async def motion_picture(
         reading = await in_thread(reading_of, work.context.store, study_id, choice)
         shown, title = models.presentation_of(study), f"{study.name}, case {case}"
         return await picture(draw_motion, "svg", made, shown, reading, title, (), None).response(work)
-
-    return await unchanging(work, study_id, make)
-
-
-@router.get("/studies/{study_id:study}/cases/{case:case}/strobes")
-async def strobes(
-    work: Attended,
-    study_id: StudyId,
-    case: CaseNumber,
-    choice: FileChoice,
-    columns: Columns = 2,
-    which: StartNumber = None,
-) -> Response:
-    """The figure of a case's strobes and its orbit: how it approaches its motion."""
-    study, _ = await work.case_of(study_id, case, require_strobes, which)
-
-    async def make() -> Response:
-        reading = await in_thread(reading_of, work.context.store, study_id, choice)
-        return json_response(await work.run_case(strobes_figure, *motion_of(study, case, which), columns, reading))
 
     return await unchanging(work, study_id, make)

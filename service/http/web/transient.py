@@ -10,25 +10,19 @@ from starlette.responses import Response
 
 from sprag.service.faults import FaultError
 from sprag.service.http.context import CaseNumber, StudyId, study_with
-from sprag.service.http.reading import FileChoice, read_as
-from sprag.service.http.respond import json_response
+from sprag.service.http.reading import read_as
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
-from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
-from sprag.service.jobs.reading import reading_of
 from sprag.service.languages import N_
-from sprag.service.results.figures.read import read_figure
-from sprag.service.results.figures.transient import transient_figure
-from sprag.service.results.transients import course_of, require_transients
+from sprag.service.views.transient import course_of, require_transients
 from sprag.worker.models.abilities import has_motor, run_transient, shape_of_transients
 from sprag.worker.models.transients import RESULTS
 
 if TYPE_CHECKING:
-    from sprag.worker.models.transients import Course
-    from sprag.worker.study import Study
+    pass
 
 router = page_router()
 
@@ -77,24 +71,6 @@ async def transient_page(
         faults=faults,
         made=made,
         results=[] if made is None else [(*info, made.results[info[0]]) for info in RESULTS],
-        figure=f"{own}/figure?{query}{read_as()}" if query else "",
+        figure=f"{own}/figure?{query}&points={_POINTS}{read_as()}" if query else "",
         file=f"/api/v1{own}?{query}",
     )
-
-
-@router.get("/studies/{study_id:study}/cases/{case:case}/transient/figure")
-async def transient_drawn(
-    work: Attended, study_id: StudyId, case: CaseNumber, kind: Text, load: Text = "", angle: Text = "",
-    torque: Text = "", within: Text = "", revolutions: Text = "", *, choice: FileChoice,
-) -> Response:  # fmt: skip
-    """The figure of a transient."""
-    given = {"load": load, "angle": angle, "torque": torque, "within": within, "revolutions": revolutions}
-
-    def look(study: Study) -> Course:
-        return course_of(study, case, kind, given)
-
-    study, course = await work.case_of(study_id, case, look)
-    await work.load(shape_of_transients(study))
-    made = await work.run_case(run_transient, study, case, course, _POINTS)
-    reading = await in_thread(reading_of, work.context.store, study_id, choice)
-    return json_response(plotly_figure(read_figure(transient_figure(made), reading)))

@@ -13,11 +13,9 @@ import numpy as np
 
 from sprag.sentences import Sentence
 from sprag.service.faults import refused
-from sprag.service.results.figures.basin import basin_figure
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.motion import motion_figure
 from sprag.service.results.figures.orders import motion_text
-from sprag.service.results.figures.portrait import portrait_figure
 from sprag.service.results.figures.read import read_figure
 from sprag.service.results.pictures.legends import (
     COLUMNS,
@@ -48,7 +46,7 @@ if TYPE_CHECKING:
     from sprag.service.results.curves import Curves
     from sprag.service.results.figures.figure import Figure as Described
     from sprag.service.results.figures.figure import Line, Marks, Panel
-    from sprag.worker.models import Basin, Portrait, Presentation, Trajectory
+    from sprag.worker.models import Presentation, Trajectory
 
 Picture = Literal["svg", "png", "pdf"]
 PICTURES: Final[tuple[Picture, ...]] = get_args(Picture)
@@ -120,18 +118,6 @@ def draw_motion(
     the machine. A line marks the place ``at`` (time in s, angle in degrees).
     """
     return draw_figure(read_figure(replace(motion_figure(made, shown, held), at=at), reading), title, picture)
-
-
-def draw_portrait(made: Portrait, shown: Presentation, reading: Reading, title: str, picture: Picture) -> bytes:
-    """Orbit and strobes of one case, beside the strobes period by period."""
-    return draw_figure(read_figure(portrait_figure(made, shown), reading), title, picture)
-
-
-def draw_basin(
-    made: Basin, paths: tuple[str, str], units: tuple[str, str], reading: Reading, title: str, picture: Picture
-) -> bytes:
-    """To which regime one case comes from each start of a grid."""
-    return draw_figure(read_figure(basin_figure(made, paths, units), reading), title, picture)
 
 
 def require_drawable(drawn: Sequence[Curves]) -> None:

@@ -20,15 +20,15 @@ from sprag.service.languages import language
 from sprag.service.reading.faults import fault_text
 from sprag.service.reading.reader import Reading
 from sprag.service.reading.together import question, questions, with_last_unit
-from sprag.service.results.branches import range_of
 from sprag.service.results.explore import ExploreQuery, plan_of
 from sprag.service.results.selection import locate_values
 from sprag.service.results.tolerances.conditions import read_conditions
-from sprag.service.results.trajectories import span
 from sprag.service.spec.components import faults_of
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.stored import accepted
+from sprag.service.views.branch import range_of
+from sprag.service.views.trajectory import span
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
 from tests.service.spec_sample import SPEC, changed, parsed, problems

@@ -14,16 +14,13 @@ from sprag.service.jobs.reading import reading_of
 from sprag.service.json_text import to_bytes
 from sprag.service.languages import gettext
 from sprag.service.reading.wording import number
-from sprag.service.results.basins import basin_of, units_of
 from sprag.service.results.figures.answers import answers_figure
-from sprag.service.results.figures.basin import basin_figure
 from sprag.service.results.figures.calibration import calibration_figure
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.explore import explore_figure
 from sprag.service.results.figures.front import front_figure, history_figure
 from sprag.service.results.figures.motion import motion_figure, phase_figure
 from sprag.service.results.figures.orders import motion_text
-from sprag.service.results.figures.portrait import portrait_figure
 from sprag.service.results.figures.read import read_figure, read_map
 from sprag.service.results.figures.ribbons import ribbon_figure, yield_figure
 from sprag.service.results.key_answer_words import curve_name, curve_named
@@ -33,7 +30,6 @@ if TYPE_CHECKING:
     from sprag.service.jobs.batch_answers import RibbonQuery, YieldQuery
     from sprag.service.jobs.library import Library
     from sprag.service.reading.reader import Choice, Reading
-    from sprag.service.results.basins import BasinQuery
     from sprag.service.results.curves import CurveQuery
     from sprag.service.results.explore import ExploreQuery
     from sprag.service.results.figures.figure import Figure
@@ -127,18 +123,6 @@ def motion_figures(
     if shown.portrait:
         figures["phase"] = phase_figure(made, shown)
     return {name: plotly_figure(read_figure(figure, reading)) for name, figure in figures.items()}
-
-
-def strobes_figure(study: Study, case: int, columns: int, reading: Reading) -> Data:
-    """The strobes and the orbit of a case that is run again for them. For the computing process."""
-    made = models.run_portrait(study, case)
-    return plotly_figure(read_figure(portrait_figure(made, models.presentation_of(study), columns), reading))
-
-
-def basin_plot(study: Study, case: int, query: BasinQuery, reading: Reading) -> Data:
-    """The basin of a case that is run from every start for it. For the computing process."""
-    made = basin_of(study, case, query)
-    return plotly_figure(read_figure(basin_figure(made, query.paths, units_of(study, query)), reading))
 
 
 def _no_motion(study: Study, case: int, ending: str) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.results.figures.read import read_figure
 from sprag.service.results.figures.turn import turn_figure
-from sprag.service.results.trajectories import trajectory_csv
+from sprag.service.views.trajectory import trajectory_csv
 from sprag.worker import models
 from sprag.worker.models.abilities import case_turn
 from sprag.worker.models.turns import CaseTurn

@@ -28,7 +28,7 @@ from sprag.service.reading.phrases import meanings
 from sprag.service.reading.reader import Reading, reading_for
 from sprag.service.reading.wording import number
 from sprag.service.results.pictures.curves import draw_motion
-from sprag.service.results.trajectories import trajectory_csv
+from sprag.service.views.trajectory import trajectory_csv
 from sprag.worker import models
 
 if TYPE_CHECKING:

@@ -212,14 +212,3 @@ def test_examples_of_bodies_fit_their_schemas(document: dict[str, Any]) -> None:
         for example in content["examples"].values():
             schema = {**content["schema"], "components": document["components"]}
             jsonschema.validate(example["value"], schema, cls=jsonschema.Draft202012Validator)
-
-
-def test_the_page_of_the_interface_is_up_to_date(document: dict[str, Any]) -> None:
-    page = (Path(__file__).resolve().parents[4] / "docs" / "http.md").read_text()
-    rows = [
-        f"| {method.upper()} | `{path}` | {' '.join(operation['description'].split())} |"
-        for path, method, operation in operations(document)
-    ]
-    rows += [f"| `{kind.uri}` | {kind.status} | {kind.title} | {kind.help} |" for kind in PROBLEM_TYPES.values()]
-    assert [row for row in rows if row not in page] == []
-    assert sum(line.startswith("| ") and "`/" in line for line in page.splitlines()) == len(rows)

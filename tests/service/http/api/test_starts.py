@@ -15,9 +15,8 @@ import pytest
 from sprag.service.client import Client
 from sprag.service.faults import FaultError
 from sprag.service.http.problems import ApiError
-from sprag.service.results import basins
-from sprag.service.results.basins import BasinQuery
 from sprag.service.spec.document import parse_spec
+from sprag.service.views import basin as basins
 from sprag.worker import models
 from sprag.worker.models import Basin, ChunkResult, FurtherRows
 from sprag.worker.models.starts import motion_of
@@ -149,7 +148,7 @@ def test_the_page_of_a_case_lists_its_regimes(service: Service, started: str) ->
     assert "0, shown below" in page
     other = service.http.get(f"/studies/{started}/cases/1", params={"start": "5"}).text
     assert "5, shown below" in other
-    assert f"/studies/{started}/cases/1/strobes?columns=2&amp;start=5" in other
+    assert f"/studies/{started}/cases/1/strobes/figure?columns=2&amp;start=5" in other
 
 
 @pytest.mark.parametrize("figure", ["branch", "diagram", "section"])
@@ -169,7 +168,8 @@ def test_pages_of_a_regime_follow_its_motion(service: Service, started: str, fig
 
     service.computer.answer = not_here
     service.http.get(drawn)
-    _, study, number, *_ = service.computer.calls[-1]
+    _, study, number, _view, _chosen, start, *_ = service.computer.calls[-1]
+    study, number = motion_of(study, number, start)
     values = service.store.study(started).run["starts"]["values"][SPEED]
     assert (number, study.base[SPEED], study.base["shaft.load"]) == (0, values[4], 0.2)
 
@@ -218,7 +218,7 @@ def test_a_study_begins_at_the_end_of_a_case(service: Service, started: str, mon
 def test_the_client_has_the_motions_of_a_case(
     service: Service, started: str, portal: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(basins, "basin_of", _basin)
+    monkeypatch.setattr(models, "run_basin", _basin)
     y = "pendulums.0.initial_angle"
     with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
         study = client.study(started)
@@ -235,17 +235,16 @@ def test_the_client_has_the_motions_of_a_case(
             assert 5 in service.computer.calls[-1] or service.computer.calls[-1][1].base[SPEED] == values[4]
 
 
-def _basin(study: Study, case: int, query: BasinQuery) -> Basin:
+def _basin(study: Study, case: int, paths: object, x: np.ndarray, y: np.ndarray) -> Basin:
     names = ("regime", "regime.order", "regime.share", "shaft.speed.mean")
     values = np.array([[1.0, 1.0, 0.5, 2.0], [1.0, 2.0, 0.25, 3.5]])
-    x, y = query.axes()
     return Basin(x, y, np.array([[0, 1], [0, -1]]), names, values)
 
 
 def test_a_basin_is_a_grid_of_two_initial_values(
     service: Service, started: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(basins, "basin_of", _basin)
+    monkeypatch.setattr(models, "run_basin", _basin)
     own = f"/studies/{started}/cases/1/basin"
     asked = {"y": "pendulums.0.initial_angle", "y_from": "-10 deg", "y_to": "0.2 rad", "points": 2}
     body = service.get(own, **asked)
@@ -263,6 +262,7 @@ def test_a_basin_is_a_grid_of_two_initial_values(
     assert "<!-- 1: 25 %, 3.5 rad/s, order 2 -->" in picture.text
     page = service.http.get(own, params=asked).text
     figure = html.unescape(re.findall(r'data-figure="(.*?)"', page)[0])
+    monkeypatch.undo()
     # This one is run: all four starts come to the motion of two periods.
     (line,) = service.http.get(figure).json()["data"]
     assert (line["name"], len(line["x"])) == ("0: 100 %, 22.84 rad/s, order 2", 4)
@@ -274,7 +274,7 @@ def test_the_page_of_a_basin_keeps_its_form(service: Service, started: str) -> N
     shown = [text in first.text for text in ('placeholder="30 rad/s"', "data-figure", 'role="alert"')]
     assert (first.status_code, *shown) == (200, True, False, False)
     wrong = {"y": "pendulums.0.initial_angle", "y_from": "12 mm", "y_to": "0.2 rad", "points": "many"}
-    for faulty, sentence in ((wrong, "is not a number of values"), ({**wrong, "points": "9"}, "<code>y_from</code>")):
+    for faulty, sentence in ((wrong, "must be a whole number"), ({**wrong, "points": "9"}, "<code>y_from</code>")):
         page = service.http.get(own, params=faulty)
         assert page.status_code == 422
         assert sentence in page.text

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sprag.service.results.branches import neighbours, usual_along
 from sprag.service.results.figures.branch import branch_figure, stable_segments
+from sprag.service.views.branch import neighbours, usual_along
 from sprag.worker.models.branches import Along, BranchContact, CaseBranch, SpecialPoint
 from sprag.worker.study import Axis, Study
 

@@ -11,20 +11,24 @@ import numpy as np
 from sprag.sentences import Sentence, Typed
 from sprag.service.answers.results import BasinData, RegimeRow
 from sprag.service.faults import FaultError, parameter_error
-from sprag.service.json_text import to_bytes
+from sprag.service.languages import N_
 from sprag.service.reading.catalogue import range_sentence
 from sprag.service.reading.texts import quantity_text
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.service.results.exports import table_csv
+from sprag.service.results.figures.basin import basin_figure
 from sprag.service.results.selection import ends_of_range
 from sprag.service.results.start_states import refuse_impossible
+from sprag.service.views.case_view import CaseView, Seen
+from sprag.service.views.questions import BASIN, BasinQuestion
 from sprag.worker import models
+from sprag.worker.models import Basin
 from sprag.worker.models.common import case_machine
 from sprag.worker.models.starts import STARTS, has_starts
 
 if TYPE_CHECKING:
-    from sprag.service.formats import Format
-    from sprag.worker.models import Basin, Parameter
+    from sprag.service.results.figures.figure import Figure
+    from sprag.worker.models import Parameter
     from sprag.worker.study import Study
 
 #: Initial values that a basin can be drawn over.
@@ -136,27 +140,6 @@ def _ends(
     return values[0], values[1]
 
 
-def basin_of(study: Study, case: int, query: BasinQuery) -> Basin:
-    """Run the case from every start. For the computing process."""
-    return models.run_basin(study, case, query.paths, *query.axes())
-
-
-def basin_file(study: Study, case: int, query: BasinQuery, form: Format) -> bytes:
-    """Run the case from every start and write the file. For the computing process."""
-    made = basin_of(study, case, query)
-    if form == "csv":
-        across, along = np.meshgrid(made.x, made.y)
-        members, speeds = made.members.reshape(-1), made.values[:, made.names.index(_SPEED)]
-        columns: list[list[Any]] = [
-            across.reshape(-1).tolist(),
-            along.reshape(-1).tolist(),
-            members.tolist(),
-            [float(speeds[member]) if member >= 0 else None for member in members],
-        ]
-        return table_csv([*query.paths, "regime.number", _SPEED], columns)
-    return to_bytes(basin_json(study, query, made))
-
-
 def basin_json(study: Study, query: BasinQuery, made: Basin) -> BasinData:
     """A basin as JSON data."""
     infos = {info.name: info for info in models.result_infos(study.model, models.variant_of(study))}
@@ -181,3 +164,41 @@ def units_of(study: Study, query: BasinQuery) -> tuple[str, str]:
     """Units of both initial values."""
     known = initial_values(study)
     return known[query.paths[0]].unit, known[query.paths[1]].unit
+
+
+class BasinView(CaseView[BasinQuestion, BasinQuery, Basin]):
+    """To which regime a case comes from each start of a grid of two initial values."""
+
+    about = BASIN
+    content = "The grid as JSON or CSV, or a picture."
+    answer = BasinData
+    lacks = N_("has no motion that settles")
+
+    def choose(self, study: Study, case: int, question: BasinQuestion) -> BasinQuery:
+        """The grid of initial values."""
+        ends = {"x": (question.x_from, question.x_to), "y": (question.y_from, question.y_to)}
+        return basin_query(study, case, question.x, question.y, ends, question.points)
+
+    def compute(self, study: Study, case: int, chosen: BasinQuery) -> Basin:
+        """Run the case from every start."""
+        return models.run_basin(study, case, chosen.paths, *chosen.axes())
+
+    def json(self, seen: Seen[BasinQuery, Basin]) -> BasinData:
+        """The grid as JSON data."""
+        return basin_json(seen.study, seen.chosen, seen.made)
+
+    def csv(self, seen: Seen[BasinQuery, Basin]) -> bytes:
+        """A row for each start: both initial values, the number of the regime, and its mean speed."""
+        across, along = np.meshgrid(seen.made.x, seen.made.y)
+        members, speeds = seen.made.members.reshape(-1), seen.made.values[:, seen.made.names.index(_SPEED)]
+        columns: list[list[Any]] = [
+            across.reshape(-1).tolist(),
+            along.reshape(-1).tolist(),
+            members.tolist(),
+            [float(speeds[member]) if member >= 0 else None for member in members],
+        ]
+        return table_csv([*seen.chosen.paths, "regime.number", _SPEED], columns)
+
+    def figure(self, seen: Seen[BasinQuery, Basin], columns: int = 2, rows: Any = None) -> Figure:
+        """Points in the plane of both initial values, a colour for each regime."""
+        return basin_figure(seen.made, seen.chosen.paths, units_of(seen.study, seen.chosen))

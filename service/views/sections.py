@@ -3,35 +3,32 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sprag.service.answers.sections import Sections
 from sprag.service.faults import choice_of, parameter_error
-from sprag.service.json_text import numbers, to_bytes
+from sprag.service.json_text import numbers
+from sprag.service.languages import N_
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.numbers import in_language
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
-from sprag.service.results.branches import range_of
 from sprag.service.results.directions import case_values
 from sprag.service.results.exports import table_csv
-from sprag.service.results.portraits import require_strobes
+from sprag.service.results.figures.sections import diagram_figure, section_figure
 from sprag.service.results.start_states import refuse_impossible
+from sprag.service.views.branch import range_of
+from sprag.service.views.case_view import CaseView, Seen
+from sprag.service.views.portrait import require_strobes
+from sprag.service.views.questions import DIAGRAM, SECTION, DiagramQuestion, SectionQuestion
 from sprag.worker.models.abilities import run_sections
 from sprag.worker.models.common import case_machine
-from sprag.worker.models.sections import Sampling
-from sprag.worker.models.starts import motion_of
+from sprag.worker.models.sections import CaseSections, Sampling
 
 if TYPE_CHECKING:
-    from sprag.service.answers.sections import Sections
-    from sprag.service.formats import Format
-    from sprag.worker.models.sections import CaseSections
+    from sprag.service.results.figures.figure import Figure
     from sprag.worker.study import Study
-
-#: Most values of the parameter of a diagram, and most strobes of each; most strobes of a section.
-MAX_VALUES: Final = 500
-MAX_STROBES: Final = 200
-MAX_SECTION: Final = 5000
 
 
 def phase_of(text: str | None) -> float:
@@ -59,7 +56,7 @@ def diagram_of(
     study : Study
     case : int
     along, ends :
-        As `branches.range_of` takes them.
+        As `range_of` takes them.
     phase : str, optional
     size : tuple of two int
         Values of the parameter, equally spaced, and strobes of each.
@@ -67,7 +64,7 @@ def diagram_of(
     Raises
     ------
     FaultError
-        As `branches.range_of`, and about ``phase``.
+        As `range_of`, and about ``phase``.
     """
     asked = range_of(study, case, along, *ends)
     own = case_machine(study, case)
@@ -93,16 +90,6 @@ def variables(study: Study) -> list[str]:
 def variable_of(study: Study, name: str | None) -> str:
     """The variable that the picture of a diagram shows, by default the shaft's speed; FaultError about ``y``."""
     return choice_of("y", name, variables(study)) if name and name.strip() else "shaft.speed"
-
-
-def sections_file(
-    study: Study, case: int, asked: Sampling, form: Format, section: bool, start: int | None = None
-) -> bytes:
-    """Settle the cases and write the file. For the computing process."""
-    made = run_sections(*motion_of(study, case, start), asked)
-    if form == "csv":
-        return sections_csv(made, asked, section=section)
-    return to_bytes(sections_json(made, study, case, asked, section=section))
 
 
 def sections_json(made: CaseSections, study: Study, case: int, asked: Sampling, *, section: bool) -> Sections:
@@ -135,3 +122,63 @@ def sections_csv(made: CaseSections, asked: Sampling, *, section: bool) -> bytes
         columns.insert(0, [float(asked.values[row]) for row in which])
     values = [made.values[:, :, column][kept].tolist() for column in range(len(made.names))]
     return table_csv(header, [*columns, *values])
+
+
+class DiagramView(CaseView[DiagramQuestion, tuple[Sampling, str], CaseSections]):
+    """A bifurcation diagram: strobes of settled motions along a parameter."""
+
+    about = DIAGRAM
+    content = "The strobes as JSON or CSV, or a picture."
+    answer = Sections
+    lacks = N_("has no motion that settles")
+
+    def choose(self, study: Study, case: int, question: DiagramQuestion) -> tuple[Sampling, str]:
+        """Where the motions are sampled, and the variable of a picture."""
+        ends, size = (question.low, question.high), (question.points, question.strobes)
+        asked = diagram_of(study, case, question.along, ends, question.phase, size)
+        return asked, variable_of(study, question.y)
+
+    def compute(self, study: Study, case: int, chosen: tuple[Sampling, str]) -> CaseSections:
+        """Settle the case for each value of the parameter."""
+        return run_sections(study, case, chosen[0])
+
+    def json(self, seen: Seen[tuple[Sampling, str], CaseSections]) -> Sections:
+        """The strobes as JSON data."""
+        return sections_json(seen.made, seen.study, seen.case, seen.chosen[0], section=False)
+
+    def csv(self, seen: Seen[tuple[Sampling, str], CaseSections]) -> bytes:
+        """A row for each strobe."""
+        return sections_csv(seen.made, seen.chosen[0], section=False)
+
+    def figure(self, seen: Seen[tuple[Sampling, str], CaseSections], columns: int = 2, rows: Any = None) -> Figure:
+        """One variable at the strobes over the parameter."""
+        return diagram_figure(seen.made, seen.study, *seen.chosen)
+
+
+class SectionView(CaseView[SectionQuestion, Sampling, CaseSections]):
+    """A Poincare section: strobes of the settled motion at a phase of the excitation."""
+
+    about = SECTION
+    content = "The strobes as JSON or CSV, or a picture."
+    answer = Sections
+    lacks = N_("has no motion that settles")
+
+    def choose(self, study: Study, case: int, question: SectionQuestion) -> Sampling:
+        """Where the motion is sampled."""
+        return section_of(study, case, question.phase, question.strobes)
+
+    def compute(self, study: Study, case: int, chosen: Sampling) -> CaseSections:
+        """Settle the case."""
+        return run_sections(study, case, chosen)
+
+    def json(self, seen: Seen[Sampling, CaseSections]) -> Sections:
+        """The strobes as JSON data."""
+        return sections_json(seen.made, seen.study, seen.case, seen.chosen, section=True)
+
+    def csv(self, seen: Seen[Sampling, CaseSections]) -> bytes:
+        """A row for each strobe."""
+        return sections_csv(seen.made, seen.chosen, section=True)
+
+    def figure(self, seen: Seen[Sampling, CaseSections], columns: int = 2, rows: Any = None) -> Figure:
+        """The strobes in the plane of angle and speed of each pendulum."""
+        return section_figure(seen.made, seen.study, seen.chosen)

@@ -6,23 +6,28 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from sprag.sentences import Amount, Sentence, Typed
+from sprag.service.answers.transients import Transient as TransientData
 from sprag.service.faults import FaultError, choice_of, parameter_error
-from sprag.service.json_text import to_bytes
+from sprag.service.languages import N_, _
 from sprag.service.reading.limits import span
 from sprag.service.reading.numbers import in_language
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
-from sprag.service.results.trajectories import timed_values, trajectory_csv
+from sprag.service.reading.wording import number, unit_text
+from sprag.service.results.figures.transient import transient_figure
+from sprag.service.views.case_view import CaseView, Said, Seen
+from sprag.service.views.questions import TRANSIENT, TransientQuestion
+from sprag.service.views.trajectory import timed_values, trajectory_csv
 from sprag.worker import models
 from sprag.worker.limits import MIN_TRAJECTORY_POINTS
-from sprag.worker.models.abilities import has_motor, has_transients, run_transient
-from sprag.worker.models.transients import KINDS, RESULTS, Course
+from sprag.worker.models.abilities import has_motor, has_transients, run_transient, shape_of_transients
+from sprag.worker.models.transients import KINDS, RESULTS, Course, Transient
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from sprag.service.answers.transients import Transient as TransientData
-    from sprag.service.formats import Format
-    from sprag.worker.models.transients import Kind, Transient
+    from sprag.service.results.figures.figure import Figure
+    from sprag.worker.models import KernelShape
+    from sprag.worker.models.transients import Kind
     from sprag.worker.study import Study
 
 #: The parameters of a transient besides its kind: unit, smallest and largest value.
@@ -103,12 +108,6 @@ def _value(name: str, text: str | None, end: float, motor: bool) -> float:
     return value
 
 
-def transient_file(study: Study, case: int, course: Course, points: int, form: Format) -> bytes:
-    """Compute the transient and write the file. For the computing process."""
-    made = run_transient(study, case, course, points)
-    return trajectory_csv(made.motion) if form == "csv" else to_bytes(transient_json(made, study, case, course))
-
-
 def row_headings(study: Study) -> list[str]:
     """The names of the values of ``case_rows``."""
     return ["case", *study.columns([0]), "outcome", *(name for name, *_ in RESULTS)]
@@ -147,3 +146,56 @@ def transient_json(made: Transient, study: Study, case: int, course: Course) -> 
         "values": values["values"],
         "ending": made.motion.ending,
     }
+
+
+def completed(course: Course) -> str:
+    """The outcome of a transient that comes to its end."""
+    return "stopped" if course.kind == "coasting" else "reached"
+
+
+class TransientView(CaseView[TransientQuestion, tuple[Course, int], Transient]):
+    """The run-up from rest of a machine shaft, a step of its load, or its coasting."""
+
+    about = TRANSIENT
+    content = "The transient as JSON, its values over time as CSV, or a picture."
+    answer = TransientData
+    lacks = N_("has no transients")
+
+    def choose(self, study: Study, case: int, question: TransientQuestion) -> tuple[Course, int]:
+        """The course of the transient, and the number of its times."""
+        given = {name: getattr(question, name) for name in _RANGES}
+        return course_of(study, case, question.kind, given), question.points
+
+    def shapes(self, study: Study) -> tuple[KernelShape, ...]:
+        """That of transients is compiled apart."""
+        return shape_of_transients(study), *super().shapes(study)
+
+    def compute(self, study: Study, case: int, chosen: tuple[Course, int]) -> Transient:
+        """Run the transient."""
+        return run_transient(study, case, *chosen)
+
+    def json(self, seen: Seen[tuple[Course, int], Transient]) -> TransientData:
+        """The transient as JSON data."""
+        return transient_json(seen.made, seen.study, seen.case, seen.chosen[0])
+
+    def csv(self, seen: Seen[tuple[Course, int], Transient]) -> bytes:
+        """Its values over time."""
+        return trajectory_csv(seen.made.motion)
+
+    def figure(self, seen: Seen[tuple[Course, int], Transient], columns: int = 2, rows: object = None) -> Figure:
+        """Speed, torques and energy over time."""
+        return transient_figure(seen.made)
+
+    def file_name(self, chosen: tuple[Course, int]) -> str:
+        """The name of its kind."""
+        return chosen[0].kind
+
+    def said(self, seen: Seen[tuple[Course, int], Transient]) -> Said:
+        """Its end and its cause, and the results."""
+        lines = [_("case {case}: {text}", case=seen.case, text=f"{seen.made.outcome}. {_(seen.made.cause)}")]
+        for name, unit, meaning in RESULTS:
+            if math.isfinite(seen.made.results[name]):
+                value = f"{number(seen.made.results[name], 6)} {unit_text(unit)}".rstrip()
+                lines.append(f"  {name} = {value}  ({_(meaning)})")
+        data = {"outcome": seen.made.outcome, "cause": seen.made.cause, "results": results_json(seen.made)}
+        return Said(lines, data, seen.made.outcome == completed(seen.chosen[0]))

@@ -11,28 +11,30 @@ from sprag.sentences import Amount, Sentence, Typed
 from sprag.service.answers import filled
 from sprag.service.answers.results import Branch, BranchContact
 from sprag.service.faults import choice_of, parameter_error
-from sprag.service.json_text import numbers, to_bytes
-from sprag.service.languages import N_
+from sprag.service.json_text import numbers
+from sprag.service.languages import N_, _
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.service.results.directions import case_values
 from sprag.service.results.exports import table_csv
-from sprag.service.results.portraits import require_strobes
+from sprag.service.results.figures.branch import OwnCases, branch_figure, special_text
 from sprag.service.results.selection import ends_of_range
+from sprag.service.views.case_view import CaseView, Said, Seen
+from sprag.service.views.portrait import require_strobes
+from sprag.service.views.questions import BRANCH, BranchQuestion
 from sprag.worker import models
 from sprag.worker.directions import SWEEP
 from sprag.worker.models.abilities import branch_results, run_branch
-from sprag.worker.models.branches import Along
+from sprag.worker.models.branches import Along, CaseBranch
 from sprag.worker.models.common import NO_PARAMETERS, case_machine
 from sprag.worker.models.parameters import allowed_values
-from sprag.worker.models.starts import motion_of
 from sprag.worker.models.vibration_drive.start_states import is_initial
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.formats import Format
-    from sprag.worker.models.branches import CaseBranch
+    from sprag.service.results.figures.figure import Figure
+    from sprag.service.storage.store import Store
     from sprag.worker.study import Study
 
 _OUTSIDE = N_("outside the range of the parameter")
@@ -163,12 +165,6 @@ def _value_in(unit: str) -> Sentence:
     return Sentence("a value in {unit}", unit=Typed(unit))
 
 
-def branch_file(study: Study, case: int, along: Along, form: Format, start: int | None = None) -> bytes:
-    """Follow the branch and write the file. For the computing process."""
-    made = run_branch(*motion_of(study, case, start), along)
-    return branch_csv(made, along) if form == "csv" else to_bytes(branch_json(made, study, case, along))
-
-
 def branch_json(made: CaseBranch, study: Study, case: int, along: Along) -> Branch:
     """The branch as JSON data."""
     return {
@@ -228,3 +224,57 @@ def neighbours(study: Study, case: int, along: Along) -> NDArray[np.int64]:
     return np.array(
         [study.case_number(list(map(int, chosen))) for chosen in itertools.product(*places)], dtype=np.int64
     )
+
+
+class BranchView(CaseView[BranchQuestion, tuple[Along, str], CaseBranch]):
+    """The periodic motions that the motion of a case becomes along a parameter."""
+
+    about = BRANCH
+    content = "The branch as JSON, its points as CSV, or a picture."
+    answer = Branch
+    lacks = N_("has no motion that settles")
+
+    def choose(self, study: Study, case: int, question: BranchQuestion) -> tuple[Along, str]:
+        """The parameter with its range, and the result of a picture."""
+        return along_of(study, case, question.along, question.low, question.high), result_of(study, question.y)
+
+    def compute(self, study: Study, case: int, chosen: tuple[Along, str]) -> CaseBranch:
+        """Follow the branch."""
+        return run_branch(study, case, chosen[0])
+
+    def json(self, seen: Seen[tuple[Along, str], CaseBranch]) -> Branch:
+        """The branch as JSON data."""
+        return branch_json(seen.made, seen.study, seen.case, seen.chosen[0])
+
+    def csv(self, seen: Seen[tuple[Along, str], CaseBranch]) -> bytes:
+        """The points of the branch."""
+        return branch_csv(seen.made, seen.chosen[0])
+
+    def rows(self, store: Store, study_id: str, study: Study, case: int, chosen: tuple[Along, str]) -> OwnCases:
+        """The finished cases of the study that differ from this one in the parameter only."""
+        along, result = chosen
+        cases = neighbours(study, case, along)
+        y = store.rows_for_cases(study_id, cases, [result]).values[result]
+        x = study.columns(cases)[along.paths[0]] if cases.size else np.empty(0)
+        kept = np.isfinite(y)
+        return OwnCases(x[kept], y[kept], cases[kept])
+
+    def figure(
+        self, seen: Seen[tuple[Along, str], CaseBranch], columns: int = 2, rows: OwnCases | None = None
+    ) -> Figure:
+        """One result over the parameter, with the study's own cases beside it."""
+        return branch_figure(seen.made, seen.study, *seen.chosen, rows)
+
+    def said(self, seen: Seen[tuple[Along, str], CaseBranch]) -> Said:
+        """How far the branch goes, and what is special on it."""
+        data = {"points": len(seen.made.parameters), "specials": len(seen.made.specials)}
+        if seen.made.note:
+            why = _("case {case} has no branch: {why}", case=seen.case, why=_(seen.made.note))
+            return Said([why], data, ok=False)
+        sentence = _(
+            "case {case}: {count} orbits of order {order}; from {first} to {last}",
+            case=seen.case, count=len(seen.made.parameters), order=seen.made.order,
+            first=_(seen.made.ends[0]), last=_(seen.made.ends[1]),
+        )  # fmt: skip
+        unit = unit_of(seen.study, seen.chosen[0].paths[0])
+        return Said([sentence, *(special_text(special, unit) for special in seen.made.specials)], data)

@@ -6,23 +6,25 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from sprag.sentences import Part, Sentence, Typed, joined
+from sprag.service.answers.results import AngleTable
+from sprag.service.answers.results import Trajectory as TrajectoryData
 from sprag.service.faults import parameter_error
-from sprag.service.json_text import numbers, to_bytes
-from sprag.service.languages import N_
+from sprag.service.json_text import numbers
+from sprag.service.languages import N_, _
 from sprag.service.reading.quantities import Units
 from sprag.service.reading.units import PERIOD_NAMES, QuantityError, parse_quantity, split_quantity, to_float
 from sprag.service.results.directions import case_values
 from sprag.service.results.exports import read_table
 from sprag.service.results.selection import ends_of_range
+from sprag.service.views.case_view import CaseView, Said, Seen
+from sprag.service.views.questions import TRAJECTORY, TrajectoryQuestion
 from sprag.worker import models
-from sprag.worker.models.starts import motion_of
+from sprag.worker.models import Trajectory
 
 if TYPE_CHECKING:
     from sprag.service.answers import Value
-    from sprag.service.answers.results import AngleTable, TimedValues, ValueAxis
-    from sprag.service.answers.results import Trajectory as TrajectoryData
-    from sprag.service.formats import Format
-    from sprag.worker.models import Extent, Trajectory
+    from sprag.service.answers.results import TimedValues, ValueAxis
+    from sprag.worker.models import Extent
     from sprag.worker.study import Study
 
 
@@ -68,19 +70,6 @@ _NOT_AFTER: Final = {
 _ALLOWED: Final = {"time": N_("a time in s or periods"), "angle": N_("an angle in rad, deg or cycles")}
 
 
-def trajectory_file(
-    study: Study, case: int, start: float, end: float, points: int, form: Format, which: int | None = None
-) -> bytes:
-    """Run the case again, from its start ``which``, and write the file.
-
-    For the computing process: large answers take seconds to write.
-    """
-    made = models.run_trajectory(*motion_of(study, case, which), start, end, points)
-    if form == "csv":
-        return trajectory_csv(made)
-    return to_bytes(trajectory_json(made, case, case_values(study, case)))
-
-
 def trajectory_json(made: Trajectory, case: int, parameters: dict[str, Value]) -> AngleTable | TrajectoryData:
     """The values as JSON data; ``parameters`` are the axis parameters of the case, SI."""
     values = timed_values(made)
@@ -116,3 +105,42 @@ def trajectory_csv(made: Trajectory, units: Units | None = None) -> bytes:
     columns |= {f"{name}.state": states for name, states in made.states.items()}
     si = {made.along: "s" if made.along == "time" else "rad", **dict(zip(made.names, made.units, strict=True))}
     return read_table(columns, si, units or Units())
+
+
+class TrajectoryView(CaseView[TrajectoryQuestion, tuple[float, float, int], Trajectory]):
+    """The motion of a case over time, or over the angle."""
+
+    about = TRAJECTORY
+    content = "Instantaneous values, as JSON or CSV."
+    answer = TrajectoryData | AngleTable
+
+    def choose(self, study: Study, case: int, question: TrajectoryQuestion) -> tuple[float, float, int]:
+        """First and last place, and their number."""
+        return *span(study, case, question.low, question.high), question.points
+
+    def compute(self, study: Study, case: int, chosen: tuple[float, float, int]) -> Trajectory:
+        """Run the case."""
+        return models.run_trajectory(study, case, *chosen)
+
+    def json(self, seen: Seen[tuple[float, float, int], Trajectory]) -> AngleTable | TrajectoryData:
+        """The values as JSON data."""
+        return trajectory_json(seen.made, seen.case, case_values(seen.study, seen.case))
+
+    def csv(self, seen: Seen[tuple[float, float, int], Trajectory]) -> bytes:
+        """A row for each place."""
+        return trajectory_csv(seen.made)
+
+    def file_name(self, chosen: tuple[float, float, int]) -> str:
+        """None: the file is the motion itself."""
+        return ""
+
+    def said(self, seen: Seen[tuple[float, float, int], Trajectory]) -> Said:
+        """How many places there are, or why there are none."""
+        way = _("{count} points in time") if seen.made.along == "time" else _("{count} points over the angle")
+        text = way.format(count=seen.chosen[2])
+        if not len(seen.made.values):
+            text = _("no points: {why}", why=_(models.ENDING_SENTENCES[seen.made.ending]))
+        sentence = _("case {case}: {text}", case=seen.case, text=f"{seen.made.ending}, {text}")
+        return Said(
+            [sentence], {"ending": seen.made.ending, "points": len(seen.made.values)}, seen.made.ending == models.OK
+        )

@@ -1,0 +1,196 @@
+"""``sprag trajectory``, ``branch``, ``basin`` and their like: the views of a case, run here or by a service.
+
+Their options are the settings of the views (`sprag.service.views.questions`); nothing else is loaded before one runs.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from inspect import Parameter, Signature
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from sprag.service.cli import completion
+from sprag.service.cli.console import ExitCode, WrongInputError, say, write_json, wrong_option
+from sprag.service.cli.file_formats import PICTURES, value_format
+from sprag.service.cli.files import output, read_study, require_cases, to_file, write_pieces
+from sprag.service.cli.names import study_of
+from sprag.service.cli.options import (
+    DEFAULT_SERVER,
+    CaseOption,
+    JsonFlag,
+    OutputFile,
+    PointsFile,
+    Server,
+    StartOption,
+    TableFiles,
+    Token,
+    ValueFormat,
+    ValueFormatOption,
+)
+from sprag.service.cli.remote import connection
+from sprag.service.faults import Fault, FaultError
+from sprag.service.languages import N_, _
+from sprag.service.views.questions import CASE_VIEWS, TRANSIENT, About, Asked, settings_of
+
+if TYPE_CHECKING:
+    from sprag.service.views.case_view import CaseView
+    from sprag.worker.models.transients import Course
+    from sprag.worker.study import Study
+
+SpecOrStudy = Annotated[
+    str,
+    typer.Argument(
+        metavar="SPEC|ID",
+        help="Study spec, JSON or TOML, which is run here (- reads standard input); or a study of a running service.",
+        autocompletion=completion.studies,
+    ),
+]
+_EachCase = Annotated[
+    bool, typer.Option("--all", help="A row for each case instead: its axes, the outcome and the results.")
+]
+
+
+def command(about: About) -> Callable[..., None]:
+    """The command of a view."""
+    asked = settings_of(about.question)
+    counted = any(one.option == "--points" for one in asked)  # which then are no file of cases
+
+    def run(
+        spec: str, case: int, file: str | None, form: ValueFormat | None, server: str, token: str | None, as_json: bool,
+        points_file: str | None = None, tables: list[str] | None = None, start: int | None = None, every: bool = False,
+        **settings: Any,
+    ) -> None:  # fmt: skip
+        written = value_format(form, file, as_json, PICTURES if about.pictures else ())
+        if _is_study(spec):
+            query = [(one.alias, str(settings[one.name])) for one in asked if settings[one.name] is not None]
+            query += [] if start is None else [("start", str(start))]
+            with connection(server, token) as client:
+                pieces = client.case_file(study_of(client, spec), case, about.name, [*query, ("format", written)])
+                write_pieces(file, pieces)
+            return
+        from sprag.service.views import cases
+
+        view = cases.CASE_VIEWS[about.name]
+        study = read_study(spec, points_file, files=tables).study
+        require_cases(study, [case])
+        if every and case:
+            raise wrong_option(
+                "--case", "conflict", N_("cannot be given with --all"), case, allowed=_("--case or --all")
+            )
+        with naming_options(study, asked, view.lacks):
+            _check_start(study, start)
+            chosen = view.choose(study, case, about.question(**settings))
+        if every:
+            _write_all(study, chosen[0], file, as_json=written == "json")
+        else:
+            _write(view, study, case, chosen, start, written, file, as_json)
+
+    options = [_parameter(one.name, _option(one), one.default) for one in asked]
+    last = [
+        _parameter("case", CaseOption, 0),
+        *([_parameter("start", StartOption, None)] if about.starts else ()),
+        *([_parameter("every", _EachCase, False)] if about is TRANSIENT else ()),
+        *([_parameter("points_file", PointsFile, None)] if not counted else ()),
+        _parameter("tables", TableFiles, None), _parameter("file", OutputFile, None),
+        _parameter("form", ValueFormatOption, None), _parameter("server", Server, DEFAULT_SERVER),
+        _parameter("token", Token, None), _parameter("as_json", JsonFlag, False),
+    ]  # fmt: skip
+    run.__doc__ = about.summary
+    run.__signature__ = Signature([_parameter("spec", SpecOrStudy, ...), *options, *last])  # type: ignore[attr-defined]
+    return run
+
+
+def _is_study(spec: str) -> bool:
+    """Whether an argument names a study of a service: it is no file, and looks like none."""
+    return spec != "-" and not Path(spec).exists() and not Path(spec).suffix and os.sep not in spec
+
+
+def _parameter(name: str, annotation: Any, default: Any) -> Parameter:
+    default = Parameter.empty if default is ... else default
+    return Parameter(name, Parameter.POSITIONAL_OR_KEYWORD, annotation=annotation, default=default)
+
+
+def _option(asked: Asked) -> Any:
+    """A setting as an option."""
+    setting = asked.setting
+    meaning = f"{setting.meaning[0].upper()}{setting.meaning[1:]}."
+    numbers = {"min": setting.low, "max": setting.high} if asked.type is int else {"metavar": setting.metavar}
+    return Annotated[asked.type, typer.Option(asked.option, help=meaning, **numbers)]
+
+
+def _check_start(study: Study, start: int | None) -> None:
+    from sprag.service.results.start_states import check_start
+
+    check_start(study, start)
+
+
+@contextmanager
+def naming_options(study: Study, asked: Sequence[Asked], lacks: str) -> Iterator[None]:
+    """Name the options of a command instead of the settings of a view; WrongInputError for each fault."""
+    try:
+        yield
+    except FaultError as error:
+        if not error.faults:
+            raise wrong_option("/model", "wrong-type", lacks, study.model, detail=error.detail) from error
+        options = {one.alias: one.option for one in asked}
+        faults = [
+            Fault(_named(options, fault), fault.code, fault.message, fault.value, fault.allowed)
+            for fault in error.faults
+        ]
+        raise WrongInputError("invalid-parameter", _("invalid option"), faults) from error
+
+
+def _named(options: dict[str, str], fault: Fault) -> str:
+    where = str(fault.where)
+    return options.get(where, f"--{where}".replace("_", "-"))
+
+
+def _write(
+    view: CaseView[Any, Any, Any], study: Study, case: int, chosen: Any, start: int | None, form: Any,
+    file: str | None, as_json: bool,
+) -> None:  # fmt: skip
+    """Compute the view of a case, write it, and say what it has."""
+    from sprag.service.views.case_view import drawn, see, written
+
+    with output(file) as write:
+        seen = see(study, case, view, chosen, start)
+        content = drawn(view, seen, form) if form in PICTURES else written(view, seen, form)
+        write(content if content.endswith(b"\n") or form in PICTURES else content + b"\n")
+    said = view.said(seen)
+    if said is None:
+        return
+    say(*said.lines)
+    if as_json and to_file(file):
+        write_json({"file": file, "case": case, **said.data})
+    if not said.ok:
+        raise typer.Exit(ExitCode.NOT_ALL_OK)
+
+
+def _write_all(study: Study, course: Course, file: str | None, *, as_json: bool) -> None:
+    """Write a row for each case; a line of JSON each, or CSV with a line of headings."""
+    from sprag.service.json_text import to_bytes
+    from sprag.service.results.exports.text import csv_lines
+    from sprag.service.views.transient import case_rows, completed, row_headings
+
+    ends: Counter[str] = Counter()
+    with output(file) as write:
+        if not as_json:
+            write(csv_lines([row_headings(study)]))
+        for row in case_rows(study, course):
+            ends[str(row["outcome"])] += 1
+            cells = ["" if value is None else value for value in row.values()]
+            write(to_bytes(row) + b"\n" if as_json else csv_lines([cells]))
+    text = ", ".join(f"{count} {outcome}" for outcome, count in ends.most_common())
+    say(_("{count} cases: {text}", count=study.cases, text=text))
+    if set(ends) - {completed(course)}:
+        raise typer.Exit(ExitCode.NOT_ALL_OK)
+
+
+#: The commands by name.
+COMMANDS = {about.name: command(about) for about in CASE_VIEWS}

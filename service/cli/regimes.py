@@ -1,0 +1,49 @@
+"""``sprag regimes``: the regimes to which one case comes from its many starts, run here."""
+
+from __future__ import annotations
+
+from sprag.service.cli.console import show_table, write_json, wrong_option
+from sprag.service.cli.files import read_study, require_cases
+from sprag.service.cli.options import CaseOption, JsonFlag, PointsFile, SpecFile
+from sprag.service.languages import N_, _
+
+#: What is shown of each regime.
+_SHOWN = (
+    "regime.number", "regime", "regime.order", "regime.share", "regime.share.low", "regime.share.high", "regime.start",
+    "shaft.speed.mean",
+)  # fmt: skip
+
+
+def regimes(spec: SpecFile, case: CaseOption = 0, points: PointsFile = None, as_json: JsonFlag = False) -> None:
+    """The regimes to which one case comes from its many starts, with their shares."""
+    import numpy as np
+
+    from sprag.worker.models import run_chunk, study_results
+    from sprag.worker.models.starts import has_starts
+    from sprag.worker.reuse import taken
+
+    study = read_study(spec, points).study
+    require_cases(study, [case])
+    if not has_starts(study.run):
+        raise wrong_option(
+            "/starts",
+            "required",
+            N_("is required"),
+            None,
+            allowed=_("`starts` in the spec of a settled study"),
+            detail=_("the study has no starts"),
+        )
+    done = run_chunk(taken(study, np.array([case])) if study.axes else study, 0, 1)
+    infos = {info.name: (place, info) for place, info in enumerate(study_results(study))}
+    further = () if done.further is None else done.further.values
+    rows = [
+        {name: infos[name][1].cell(float(row[infos[name][0]])) for name in _SHOWN} for row in (done.values[0], *further)
+    ]
+    if as_json:
+        write_json({"case": case, "ending": done.endings[0], "regimes": rows})
+        return
+    show_table(
+        _("Case {case}: {count} starts", case=case, count=study.run["starts"]["count"]),
+        [(name.removeprefix("regime."), name != "regime") for name in _SHOWN],
+        [tuple(row.values()) for row in rows],
+    )

@@ -1,0 +1,74 @@
+"""The figures of the views of a case: an address for each of `sprag.service.views.cases` that is a picture."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from starlette.responses import Response
+
+from sprag.service.http.asked import with_question
+from sprag.service.http.context import CaseNumber, StartNumber, StudyId
+from sprag.service.http.drawing import Columns, unchanging
+from sprag.service.http.reading import FileChoice
+from sprag.service.http.respond import json_response
+from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
+from sprag.service.http.web.figures.plotly import Data, plotly_figure
+from sprag.service.http.work import Attended, Work
+from sprag.service.jobs.reading import reading_of
+from sprag.service.results.figures.read import read_figure
+from sprag.service.views.case_view import see
+from sprag.service.views.cases import CASE_VIEWS
+
+if TYPE_CHECKING:
+    from sprag.service.reading.reader import Choice, Reading
+    from sprag.service.views.case_view import CaseView
+    from sprag.worker.study import Study
+
+router = page_router()
+
+
+def case_figure(
+    study: Study,
+    case: int,
+    view: CaseView[Any, Any, Any],
+    chosen: Any,
+    start: int | None,
+    columns: int,
+    rows: Any,
+    reading: Reading,
+) -> Data:
+    """Compute the view of a case and draw it for the browser. For a process that computes."""
+    figure = view.figure(see(study, case, view, chosen, start), columns, rows)
+    return plotly_figure(read_figure(figure, reading))
+
+
+def _add(view: CaseView[Any, Any, Any]) -> None:
+    async def drawn(
+        *, work: Work, study_id: str, case: int, choice: Choice, columns: int | None = None, which: int | None = None,
+        **settings: Any,
+    ) -> Response:  # fmt: skip
+        look = partial(view.choose, case=case, question=view.about.question(**settings))
+        study, asked = await work.case_of(study_id, case, look, which)
+        rows = await in_thread(view.rows, work.context.store, study_id, study, case, asked)
+
+        async def make() -> Response:
+            for shape in view.shapes(study):
+                await work.load(shape)
+            reading = await in_thread(reading_of, work.context.store, study_id, choice)
+            shown = study, case, view, asked, which, columns or 2, rows, reading
+            return json_response(await work.compute(case_figure, *shown))
+
+        return await (make() if rows is not None else unchanging(work, study_id, make))
+
+    drawn.__doc__ = view.__doc__
+    before = {"work": Attended, "study_id": StudyId, "case": CaseNumber, "choice": FileChoice}
+    after = {"columns": Columns | None, **({"which": StartNumber} if view.about.starts else {})}
+    with_question(drawn, view.about.question, before, after)
+    router.get(f"/studies/{{study_id:study}}/cases/{{case:case}}/{view.about.name}/figure")(drawn)
+
+
+for _view in CASE_VIEWS.values():
+    if _view.about.pictures:
+        _add(_view)

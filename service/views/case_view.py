@@ -1,0 +1,142 @@
+"""The views of a case: what each is asked, who has it, how it is computed, and how it is written and drawn.
+
+One description serves the address of the API, the figure of a page, and the command: see
+`sprag.service.http.api.case_views`, `sprag.service.http.web.figures.cases` and `sprag.service.cli.case_views`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypeVar
+
+from sprag.service.json_text import to_bytes
+from sprag.service.reading.reader import Reading
+from sprag.service.results.figures.read import read_figure
+from sprag.service.results.pictures.curves import draw_figure
+from sprag.worker import models
+from sprag.worker.models.starts import motion_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sprag.service.results.figures.figure import Figure
+    from sprag.service.results.pictures.curves import Picture
+    from sprag.service.storage.store import Store
+    from sprag.service.views.questions import About
+    from sprag.worker.models import KernelShape
+    from sprag.worker.study import Study
+
+Question = TypeVar("Question")
+Chosen = TypeVar("Chosen")
+Made = TypeVar("Made")
+
+
+@dataclass(frozen=True, slots=True)
+class Seen(Generic[Chosen, Made]):
+    """A view of a case: of which study and case, what was chosen, and what was computed."""
+
+    study: Study
+    case: int
+    chosen: Chosen
+    made: Made
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What a command says of a view that it has written.
+
+    Attributes
+    ----------
+    lines : sequence of str
+        Sentences in the language of the task.
+    data : mapping
+        The same for programs that asked for a file.
+    ok : bool
+        Whether the motion came to its end.
+    """
+
+    lines: Sequence[str]
+    data: Mapping[str, Any]
+    ok: bool = True
+
+
+class CaseView(ABC, Generic[Question, Chosen, Made]):
+    """A view of a case.
+
+    Attributes
+    ----------
+    about : About
+        Its name, its question, and what it is.
+    content : str
+        What its files have, a sentence for the API.
+    answer : type
+        The shape of its JSON.
+    lacks : str
+        What is said of a machine that has no such view.
+    """
+
+    about: ClassVar[About]
+    content: ClassVar[str]
+    answer: ClassVar[Any]
+    lacks: ClassVar[str] = ""
+
+    @abstractmethod
+    def choose(self, study: Study, case: int, question: Question) -> Chosen:
+        """What a question means for a case; FaultError about a setting, or where the case has no such view."""
+
+    def shapes(self, study: Study) -> tuple[KernelShape, ...]:
+        """The kernels that the computation needs."""
+        return (models.shape_of(study),)
+
+    @abstractmethod
+    def compute(self, study: Study, case: int, chosen: Chosen) -> Made:
+        """Run the case for the view. In a process that computes."""
+
+    @abstractmethod
+    def json(self, seen: Seen[Chosen, Made]) -> Mapping[str, Any]:
+        """The view as JSON data."""
+
+    @abstractmethod
+    def csv(self, seen: Seen[Chosen, Made]) -> bytes:
+        """The view as a table."""
+
+    def rows(self, store: Store, study_id: str, study: Study, case: int, chosen: Chosen) -> Any:
+        """What its figure shows of the rows of the study; None: nothing, so that it never changes."""
+        return None
+
+    def figure(self, seen: Seen[Chosen, Made], columns: int = 2, rows: Any = None) -> Figure:
+        """The view as a described figure, with so many panels in a row."""
+        raise NotImplementedError  # those without pictures
+
+    def file_name(self, chosen: Chosen) -> str:
+        """The last part of the name of its file."""
+        return self.about.name
+
+    def said(self, seen: Seen[Chosen, Made]) -> Said | None:
+        """What a command says beside the file; None: nothing."""
+        return None
+
+
+def see(study: Study, case: int, view: CaseView[Any, Any, Any], chosen: Any, start: int | None) -> Seen[Any, Any]:
+    """Compute the view of a case, or of one of its starts. For a process that computes."""
+    return Seen(study, case, chosen, view.compute(*motion_of(study, case, start), chosen))
+
+
+def written(view: CaseView[Any, Any, Any], seen: Seen[Any, Any], form: Literal["json", "csv"]) -> bytes:
+    """The view in one of its two forms for programs."""
+    return view.csv(seen) if form == "csv" else to_bytes(view.json(seen))
+
+
+def case_file(
+    study: Study, case: int, view: CaseView[Any, Any, Any], chosen: Any, form: Literal["json", "csv"], start: int | None
+) -> bytes:
+    """Compute the view of a case and write it there, because large ones take seconds to write."""
+    return written(view, see(study, case, view, chosen, start), form)
+
+
+def drawn(view: CaseView[Any, Any, Any], seen: Seen[Any, Any], form: Picture) -> bytes:
+    """The view as a picture, in SI units."""
+    figure = read_figure(view.figure(seen), Reading(seen.study.model))
+    return draw_figure(figure, f"{seen.study.name}, case {seen.case}", form)

@@ -1,0 +1,75 @@
+"""How one case approaches its motion, strobe by strobe, and its orbit: the document, and its tables as CSV."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from sprag.service.answers.results import Portrait as PortraitData
+from sprag.service.faults import FaultError, choice_of
+from sprag.service.languages import N_
+from sprag.service.results.directions import case_values
+from sprag.service.results.figures.portrait import portrait_figure
+from sprag.service.views.case_view import CaseView, Seen
+from sprag.service.views.questions import STROBES, StrobesQuestion, choices_of
+from sprag.service.views.trajectory import timed_values, trajectory_csv
+from sprag.worker import models
+from sprag.worker.models import Portrait
+
+if TYPE_CHECKING:
+    from sprag.service.answers import Value
+    from sprag.service.results.figures.figure import Figure
+    from sprag.worker.study import Study
+
+
+def require_strobes(study: Study) -> None:
+    """Raise FaultError where the study's machine has no strobes."""
+    if not models.has_strobes(study):
+        message = f"A machine of model {study.model} has no excitation, so it has no strobes."
+        raise FaultError("not-found", message)
+
+
+def portrait_json(made: Portrait, case: int, parameters: dict[str, Value]) -> PortraitData:
+    """Strobes and orbit as JSON data; ``parameters`` are the axis parameters of the case, SI."""
+    return {
+        "case": case,
+        "parameters": parameters,
+        "regime": made.regime or None,
+        "order": made.order or None,
+        "strobes": timed_values(made.strobes),
+        "orbit": timed_values(made.orbit) if made.orbit.times.size else None,
+        "ending": made.ending,
+    }
+
+
+class StrobesView(CaseView[StrobesQuestion, str, Portrait]):
+    """How a case approaches its motion, once per excitation period, and its orbit."""
+
+    about = STROBES
+    content = "Strobes and orbit as JSON, one of them as CSV, or a picture."
+    answer = PortraitData
+    lacks = N_("has no motion that settles")
+
+    def choose(self, study: Study, case: int, question: StrobesQuestion) -> str:
+        """The table of a CSV file."""
+        require_strobes(study)
+        return choice_of("table", question.table, choices_of(StrobesQuestion, "table"))
+
+    def compute(self, study: Study, case: int, chosen: str) -> Portrait:
+        """Run the case."""
+        return models.run_portrait(study, case)
+
+    def json(self, seen: Seen[str, Portrait]) -> PortraitData:
+        """Strobes and orbit as JSON data."""
+        return portrait_json(seen.made, seen.case, case_values(seen.study, seen.case))
+
+    def csv(self, seen: Seen[str, Portrait]) -> bytes:
+        """One of the tables."""
+        return trajectory_csv(seen.made.strobes if seen.chosen == "strobes" else seen.made.orbit)
+
+    def figure(self, seen: Seen[str, Portrait], columns: int = 2, rows: Any = None) -> Figure:
+        """Orbit and strobes, beside the strobes period by period."""
+        return portrait_figure(seen.made, models.presentation_of(seen.study), columns)
+
+    def file_name(self, chosen: str) -> str:
+        """The name of the table."""
+        return chosen

@@ -1,0 +1,373 @@
+"""What a view is asked: its settings with their meaning, limits and examples, from which every front makes its own.
+
+The fields of a question are the parameters of the view's address, under their `Setting.alias` where they have one, and
+the options of its command. Loading this module loads no engine: the commands read their options from here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, fields
+from typing import Annotated, Any, Final, TypeVar, get_type_hints
+
+from sprag.service.faults import parameter_error
+from sprag.service.reading.limits import span
+from sprag.worker.limits import (
+    MAX_BASIN_POINTS,
+    MAX_DIAGRAM_STROBES,
+    MAX_DIAGRAM_VALUES,
+    MAX_SECTION_STROBES,
+    MAX_TRAJECTORY_POINTS,
+    MIN_TRAJECTORY_POINTS,
+)
+
+Question = TypeVar("Question")
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """One setting of a question.
+
+    Attributes
+    ----------
+    meaning : str
+        What it is, in half a sentence.
+    alias : str
+        Its name in addresses, where that is no name of Python.
+    examples : tuple
+        Values that work for most studies.
+    low, high : int or None
+        Its range, both ends included.
+    longest : int or None
+        Most characters.
+    choices : tuple of str
+        The only values.
+    option : str
+        Name of its option, where another one has the name of the setting.
+    metavar : str
+        What stands for the value in the help of a command.
+    """
+
+    meaning: str
+    alias: str = ""
+    examples: tuple[Any, ...] = ()
+    low: int | None = None
+    high: int | None = None
+    longest: int | None = None
+    choices: tuple[str, ...] = ()
+    option: str = ""
+    metavar: str = "VALUE"
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A setting as the fronts make it: its name, its type, its default (``...``: required), and its description."""
+
+    name: str
+    type: Any
+    default: Any
+    setting: Setting
+
+    @property
+    def alias(self) -> str:
+        """Its name in addresses."""
+        return self.setting.alias or self.name
+
+    @property
+    def option(self) -> str:
+        """The name of its option."""
+        return self.setting.option or f"--{self.alias.replace('_', '-')}"
+
+
+def settings_of(question: type) -> tuple[Asked, ...]:
+    """The settings of a question in their order."""
+    hints = get_type_hints(question, include_extras=True)
+    return tuple(
+        Asked(
+            field.name,
+            hints[field.name].__origin__,
+            ... if field.default is MISSING else field.default,
+            hints[field.name].__metadata__[0],
+        )
+        for field in fields(question)
+    )
+
+
+def choices_of(question: type, name: str) -> tuple[str, ...]:
+    """The only values of a setting."""
+    return next(asked.setting.choices for asked in settings_of(question) if asked.name == name)
+
+
+def question_of(question: type[Question], texts: Mapping[str, str]) -> Question:
+    """A question with the texts of a form, by alias; blank ones are not given. FaultError about a whole number."""
+    given = {asked: texts[asked.alias].strip() for asked in settings_of(question) if asked.alias in texts}
+    return question(**{asked.name: _value(asked, text) for asked, text in given.items() if text})
+
+
+def _value(asked: Asked, text: str) -> str | int:
+    if asked.type is not int:
+        return text
+    low, high = asked.setting.low or 0, asked.setting.high or 0
+    if not (text.isdecimal() and text.isascii() and low <= int(text) <= high):
+        raise parameter_error(asked.alias, "out-of-range", "must be a whole number", text, span(low, high))
+    return int(text)
+
+
+Along = Annotated[
+    str,
+    Setting(
+        "path of the parameter, or several joined by commas that have one value",
+        examples=("shaft.load",),
+        longest=400,
+        metavar="PATH",
+    ),
+]
+Low = Annotated[
+    str | None, Setting("start of the range, SI or with a unit; by default the smallest on its axis", alias="from")
+]
+High = Annotated[str | None, Setting("end of the range, likewise; by default the largest on its axis", alias="to")]
+Phase = Annotated[
+    str | None,
+    Setting(
+        "phase of the excitation at the strobes, rad or with a unit; by default 0",
+        examples=("90 deg",),
+        metavar="ANGLE",
+    ),
+]
+End = Annotated[str | None, Setting("SI or with a unit; by default as in the study's starts", longest=80)]
+
+
+@dataclass(frozen=True, slots=True)
+class TrajectoryQuestion:
+    """Which part of a motion, and at how many places."""
+
+    low: Annotated[
+        str | None,
+        Setting(
+            "first time, in s or with a unit (s, periods), or angle, in rad or with a unit; by default 0, of a settled "
+            "study `max_period` periods before the end",
+            alias="from",
+            examples=("0",),
+            metavar="TIME",
+        ),
+    ] = None
+    high: Annotated[
+        str | None,
+        Setting(
+            "last time or angle, likewise; by default the end of the run (`at_most` of a settled study) or cycle",
+            alias="to",
+            examples=("2.5 periods",),
+            metavar="TIME",
+        ),
+    ] = None
+    points: Annotated[
+        int,
+        Setting(
+            "equally spaced times or angles",
+            examples=(50,),
+            low=MIN_TRAJECTORY_POINTS,
+            high=MAX_TRAJECTORY_POINTS,
+            metavar="N",
+        ),
+    ] = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class EngagementsQuestion:
+    """Which table."""
+
+    table: Annotated[
+        str,
+        Setting("the table of a CSV file; JSON has both", choices=("engagements", "periods"), metavar="TABLE"),
+    ] = "engagements"
+
+
+@dataclass(frozen=True, slots=True)
+class StrobesQuestion:
+    """Which table."""
+
+    table: Annotated[
+        str,
+        Setting("the table of a CSV file; JSON and pictures have both", choices=("strobes", "orbit"), metavar="TABLE"),
+    ] = "strobes"
+
+
+@dataclass(frozen=True, slots=True)
+class BranchQuestion:
+    """Along which parameter, how far, and the result of a picture."""
+
+    along: Along
+    low: Low = None
+    high: High = None
+    y: Annotated[str | None, Setting("the result that a picture shows", metavar="RESULT")] = None
+
+
+@dataclass(frozen=True, slots=True)
+class DiagramQuestion:
+    """Along which parameter, how far, at which phase, how many values and strobes, and the variable of a picture."""
+
+    along: Along
+    low: Low = None
+    high: High = None
+    phase: Phase = None
+    points: Annotated[
+        int,
+        Setting(
+            "equally spaced values of the parameter",
+            examples=(20,),
+            low=2,
+            high=MAX_DIAGRAM_VALUES,
+            option="--values",
+            metavar="N",
+        ),
+    ] = 200
+    strobes: Annotated[
+        int, Setting("most strobes of each motion", examples=(16,), low=1, high=MAX_DIAGRAM_STROBES, metavar="N")
+    ] = 64
+    y: Annotated[str | None, Setting("the variable that a picture shows", metavar="VARIABLE")] = None
+
+
+@dataclass(frozen=True, slots=True)
+class SectionQuestion:
+    """At which phase, and how many strobes."""
+
+    phase: Phase = None
+    strobes: Annotated[int, Setting("most strobes", examples=(50,), low=1, high=MAX_SECTION_STROBES, metavar="N")] = (
+        1000
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class BasinQuestion:
+    """Which two initial values, from where to where, and how many of each."""
+
+    x: Annotated[
+        str | None, Setting("initial value across; by default the first one of the study's starts", metavar="PATH")
+    ] = None
+    y: Annotated[str | None, Setting("the other initial value; by default the next one", metavar="PATH")] = None
+    x_from: End = None
+    x_to: End = None
+    y_from: End = None
+    y_to: End = None
+    points: Annotated[
+        int,
+        Setting("values of each", examples=(2,), low=2, high=MAX_BASIN_POINTS, option="--grid", metavar="N"),
+    ] = 20
+
+
+@dataclass(frozen=True, slots=True)
+class TransientQuestion:
+    """Which transient, with which load, from which angle, and how far."""
+
+    kind: Annotated[
+        str,
+        Setting(
+            "which transient it is", examples=("run-up",), choices=("run-up", "load-step", "coasting"), metavar="KIND"
+        ),
+    ]
+    load: Annotated[
+        str | None,
+        Setting("factor on the torque of all operations during it; by default 1", examples=("1.5",), metavar="FACTOR"),
+    ] = None
+    angle: Annotated[
+        str | None,
+        Setting("angle of the shaft at which it begins, rad or with a unit; by default 0", metavar="ANGLE"),
+    ] = None
+    torque: Annotated[
+        str | None,
+        Setting("constant driving torque of a run-up, N*m or with a unit; required without a motor", metavar="TORQUE"),
+    ] = None
+    within: Annotated[
+        str | None,
+        Setting(
+            "share of the first difference in speed from the steady cycle at which that counts as reached; by default "
+            "0.01 with a motor, otherwise 0",
+            metavar="SHARE",
+        ),
+    ] = None
+    revolutions: Annotated[str | None, Setting("most revolutions that are computed; by default 1000", metavar="N")] = (
+        None
+    )
+    points: Annotated[
+        int,
+        Setting(
+            "equally spaced times",
+            examples=(50,),
+            low=MIN_TRAJECTORY_POINTS,
+            high=MAX_TRAJECTORY_POINTS,
+            metavar="N",
+        ),
+    ] = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """A view of a case as every front knows it, without the engine.
+
+    Attributes
+    ----------
+    name : str
+        The last part of its address, and its command.
+    question : type
+        What it is asked.
+    summary : str
+        What it is, a sentence.
+    pictures : bool
+        Whether it is a picture as well; otherwise only JSON and CSV.
+    starts : bool
+        Whether it is that of one start where the case has several.
+    """
+
+    name: str
+    question: type
+    summary: str
+    pictures: bool = True
+    starts: bool = True
+
+
+TRAJECTORY: Final = About(
+    "trajectory",
+    TrajectoryQuestion,
+    "Compute every variable, torque, power and state of one case over time, or over the angle.",
+    pictures=False,
+)
+ENGAGEMENTS: Final = About(
+    "engagements",
+    EngagementsQuestion,
+    "Compute every engagement of the clutches of one case, and the means of its periods.",
+    pictures=False,
+)
+STROBES: Final = About(
+    "strobes",
+    StrobesQuestion,
+    "Compute the state of one case at the end of each excitation period, and its orbit.",
+)
+BRANCH: Final = About(
+    "branch",
+    BranchQuestion,
+    "Follow the periodic motion of one case along a parameter: stable and unstable orbits, folds, doublings, grazings.",
+)
+DIAGRAM: Final = About(
+    "diagram",
+    DiagramQuestion,
+    "Compute a bifurcation diagram: the strobes of the settled motions of one case along a parameter.",
+)
+SECTION: Final = About(
+    "section",
+    SectionQuestion,
+    "Compute a Poincare section: the strobes of the settled motion of one case at a phase of the excitation.",
+)
+BASIN: Final = About(
+    "basin",
+    BasinQuestion,
+    "Compute a basin: the regime to which one case comes from each start of a grid of two initial values.",
+    starts=False,
+)
+TRANSIENT: Final = About(
+    "transient",
+    TransientQuestion,
+    "Compute the run-up from rest of a machine shaft, a step of its load, or its coasting, over time.",
+    starts=False,
+)
+#: Every view of a case, in the order of the API.
+CASE_VIEWS: Final = (TRAJECTORY, ENGAGEMENTS, STROBES, BRANCH, DIAGRAM, SECTION, BASIN, TRANSIENT)
