@@ -14,12 +14,13 @@ unexport PYTHONDONTWRITEBYTECODE
 
 CHECKS := mypy ruff imports reference catalogues collect
 
-.PHONY: help demo test check serve clean $(CHECKS)
+.PHONY: help demo test check serve docs clean $(CHECKS)
 
 help:
 	@echo "make demo [EXIT=1]   set up, run the example study over HTTP, show its curve, then serve (or stop)"
 	@echo "make test            set up and run every check and test"
 	@echo "make serve           set up and run the service"
+	@echo "make docs            build the documentation as a site, which the service shows"
 	@echo "make clean           remove the environment and what was built"
 
 demo: $(RUNTIME)
@@ -27,6 +28,9 @@ demo: $(RUNTIME)
 
 serve: $(RUNTIME)
 	@$(BIN)/sprag serve
+
+docs: $(DEV)
+	$(BIN)/python -m docs.site
 
 # The tests of one file share processes and servers, so they stay together, as do some files (TOGETHER in tests/conftest.py).
 # Many wait for processes of the program, so that three run side by side even on two cores.
@@ -89,4 +93,4 @@ $(DEV): $(SOURCES)
 	@touch $(RUNTIME) $@
 
 clean:
-	rm -rf $(VENV) build dist demo *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) build dist demo service/http/web/site *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -124,8 +124,8 @@ def test_the_presets_are_described_with_their_sources() -> None:
         assert row.endswith(f"| {about.shows} | {about.values} |")
 
 
-def test_the_waiting_loop_of_the_readme_ends_in_every_state_that_a_study_does_not_leave_by_itself() -> None:
-    (pattern,) = re.findall(r"grep -qE '(.+?)'", (ROOT / "README.md").read_text())
+def test_the_waiting_loop_of_the_first_study_ends_in_every_state_that_a_study_does_not_leave_by_itself() -> None:
+    (pattern,) = re.findall(r"grep -qE '(.+?)'", (ROOT / "docs" / "first-study.md").read_text())
     for state in StudyState:
         stays = state.terminal or state is StudyState.PAUSED
         assert (re.search(pattern, f'{{"id":"x","state":"{state}","model":"m"}}') is not None) is stays, state

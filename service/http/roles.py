@@ -51,7 +51,8 @@ _VIEWER: Final = (
     "GET /api/v1/components", "GET /components", "GET /api/v1/views",
     "GET /api/v1/models", "GET /api/v1/models/{name}", "GET /api/v1/presets", "GET /api/v1/presets/{name}",
     "GET /api/v1/workers", "GET /workers",
-    "GET /metrics", "GET /openapi.json", "GET /docs", "GET /docs/{name}", "GET /problems/{slug}",
+    "GET /metrics", "GET /openapi.json", "GET /problems/{slug}",
+    "GET /docs", "GET /docs/{name}", "GET /docs/site", "GET /docs/site/{name}",
     "GET /live/{name}", "GET /units", "POST /units",  # a cookie of the reader's own
     "GET /", "GET /new", "POST /new/check", "GET /calibrate",
     f"GET {_PAGE}",

@@ -1,4 +1,4 @@
-"""The demonstration, and every command of the README's walk, run as it stands there against a real service."""
+"""The demonstration, and the commands of the first study and the README, run as they stand there on a real service."""
 
 from __future__ import annotations
 
@@ -20,14 +20,17 @@ from benchmarks.faults.harness import kill_family
 from tests.acceptance.processes import EXAMPLES, INTERRUPTIBLE, ROOT, SECONDS, environment
 
 README = (ROOT / "README.md").read_text()
+FIRST_STUDY = (ROOT / "docs" / "first-study.md").read_text()
 PRINTED = "http://127.0.0.1:8000"
 
 
 def blocks() -> list[str]:
-    """The shell commands of the page after the two that set everything up."""
-    found = re.findall(r"^```sh\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
-    assert found[0].split() == ["make", "demo", *found[0].split()[2:]]
-    return found[1:]
+    """The shell commands of both pages after the two that set everything up."""
+    walk, (setting_up, *others) = (
+        re.findall(r"^```sh\n(.*?)^```$", page, re.DOTALL | re.MULTILINE) for page in (FIRST_STUDY, README)
+    )
+    assert setting_up.split() == ["make", "demo", *setting_up.split()[2:]]
+    return [*walk, *others]
 
 
 def tools(folder: Path) -> str:
@@ -78,13 +81,14 @@ def demonstration(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Demonstr
     kill_family(process)
 
 
-def test_every_command_of_the_readme_does_what_it_says(tmp_path: Path, demonstration: Demonstration) -> None:
+def test_every_command_of_the_two_pages_does_what_it_says(tmp_path: Path, demonstration: Demonstration) -> None:
     """The demonstration has run the example study already, and its rows are taken from its database."""
     shutil.copytree(EXAMPLES, tmp_path / "examples")
     path = tools(tmp_path)
     script = "".join(blocks())
     assert PRINTED in script
-    assert "$ .venv/bin/sprag serve\n" in README
+    for page in (FIRST_STUDY, README):
+        assert "$ .venv/bin/sprag serve\n" in page
     done = subprocess.run(
         ["/bin/sh", "-eu", "-c", script.replace(PRINTED, demonstration.address)],
         cwd=tmp_path,

@@ -17,6 +17,8 @@ from sprag.service.http.web.manual import PAGES as MANUAL_PAGES
 from tests.acceptance.processes import ROOT, environment
 
 PACKAGED = ("sprag/", "engine/", "worker/", "service/", "migrations/")
+#: Files for those of the site of the documentation, which `make docs` builds before a release is packed.
+SITE = ("index.html", "adr/0001-one.html", "figures/pages/new.png", "assets/main.1a2b.min.css", "style-hash.txt")
 STUDY = {
     "sprag": 1,
     "model": "vibration-drive",
@@ -50,6 +52,10 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 target.symlink_to((ROOT / name).readlink())
             else:
                 target.write_bytes((ROOT / name).read_bytes())
+    for name in SITE:
+        target = folder / "sources" / "service" / "http" / "web" / "site" / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.touch()
     pack = f"from setuptools.build_meta import build_sdist; build_sdist({str(folder)!r})"
     done = run(sys.executable, "-c", pack, cwd=folder / "sources")
     assert done.returncode == 0, done.stderr
@@ -126,6 +132,7 @@ def test_the_wheel_has_what_the_program_reads(wheel: Path) -> None:
     assert wanted <= names, sorted(wanted - names)
     pages = {f"sprag/service/http/web/manual/{name}.md" for name in MANUAL_PAGES}
     assert pages <= names, sorted(pages - names)
+    assert {f"sprag/service/http/web/site/{name}" for name in SITE} <= names
     manual = {name for name in names if ".data/data/share/man/man1/" in name}
     assert {Path(name).name for name in manual} == {page.name for page in (ROOT / "docs" / "man").iterdir()}
     assert {name.partition("/")[0] for name in names - manual if ".dist-info/" not in name} == {"sprag"}

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from fastapi import Request
-from starlette.responses import Response
+from starlette.responses import RedirectResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from sprag.sentences import Sentence
+from sprag.service.http.prefix import here
 from sprag.service.http.problems import PROBLEM_TYPES, ApiError
 from sprag.service.http.respond import entity_tag, json_response, not_modified
 from sprag.service.http.routers import page_router
@@ -33,7 +35,25 @@ _KEPT: Final = "max-age=3600"
 @router.get("/docs")
 async def docs(request: Request) -> Response:
     """The interface, operation by operation."""
-    return page("docs.html", groups=apidoc.groups(request.app.openapi()), problems=PROBLEM_TYPES.values())
+    return page(
+        "docs.html", groups=apidoc.groups(request.app.openapi()), problems=PROBLEM_TYPES.values(), site=_SITE.is_dir()
+    )
+
+
+@router.get("/docs/site")
+async def site_home() -> Response:
+    """The way to the first page of the documentation's site, whose links are relative."""
+    return RedirectResponse(here("/docs/site/"), 303)
+
+
+@router.get("/docs/site/{name:path}")
+async def site(name: str) -> Response:
+    """A file of the documentation's site."""
+    if not _SITE.is_dir():
+        raise ApiError(
+            "not-found", Sentence("This installation has no site of the documentation; `make docs` builds it.")
+        )
+    return _FileAnswer(_SITE_FILES, name or "index.html")
 
 
 @router.get("/docs/{name}")
@@ -41,7 +61,7 @@ async def manual(name: str) -> Response:
     """A page of the guide or the theory."""
     if name not in PAGES:
         raise ApiError("not-found", Sentence("Unknown page; known pages: {pages}.", pages=", ".join(PAGES)))
-    return await in_thread(lambda: page("manual.html", page=manual_page(name), titles=titles()))
+    return await in_thread(lambda: page("manual.html", page=manual_page(name), titles=titles(), site=_SITE.is_dir()))
 
 
 @router.get("/openapi.json")
@@ -59,12 +79,21 @@ async def problem(slug: str) -> Response:
     return page("problem.html", problem=PROBLEM_TYPES[slug])
 
 
+class _FileAnswer(Response):
+    """The file of a name."""
+
+    def __init__(self, files: StaticFiles, name: str) -> None:
+        super().__init__()
+        self._files, self._name = files, name
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send the file, or 404 where there is none."""
+        answer = await self._files.get_response(self._name, scope)
+        await answer(scope, receive, send)
+
+
 class _Files(StaticFiles):
     """Style sheet, icon and scripts of all pages."""
-
-    def get_path(self, scope: Scope) -> str:
-        """The name in the URL."""
-        return str(scope["path_params"]["name"])
 
     def file_response(self, *args: Any, **options: Any) -> Response:
         """The file; it changes only with the program."""
@@ -76,15 +105,28 @@ class _Files(StaticFiles):
 _FILES: Final = _Files(packages=[("sprag.service.http.web", "static")])
 
 
-class _FileAnswer(Response):
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        await _FILES(scope, receive, send)
+class _SiteFiles(StaticFiles):
+    """The site that `make docs` builds (docs/site.py), under a policy that allows the style of its search."""
+
+    def file_response(self, *args: Any, **options: Any) -> Response:
+        """The file; the hash of the style is a file of the site."""
+        response = super().file_response(*args, **options)
+        style = Path(str(self.directory), "style-hash.txt").read_text("ascii")
+        response.headers["Content-Security-Policy"] = (
+            f"default-src 'self'; style-src 'self' {style}; img-src 'self' data:; object-src 'none'; "
+            "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+        )
+        return response
+
+
+_SITE: Final = Path(__file__).with_name("site")
+_SITE_FILES: Final = _SiteFiles(directory=_SITE, check_dir=False)
 
 
 @router.get("/static/{name}")
 async def static(request: Request, name: str) -> Response:
     """Style sheet, icon and scripts of all pages."""
-    return await in_thread(_plotly, request) if name == PLOTLY else _FileAnswer()
+    return await in_thread(_plotly, request) if name == PLOTLY else _FileAnswer(_FILES, name)
 
 
 def _plotly(request: Request) -> Response:
