@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from sprag.service.reading.wording import words
 from sprag.service.spec.components import CHARACTERISTIC, CHARACTERISTICS
@@ -20,6 +20,7 @@ from sprag.service.spec.machine.shaft_parts import (
 )
 from sprag.service.spec.plan import goal, refine
 from sprag.worker import models
+from sprag.worker.models.form import Block, Form, FormChoice, FormField
 
 
 def form_values() -> Iterator[str]:
@@ -37,6 +38,31 @@ def form_values() -> Iterator[str]:
     yield from (words(name).lower() for name in DISTRIBUTION.values)
     yield from (words(kind) for kind in MECHANISM_CHOICES)
     for name in models.model_names():
-        yield from models.model_of(name).presentation.sections.values()
+        yield from filter(None, _own(models.model_of(name).presentation.form))
         for parameter in models.parameter_catalogue(name):
             yield from (words(name) for name in parameter.path.split(".") if name not in ("K", "N"))
+
+
+def _own(form: Form) -> Iterator[str]:
+    """What the form of a model itself says."""
+    yield from (form.called, form.batch, form.normal, form.advice, *form.labels.values())
+    yield from (title for _, title in form.groups)
+    yield from (kind.title for kind in form.components)
+    for rows in form.lists:
+        yield from (rows.title, rows.add, rows.drop, rows.every, rows.one)
+        yield from _texts(rows.fields)
+    for part in form.parts:
+        for block in (part,) if isinstance(part, Block) else part.blocks:
+            yield block.title
+            yield from _texts(block.items)
+
+
+def _texts(items: Iterable[FormField | FormChoice]) -> Iterator[str]:
+    for item in items:
+        yield from (item.label, item.help)
+        if isinstance(item, FormField):
+            yield item.default if item.kind != "tick" else ""
+            continue
+        for option in item.options:
+            yield option.label or words(option.value)
+            yield from _texts(option.items)

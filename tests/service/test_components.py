@@ -11,7 +11,7 @@ import pytest
 
 from sprag.service.client import Client
 from sprag.service.http.web.form.components import take_component
-from sprag.service.http.web.form.page import EMPTY_SHAFT
+from sprag.service.http.web.form.page import empty
 from sprag.service.http.web.form.spec import spec_of, values_of
 from sprag.service.results.exports.components import components_csv
 from sprag.service.spec.components import Component, fields_of, read_components
@@ -124,7 +124,7 @@ def test_a_drive_takes_a_spring_and_a_clutch(service: Service) -> None:
 
 
 def test_a_shaft_takes_a_motor(service: Service) -> None:
-    values = dict(EMPTY_SHAFT) | {"component": stored(service, MOTOR)["1LE1 4 kW"]}
+    values = empty("machine-shaft") | {"component": stored(service, MOTOR)["1LE1 4 kW"]}
     take_component(values, service.store.components())
     motor = spec_of(values)[0]["base"]["drive"]["motor"]
     assert motor["kind"] == "kloss"

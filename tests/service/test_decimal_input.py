@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from sprag.service.faults import SelectionError
-from sprag.service.http.web.form.page import EMPTY_FORM
+from sprag.service.http.web.form.page import empty
 from sprag.service.http.web.form.spec import values_of
 from sprag.service.results.selection import value_of
 
@@ -30,7 +30,7 @@ def test_ranges_of_explore_and_values_of_curves(service: Service, spec: dict[str
 
 
 def test_the_form_reads_them_and_keeps_what_was_typed(service: Service, spec: dict[str, Any]) -> None:
-    values = {**EMPTY_FORM, **values_of(spec)}
+    values = {**empty("vibration-drive"), **values_of(spec)}
     values |= {"/base/excitation/frequency": "1500,5 об/мин", "/base/pendulums/0/backlash": "0,3 град"}
     values |= {"/base/pendulums/0/spring_rate": "9 Н/мм", "/base/pendulums/0/mass": "0,5", "do": "submit"}
     values |= {"/run/at_most": "", "/run/max_period": "", "/run/settled": ""}  # the run has a given time

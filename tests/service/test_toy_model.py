@@ -17,8 +17,9 @@ from sprag.engine import Ending
 from sprag.engine.catalogue import Parameter, ResultInfo
 from sprag.engine.outcome import Trajectory
 from sprag.service.formats import MEDIA_TYPES
-from sprag.service.http.web.form.fields import FORM_MODEL, path_choices, sections
-from sprag.service.http.web.form.spec import spec_of
+from sprag.service.http.web.form.fields import FORM_MODEL
+from sprag.service.http.web.form.machine import blocks, choices_of
+from sprag.service.http.web.form.spec import spec_of, values_of
 from sprag.service.settings import Settings
 from sprag.service.spec.document import SpecError, parse_spec
 from sprag.service.spec.extend import parse_extended
@@ -173,8 +174,8 @@ def test_the_catalogues_list_it(service: Service) -> None:
 
 
 def names_by_title(model: str) -> dict[str, list[str]]:
-    """Titles of the sections of the form with the names of their fields."""
-    return {section.title: [field.name for field in section.fields] for section in sections(model)}
+    """Titles of the blocks of the form with the names of their fields."""
+    return {block.title: [entry.name for entry in block.entries] for block in blocks({"model": model})}
 
 
 def test_the_form_has_a_section_for_each_part_of_a_machine() -> None:
@@ -192,16 +193,30 @@ def test_the_form_of_an_unknown_model_says_which_there_are(service: Service) -> 
 
 def test_a_study_without_fields_in_the_form_is_text_and_the_page_says_so(service: Service) -> None:
     said = "The form has no fields for all of this study"
-    page = service.http.get(f"/new?model={NAME}").text
+    assert said not in service.http.get("/new?mode=text").text
+    several = SPEC | {"axes": [{"points": f"{path}\n1\n2\n"} for path in ("body.mass", "body.spring_rate")]}
+    page = service.http.get(f"/new?clone={service.submit(several)}").text
     assert said in page
     assert Controls(page).values["/text"].startswith('{\n  "sprag": 1,\n  "model": "damped-oscillator"')
-    assert said not in service.http.get("/new?mode=text").text
-    assert said in service.http.get(f"/new?clone={service.submit(SPEC)}").text
+
+
+def test_its_form_is_filled_in_and_submitted(service: Service) -> None:
+    page = service.http.get(f"/new?model={NAME}").text
+    shown = Controls(page).values
+    assert {"/base/body/mass", "/base/body/spring_rate", "/base/damping", "axes"} <= set(shown)
+    assert not {"pendulums", "/run/until"} & set(shown)
+    values = values_of(SPEC)
+    assert parse_spec(spec_of(values)[0]).study == parse_spec(SPEC).study
+    answer = service.http.post("/new", data={**shown, **values, "do": "submit"}, follow_redirects=False)
+    assert answer.status_code == 303
+    study = service.store.study(answer.headers["location"].rpartition("/")[2])
+    assert study.physics_hash("1") == parse_spec(SPEC).study.physics_hash("1")
 
 
 def test_a_new_parameter_of_a_drive_is_in_the_form_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     drive, before = model_of(FORM_MODEL), names_by_title(FORM_MODEL)
-    assert list(before) == ["Vibration of the base", "Output shaft", "Surroundings"]
+    titles = ["Vibration of the base", "Pendulum 0", "Freewheel clutch", "Output shaft", "Surroundings"]
+    assert list(before) == titles
     new = tuple(Parameter(p, "x", "1", 0.0, 9.0, False, 0.0, "new") for p in ("shaft.drag", "housing.mass", "pressure"))
     more = (*drive.parameters(), *new)
     monkeypatch.setattr(type(drive), "parameters", lambda _: more)
@@ -215,7 +230,7 @@ def test_a_new_parameter_of_a_drive_is_in_the_form_by_itself(monkeypatch: pytest
     spec, faults = spec_of({"/base/shaft/drag": "1", "/base/housing/mass": "2", "/base/pressure": "3"})
     base = spec["base"]
     assert (faults, base["shaft"]["drag"], base["housing"], base["pressure"]) == ({}, 1.0, {"mass": 2.0}, 3.0)
-    offered = {choice.path for _, group in path_choices(1, {}) for choice in group}
+    offered = {choice.path for _, group in choices_of({}, base) for choice in group}
     assert offered >= {entry.path for entry in new}
 
 

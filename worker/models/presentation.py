@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
+from sprag.worker.models.form import Form
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -100,7 +102,7 @@ class Presentation:
     symbols : symbol of the catalogue -> base and index as in print
     captions : what people read instead of a name of the catalogue, with N and K for indices; ``{}`` is the last index
     letters : base and index, as in print, of results
-    sections : first part of paths -> title of its fields in the form, in their order; "" for parameters without parts
+    form : its machine as fields of a form
     theory : beginning of paths without indices -> page of docs/ and heading that explain it, as in a URL
     """
 
@@ -126,7 +128,7 @@ class Presentation:
     symbols: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     captions: Mapping[str, str] = field(default_factory=dict)
     letters: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    sections: Mapping[str, str] = field(default_factory=dict)
+    form: Form = field(default_factory=Form)
     theory: Mapping[str, str] = field(default_factory=dict)
 
     def explained(self, path: str) -> str:

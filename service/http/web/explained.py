@@ -20,7 +20,6 @@ _SECTIONS: Final = {
     "/refine": "guide-refinement#what-to-write",
     "/goal": "guide-goals#what-to-write",
     "/tolerances": "guide-tolerances#the-study",
-    "/drive_is": "theory-machine-shaft#balance-of-works",
     "/seed": "guide-tolerances#the-study",
     "/draws": "guide-tolerances#the-study",
     "/drives": "guide-tolerances#the-study",

@@ -66,6 +66,8 @@ class Drawing:
 
 def drawings(study: Study, angle: float) -> tuple[Drawing, ...]:
     """The mechanisms of a study's base at an angle of its shaft, in degrees; none where links do not reach."""
+    if study.model != machine_shaft.MODEL:
+        return ()
     structure = study.structure or {}
     angles = np.radians(np.append(np.arange(0.0, 360.0 + STEP, STEP), math.fmod(angle, 360.0)))
     several = "parts" in structure

@@ -14,7 +14,7 @@ from sprag.service.faults import FaultError
 from sprag.service.http.web.calibrate import calibration_spec
 from sprag.service.http.web.form.check import check_form
 from sprag.service.http.web.form.entries import list_of
-from sprag.service.http.web.form.shaft_spec import base_of
+from sprag.service.http.web.form.machine_spec import base_of
 from sprag.service.http.web.form.spec import spec_of, values_of
 from sprag.service.languages import language
 from sprag.service.reading.faults import fault_text

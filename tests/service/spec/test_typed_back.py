@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import itertools
 import math
 import re
 from collections.abc import Iterator
@@ -17,9 +16,10 @@ from hypothesis import strategies as st
 
 from sprag.service import languages
 from sprag.service.cli.extend import _values
-from sprag.service.http.web.form import shaft
 from sprag.service.http.web.form.entries import list_of, plain
-from sprag.service.http.web.form.fields import Field, pendulum, refine_fields, run_fields, search_fields, sections
+from sprag.service.http.web.form.fields import Field, refine_fields, run_fields, search_fields
+from sprag.service.http.web.form.machine import entries
+from sprag.service.http.web.form.page import empty
 from sprag.service.http.web.form.spec import spec_of
 from sprag.service.languages import language
 from sprag.service.presets import preset_names, preset_text
@@ -32,8 +32,6 @@ from sprag.service.reading.wording import number, typed_text, unit_text
 from sprag.service.spec.components import KINDS as COMPONENT_KINDS
 from sprag.service.spec.components import faults_of, fields_of
 from sprag.service.spec.document import format_of, load_spec
-from sprag.service.spec.machine.shaft_drive import MOTOR, STAGE
-from sprag.service.spec.machine.shaft_parts import MECHANISM_CHOICES
 from sprag.worker import models
 from tests.service.spec_sample import changed
 
@@ -140,20 +138,19 @@ def _is_quantity(text: str) -> bool:
 
 
 def fields() -> Iterator[Field]:
-    """Every field of the forms of both models, in every shape."""
-    for section in (*sections(), pendulum(0)):
-        yield from section.fields
+    """Every field of the forms of all models, with each option of each choice."""
     yield from (*run_fields().values(), *refine_fields().values(), *search_fields())
-    ways = itertools.zip_longest(
-        (*MECHANISM_CHOICES, "formula", "csv", "none"), (way for way, _ in shaft._OPERATIONS),
-        ("found", "value", "formula", "csv", *MOTOR.values), STAGE.values, fillvalue="",
-    )  # fmt: skip
-    for mechanism, operation, drive, stage in ways:
-        values = {"model": models.MACHINE_SHAFT, "stages": "1", "/base/mechanism": mechanism or "none",
-                  "/base/operation": operation or "none", shaft.DRIVE: drive or "found",
-                  "/base/drive/stages/0/kind": stage or STAGE.values[0]}  # fmt: skip
-        for block in shaft.blocks(values):
-            yield from (entry.field for entry in block.entries)
+    for model in models.model_names():
+        begun = empty(model) | {"stages": "1"}
+        for choice in [entry for entry in entries(begun, hidden=True) if entry.field.choices]:
+            for value, _label in choice.field.choices:
+                yield from (entry.field for entry in entries(begun | {choice.name: value}, hidden=True))
+
+
+def examples() -> Iterator[str]:
+    """What fields of the study show while they are empty."""
+    for model in models.model_names():
+        yield from models.model_of(model).presentation.form.examples.values()
 
 
 def templates() -> Iterator[tuple[str, str]]:
@@ -172,6 +169,7 @@ EXAMPLES: Final = sorted(
         for text in (
             *(text for field in fields() for text in (field.example, field.default, field.unit and f"1 {field.unit}")),
             *(text for _, text in templates()),
+            *examples(),
             *(text for one in units._EXAMPLES.values() for text in one),
         )
         if text and _is_quantity(text)
@@ -204,7 +202,8 @@ def test_every_example_is_read_as_a_person_reads_it(text: str) -> None:
 def test_no_placeholder_escapes() -> None:
     """Each placeholder is a text of the catalogues, one that `templates` collects, or an expression that is known."""
     known = (
-        r"field\.example \| typed", r"\(default or example\) \| typed", r"example( \| typed)?", r"help",
+        r"form\.example\(\"\w+\"\)", r"field\.example \| typed",
+        r"\(default or example\) \| typed", r"example( \| typed)?", r"help",
         r"ends\[[01]\].*", r"usual_points", r".* \| number(\(4\))?",
         r"_\(\"[^\"]*\"\)", r".*\| unit", r".*\| safe( if .*)?",
         r"\"[^\"]*\" \| typed",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.worker.models.machine_shaft.form import FORM
 from sprag.worker.models.machine_shaft.words import CAPTIONS, LETTERS
 from sprag.worker.models.presentation import Answer, Panel, Presentation, Reference
 
@@ -65,7 +66,8 @@ _THEORY: Final = {
     "phi_c": "four-squares",
     "balance": "balance-of-works",
     "balance_side": "balance-of-works",
-    "drive": "the-drive-train",
+    "drive": "balance-of-works",
+    **dict.fromkeys(("drive.inertia", "drive.stages"), "the-drive-train"),
     "drive.torque": "balance-of-works",
     "drive.scale": "balance-of-works",
     "drive.motor": "balance-of-works",
@@ -99,6 +101,7 @@ PRESENTATION: Final = Presentation(
     "of the resistance's work.",
     captions=CAPTIONS,
     letters=LETTERS,
+    form=FORM,
     theory={path: f"theory-machine-shaft#{heading}" for path, heading in _THEORY.items()},
 )
 

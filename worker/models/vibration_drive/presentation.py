@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from sprag.worker.models.presentation import Answer, Panel, Presentation
+from sprag.worker.models.vibration_drive.form import FORM
 from sprag.worker.models.vibration_drive.words import CAPTIONS, LETTERS
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ PRESENTATION: Final = Presentation(
     },
     captions=CAPTIONS,
     letters=LETTERS,
-    sections={"excitation": "Vibration of the base", "shaft": "Output shaft", "": "Surroundings"},
+    form=FORM,
     theory={
         **dict.fromkeys(
             ("gravity", "excitation", "pendulums", "pendulums.clutch", "shaft", "clutch"), "theory#equations-of-motion"

@@ -12,9 +12,9 @@ from sprag.service.faults import Fault
 from sprag.service.http.web.figures.fit import FitChart, fit_chart
 from sprag.service.http.web.form.columns import COLUMNS
 from sprag.service.http.web.form.entries import Faults, items_of, list_of, range_of
-from sprag.service.http.web.form.shaft import is_shaft
-from sprag.service.http.web.form.shaft_spec import step_of
-from sprag.service.http.web.form.spec import WAYS, clutch_pointers, field_of, pendulums_of, spec_of
+from sprag.service.http.web.form.machine import model_name, places
+from sprag.service.http.web.form.machine_spec import step_of
+from sprag.service.http.web.form.spec import WAYS, field_of, spec_of
 from sprag.service.jobs.preview import preview_json
 from sprag.service.languages import _, gettext
 from sprag.service.reading.faults import allowed_text, fault_text
@@ -151,13 +151,11 @@ def check_form(
         found.parsed = None
     if found.parsed is not None:
         found.preview = preview_json(found.parsed, chunking, known(found.parsed.study), left)
-        if is_shaft(values):
-            found.sketch = drawings(found.parsed.study, _SKETCHED)
+        found.sketch = drawings(found.parsed.study, _SKETCHED)
     found.notes += _points(values)
-    for pointer in clutch_pointers(values):
-        if values.get(f"{pointer}/kind") == "data":
-            found.notes += _assumed(values.get(f"{pointer}/data", ""))
-            _fit(found, pointer, values)
+    for pointer in places(values, "measured"):
+        found.notes += _assumed(values.get(f"{pointer}/data", ""))
+        _fit(found, pointer)
     return found
 
 
@@ -168,7 +166,7 @@ def _beside(name: str, edited: str) -> str:
 
 def _points(values: Mapping[str, str]) -> list[str]:
     """Points of bare numbers of lists and ranges that are taken as decimal; the spec warns of those with units."""
-    notes, reading = [], Reading("machine-shaft" if is_shaft(values) else "vibration-drive")
+    notes, reading = [], Reading(model_name(values))
     for pointer, names, items, entries in _typed_together(values):
         doubt = settle(items).doubt
         if doubt is not None and not isinstance(entries[doubt], str):
@@ -259,9 +257,9 @@ def _with_derived(spec: Mapping[str, Any], study: Study) -> dict[str, Any]:
     return {**spec, "base": with_values(spec["base"], {path: study.base[path] for path in study.derive})}
 
 
-def _fit(found: Checked, pointer: str, values: Mapping[str, str]) -> None:
+def _fit(found: Checked, pointer: str) -> None:
     clutch = clutch_at(found.spec, pointer)
-    if not clutch.get("data") or "accuracy" not in clutch or pendulums_of(values) < 1:
+    if not clutch.get("data") or "accuracy" not in clutch:
         return
     known = backlashes(found.spec if found.parsed is None else _with_derived(found.spec, found.parsed.study), pointer)
     read = read_clutch(Report(), pointer, clutch, pointer.removeprefix("/base/").replace("/", ".") + ".", known)

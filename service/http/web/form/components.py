@@ -2,54 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 
 from sprag.service.http.web.form.entries import Values
-from sprag.service.http.web.form.shaft import DRIVE, is_shaft
-from sprag.service.http.web.form.spec import clutch_pointers, pendulums_of
-from sprag.service.languages import N_
-from sprag.service.spec.components import CHARACTERISTIC, CLUTCH, KINDS, MOTOR, SPRING, Component
+from sprag.service.http.web.form.machine import BASE, form_of, rows_of
 from sprag.service.storage.components import ComponentRecord
+from sprag.worker.models.form import Rows
 
-_TITLES = {SPRING: N_("Springs"), CLUTCH: N_("Clutches"), MOTOR: N_("Motors")}
 
-
-def component_groups(records: Iterable[ComponentRecord], *, shaft: bool) -> list[tuple[str, list[tuple[str, str]]]]:
+def component_groups(
+    values: Mapping[str, str], records: Sequence[ComponentRecord]
+) -> list[tuple[str, list[tuple[str, str]]]]:
     """Id and name of the components that a machine of the form can have, by kind."""
-    found: dict[str, list[tuple[str, str]]] = {}
-    for record in records:
-        if (record.component.kind == MOTOR) == shaft:
-            found.setdefault(record.component.kind, []).append((record.id, record.component.name))
-    return [(_TITLES[kind], found[kind]) for kind in KINDS if kind in found]
+    groups = (
+        (kind.title, [(record.id, record.component.name) for record in records if record.component.kind == kind.name])
+        for kind in form_of(values).components
+    )
+    return [(title, group) for title, group in groups if group]
+
+
+def rows_with_components(values: Mapping[str, str]) -> Rows | None:
+    """The list of which one row can take a component; None where there is none."""
+    form = form_of(values)
+    names = [name for kind in form.components for name in kind.fields.values()]
+    return next((rows for rows in form.lists if any(name.startswith(f"{rows.at}/N/") for name in names)), None)
 
 
 def take_component(values: Values, records: Iterable[ComponentRecord]) -> None:
-    """Fill in the fields of the chosen component, of every pendulum or of the chosen one; nothing without a choice."""
+    """Fill in the fields of the chosen component, of every row of a list or of the chosen one; nothing without a
+    choice. What is common to all rows stays so, also where one is chosen.
+    """
     chosen = next((record.component for record in records if record.id == values.get("component")), None)
-    if chosen is None or (chosen.kind == MOTOR) != is_shaft(values):
+    kind = next((kind for kind in form_of(values).components if chosen and kind.name == chosen.kind), None)
+    if chosen is None or kind is None:
         return
-    one = values.get("component_for", "")
-    count = pendulums_of(values)
-    indices = [int(one)] if one.isdecimal() and int(one) < count else list(range(count))
-    if chosen.kind == MOTOR:
-        fields = {name: text for name, text in chosen.fields.items() if name != CHARACTERISTIC}
-        values |= {DRIVE: chosen.fields[CHARACTERISTIC]}
-        values |= {f"/base/drive/motor/{name}": text for name, text in fields.items()}
-    elif chosen.kind == CLUTCH:
-        _take_clutch(values, chosen, indices)
-    else:
-        for index in indices:
-            values |= {f"/base/pendulums/{index}/{name}": text for name, text in chosen.fields.items()}
-
-
-def _take_clutch(values: Values, chosen: Component, indices: list[int]) -> None:
-    """The law of a clutch; a law for all pendulums stays one for all, also where one pendulum is chosen."""
-    law = {name: text for name, text in chosen.fields.items() if name != "backlash"}
-    pointers = clutch_pointers(values)
-    shared = pointers == ["/base/clutch"]
-    for pointer in pointers if shared else [f"/base/pendulums/{index}/clutch" for index in indices]:
-        values |= {f"{pointer}/kind": "law", f"{pointer}/windup_limit": ""}
-        values |= {f"{pointer}/{name}": text for name, text in law.items()}
-    if "backlash" in chosen.fields:
-        for index in indices if not shared else range(pendulums_of(values)):
-            values[f"/base/pendulums/{index}/backlash"] = chosen.fields["backlash"]
+    rows = rows_with_components(values)
+    count, one = rows_of(values, rows) if rows else 0, values.get("component_for", "")
+    indices: Sequence[int] = [int(one)] if one.isdecimal() and int(one) < count else range(count)
+    choice, shared = rows.shared if rows and rows.shared else ("", "")
+    rowed = values.get(f"{BASE}/{choice}") == "own"
+    if not rowed and any(name.startswith(f"{shared}/") for name in kind.fields.values()):
+        indices = range(count)
+    for name, text in (*kind.sets.items(), *((kind.fields[name], text) for name, text in chosen.fields.items())):
+        at, inside, own = name.partition("/N/")
+        if not inside and rows and rowed and name.startswith(f"{shared}/"):
+            at, inside, own = rows.at, "/N/", name
+        values |= {f"{BASE}/{at}/{index}/{own}": text for index in indices} if inside else {f"{BASE}/{name}": text}

@@ -8,22 +8,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from sprag.service.languages import ENGLISH, N_, _, current
 from sprag.service.reading.reader import Reading
 from sprag.service.reading.units import examples
 from sprag.service.reading.wording import number, words
-from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN, Described
+from sprag.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN, Described
 from sprag.service.spec.plan import goal, refine
 from sprag.worker import models
 from sprag.worker.models import Parameter
-from sprag.worker.models.parameters import placed
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 #: The model that the form describes unless another is chosen.
 FORM_MODEL: Final = "vibration-drive"
-#: Placeholders in paths of the catalogue.
-_NUMBERED: Final = frozenset({"N", "K", "NAME"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,48 +41,6 @@ class Field:
     default: str
     example: str
     choices: tuple[tuple[str, str], ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Section:
-    """Fields that belong together."""
-
-    title: str
-    pointer: str
-    fields: tuple[Field, ...]
-
-
-def sections(model: str = FORM_MODEL) -> list[Section]:
-    """A section for each part of the machine, in the order and with the titles of the model's presentation.
-
-    Parts that it does not name follow, titled by their name. Those with indices (pendulums, clutch) have fields of
-    their own.
-    """
-    titles = models.model_of(model).presentation.sections
-    parts: dict[str, list[Parameter]] = {part: [] for part in titles}
-    for entry in models.parameter_catalogue(model):
-        parts.setdefault(_part(entry), []).append(entry)
-    return [
-        Section(
-            _(titles.get(part, words(part or "other parameters"))),
-            f"/base/{part}".rstrip("/"),
-            tuple(field_for(e, e.path) for e in entries),
-        )
-        for part, entries in parts.items()
-        if entries and not any(_NUMBERED & set(entry.path.split(".")) for entry in entries)
-    ]
-
-
-def _part(entry: Parameter) -> str:
-    """The part of the machine that a parameter belongs to; "" where its path has no parts."""
-    return entry.path.partition(".")[0] if "." in entry.path else ""
-
-
-def pendulum(index: int) -> Section:
-    """The section of one pendulum."""
-    entries = [entry for entry in models.parameter_catalogue(FORM_MODEL) if entry.path.startswith("pendulums.N.")]
-    fields = tuple(field_for(entry, entry.path.replace(".N.", f".{index}.")) for entry in entries)
-    return Section(_("Pendulum {number}", number=index), f"/base/pendulums/{index}", fields)
 
 
 def field_for(entry: Parameter, path: str) -> Field:
@@ -114,11 +72,6 @@ def run_fields() -> dict[str, Field]:
     return {entry.name: described(entry, "/run") for entry in entries}
 
 
-def degree_field(pointer: str) -> Field:
-    """The highest degree of the fit of a clutch at ``pointer``."""
-    return described(FIT["max_degree"], pointer)
-
-
 def refine_fields() -> dict[str, Field]:
     """The fields of a refinement, by name."""
 
@@ -147,8 +100,21 @@ def described(entry: Described, pointer: str) -> Field:
     between = N_("{low} to {high} periods") if entry.kind == "periods" else N_("{low} to {high}")
     limits = _(between, low=ends[0], high=ends[1]) if entry.high else entry.limits
     name = f"{pointer}/{entry.name}"
-    choices = tuple((value, _(words(word) if word == value else word)) for value, word in entry.choices)
-    return Field(name, _(entry.label), "", "", "", _(entry.help), limits, False, entry.default_text, "", choices)
+    choices = [(value, _(words(word) if word == value else word)) for value, word in entry.choices]
+    choices.sort(key=lambda pair: entry.default not in (None, pair[0]))
+    return Field(
+        name,
+        _(entry.label or words(entry.name)),
+        "",
+        "",
+        "",
+        _(entry.help),
+        limits,
+        False,
+        entry.default_text,
+        "",
+        tuple(choices),
+    )
 
 
 def range_words(entry: Parameter) -> str:
@@ -176,51 +142,30 @@ class Choice:
 Groups = list[tuple[str, list[Choice]]]
 
 
-def result_choices(pendulums: int, *, numbers: bool = False, model: str = FORM_MODEL) -> Groups:
-    """The results that a search can ask for, by group; with ``numbers`` no categories."""
+def result_choices(model: str, rows: Callable[[str], int], *, numbers: bool = False) -> Groups:
+    """The results that a search can ask for, by group; with ``numbers`` no categories.
+
+    ``rows`` is the number of rows of each list of the machine.
+    """
     groups: dict[str, list[Choice]] = {}
     for entry in models.result_catalogue(model):
-        for index in range(pendulums if ".N." in entry.name else 1):
+        first, indexed, _rest = entry.name.partition(".N.")
+        for index in range(rows(first) if indexed else 1):
             name = entry.name.replace(".N.", f".{index}.")
-            parts = name.split(".")
-            group = words(".".join(parts[:2] if parts[0] == "pendulums" else parts[:1]))
+            group = words(".".join(name.split(".")[: 2 if indexed else 1]))
             if not (numbers and entry.kind == "category"):
                 groups.setdefault(_(group), []).append(Choice(name, label_of(name, model), entry.unit))
     return list(groups.items())
 
 
-def label_of(name: str, model: str = FORM_MODEL) -> str:
-    """What a list of parameters or results calls one; headings of pasted columns are these in English, or paths."""
-    return words(name) if current() == ENGLISH else Reading(model).caption(name)
+def label_of(name: str, model: str, path: str = "") -> str:
+    """What a list of parameters or results calls one; headings of pasted columns are these in English, or paths.
 
-
-def categories() -> tuple[str, ...]:
-    """The values of the results that are categories."""
-    return tuple(value for entry in models.result_catalogue(FORM_MODEL) for value in entry.categories)
-
-
-def path_choices(pendulums: int, coefficients: dict[str, int]) -> Groups:
-    """The parameters that can vary, by group.
-
-    Parameters
-    ----------
-    pendulums : number of pendulums
-    coefficients : prefix of a clutch law's paths ("clutch.", "pendulums.0.clutch.") -> number of its coefficients
+    ``path`` is the whole path of one whose English label has less.
     """
-    groups: dict[str, list[Choice]] = {}
-    titles = models.model_of(FORM_MODEL).presentation.sections
-    for entry in models.parameter_catalogue(FORM_MODEL):
-        if entry.path.startswith("clutch."):
-            continue
-        for index in range(pendulums if ".N." in entry.path else 1):
-            path = entry.path.replace(".N.", f".{index}.")
-            group = words(path.rpartition(".")[0]) or titles.get("", "")
-            groups.setdefault(_(group), []).append(Choice(path, label_of(path), entry.unit))
-    for prefix, count in coefficients.items():
-        for index in range(count):
-            path = f"{prefix}coefficients.{index}"
-            entry = placed(models.CLUTCH_COEFFICIENT, path)
-            part = _(words(prefix.rstrip(".")))
-            label = _("{part} coefficient c{number}", part=part, number=index + 1)
-            groups.setdefault(part, []).append(Choice(path, label, entry.unit))
-    return list(groups.items())
+    return words(name) if current() == ENGLISH else Reading(model).caption(path or name)
+
+
+def categories(model: str) -> tuple[str, ...]:
+    """The values of the results that are categories."""
+    return tuple(value for entry in models.result_catalogue(model) for value in entry.categories)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import secrets
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Annotated, Any, Final
 
 from fastapi import Query, Request
@@ -24,36 +26,23 @@ from sprag.service.http.web.form import study_check
 from sprag.service.http.web.form.cases import kinds, methods
 from sprag.service.http.web.form.check import Checked, message
 from sprag.service.http.web.form.columns import take_columns
-from sprag.service.http.web.form.components import component_groups, take_component
+from sprag.service.http.web.form.components import component_groups, rows_with_components, take_component
 from sprag.service.http.web.form.entries import Values
 from sprag.service.http.web.form.fields import (
     FORM_MODEL,
     Groups,
     categories,
-    degree_field,
-    path_choices,
-    pendulum,
     refine_fields,
     result_choices,
     run_fields,
     search_fields,
-    sections,
 )
 from sprag.service.http.web.form.goal import GOAL_DEFAULTS, LIMITS
+from sprag.service.http.web.form.machine import BASE, blocks, choices_of, entries, form_of, model_name
+from sprag.service.http.web.form.machine_spec import base_of, values_of_base
 from sprag.service.http.web.form.own_machine import laboratory_address
-from sprag.service.http.web.form.parts import PARTS, add_part, add_row, copy, count_of, drop, drop_row
-from sprag.service.http.web.form.shaft import blocks, is_shaft, shaft_paths
-from sprag.service.http.web.form.shaft_spec import base_of
-from sprag.service.http.web.form.spec import (
-    FORMULA,
-    REFINE_DEFAULTS,
-    clutch_pointers,
-    is_search,
-    pendulums_of,
-    spec_of,
-    values_of,
-    with_clutch_defaults,
-)
+from sprag.service.http.web.form.parts import count_of, parts_of, reshape, share, unshared
+from sprag.service.http.web.form.spec import REFINE_DEFAULTS, is_search, values_of
 from sprag.service.http.web.form.tolerances import OWN, distributions, drive_fields, own_name, with_batch
 from sprag.service.http.web.form.undo import history_of, remember, undo
 from sprag.service.http.web.form.values import Form
@@ -68,30 +57,9 @@ from sprag.service.spec.document import UNNAMED
 from sprag.service.spec.report import SpecError
 from sprag.service.spec.stored import accepted
 from sprag.worker import models
-from sprag.worker.models import MAX_PENDULUMS
 
 router = page_router()
 
-#: Initial values of an empty form.
-EMPTY_FORM: Final[Values] = {
-    "pendulums": "1",
-    "asks": "axes",
-    "axes": "1",
-    "/combine": "grid",
-    **{f"/run/{name}": run_fields()[name].default for name in ("until", "at_most", "tolerance", "reset")},
-    "/base/clutch/kind": "law",
-    "/axes/0/way": "linspace",
-    **REFINE_DEFAULTS,
-    **GOAL_DEFAULTS,
-}
-#: Initial values of an empty form of a machine shaft.
-EMPTY_SHAFT: Final[Values] = {
-    **{name: text for name, text in EMPTY_FORM.items() if not name.startswith(("/run/", "/base/", "pendulums"))},
-    "model": models.MACHINE_SHAFT,
-    "/base/mechanism": "slider_crank",
-    "/base/operation": "steps",
-    "/refine/results": "irregularity",
-}
 #: Beginnings of the fields of the other question, which the page keeps though it does not show them.
 _OF_AXES: Final = ("/axes/", "/refine/", "/combine", "/sample/", "/points", "/exclude/")
 _OF_SEARCH: Final = ("/goal/",)
@@ -118,8 +86,7 @@ async def new_study(
         if model not in models.model_names():
             known = ", ".join(models.model_names())
             raise ApiError("not-found", Sentence("Unknown model; known models: {models}.", models=known))
-        values = _empty(mode, model)
-        return form_page(request, values, None, fields="/text" not in values or mode == "text")
+        return form_page(request, {"/text": "", "format": "json"} if mode == "text" else empty(model), None)
     fields = True
     try:
         values = values_of(spec)
@@ -133,13 +100,23 @@ async def new_study(
     return await in_thread(form_page, request, values, checked, fields=fields)
 
 
-def _empty(mode: str, model: str) -> Values:
-    """The values of a form that begins with nothing."""
-    if mode == "text":
-        return {"/text": "", "format": "json"}
-    if model not in {FORM_MODEL, models.MACHINE_SHAFT}:
-        return {"/text": spec_text({"sprag": 1, "model": model, "base": {}, "axes": []}), "format": "json"}
-    return dict(EMPTY_SHAFT) if model == models.MACHINE_SHAFT else with_clutch_defaults(dict(EMPTY_FORM))
+def empty(model: str) -> Values:
+    """The values of a form of ``model`` that begins with nothing."""
+    values: Values = {
+        "model": model,
+        "asks": "axes",
+        "axes": "1",
+        "/combine": "grid",
+        "/axes/0/way": "linspace",
+        **REFINE_DEFAULTS,
+        **GOAL_DEFAULTS,
+    }
+    form = form_of(values)
+    values |= {rows.name: str(rows.least) for rows in form.lists if rows.least}
+    if form.with_run:
+        values |= {f"/run/{name}": run_fields()[name].default for name in ("until", "at_most", "tolerance", "reset")}
+    values_of_base({}, values)
+    return {**values, **form.new}
 
 
 def _start(
@@ -171,8 +148,9 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
     if wanted == "undo":
         undo(values)
         return await in_thread(form_page, request, values, await look_over(context, work, values))
-    before = _as_sent(values)
-    share_clutches(values)
+    before = values if "/text" in values else unshared(values)
+    if "/text" not in values:
+        share(values)
     if wanted == "submit":
         checked, made = await work.check(study_check.form_study, context.library, values, context.store.clock.now())
         return await in_thread(_submit, context, request, values, checked, made)
@@ -237,51 +215,6 @@ async def look_over(context: Context, work: Work, values: Mapping[str, str]) -> 
     return await work.check(study_check.form, context.library, values, context.store.clock.now(), CHOICE.get())
 
 
-def reshape(values: Values, wanted: str) -> None:
-    """Add or remove a pendulum or a row of a part, as the pressed button requests; the other fields are kept."""
-    action, _, index = wanted.partition(" ")
-    verb, _, part = action.partition("-")
-    if action == "add-pendulum":
-        count = pendulums_of(values)
-        if count < MAX_PENDULUMS:
-            copy(values, f"/base/pendulums/{count - 1}/", f"/base/pendulums/{count}/")
-            copy(values, f"{OWN}pendulums/{count - 1}/", f"{OWN}pendulums/{count}/")
-            _adapt_formulas(values, count)
-        values["pendulums"] = str(min(count + 1, MAX_PENDULUMS))
-    elif action == "drop-pendulum":
-        count = pendulums_of(values)
-        drop(values, f"/base/pendulums/{count - 1}/")
-        drop(values, f"{OWN}pendulums/{count - 1}/")
-        values["pendulums"] = str(max(count - 1, 1))
-    elif action == "add-parts":
-        add_part(values)
-    elif part in PARTS and verb == "add":
-        add_row(values, part)
-    elif part in PARTS and verb == "drop" and index.isdigit():
-        drop_row(values, part, int(index))
-
-
-def share_clutches(values: Values) -> None:
-    """Initialise own laws from the common one, and the common one from the first, so that no input is lost."""
-    common, first = "/base/clutch/", "/base/pendulums/0/clutch/"
-    own = values.get("clutches") == "own"
-    if own and f"{common}kind" in values:
-        for index in range(pendulums_of(values)):
-            copy(values, common, f"/base/pendulums/{index}/clutch/")
-        drop(values, common)
-    elif not own and f"{common}kind" not in values and f"{first}kind" in values:
-        copy(values, first, common)
-        for index in range(pendulums_of(values)):
-            drop(values, f"/base/pendulums/{index}/clutch/")
-
-
-def _adapt_formulas(values: Values, index: int) -> None:
-    """Let the formulas of a copied pendulum use its own parameters."""
-    for name, text in list(values.items()):
-        if name.startswith(f"/base/pendulums/{index}/") and FORMULA in text:
-            values[name] = text.replace(f"pendulums.{index - 1}.", f"pendulums.{index}.")
-
-
 def form_page(
     request: Request, values: Values, checked: Checked | None, status: int = 200, *, fields: bool = True
 ) -> Response:
@@ -289,8 +222,13 @@ def form_page(
 
     ``fields`` is False where the form has no fields for the study, so that its spec is shown as text.
     """
-    text_mode, shaft = "/text" in values, is_shaft(values)
-    model = models.MACHINE_SHAFT if shaft else FORM_MODEL
+    text_mode, model, own = "/text" in values, model_name(values), form_of(values)
+    parts = parts_of(values)
+    rows = {} if text_mode else {name: range(count_of(values, name)) for name in parts}
+
+    def results(*, numbers: bool = False) -> Groups:
+        return result_choices(model, lambda name: len(rows.get(name, ())), numbers=numbers)
+
     return page(
         "new_text.html" if text_mode else "new.html",
         status=status,
@@ -301,28 +239,26 @@ def form_page(
         begun=checked is not None,
         address=_address(request),
         key=values.get("key") or secrets.token_hex(8),
-        shaft=shaft,
-        blocks=blocks(values) if shaft else [],
-        sections=[] if shaft else sections(),
-        pendulums=[pendulum(index) for index in range(0 if text_mode or shaft else pendulums_of(values))],
-        most_pendulums=MAX_PENDULUMS,
-        parts=PARTS,
-        rows={name: range(0 if text_mode else count_of(values, name)) for name in PARTS},
+        model=model,
+        form=own,
+        models=[(name, _called(name)) for name in models.model_names() if name != model],
+        blocks=[] if text_mode else blocks(values),
+        parts=parts,
+        rows=rows,
         search=is_search(values),
         kept=_kept(values),
         choices=[] if text_mode else _choices(values),
-        components=[] if text_mode else component_groups(request.app.state.context.store.components(), shaft=shaft),
+        components=[] if text_mode else component_groups(values, request.app.state.context.store.components()),
+        component_rows=rows_with_components(values),
         undoable=bool(history_of(values)),
-        presets=[preset for preset in map(preset_of, preset_names()) if text_mode or _fits_form(preset, shaft=shaft)],
-        most_coefficients=models.MAX_COEFFICIENTS,
+        presets=[preset_of(name) for name in (preset_names() if text_mode else _presets(model))],
         run=run_fields(),
         refine=refine_fields(),
         limits=LIMITS,
-        categories=categories(),
+        categories=categories(model),
         search_fields=search_fields(),
-        goals=result_choices(pendulums_of(values), numbers=True, model=model),
-        limited=result_choices(pendulums_of(values), model=model),
-        degree_field=degree_field,
+        goals=results(numbers=True),
+        limited=results(),
         batch=with_batch(values),
         own_name=own_name,
         drive_fields=drive_fields(),
@@ -343,20 +279,16 @@ async def spec_in_form(work: Work, spec: dict[str, Any]) -> Response:
     return await in_thread(form_page, work.request, values, checked, fields=fields)
 
 
+def _called(model: str) -> str:
+    """What a model is called in a sentence."""
+    shown = models.model_of(model).presentation
+    return shown.form.called or shown.title or model
+
+
 def _choices(values: Values) -> Groups:
-    """The parameters that can vary, by group."""
-    if is_shaft(values):
-        return shaft_paths(base_of(values, {}))
-    laws = {pointer: _coefficients(values, pointer) for pointer in clutch_pointers(values)}
-    prefixes = {pointer.removeprefix("/base/").replace("/", ".") + ".": count for pointer, count in laws.items()}
-    return path_choices(pendulums_of(values), prefixes)
-
-
-def _as_sent(values: Values) -> Values:
-    """The form before its buttons change it; sharing or separating the clutches is undone with what it moves."""
-    own, has_common = values.get("clutches") == "own", "/base/clutch/kind" in values
-    moved = own == has_common and not is_shaft(values) and "/text" not in values
-    return {**values, **({"clutches": "common" if own else "own"} if moved else {})}
+    """The parameters that can vary, by group; what follows from others is a number too."""
+    numbers = {name: re.sub(r"(^|;)\s*=[^;]*", r"\1 1", text) for name, text in values.items()}
+    return choices_of(values, base_of(numbers, {}))
 
 
 def _kept(values: Values) -> Values:
@@ -364,32 +296,25 @@ def _kept(values: Values) -> Values:
     others: tuple[str, ...] = _OF_AXES if is_search(values) else _OF_SEARCH
     if not with_batch(values):
         others = (*others, *_OF_BATCH)
-    if is_shaft(values):
-        shown = {entry.name for block in blocks(values) for entry in block.entries}
-        return {
-            name: text for name, text in values.items()
-            if name.startswith(others) or (name.startswith("/base/") and name not in shown)
-        }  # fmt: skip
-    return {name: text for name, text in values.items() if name.startswith(others)}
+    shown = {entry.name for entry in entries(values, hidden=True)}
+    return {
+        name: text for name, text in values.items()
+        if name.startswith(others) or (name.startswith(f"{BASE}/") and name not in shown)
+    }  # fmt: skip
 
 
-def _fits_form(preset: Mapping[str, Any], *, shaft: bool) -> bool:
-    if preset["spec"]["model"] != (models.MACHINE_SHAFT if shaft else FORM_MODEL):
-        return False
-    try:
-        return bool(values_of(preset["spec"]))
-    except ValueError:
-        return False
+@lru_cache(maxsize=8)
+def _presets(model: str) -> tuple[str, ...]:
+    """Names of the examples of a model that the form has fields for."""
 
+    def fits(spec: Mapping[str, Any]) -> bool:
+        try:
+            return bool(values_of(spec))
+        except ValueError:
+            return False
 
-def _coefficients(values: Values, pointer: str) -> int:
-    """Number of coefficients that an axis can vary: none for a fitted law."""
-    if values.get(f"{pointer}/kind", "law") != "law":
-        return 0
-    found = spec_of({**values, "axes": "0"})[0]["base"]
-    parts = pointer.split("/")
-    clutch = found["clutch"] if len(parts) == 3 else found["pendulums"][int(parts[3])]["clutch"]
-    return len(clutch.get("coefficients", ()))
+    specs = {name: preset_of(name)["spec"] for name in preset_names()}
+    return tuple(name for name, spec in specs.items() if spec["model"] == model and fits(spec))
 
 
 def _address(request: Request) -> str:

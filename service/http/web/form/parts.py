@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from sprag.service.http.web.form.entries import Values, count_in
+from sprag.service.http.web.form.machine import BASE, form_of
 from sprag.service.http.web.form.tolerances import OWN
 from sprag.service.spec.plan import goal
 from sprag.worker.limits import MAX_AXES
-from sprag.worker.models import machine_shaft
+from sprag.worker.models.form import Rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,12 +25,14 @@ class Part:
     most : largest number of rows
     entries : fields of which at least one has a text in a row that is filled in
     new : initial values of a new row
+    rows : of a list of the machine, what its model says about it
     """
 
     pointer: str
     most: int
     entries: tuple[str, ...]
     new: Values = field(default_factory=dict)
+    rows: Rows | None = None
 
 
 #: Correlations that the form shows; a spec may have more.
@@ -48,14 +51,20 @@ PARTS: Final = {
     "ranges": Part("/sample/ranges", MAX_AXES, ("path", "tied", "from", "to")),
     "exclude": Part("/exclude", _MOST_CONDITIONS, ("path", "value", "and/path", "and/value")),
     "correlations": Part("/correlations", _MOST_CORRELATIONS, ("between/0", "between/1", "coefficient")),
-    "stages": Part("/base/drive/stages", machine_shaft.MAX_STAGES, ("kind",)),
-    "parts": Part("/base/parts", machine_shaft.MAX_PARTS, ("mechanism",)),
 }
 
 
+def parts_of(values: Mapping[str, str]) -> dict[str, Part]:
+    """Every list of a form, by the name of the field with the number of its rows."""
+    lists = form_of(values).lists
+    return PARTS | {rows.name: Part(f"{BASE}/{rows.at}", rows.most, (), rows=rows) for rows in lists}
+
+
 def count_of(values: Mapping[str, str], name: str) -> int:
-    """Number of rows of a part."""
-    return count_in(values, name, 0, 0, PARTS[name].most)
+    """Number of rows of a part; 0 where the form has no such list."""
+    part = parts_of(values).get(name, Part("", 0, ()))
+    least = part.rows.least if part.rows else 0
+    return count_in(values, name, least, least, part.most)
 
 
 def filled(values: Mapping[str, str], name: str) -> list[int]:
@@ -68,60 +77,101 @@ def filled(values: Mapping[str, str], name: str) -> list[int]:
     ]
 
 
-def add_row(values: Values, name: str) -> None:
+def reshape(values: Values, wanted: str) -> None:
+    """Add or remove a row of a part, as the pressed button requests; the other fields are kept."""
+    action, _, index = wanted.partition(" ")
+    verb, _, name = action.partition("-")
+    part = parts_of(values).get(name)
+    if part is not None and verb == "add":
+        _add_row(values, name, part)
+    elif part is not None and verb == "drop" and index.isdigit():
+        _drop_row(values, name, part, int(index))
+
+
+def _add_row(values: Values, name: str, part: Part) -> None:
     """Add a row, unless there are as many as there may be."""
-    part, count = PARTS[name], count_of(values, name)
+    rows, count = part.rows, count_of(values, name)
+    if rows is not None and rows.alone and not count:
+        _enclose(values, rows)
+        count = 1
     if count < part.most:
         values |= {f"{part.pointer}/{count}/{entry}": text for entry, text in part.new.items()}
+        if rows is not None and rows.copies:
+            for pointer in _with_tolerances(part.pointer):
+                _copy_row(values, pointer, count - 1, count)
         values[name] = str(count + 1)
 
 
-def add_part(values: Values) -> None:
-    """Add a part to a machine shaft, as a copy of its last one; its only mechanism becomes the first of them."""
-    count = count_of(values, "parts")
-    if not count:
-        for name in ("mechanism", "operation"):
-            for old in _with_tolerances(f"/base/{name}"):
-                copy(values, old, old.replace(name, f"parts/0/{name}", 1))
-                drop(values, old)
-            _rename(values, f"{name}.", f"parts.0.{name}.")
-        count = 1
-    if count < PARTS["parts"].most:
-        for pointer in _with_tolerances("/base/parts"):
-            _copy_row(values, pointer, count - 1, count)
-        values["parts"] = str(count + 1)
-
-
-def _rename(values: Values, old: str, new: str) -> None:
-    """Replace the beginning of paths that vary or are in formulas."""
-    for name, text in values.items():
-        if name.endswith(("/path", "/tied", "/with")) or text.startswith("="):
-            values[name] = re.sub(rf"(?<![\w.]){re.escape(old)}", new, text)
+def _enclose(values: Values, rows: Rows) -> None:
+    """Make what stands alone the first row of its list; paths that vary or are in formulas follow."""
+    for root in dict.fromkeys(item.name.partition("/")[0] for block in rows.blocks for item in block.items):
+        inside = f"{rows.at}/0/{root}"
+        for old in _with_tolerances(f"{BASE}/{root}"):
+            copy(values, old, old.replace(root, inside, 1))
+            drop(values, old)
+        for name, text in values.items():
+            if name.endswith(("/path", "/tied", "/with")) or text.startswith("="):
+                values[name] = re.sub(rf"(?<![\w.]){root}\.", f"{inside.replace('/', '.')}.", text)
 
 
 def _copy_row(values: Values, pointer: str, source: int, target: int) -> None:
-    """Copy the fields of a row; what shares the draw of a tolerance in it is in the same row."""
+    """Copy the fields of a row; what follows from numbers of it, or shares their draws, does so in the same row."""
     copy(values, f"{pointer}/{source}/", f"{pointer}/{target}/")
-    paths = pointer.removeprefix(OWN).replace("/", ".")
-    for name in [name for name in values if name.startswith(f"{pointer}/{target}/") and name.endswith("/with")]:
-        values[name] = values[name].replace(f"{paths}.{source}.", f"{paths}.{target}.")
+    paths = pointer.removeprefix(OWN).removeprefix(f"{BASE}/").replace("/", ".")
+    for name in [name for name in values if name.startswith(f"{pointer}/{target}/")]:
+        if name.endswith("/with") or "=" in values[name]:
+            values[name] = values[name].replace(f"{paths}.{source}.", f"{paths}.{target}.")
 
 
-def _with_tolerances(pointer: str) -> tuple[str, ...]:
-    """The beginning of names of fields, and that of the fields of their tolerances."""
-    return (pointer, pointer.replace("/base/", OWN, 1)) if pointer.startswith("/base/") else (pointer,)
+def share(values: Values) -> None:
+    """Initialise what each row has of its own from what is common, and that from the first row, so that no input is
+    lost.
+    """
+    for rows in form_of(values).lists:
+        if rows.shared is None:
+            continue
+        common, rowed = f"{BASE}/{rows.shared[1]}/", [
+            f"{BASE}/{rows.at}/{index}/{rows.shared[1]}/" for index in range(count_of(values, rows.name))
+        ]  # fmt: skip
+        given = any(name.startswith(common) for name in values)
+        if values.get(f"{BASE}/{rows.shared[0]}") == "own":
+            if given:
+                for own in rowed:
+                    copy(values, common, own)
+                drop(values, common)
+        elif not given:
+            copy(values, rowed[0], common)
+            for own in rowed:
+                drop(values, own)
 
 
-def drop_row(values: Values, name: str, index: int) -> None:
-    """Remove a row; those behind it move up."""
-    part, count = PARTS[name], count_of(values, name)
-    if index >= count:
+def unshared(values: Values) -> Values:
+    """The form before `share`: what it moves is undone together with the choice that moved it."""
+    before = dict(values)
+    for rows in form_of(values).lists:
+        if rows.shared is not None:
+            choice, common = f"{BASE}/{rows.shared[0]}", f"{BASE}/{rows.shared[1]}/"
+            own = values.get(choice) == "own"
+            if own == any(name.startswith(common) for name in values):
+                before[choice] = "common" if own else "own"
+    return before
+
+
+def _drop_row(values: Values, name: str, part: Part, index: int) -> None:
+    """Remove a row, unless there must be as many; those behind it move up."""
+    count = count_of(values, name)
+    if index >= count or (part.rows is not None and count <= part.rows.least):
         return
     for pointer in _with_tolerances(part.pointer):
         for row in range(index, count):
             drop(values, f"{pointer}/{row}/")
             _copy_row(values, pointer, row + 1, row)
     values[name] = str(count - 1)
+
+
+def _with_tolerances(pointer: str) -> tuple[str, ...]:
+    """The beginning of names of fields, and that of the fields of their tolerances."""
+    return (pointer, pointer.replace("/base/", OWN, 1)) if pointer.startswith("/base/") else (pointer,)
 
 
 def copy(values: Values, source: str, target: str) -> None:

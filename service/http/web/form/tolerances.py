@@ -7,13 +7,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from sprag.service.http.web.form.entries import Values, count_in, list_of, list_text, names_of, plain, text_of
-from sprag.service.http.web.form.fields import Field, described, pendulum, sections
-from sprag.service.http.web.form.shaft import blocks, is_shaft
+from sprag.service.http.web.form.entries import Values, list_of, list_text, names_of, plain, text_of
+from sprag.service.http.web.form.fields import Field, described
+from sprag.service.http.web.form.machine import entries
 from sprag.service.languages import _
 from sprag.service.reading.wording import words
 from sprag.service.spec.draws.described import DISTRIBUTION, DRAWS
-from sprag.worker.models import MAX_PENDULUMS
 
 #: Fields of a spec that this part of the form shows.
 FIELDS: Final = ("tolerances", "drives", "seed", "draws")
@@ -81,11 +80,7 @@ def _filled(values: Mapping[str, str]) -> Iterator[tuple[str, str]]:
 
 def _tolerant(values: Mapping[str, str]) -> list[str]:
     """Names of the fields of the machine that can have a tolerance."""
-    if is_shaft(values):
-        return [entry.name for block in blocks(values) for entry in block.entries if entry.is_parameter]
-    pendulums = count_in(values, "pendulums", 1, 1, MAX_PENDULUMS)
-    parts = (*sections(), *(pendulum(index) for index in range(pendulums)))
-    return [field.name for section in parts for field in section.fields]
+    return [entry.name for entry in entries(values) if entry.tolerant]
 
 
 def own_name(field: str) -> str:

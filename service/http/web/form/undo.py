@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Final
+from typing import Any, Final
 
 from sprag.service.http.web.form.entries import Values
+from sprag.service.http.web.form.values import OLD_NAMES
 
 HISTORY: Final = "history"
 _MOST: Final = 30
@@ -28,8 +29,13 @@ def history_of(values: Mapping[str, str]) -> list[Change]:
         found = json.loads(values.get(HISTORY) or "[]")
     except (ValueError, RecursionError):
         return []
-    items = found if isinstance(found, list) else []
-    return [item for item in items if isinstance(item, dict) and all(_is_text(text) for text in item.values())][-_MOST:]
+    items: list[object] = found if isinstance(found, list) else []
+    changes: list[dict[str, Any]] = [item for item in items if isinstance(item, dict)]
+    return [
+        {OLD_NAMES.get(name, name): text for name, text in item.items()}
+        for item in changes
+        if all(_is_text(text) for text in item.values())
+    ][-_MOST:]
 
 
 def _is_text(value: object) -> bool:

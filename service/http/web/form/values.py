@@ -12,6 +12,8 @@ from sprag.service.http.web.form.entries import Values
 from sprag.service.languages import _
 
 Pairs = list[tuple[str, str]]
+#: Names that fields of older drafts have, and what they are called today.
+OLD_NAMES: Final = {"drive_is": "/base/drive", "clutches": "/base/clutches"}
 _FORM_TYPE: Final = "application/x-www-form-urlencoded"
 #: Fields of a form, at most.
 _MOST_FIELDS: Final = 2000
@@ -23,9 +25,10 @@ async def read_pairs(request: Request) -> Pairs:
         raise ApiError("unsupported-media-type", f"A form is sent as {_FORM_TYPE}.")
     try:
         text = (await request.body()).decode("utf-8")
-        return parse_qsl(text, keep_blank_values=True, max_num_fields=_MOST_FIELDS)
+        pairs = parse_qsl(text, keep_blank_values=True, max_num_fields=_MOST_FIELDS)
     except ValueError as error:
         raise ApiError("bad-request", "The form cannot be read.") from error
+    return [(OLD_NAMES.get(name, name), text) for name, text in pairs]
 
 
 async def read_form(request: Request) -> Values:

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.http.web.figures.shaft import overridden
-from sprag.service.http.web.form.shaft import part_of
+from sprag.service.http.web.form.machine import row_of
 from sprag.service.http.web.laboratory.sliders import quantity_text
 from sprag.service.languages import N_, _, gettext
 from sprag.service.reading.numbers import parse_number
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.report import SpecError
+from sprag.worker import models
 from sprag.worker.models.parameters import parameter_of
 
 if TYPE_CHECKING:
@@ -94,14 +95,14 @@ def _estimate(text: str) -> tuple[float | None, str]:
 
 def _meant(study: Study, path: str, question: str) -> bool:
     """Whether a question is about the number at ``path``."""
-    own, entry = part_of(path)[1], parameter_of(study, path)
+    own, entry = row_of(models.MACHINE_SHAFT, path)[2], parameter_of(study, path)
     if question == "masses":
         return own.startswith("mechanism.") and entry is not None and entry.unit in {"kg", "kg*m^2"}
     return own == {"inertia": "drive.inertia", "load": "operation.scale"}[question]
 
 
 def _asked(slider: Slider, question: str) -> bool:
-    own = part_of(slider.path)[1]
+    own = row_of(models.MACHINE_SHAFT, slider.path)[2]
     if question == "masses":
         return slider.unit == "kg" and own.startswith("mechanism.")
     return own == {"inertia": "drive.inertia", "load": "operation.scale"}[question]
@@ -111,5 +112,7 @@ def _alike(chosen: Setting, sliders: list[Slider]) -> list[list[Slider]]:
     """The sliders, those together that are the same number of parts that are alike: they vary together."""
     groups: dict[tuple[str, float], list[Slider]] = {}
     for slider in sliders:
-        groups.setdefault((part_of(slider.path)[1], chosen.study.base[slider.path]), []).append(slider)
+        groups.setdefault((row_of(models.MACHINE_SHAFT, slider.path)[2], chosen.study.base[slider.path]), []).append(
+            slider
+        )
     return list(groups.values())

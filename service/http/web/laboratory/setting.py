@@ -15,8 +15,8 @@ from sprag.service.http.views import preset_of
 from sprag.service.http.web.figures.shaft import overridden
 from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.entries import plain
+from sprag.service.http.web.form.machine import group_of
 from sprag.service.http.web.form.own_machine import case_page, machine_of, read_machine
-from sprag.service.http.web.form.shaft import group_of
 from sprag.service.http.web.laboratory.sliders import Slider, faults_by_field, in_order, is_own, slider_of
 from sprag.service.presets import preset_names
 from sprag.service.reading.limits import span
@@ -67,7 +67,7 @@ class Setting:
         found: dict[str, list[Slider]] = {}
         for slider in self.sliders:
             if not slider.first:
-                found.setdefault(group_of(slider.path), []).append(slider)
+                found.setdefault(group_of(models.MACHINE_SHAFT, slider.path), []).append(slider)
         return found
 
     @property

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from sprag.service.http.web.form.check import message
-from sprag.service.http.web.form.shaft import part_of
+from sprag.service.http.web.form.machine import row_of
 from sprag.service.languages import N_, _
 from sprag.service.reading.numbers import in_language, parse_number
 from sprag.service.reading.quantities import read_units
 from sprag.service.reading.units import QuantityError, has_unit, parse_quantity, split_quantity
 from sprag.service.reading.wording import words
+from sprag.worker import models
 from sprag.worker.models.parameters import parameter_of
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def slider_of(own: Study, study: Study, path: str, text: str, reading: Reading, 
     if entry is not None:
         low, high = max(low, entry.low), min(high, entry.high)
     shown, factor = scale(unit, _SHOWN.get(unit, _SI), reading, choice)
-    part, name = part_of(path)
+    _rows, part, name = row_of(models.MACHINE_SHAFT, path)
     label = _("Load, as a multiple of the diagram") if name == "operation.scale" else _(words(path.rsplit(".", 1)[-1]))
     if name.startswith(("operation.steps.", "drive.stages.")):
         place = name.split(".")
@@ -118,7 +119,7 @@ def is_own(text: str, own: float, si: str) -> bool:
 
 def _factors(study: Study, path: str) -> tuple[tuple[float, float], bool]:
     """Range of a slider as factors on the machine's own value, and whether it is always in sight."""
-    own = part_of(path)[1]
+    own = row_of(models.MACHINE_SHAFT, path)[2]
     if own in FIRST:
         return FIRST[own], True
     entry = parameter_of(study, path)
@@ -158,7 +159,7 @@ def in_order(sliders: list[Slider]) -> list[Slider]:
     order = list(FIRST)
 
     def place(slider: Slider) -> tuple[bool, int, bool, str]:
-        part, own = part_of(slider.path)
+        _rows, part, own = row_of(models.MACHINE_SHAFT, slider.path)
         return not slider.first, part, own not in order, own
 
     return sorted(sliders, key=place)

@@ -176,7 +176,7 @@ const snapshot = () => {
 };
 const remember = (event) => {
   const history = form.elements.namedItem("history");
-  if (!history || event.target.name === "clutches") return; // the server moves their fields, and remembers it
+  if (!history || "moves" in event.target.dataset) return; // the server moves fields, and remembers it
   const fields = snapshot(), change = {};
   for (const name of new Set([...Object.keys(shown), ...Object.keys(fields)])) {
     if (shown[name] !== fields[name]) change[name] = shown[name] ?? null;

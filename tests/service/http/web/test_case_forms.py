@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from sprag.service.http.web.form.check import check_form
-from sprag.service.http.web.form.page import EMPTY_FORM, reshape
+from sprag.service.http.web.form.page import empty
+from sprag.service.http.web.form.parts import reshape
 from sprag.service.http.web.form.spec import field_of, spec_of, values_of
 from sprag.service.spec.document import parse_spec
 from sprag.worker.chunking import Chunking
@@ -119,7 +120,7 @@ def test_faults_count_axes_and_rows_that_are_filled_in() -> None:
 
 
 def test_rows_come_and_go() -> None:
-    values = dict(EMPTY_FORM)
+    values = empty("vibration-drive")
     for part in ("ranges", "ranges", "exclude"):
         reshape(values, f"add-{part}")
     assert (values["ranges"], values["exclude"]) == ("2", "1")

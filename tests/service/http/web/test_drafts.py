@@ -9,8 +9,8 @@ import pytest
 
 from sprag.service.http.web.form.check import check_form, look_over
 from sprag.service.http.web.form.columns import take_columns
-from sprag.service.http.web.form.fields import path_choices
-from sprag.service.http.web.form.page import reshape
+from sprag.service.http.web.form.machine import choices_of
+from sprag.service.http.web.form.parts import reshape
 from sprag.service.http.web.form.spec import spec_of, values_of
 from sprag.service.http.web.form.undo import history_of, remember, undo
 from sprag.service.presets import preset_text
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from tests.service.conftest import Service
 
-CHOICES = path_choices(1, {})
+CHOICES = choices_of({}, SPEC["base"])
 
 
 def words(values: dict[str, str], choice: Choice | None = None) -> str:
@@ -60,7 +60,7 @@ def test_the_draft_of_each_kind_of_study(preset: str, expected: str) -> None:
 def test_each_change_is_undone() -> None:
     values = values_of(SPEC)
     first = dict(values)
-    for action in ("drop-axes 1", "add-axes", "add-pendulum"):
+    for action in ("drop-axes 1", "add-axes", "add-pendulums"):
         before = dict(values)
         reshape(values, action)
         remember(values, before)
@@ -97,7 +97,7 @@ def test_the_page_undoes_without_scripts(service: Service) -> None:
     page = service.http.post("/new", data={**values, "do": "check"}).text
     assert 'name="/base/pendulums/0/clutch/coefficients" value="0; 200; 0; 20000"' in page
     history = page.partition('name="history" value="')[2].partition('"')[0].replace("&#34;", '"')
-    assert json.loads(history)[0]["clutches"] == "common"
+    assert json.loads(history)[0]["/base/clutches"] == "common"
     own = {
         name.replace("/base/clutch", "/base/pendulums/0/clutch"): text for name, text in values.items()
     } | {"history": history}  # fmt: skip

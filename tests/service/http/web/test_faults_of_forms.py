@@ -12,9 +12,8 @@ from sprag.service import languages
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form.check import check_form
 from sprag.service.http.web.form.columns import COLUMNS, take_columns
-from sprag.service.http.web.form.page import EMPTY_SHAFT
-from sprag.service.http.web.form.shaft import CONSTANTS
-from sprag.service.http.web.form.shaft_spec import step_of
+from sprag.service.http.web.form.machine_spec import step_of
+from sprag.service.http.web.form.page import empty
 from sprag.service.http.web.form.spec import spec_of, values_of
 from sprag.service.http.web.laboratory.questions import _estimate
 from sprag.service.http.web.laboratory.setting import _angle
@@ -28,6 +27,7 @@ from sprag.worker.chunking import Chunking
 from sprag.worker.limits import MAX_FINISH_DAYS
 from tests.service.spec_sample import SPEC
 
+CONSTANTS = "/base/constants"
 STEPS = "/base/operation/steps"
 WRONG_STEPS = "0 deg; 10 deg; 1 kN\n10 deg; 400 m; 1 kN"
 #: Words without which the Ukrainian sentences do: names, units, examples.
@@ -56,7 +56,7 @@ def test_a_step_of_an_operation_is_named(place: str, english: str, ukrainian: st
 
 
 def test_a_wrong_step_and_a_line_of_constants_are_said_in_the_language_of_the_page() -> None:
-    values = {**EMPTY_SHAFT, STEPS: WRONG_STEPS, CONSTANTS: "k 40"}
+    values = {**empty("machine-shaft"), STEPS: WRONG_STEPS, CONSTANTS: "k 40"}
     assert check_form(values, Chunking()).faults[STEPS][0].startswith("step 2, to: ")
     assert spec_of(values)[1][CONSTANTS] == ["line 1 has no equals sign; got k 40; allowed: lines such as k = 40"]
     with languages.language("uk"):

@@ -17,8 +17,9 @@ from sprag.service.http.web.figures.answers import motion_figures
 from sprag.service.http.web.figures.thinning import thin
 from sprag.service.http.web.form.check import check_form, check_text, message
 from sprag.service.http.web.form.entries import plain
-from sprag.service.http.web.form.page import EMPTY_FORM, reshape, share_clutches
-from sprag.service.http.web.form.spec import field_of, spec_of, values_of, with_clutch_defaults
+from sprag.service.http.web.form.page import empty
+from sprag.service.http.web.form.parts import reshape, share
+from sprag.service.http.web.form.spec import field_of, spec_of, values_of
 from sprag.service.http.web.templates import duration, fragment, time_left
 from sprag.service.presets import preset_names, preset_text
 from sprag.service.reading.reader import Reading
@@ -29,6 +30,7 @@ from sprag.worker.chunking import Chunking
 from sprag.worker.study import Study
 from tests.service.spec_sample import changed
 
+EMPTY_FORM = empty("vibration-drive")
 EXAMPLES = Path(__file__).resolve().parents[4] / "examples"
 
 
@@ -140,7 +142,7 @@ def test_a_wrong_formula_is_told_beside_its_field() -> None:
 
 def test_a_copied_pendulum_follows_from_its_own_parameters() -> None:
     values = values_of(derived_spec())
-    reshape(values, "add-pendulum")
+    reshape(values, "add-pendulums")
     assert "pendulums.1.mass * pendulums.1.arm^2" in values["/base/pendulums/1/inertia"]
     assert "pendulums.0.mass * pendulums.0.arm^2" in values["/base/pendulums/0/inertia"]
 
@@ -328,21 +330,21 @@ def test_numbers_are_written_for_people() -> None:
 
 
 def test_clutches_of_their_own_begin_as_the_common_one_and_go_back_to_the_first_ones() -> None:
-    values = {**filled(), "pendulums": "2", "clutches": "own"}
+    values = {**filled(), "pendulums": "2", "/base/clutches": "own"}
     law = values["/base/clutch/coefficients"]
-    share_clutches(values)
+    share(values)
     assert [values[f"/base/pendulums/{index}/clutch/coefficients"] for index in (0, 1)] == [law, law]
     values |= {"/base/pendulums/0/clutch/coefficients": "0; 7", "/base/pendulums/1/clutch/coefficients": "0; 9"}
-    share_clutches(values)
+    share(values)
     assert values["/base/pendulums/1/clutch/coefficients"] == "0; 9"
-    values["clutches"] = "common"
-    share_clutches(values)
+    values["/base/clutches"] = "common"
+    share(values)
     assert values["/base/clutch/coefficients"] == "0; 7"
     assert not [name for name in values if "pendulums" in name and "clutch" in name]
 
 
 def test_no_torque_at_zero_windup_is_ticked_unless_said_otherwise() -> None:
-    for values in (with_clutch_defaults({}), filled()):
+    for values in (EMPTY_FORM, filled()):
         changed = {**values, "/base/clutch/kind": "data"}
         assert spec_of(changed)[0]["base"]["clutch"]["through_origin"] is True
     measured = {"data": [[0, 1], [0.1, 2]], "accuracy": 1, "through_origin": False}

@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from sprag.service.http.web.form.check import check_form
-from sprag.service.http.web.form.page import EMPTY_FORM, reshape
+from sprag.service.http.web.form.page import empty
+from sprag.service.http.web.form.parts import reshape
 from sprag.service.http.web.form.spec import field_of, spec_of, values_of
 from sprag.service.presets import preset_text
 from sprag.service.spec.document import load_spec, parse_spec
@@ -145,7 +146,7 @@ def test_the_form_is_filled_in_without_javascript(service: Service) -> None:
 
 
 def test_an_empty_form_can_become_a_search(service: Service) -> None:
-    shown = Controls(service.http.post("/new", data={**EMPTY_FORM, "asks": "goal"}).text).values
+    shown = Controls(service.http.post("/new", data={**empty("vibration-drive"), "asks": "goal"}).text).values
     assert (shown["vary"], shown["best"], shown["/goal/best/0/toward"]) == ("1", "1", "max")
     assert (shown["/goal/population"], shown["/goal/polish"]) == ("100", "on")
     assert shown["/axes/0/way"] == "linspace"

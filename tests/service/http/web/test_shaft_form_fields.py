@@ -8,7 +8,8 @@ import pytest
 
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form.check import check_form
-from sprag.service.http.web.form.page import EMPTY_SHAFT, reshape
+from sprag.service.http.web.form.page import empty
+from sprag.service.http.web.form.parts import reshape
 from sprag.service.http.web.form.spec import field_of, spec_of, values_of
 from sprag.service.presets import preset_names
 from sprag.service.spec.document import parse_spec
@@ -128,7 +129,7 @@ def test_a_second_part_is_a_copy_of_the_first_and_paths_follow() -> None:
     assert first == {name: second[name] for name in first}
     assert second["crank_angle"] == "240 deg"
     assert spec["axes"][0]["path"] == "parts.0.operation.scale"
-    assert spec["derive"]["parts.1.mechanism.slider_crank.rod"] == "4 * parts.0.mechanism.slider_crank.crank"
+    assert spec["derive"]["parts.1.mechanism.slider_crank.rod"] == "4 * parts.1.mechanism.slider_crank.crank"
 
 
 @pytest.mark.parametrize(
@@ -136,7 +137,7 @@ def test_a_second_part_is_a_copy_of_the_first_and_paths_follow() -> None:
     [
         ("/base/mechanism/slider_crank/crank", "/base/mechanism/slider_crank/crank"),
         ("/base/operation/steps/0/from", "/base/operation/steps"),
-        ("/base/drive/motor", "drive_is"),
+        ("/base/drive/motor", "/base/drive"),
         ("/base/mechanism", "/base/mechanism"),
         ("/base", ""),
     ],
@@ -147,7 +148,7 @@ def test_a_fault_stands_beside_its_field(pointer: str, field: str) -> None:
 
 def test_an_empty_form_says_what_is_missing_and_a_wrong_step_which_one() -> None:
     checked = check_form(
-        {**EMPTY_SHAFT, "/base/operation/steps": "0 deg; 10 deg; 1 kN\n10 deg; 400 m; 1 kN"}, Chunking()
+        {**empty("machine-shaft"), "/base/operation/steps": "0 deg; 10 deg; 1 kN\n10 deg; 400 m; 1 kN"}, Chunking()
     )
     assert {"/base/mean_speed", "/base/drive/inertia", "/base/mechanism/slider_crank/crank"} <= set(checked.faults)
     assert checked.faults["/base/operation/steps"][0].startswith("step 2, to: ")

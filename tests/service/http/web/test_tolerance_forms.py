@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from sprag.service.http.web.form.page import reshape
+from sprag.service.http.web.form.parts import reshape
 from sprag.service.http.web.form.spec import field_of, spec_of, values_of
 from sprag.service.presets import preset_text
 from sprag.service.spec.document import load_spec, parse_spec
@@ -103,9 +103,9 @@ def test_faults_of_tolerances_stand_beside_them() -> None:
 
 def test_a_further_pendulum_has_the_tolerances_of_the_one_before() -> None:
     values = values_of(json.loads(EXAMPLE.read_text()))
-    reshape(values, "add-pendulum")
+    reshape(values, "add-pendulums")
     assert values[BACKLASH.replace("/0/", "/1/")] == "60 %"
-    reshape(values, "drop-pendulum")
+    reshape(values, "drop-pendulums 1")
     assert BACKLASH.replace("/0/", "/1/") not in values
 
 

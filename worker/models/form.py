@@ -1,0 +1,198 @@
+"""The form of a model's machine as data: blocks of fields, lists of rows, and choices that decide about other fields.
+
+Names are paths with slashes below the base of a spec, or below a row of a list. What a catalogue describes (numbers,
+choices of the spec) needs no more than its name here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+#: How the text of a field is read: as a number or choice that a catalogue describes, a number, a text as it is, a list,
+#: a table of two columns, measured rows, lines of names with numbers, lines of steps; or whether it is ticked.
+FieldKind = Literal["", "number", "text", "list", "table", "measured", "constants", "steps", "tick"]
+
+
+@dataclass(frozen=True, slots=True)
+class Hidden:
+    """Where the choice of the name ``by`` has one of ``values``, the field is not there; of many only ``numbers``."""
+
+    by: str
+    values: tuple[str, ...]
+    numbers: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class FormField:
+    """A field that gives one entry of the base; a name that ends in ``*`` stands for all numbers directly there.
+
+    Attributes
+    ----------
+    label, help, range, default, example, symbol, unit, required : of what no catalogue describes, or instead of its
+    mark : part of the sketch that it is about
+    lines : height of its text; 0 for a line
+    columns : of a table, or the choice (with ``@``) whose value is the column
+    without : values of its choices that are not offered
+    hidden : where it is not there
+    """
+
+    name: str
+    kind: FieldKind = ""
+    label: str = ""
+    help: str = ""
+    range: str = ""
+    default: str = ""
+    example: str = ""
+    symbol: str = ""
+    unit: str = ""
+    required: bool = False
+    mark: str = ""
+    lines: int = 0
+    columns: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+    hidden: tuple[Hidden, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """One way of a choice with its fields; ``label`` "" is the words of its value.
+
+    A spec has chosen it where it has an entry ``at``, with ``is_kind`` one whose ``kind`` is the value; the first
+    option of a choice, which needs none, is that of the others. ``implies`` are entries that hold with it without a
+    field.
+    """
+
+    value: str
+    label: str = ""
+    items: tuple[FormField | FormChoice, ...] = ()
+    at: str = ""
+    is_kind: bool = False
+    implies: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class FormChoice:
+    """A choice of the form's own, which the spec has by what else it has.
+
+    Where its ``control`` is a switch, the page has the fields of all options.
+    """
+
+    name: str
+    label: str
+    options: tuple[Option, ...]
+    help: str = ""
+    control: Literal["select", "radio", "switch"] = "select"
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Fields under one heading; one that is ``within`` continues the block before it.
+
+    ``only`` is a choice and the value with which it is there, ``adds`` the list to which its button adds.
+    """
+
+    title: str
+    items: tuple[FormField | FormChoice, ...]
+    within: bool = False
+    only: tuple[str, str] | None = None
+    adds: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """A list of ``least`` to ``most`` rows, each with the same blocks.
+
+    Attributes
+    ----------
+    name, at : of the field with the number of rows, and their place in the base
+    title, first : of a row by its number, and the number of the first one
+    add, drop : texts of the buttons; ``only_last`` removes no other row
+    copies : whether a new row is a copy of the last one
+    alone : whether the blocks stand once, outside of the list, where it has no rows
+    fields : what only a row has, before the items of its first block
+    shared : a choice, and the entry of each row that stands outside of the list where its value is not "own"
+    every, one : all rows, and one of them by its number, as those for which a component is taken
+    """
+
+    name: str
+    at: str
+    least: int
+    most: int
+    title: str
+    add: str
+    drop: str
+    blocks: tuple[Block, ...]
+    first: int = 1
+    only_last: bool = False
+    copies: bool = True
+    alone: bool = False
+    fields: tuple[FormField, ...] = ()
+    shared: tuple[str, str] | None = None
+    every: str = ""
+    one: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentKind:
+    """A kind of components that a machine can have.
+
+    Attributes
+    ----------
+    name, title : of the kind, and of many
+    fields : field of a component -> name of a field of the form, with ``N`` for a row of a list
+    sets : further fields that it fills in
+    """
+
+    name: str
+    title: str
+    fields: Mapping[str, str]
+    sets: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """The form of a model.
+
+    Attributes
+    ----------
+    parts : blocks and lists in their order; parameters elsewhere have blocks of their own
+    components : kinds of components
+    new : values of an empty form
+    called : the model in a sentence, such as "a machine shaft"; "" for its title
+    with_run : whether its studies have a run, so that cases can start from their neighbours
+    examples : what fields of the study show while they are empty, and a formula
+    sketch : template of a drawing that explains the machine; "" for its mechanisms
+    batch, normal : what is said about a batch of machines that differ
+    advice : what is said about axes
+    groups : beginning of paths -> heading under which they are offered as axes; by default their first parts
+    nameless : pattern of the beginning of paths that the labels of axes leave out
+    labels : path of the catalogue -> label of its axis, with {part} and {number}
+    """
+
+    parts: tuple[Block | Rows, ...] = ()
+    components: tuple[ComponentKind, ...] = ()
+    new: Mapping[str, str] = field(default_factory=dict)
+    called: str = ""
+    with_run: bool = False
+    examples: Mapping[str, str] = field(default_factory=dict)
+    sketch: str = ""
+    batch: str = "Built machines differ: a field “±” beside each parameter, a share of it or a quantity"
+    normal: str = (
+        "Normal: ± is three standard deviations, so that nearly all machines are within it. Each place of the study is "
+        "run with the nominal machine and with the drawn ones."
+    )
+    advice: str = ""
+    groups: tuple[tuple[str, str], ...] = ()
+    nameless: str = ""
+    labels: Mapping[str, str] = field(default_factory=dict)
+
+    def example(self, name: str) -> str:
+        """An example; "" where there is none."""
+        return self.examples.get(name, "")
+
+    @property
+    def lists(self) -> tuple[Rows, ...]:
+        """Its lists."""
+        return tuple(part for part in self.parts if isinstance(part, Rows))

@@ -1,0 +1,187 @@
+"""The form of machine shafts."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from sprag.engine.machine_shaft.spec import MAX_PARTS, MAX_STAGES, REVOLUTIONS
+from sprag.worker.models.form import Block, ComponentKind, Form, FormChoice, FormField, Hidden, Option, Rows
+
+_FORMULA_HELP: Final = "of phi in rad, such as 40*sin(2*phi)^2; of an operation also of t in s, x and omega"
+_TABLE_HELP: Final = "two columns, with units in their headings"
+#: Motors and the numbers of each.
+MOTORS: Final = {
+    "linear": ("a motor with a linear characteristic", ("no_load_speed", "stall_torque", "inertia")),
+    "kloss": ("an induction motor (Kloss)", ("inertia", "synchronous_speed", "breakdown_torque", "breakdown_slip")),
+    "table": ("a motor with a measured characteristic", ("inertia", "scale")),
+}
+_GEARED: Final = ("ratio", "efficiency", "output_inertia", "inertia")
+_STAGES: Final = {
+    **dict.fromkeys(("gear", "worm"), _GEARED), **dict.fromkeys(("belt", "chain"), (*_GEARED, "mass", "radius")),
+    "screw_nut": ("lead", "inertia", "mass"), "rack": ("radius", "inertia", "mass"),
+}  # fmt: skip
+#: Mechanisms and their choices.
+_BODIES: Final = ("weights", "bodies")
+_MECHANISMS: Final = {
+    "slider_crank": _BODIES, "four_bar": _BODIES, "drag_link": _BODIES, "toggle": _BODIES, "scotch_yoke": (),
+    "parallel_crank": (), "quick_return": ("kind", *_BODIES), "cam": ("rise", "fall"),
+}  # fmt: skip
+
+
+def _formula(at: str) -> FormField:
+    example = "40*sin(2*phi)^2"
+    return FormField(f"{at}/formula", "text", "Formula", _FORMULA_HELP, example=example, required=True, lines=2)
+
+
+def _table(at: str, headings: str, *columns: str) -> tuple[FormField, ...]:
+    rows = f"{headings}\n0,0\n180,20\n360,0"
+    table = FormField(f"{at}/csv", "table", "Table", _TABLE_HELP, example=rows, required=True, lines=5, columns=columns)
+    return table, FormField(f"{at}/interpolation")
+
+
+def _mechanism(kind: str) -> Option:
+    at = f"mechanism/{kind}"
+    hidden = [Hidden(f"{at}/bodies", ("two_mass",), ("rod_inertia", "coupler_inertia"))]
+    if kind == "four_bar":
+        hidden.append(Hidden(f"{at}/weights", ("ram",), ("inclination",)))
+    choices = (FormField(f"{at}/{name}") for name in _MECHANISMS[kind])
+    return Option(kind, "", (*choices, FormField(f"{at}/*", hidden=tuple(hidden))), at=at)
+
+
+def _balance(kind: str) -> dict[str, str]:
+    return {"balance": kind, "balance_side": "drive"}
+
+
+def _motor(kind: str) -> Option:
+    label, numbers = MOTORS[kind]
+    table = _table("drive/motor", "speed [rpm],torque [N*m]", "speed", "torque") if kind == "table" else ()
+    return Option(
+        kind,
+        label,
+        (*table, *_fields("drive/motor", *numbers)),
+        at="drive/motor",
+        is_kind=True,
+        implies=_balance("motor"),
+    )
+
+
+def _fields(at: str, *names: str) -> tuple[FormField, ...]:
+    return tuple(FormField(f"{at}/{name}") for name in names)
+
+
+_BALANCE: Final = (FormField("balance", default="by default", without=("motor",)), FormField("balance_side"))
+_SCALED: Final = (*_fields("drive", "scale"), *_BALANCE)
+_TORQUE: Final = "drive/torque"
+_DRIVE: Final = FormChoice(
+    "drive", "Driving torque", help="or the motor that gives it",
+    options=(
+        Option("found", "the constant torque that balances the operation", implies=_balance("constant")),
+        Option("value", "a constant torque", (FormField(_TORQUE), *_BALANCE), at=_TORQUE),
+        Option("formula", "a formula of the angle", (_formula(_TORQUE), *_SCALED), at=f"{_TORQUE}/formula"),
+        Option("csv", "a table over the angle",
+               (*_table(_TORQUE, "angle [deg],torque [N*m]", "angle", "torque"), *_SCALED), at=f"{_TORQUE}/csv"),
+        *map(_motor, MOTORS),
+    ),
+)  # fmt: skip
+_FLYWHEEL: Final = FormChoice(
+    "drive/flywheel", "Flywheel", help="on the main shaft, by its dimensions",
+    options=(
+        Option("none", "none"),
+        *(Option(kind, "", (FormField("drive/flywheel/*"),), at="drive/flywheel", is_kind=True)
+          for kind in ("rim", "disc")),
+    ),
+)  # fmt: skip
+_MECHANISM: Final = FormChoice(
+    "mechanism", "Mechanism",
+    options=(
+        Option("none", "none"),
+        *map(_mechanism, _MECHANISMS),
+        Option("formula", "inertia as a formula", (_formula("mechanism"),), at="mechanism/formula"),
+        Option("csv", "inertia as a table", _table("mechanism", "angle [deg],inertia [kg*m^2]", "angle", "inertia"),
+               at="mechanism/csv"),
+    ),
+)  # fmt: skip
+_OVER, _INDICATOR = "operation/over", "operation/indicator"
+_COURSE: Final = (
+    *_fields("operation", "quantity", "over"),
+    FormField("operation/during", hidden=(Hidden(_OVER, ("angle", "time")),)),
+    FormField("operation/sense"),
+    FormField("operation/recorded_at", hidden=(Hidden(_OVER, ("angle", "stroke")),)),
+)  # fmt: skip
+_SHARE: Final = _fields("operation", "scale", "efficiency")
+_STEPS: Final = FormField(
+    "operation/steps", "steps", "Steps", "one step a line: from; to; value", example="120 deg; 180 deg; 20 kN",
+    required=True, lines=3,
+)  # fmt: skip
+_OPERATION: Final = FormChoice(
+    "operation", "Resistance",
+    options=(
+        Option("none", "none"),
+        Option("value", "constant", (*_COURSE, *_fields("operation", "value"), *_SHARE), at="operation/value"),
+        Option("steps", "steps", (*_COURSE, _STEPS, *_SHARE), at="operation/steps"),
+        Option("formula", "formula", (*_COURSE, _formula("operation"), *_SHARE), at="operation/formula"),
+        Option("csv", "table",
+               (*_COURSE, *_table("operation", "angle [deg],force [kN]", f"@{_OVER}", "@operation/quantity"), *_SHARE),
+               at="operation/csv"),
+        Option("gas", "gas in a compressor", (FormField("operation/gas/*"), *_SHARE), at="operation/gas"),
+        Option("indicator", "indicator diagram", (
+            FormField(f"{_INDICATOR}/over"),
+            FormField(f"{_INDICATOR}/recorded_at", hidden=(Hidden(f"{_INDICATOR}/over", ("angle", "stroke")),)),
+            FormField(f"{_INDICATOR}/*"),
+            *_table(_INDICATOR, "angle [deg],pressure [bar]", f"@{_INDICATOR}/over", "pressure"),
+            *_SHARE,
+        ), at=_INDICATOR),
+    ),
+)  # fmt: skip
+_STAGE: Final = tuple(
+    FormField(f"{name}", hidden=(Hidden("kind", tuple(kind for kind, own in _STAGES.items() if name not in own)),))
+    for name in dict.fromkeys(name for own in _STAGES.values() for name in own)
+)
+
+FORM: Final = Form(
+    parts=(
+        Block("Machine", (
+            FormField("mean_speed", hidden=(Hidden("drive", tuple(MOTORS)),)),
+            FormField("mean_speed_is"),
+            FormField(
+                "cycle", "number", "Cycle", f"revolutions until everything repeats, 1 to {max(REVOLUTIONS)}",
+                default="1 revolution", example="2 revolutions",
+            ),
+            *(FormField(name) for name in ("wanted_irregularity", "friction_torque", "gravity")),
+            FormField("phi_c", label="Reference angle", symbol="phi_c", default="by default"),
+            FormField(
+                "constants", "constants", "Constants of formulas", "one a line: name = value", example="k = 40", lines=2
+            ),
+        )),
+        Block("Drive", (FormField("drive/inertia"), _DRIVE, _FLYWHEEL), adds="stages"),
+        Rows(
+            "stages", "drive/stages", 0, MAX_STAGES, "Stage {number}", "Add a stage", "Remove this stage",
+            blocks=(Block("", (FormField("kind"), *_STAGE)),), copies=False,
+        ),
+        Rows(
+            "parts", "parts", 0, MAX_PARTS, "Part {number}: {label}", "Add a part", "Remove this part",
+            blocks=(Block("Mechanism", (_MECHANISM,)), Block("Operation", (_OPERATION,))),
+            alone=True, fields=(FormField("crank_angle"),),
+        ),
+    ),
+    components=(
+        ComponentKind("motor", "Motors", {
+            "characteristic": "drive",
+            **{name: f"drive/motor/{name}" for kind in ("linear", "kloss") for name in MOTORS[kind][1]},
+        }),
+    ),
+    new={"/base/mechanism": "slider_crank", "/base/operation": "steps", "/refine/results": "irregularity"},
+    called="a machine shaft",
+    examples={
+        "formula": "2.5 * mechanism.slider_crank.crank",
+        "values": "1; 2; 5 kg*m^2", "from": "200 rpm", "to": "400 rpm", "step": "50 rpm", "value": "300 rpm",
+        "tied": "parts.1.mechanism.slider_crank.crank",
+        "columns": "operation.scale\tdrive.inertia [kg*m^2]\n1\t0.2\n1.5\t0.3",
+        "points": "operation.scale,drive.inertia [kg*cm^2]\n1,200\n1.5,300",
+    },
+    groups=(
+        ("drive.flywheel.", "Flywheel"), ("drive.motor.", "Motor"), ("drive.stages.", "Stages"), ("drive.", "Drive"),
+        ("mechanism.", "Mechanism"), ("operation.", "Operation"), ("constants.", "Constants"), ("", "Machine"),
+    ),
+    nameless=r"(parts\.\d+\.)?((mechanism\.\w+|operation(\.gas|\.indicator)?|drive|constants)\.)?",
+)  # fmt: skip

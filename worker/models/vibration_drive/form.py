@@ -1,0 +1,92 @@
+"""The form of vibration drives."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from sprag.engine.vibration_drive.parameters import MAX_COEFFICIENTS, MAX_PENDULUMS
+from sprag.worker.models.form import Block, ComponentKind, Form, FormChoice, FormField, Option, Rows
+
+_CLUTCH: Final = FormChoice(
+    "clutch/kind", "How the clutch is given", control="switch",
+    options=(
+        Option("law", "Coefficients", (
+            FormField(
+                "clutch/coefficients", "list", "Coefficients",
+                f"c₁; c₂; c₃; … of the torque c₁ + c₂u + c₃u² + … over the windup u, in N·m/rad^(k−1); 1 to "
+                f"{MAX_COEFFICIENTS}",
+                example="0; 200; 0; 20000", mark="clutch", required=True,
+            ),
+            FormField(
+                "clutch/windup_limit", "number", "Windup limit",
+                "largest windup the law was measured to; beyond it goes on straight", range="> 0 rad",
+                default="none", example="0.05 rad", symbol="u_end", unit="rad", mark="clutch",
+            ),
+        )),
+        Option("data", "Measured data", (
+            FormField(
+                "clutch/data", "measured", "Measured angle and torque",
+                "two columns, pasted from a spreadsheet; a header such as angle_deg, torque_Nm names the units, "
+                "without one they are rad and N·m",
+                example="angle_deg\ttorque_Nm\n0\t0\n0.25\t0.878", mark="clutch", required=True, lines=7,
+            ),
+            FormField(
+                "clutch/accuracy", "number", "Accuracy", "largest residual of the fit that is accepted",
+                range="> 0 N*m", example="0.05 N*m", unit="N*m", mark="clutch", required=True,
+            ),
+            FormField("clutch/max_degree"),
+            FormField("clutch/through_origin", "tick", "No torque at zero windup", default="on"),
+            FormField("clutch/angles_include_backlash", "tick", "Angles include the backlash"),
+        ), at="clutch/data"),
+    ),
+)  # fmt: skip
+_WHOSE: Final = FormChoice(
+    "clutches", "Whose clutch", control="radio",
+    options=(
+        Option("common", "One law for all pendulums", (_CLUTCH,)),
+        Option("own", "One law for each pendulum", at="pendulums/0/clutch"),
+    ),
+)  # fmt: skip
+
+FORM: Final = Form(
+    parts=(
+        Block("Vibration of the base", (FormField("excitation/*"),)),
+        Rows(
+            "pendulums", "pendulums", 1, MAX_PENDULUMS, "Pendulum {number}", "Add a pendulum", "Remove the last one",
+            blocks=(
+                Block("", (FormField("*"),)),
+                Block("Its clutch", (_CLUTCH,), within=True, only=("clutches", "own")),
+            ),
+            first=0, only_last=True, shared=("clutches", "clutch"), every="every pendulum", one="pendulum {number}",
+        ),
+        Block("Freewheel clutch", (_WHOSE,)),
+        Block("Output shaft", (FormField("shaft/*"),)),
+        Block("Surroundings", (FormField("*"),)),
+    ),
+    components=(
+        ComponentKind("spring", "Springs", {name: f"pendulums/N/{name}" for name in ("spring_rate", "damping")}),
+        ComponentKind(
+            "clutch", "Clutches",
+            {
+                "coefficients": "clutch/coefficients", "windup_limit": "clutch/windup_limit",
+                "backlash": "pendulums/N/backlash",
+            },
+            {"clutch/kind": "law", "clutch/windup_limit": ""},
+        ),
+    ),
+    called="a vibration drive",
+    with_run=True,
+    sketch="_sketch.html",
+    examples={
+        "formula": "1.1 * pendulums.0.mass * pendulums.0.arm^2 + 2e-4 kg*m^2",
+        "values": "0; 0.1; 0.2 N*m", "from": "20 Hz", "to": "35 Hz", "step": "1 Hz", "value": "0.2 N*m",
+        "tied": "excitation.amplitude_y",
+        "columns": "shaft.load [N*mm]\texcitation.frequency [Hz]\n100\t25\n200\t30",
+        "points": "shaft.load [N*mm],excitation.frequency [Hz]\n100,25\n200,30",
+    },
+    batch="Built drives differ: a field “±” beside each parameter, a share of it or a quantity",
+    normal="Normal: ± is three standard deviations, so that nearly all drives are within it. Each place of the study "
+    "is run with the nominal drive and with the drawn ones.",
+    advice="Start the load at 0: the main curve then begins at the no-load speed.",
+    labels={"clutch.coefficients.K": "{part} coefficient c{number}"},
+)  # fmt: skip
