@@ -7,7 +7,8 @@ from collections.abc import Iterable, Iterator
 from sprag.service.reading.wording import words
 from sprag.service.spec.components import CHARACTERISTIC, CHARACTERISTICS
 from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN
-from sprag.service.spec.draws.described import DISTRIBUTION, DRAWS
+from sprag.service.spec.draws.described import DISTRIBUTION
+from sprag.service.spec.draws.tolerances import DRAWS
 from sprag.service.spec.machine.shaft import MEAN_SPEED_IS
 from sprag.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, FLYWHEEL, MOTOR, STAGE
 from sprag.service.spec.machine.shaft_parts import (
@@ -18,7 +19,8 @@ from sprag.service.spec.machine.shaft_parts import (
     OPERATION_CHOICES,
     PHI_C,
 )
-from sprag.service.spec.plan import goal, refine
+from sprag.service.spec.plan.goal import GOAL
+from sprag.service.spec.plan.refine import REFINE
 from sprag.worker import models
 from sprag.worker.models.form import Block, Form, FormChoice, FormField
 
@@ -29,7 +31,7 @@ def form_values() -> Iterator[str]:
     yield from map(words, CHARACTERISTICS)
     machine = (*MECHANISM_CHOICES.values(), OPERATION_CHOICES)
     drive = (MEAN_SPEED_IS, BALANCE, BALANCE_SIDE, FLYWHEEL, MOTOR, STAGE, INDICATOR_OVER, INTERPOLATION, PHI_C)
-    plan = (*goal.SEARCH.values(), refine.RESULTS, refine.ERROR, refine.START, refine.FINEST, refine.MOST)
+    plan = (*GOAL.described.values(), REFINE.listed["results"], *REFINE.described.values())
     entries = (*SETTLED_RUN.values(), DURATION, *ANY_RUN.values(), *FIT.values(), *DRAWS.values(), *plan, *drive)
     for entry in (*entries, *(entry for choices in machine for entry in choices.values())):
         name = words(getattr(entry, "name", ""))

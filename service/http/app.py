@@ -99,7 +99,7 @@ from sprag.service.settings import Settings, UnsafeSettingsError
 from sprag.service.spec import components as component_spec
 from sprag.service.spec import labels
 from sprag.service.spec import saved_views as view_spec
-from sprag.service.spec.schema.axes import extension_schema
+from sprag.service.spec.extend import EXTENSION
 from sprag.service.spec.schema.document import spec_schema
 from sprag.service.storage.readiness import Readiness
 from sprag.service.storage.store import Store
@@ -224,7 +224,7 @@ class Application(FastAPI):
         if self.openapi_schema is None:
             schemas = {
                 "Spec": spec_schema(),
-                "Extension": extension_schema(),
+                "Extension": EXTENSION.schema(),
                 "ClutchFitRequest": clutch_fits.SCHEMA,
                 "StudyChange": labels.SCHEMA,
                 "Components": component_spec.SCHEMA,

@@ -26,6 +26,7 @@ from sprag.service.schedules.trouble import read_trouble_flags
 from sprag.service.spec.described import Described, choice, named
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.fields import read_object
+from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report, SpecError
 from sprag.service.zones import zones
 from sprag.worker.limits import MAX_NAME_LENGTH, MAX_PRIORITY
@@ -163,7 +164,9 @@ def _read(data: object, now: datetime, old: ScheduleFields | None = None) -> Sch
     zone = _read_zone(report, found.get("zone", "UTC"))
     timing = _read_timing(report, found, zone, now, old)
     window = _read_window(report, found.get("window"), zone)
-    priority, fresh, enabled, overlap, catch_up, when = (plain.read(report, "", found) for plain in PLAIN.values())
+    priority, fresh, enabled, overlap, catch_up, when = (
+        plain.read(Node(report, "", found)) for plain in PLAIN.values()
+    )
     finish_by = _read_duration(report, "finish_by", found, check_run_finish, ALLOWED_OF_RUNS)
     grace = _read_duration(report, "misfire_grace", found, check_grace, GRACE_ALLOWED)
     paused_until = _read_pause(report, found.get("paused_until"), zone, now, old)

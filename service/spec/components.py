@@ -21,8 +21,9 @@ from sprag.service.reading.printed import could_be_several, could_be_values
 from sprag.service.reading.together import AMBIGUOUS_UNIT, questions
 from sprag.service.reading.units import QuantityError
 from sprag.service.spec.csv_text import in_cell, read_csv, refuse_mixed_column, unescape
-from sprag.service.spec.fields import exact, read_object
+from sprag.service.spec.fields import read_object
 from sprag.service.spec.labels import LINES_ALLOWED, printable_lines
+from sprag.service.spec.node import Node, exact
 from sprag.service.spec.report import Report, SpecError, join
 from sprag.service.spec.table_text import heading_of
 from sprag.worker import models
@@ -238,7 +239,8 @@ def _faults_of_field(kind: str, name: str, text: str) -> list[Fault]:
 
 def _read_csv(report: Report, text: object) -> list[tuple[str, Component]]:
     example = N_("columns kind, name, note and the fields")
-    rows = read_csv(report, "/csv", text, (MAX_COMPONENTS, 40), example, texts=_TEXTS)
+    node = Node(report, "/csv", text)
+    rows = read_csv(node, (MAX_COMPONENTS, 40), example, texts=_TEXTS)
     if rows is None:
         return []
     headings = [heading_of(cell) or ("", "") for cell in rows[0].cells]
@@ -255,7 +257,7 @@ def _read_csv(report: Report, text: object) -> list[tuple[str, Component]]:
     for place, (name, unit) in enumerate(headings):
         parameter = parameters.get(name)
         if parameter is not None and not unit:
-            refuse_mixed_column(report, "/csv", rows[1:], (place, name), parameter.unit)
+            refuse_mixed_column(node, rows[1:], (place, name), parameter.unit)
     if report.found:
         return []
     made = []

@@ -19,7 +19,7 @@ from sprag.service.spec.table_text import MAX_HEADING, CsvRow, Split, settled_ta
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from sprag.service.spec.report import Report
+    from sprag.service.spec.node import Node
 
 #: Beginnings of text that a spreadsheet would interpret as a formula.
 _FORMULA_STARTS: Final = ("=", "+", "-", "@", "\t", "\r")
@@ -42,38 +42,38 @@ def unescape(text: str) -> str:
     return text[1:] if text.startswith("'") and text.lstrip("'").startswith(_FORMULA_STARTS) else text
 
 
-def read_csv(
-    report: Report, where: str, text: object, most: tuple[int, int], example: str, texts: Collection[str] = ()
-) -> list[CsvRow] | None:
+def read_csv(node: Node, most: tuple[int, int], example: str, texts: Collection[str] = ()) -> list[CsvRow] | None:
     """The non-empty rows, the headings first, all of the same length, with decimal points for decimal commas.
 
     None, and the faults recorded, where invalid. ``most`` rows under the headings and columns are allowed. ``example``
     says what the text is, for its absence. Cells under the headings ``texts`` stay as they are written.
     """
+    text = node.value
     if not isinstance(text, str):
-        report.fault(
-            where, "required" if text is None else "wrong-type",
-            "is required" if text is None else "must be the text of a CSV file", text, allowed=example,
-        )  # fmt: skip
+        node.refuse(
+            "required" if text is None else "wrong-type",
+            "is required" if text is None else "must be the text of a CSV file",
+            allowed=example,
+        )
         return None
     try:
         table = split(text)
     except csv.Error as error:
-        report.fault(where, "unreadable", not_csv(error))
+        node.refuse("unreadable", not_csv(error), None)
         return None
     rows = with_units(table.rows)
     columns = len(rows[0].cells) if rows else 0
     if not 2 <= len(rows) <= most[0] + 1 or not 1 <= columns <= most[1]:
         size = {"lines": str(len(rows) - 1), "columns": str(columns)}
         under = Sentence("has {lines} lines of {columns} columns under its headings", **size)
-        report.fault(
-            where,
+        node.refuse(
             "out-of-range",
             "is empty" if not rows else "has no lines under its headings" if len(rows) == 1 else under,
+            None,
             allowed=Sentence("1 to {lines} lines of 1 to {columns} columns", lines=most[0], columns=most[1]),
         )
         return None
-    before = report.found
+    before = node.report.found
     for place, cell in enumerate(rows[0].cells, 1):
         if len(cell) > MAX_HEADING:
             message = plural(
@@ -81,7 +81,7 @@ def read_csv(
                 "the heading of column {place} has {count} characters",
                 len(cell), place=str(place),
             )  # fmt: skip
-            report.fault(where, "out-of-range", message, allowed=at_most(MAX_HEADING))
+            node.refuse("out-of-range", message, None, allowed=at_most(MAX_HEADING))
     for row in rows[1:]:
         if len(row.cells) != columns:
             message = plural(
@@ -91,10 +91,10 @@ def read_csv(
             if len(row.cells) > columns:
                 hint = Sentence("with decimal commas, columns are separated by semicolons")
                 allowed = joined("; ", (allowed, hint))
-            report.fault(where, "unequal-lengths", message, allowed=allowed)
-        if report.full:
+            node.refuse("unequal-lengths", message, None, allowed=allowed)
+        if node.report.full:
             break
-    return None if report.found > before else _settled(report, where, table._replace(rows=rows), texts)
+    return None if node.report.found > before else _settled(node, table._replace(rows=rows), texts)
 
 
 def not_csv(error: csv.Error) -> Sentence:
@@ -114,7 +114,7 @@ def has_units(text: str) -> bool:
     return _WITH_UNIT.search(text) is not None
 
 
-def refuse_mixed_column(report: Report, where: str, rows: Sequence[CsvRow], column: tuple[int, str], unit: str) -> bool:
+def refuse_mixed_column(node: Node, rows: Sequence[CsvRow], column: tuple[int, str], unit: str) -> bool:
     """Record a fault where bare numbers of a column stand beside quantities in units of another scale.
 
     ``column`` is its place and its heading, which has no unit, so that a bare number would be in ``unit`` (SI). The
@@ -131,19 +131,17 @@ def refuse_mixed_column(report: Report, where: str, rows: Sequence[CsvRow], colu
     line = rows[cells.index(values[asked.place])].line
     allowed = Sentence("a unit in the heading, as in {heading} [{unit}], or in each cell", heading=heading, unit=unit)
     message = in_cell(line, asked.message, heading)
-    report.fault(where, AMBIGUOUS_UNIT, message, heading, allowed=allowed, unit=unit)
+    node.refuse(AMBIGUOUS_UNIT, message, heading, allowed=allowed, unit=unit)
     return True
 
 
-def _settled(report: Report, where: str, table: Split, texts: Collection[str]) -> list[CsvRow] | None:
+def _settled(node: Node, table: Split, texts: Collection[str]) -> list[CsvRow] | None:
     """The rows with decimal points; None, and a fault recorded, where points could separate thousands."""
     kept = {place for place, heading in enumerate(table.rows[0].cells) if heading.strip() in texts}
     rows, doubt = settled_table(table._replace(rows=table.rows[1:]), kept)
     if doubt is not None and not doubt.likely:
-        report.fault(
-            where, "ambiguous-point", in_cell(doubt.line, question(doubt.text)), doubt.text, allowed=WITHOUT_DOUBT
-        )
+        node.refuse("ambiguous-point", in_cell(doubt.line, question(doubt.text)), doubt.text, allowed=WITHOUT_DOUBT)
         return None
     if doubt is not None:
-        report.warn("ambiguous-point", where, of_line(doubt.line, assumption(doubt.text)))
+        node.report.warn("ambiguous-point", node.pointer, of_line(doubt.line, assumption(doubt.text)))
     return [table.rows[0], *rows]

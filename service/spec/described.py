@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Final, Literal
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, Literal, Union
 
 from sprag.sentences import Sentence
 from sprag.service.reading.numbers import WITHOUT_DOUBT, assumption, question, settle
 from sprag.service.reading.part_names import RUN_LABELS
-from sprag.service.spec.fields import read_choice, read_flag, read_number, read_periods, read_plain, read_whole
 from sprag.service.spec.lists import refuse_mixed
-from sprag.service.spec.report import Report, join
+from sprag.service.spec.node import Node
+from sprag.service.spec.schema.quantity import Schema, object_schema, one_of, quantity_schema
 from sprag.worker.limits import (
     MAX_ORBIT_PERIODS,
     MAX_SETTLED,
@@ -26,6 +26,13 @@ from sprag.worker.models import MAX_COEFFICIENTS, SETTLED, Parameter
 #: What is said about a list that is none, and what is allowed; the catalogue has these texts for the items of each.
 NO_LIST: Final = "must be a list of {items}"
 A_LIST: Final = "a list of {{low}} to {{high}} {items}{{note}}"
+_IN_ONE_TEXT: Final[Schema] = {
+    "type": "string",
+    "minLength": 1,
+    "description": "the values in one text, semicolons between them; a unit at the end holds for the bare numbers "
+    "before it",
+    "examples": ["0; 50; 100 N*mm"],
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,15 +43,15 @@ class Described:
     ----------
     name, label, help : its name, its label in the form, and its meaning
     kind : "whole" and "number", from ``low`` to ``high``; "periods", a text with a whole number of periods; "time", a
-        number of seconds or a text; "text", a number or a text within ``limits``; "flag"; "choice", one of ``choices``:
-        values and their labels in the form
+        number of seconds or a text; "text", a number or a text within ``limits``; "part", a fraction as a text or the
+        whole number under it; "flag"; "choice", one of ``choices``: values and their labels in the form
     default : what stands for a field that is not given; None where it is required or its absence means something
     """
 
     name: str
     label: str
     help: str
-    kind: Literal["whole", "number", "periods", "time", "text", "flag", "choice"]
+    kind: Literal["whole", "number", "periods", "time", "text", "part", "flag", "choice"]
     low: float = 0
     high: float = 0
     default: Any = None
@@ -62,24 +69,24 @@ class Described:
         """What can be chosen."""
         return tuple(value for value, _ in self.choices)
 
-    def read(self, report: Report, pointer: str, found: Mapping[str, Any]) -> Any:
-        """Its value in the object ``found`` at ``pointer``; None, and a problem noted, when it is wrong or missing.
+    def read(self, owner: Node) -> Any:
+        """Its value in the object ``owner``; None, and a fault recorded, when it is wrong or missing.
 
         Times are read where the frequencies of a study are known, texts beside their descriptions.
         """
-        given = self.name in found
-        if not given and self.default is not None:
+        node = owner[self.name]
+        if not node.given and self.default is not None:
             return self.default
-        where, value = join(pointer, self.name), found.get(self.name)
         match self.kind:
             case "choice":
-                return read_choice(report, where, value, self.values, given=given)
+                return node.choice(self.values)
             case "flag":
-                return read_flag(report, where, value)
+                return node.flag()
             case "number":
-                return read_plain(report, where, value, self.low, self.high)
-        read = read_periods if self.kind == "periods" else read_whole
-        return read(report, where, value, int(self.low), int(self.high))
+                return node.plain(self.low, self.high)
+            case "periods":
+                return node.periods(int(self.low), int(self.high))
+        return node.whole(int(self.low), int(self.high))
 
     def schema(self) -> dict[str, Any]:
         """Its JSON Schema."""
@@ -89,8 +96,9 @@ class Described:
             return {"type": "string", "examples": [self.default_text], "default": self.default_text, **schema}
         if self.kind == "time":
             return {"type": ["number", "string"], "examples": ["60 periods", "2 s", 2.0], "minimum": 0, **schema}
-        if self.kind == "text":
-            return {"type": ["number", "string"], "default": self.default, "description": f"{self.help}: {self.limits}"}
+        if self.kind in ("text", "part"):
+            number = "number" if self.kind == "text" else "integer"
+            return {"type": [number, "string"], "default": self.default, "description": f"{self.help}: {self.limits}"}
         if self.default is not None:
             schema["default"] = self.default
         if self.kind == "choice":
@@ -105,7 +113,8 @@ class Described:
 class Listed:
     """A list of ``low`` to ``high`` ``items`` (what they are called); ``help`` says what it means.
 
-    ``note`` is said to those who gave another thing.
+    ``note`` is said to those who gave another thing, ``item`` describes each item, and ``text`` says that one text with
+    all of them will do.
     """
 
     items: str
@@ -113,83 +122,138 @@ class Listed:
     high: int
     help: str = ""
     note: str = ""
+    item: Field = field(default_factory=dict)
+    text: bool = False
 
-    def read(self, report: Report, pointer: str, data: object) -> list[Any] | None:
-        """The list; None, and a fault noted, when it is not one or has too few or too many items."""
+    def read(self, node: Node) -> list[Node] | None:
+        """The items, none where the list may be missing; None, and a fault recorded, unless it is such a list."""
+        data = node.value
+        if not node.given and not self.low:
+            return []
         if isinstance(data, list) and self.low <= len(data) <= self.high:
-            return data
+            return node.parts()
         missing = data is None and self.low > 0
-        report.fault(
-            pointer,
+        node.refuse(
             "required" if missing else "wrong-type",
             "is required" if missing else Sentence(NO_LIST.format(items=self.items)),
-            data,
-            allowed=Sentence(
-                A_LIST.format(items=self.items),
-                low=self.low,
-                high=self.high,
-                note=Sentence(self.note),
-            ),
+            allowed=Sentence(A_LIST.format(items=self.items), low=self.low, high=self.high, note=Sentence(self.note)),
         )
         return None
 
-    def read_rows(self, report: Report, pointer: str, data: object, *columns: Parameter) -> list[list[float]]:
+    def read_rows(self, node: Node, *columns: Parameter) -> list[list[float]]:
         """Rows with a number for each of ``columns``; those that are wrong are noted and left out."""
-        allowed = f"[{', '.join(column.path for column in columns)}]"
+        given = self.read(node) or []
         rows: list[list[float]] = []
-        given = self.read(report, pointer, data) or []
-        written = _settled(report, pointer, given)
-        for index, row in enumerate(given):
-            where = join(pointer, index)
-            if not isinstance(row, list) or len(row) != len(columns):
-                report.fault(where, "wrong-type", "must be a row of two numbers", row, allowed=allowed)
+        for row, cells in zip(given, _settled(given), strict=True):
+            if len(cells) != len(columns):
+                row.refuse("wrong-type", "must be a row of two numbers",
+                           allowed=f"[{', '.join(column.path for column in columns)}]")  # fmt: skip
                 continue
-            read = [read_number(report, join(where, k), written[index][k], own) for k, own in enumerate(columns)]
-            numbers = [number for number in read if number is not None]
-            if len(numbers) == len(columns):
-                rows.append(numbers)
-        return rows if not self._mixed(report, pointer, data, columns) else []
+            read = [cell.number(column) for cell, column in zip(cells, columns, strict=True)]
+            rows.append([number for number in read if number is not None])
+        full = [row.parts() for row in node.parts() if isinstance(row.value, list) and len(row.value) == len(columns)]
+        mixed = [refuse_mixed([row[k] for row in full], column.unit) for k, column in enumerate(columns)]
+        return [] if any(mixed) else [row for row in rows if len(row) == len(columns)]
 
-    def _mixed(self, report: Report, pointer: str, data: object, columns: Sequence[Parameter]) -> bool:
-        """Whether a column has bare numbers beside quantities of another scale; each is recorded as a fault."""
-        rows = [(index, row) for index, row in enumerate(data if isinstance(data, list) else ())
-                if isinstance(row, list) and len(row) == len(columns)]  # fmt: skip
-        before = report.found
-        for k, column in enumerate(columns):
-            refuse_mixed(report, [(join(pointer, index, k), row[k]) for index, row in rows], column.unit)
-        return report.found > before
-
-    def schema(self, item: dict[str, Any]) -> dict[str, Any]:
-        """Its JSON Schema, ``item`` being that of each item."""
-        schema = {"description": self.help} if self.help else {}
+    def schema(self) -> Schema:
+        """Its JSON Schema."""
+        schema: Schema = {"description": self.help} if self.help else {}
         least = {"minItems": self.low} if self.low else {}
-        return {"type": "array", **least, "maxItems": self.high, "items": item, **schema}
+        listed = {"type": "array", **least, "maxItems": self.high, "items": schema_of(self.item), **schema}
+        return {"anyOf": [listed, _IN_ONE_TEXT]} if self.text else listed
 
 
-def _settled(report: Report, pointer: str, rows: list[Any]) -> list[list[Any]]:
-    """The rows of a table, their texts with decimal points.
+#: What a record is made of; a plain dictionary is the JSON Schema of what is read in a way of its own.
+Field = Union["Described", "Listed", "Record", "Variants", Parameter, Schema]
+
+
+def schema_of(field: Field) -> Schema:
+    """The JSON Schema of a field."""
+    if isinstance(field, dict):
+        return field
+    return quantity_schema(field) if isinstance(field, Parameter) else field.schema()
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """An object of a spec.
+
+    Attributes
+    ----------
+    fields : its fields by name
+    help : what it means
+    required : the fields that it must have
+    either : fields of which it must have exactly one
+    """
+
+    fields: Mapping[str, Field]
+    help: str = ""
+    required: Sequence[str] = ()
+    either: Sequence[str] = ()
+
+    @property
+    def described(self) -> dict[str, Described]:
+        """The fields that are read, and shown in the form, by their descriptions alone."""
+        return {name: field for name, field in self.fields.items() if isinstance(field, Described)}
+
+    @property
+    def listed(self) -> dict[str, Listed]:
+        """The fields that are lists."""
+        return {name: field for name, field in self.fields.items() if isinstance(field, Listed)}
+
+    def read(self, node: Node, *, null: bool = True) -> bool:
+        """Whether ``node`` is an object, whose unknown fields are recorded; ``null`` stands for a missing one."""
+        return node.has(tuple(self.fields), null=null)
+
+    def items(self, node: Node, name: str) -> Sequence[Node]:
+        """The items of the list ``name``; none, and a fault recorded, where it is invalid."""
+        return self.listed[name].read(node[name]) or ()
+
+    def values(self, node: Node) -> dict[str, Any]:
+        """The values of the fields that are read by their descriptions alone; those of faulty ones are None."""
+        return {name: field.read(node) for name, field in self.described.items()}
+
+    def schema(self) -> Schema:
+        """Its JSON Schema, in which it has no other fields."""
+        properties = {name: schema_of(field) for name, field in self.fields.items()}
+        schema = object_schema(properties, self.required, self.help)
+        return one_of(schema, self.either) if self.either else schema
+
+
+@dataclass(frozen=True, slots=True)
+class Variants:
+    """A value that is described by any of ``ways``; an object of several kinds has the fields of all of them."""
+
+    ways: Sequence[Field]
+
+    def read(self, node: Node) -> bool:
+        """Whether ``node`` is an object, whose fields that no kind has are recorded."""
+        known = dict.fromkeys(name for way in self.ways if isinstance(way, Record) for name in way.fields)
+        return node.has(tuple(known))
+
+    def schema(self) -> Schema:
+        """Its JSON Schema."""
+        return {"anyOf": [schema_of(way) for way in self.ways]}
+
+
+def _settled(rows: Sequence[Node]) -> list[list[Node]]:
+    """The cells of a table, their texts with decimal points; no cells for a row that is not a list.
 
     Points that could separate thousands are decimal, as in every text of a spec, with a warning; beside decimal commas
     they are a fault.
     """
-    places = [
-        (i, k)
-        for i, row in enumerate(rows)
-        for k, cell in enumerate(row if isinstance(row, list) else ())
-        if isinstance(cell, str)
-    ]
-    texts, doubt = settle([rows[i][k] for i, k in places])
+    cells = [row.parts() if isinstance(row.value, list) else [] for row in rows]
+    written = [cell for row in cells for cell in row if isinstance(cell.value, str)]
+    texts, doubt = settle([cell.value for cell in written])
     if doubt is not None:
-        i, k = places[doubt]
-        where, text = join(pointer, i, k), rows[i][k]
-        if any(own != rows[i][k] for (i, k), own in zip(places, texts, strict=True)):
-            report.fault(where, "ambiguous-point", question(text), text, allowed=WITHOUT_DOUBT)
+        cell = written[doubt]
+        if any(text != cell.value for cell, text in zip(written, texts, strict=True)):
+            cell.refuse("ambiguous-point", question(cell.value), allowed=WITHOUT_DOUBT)
         else:
-            report.warn("ambiguous-point", where, assumption(text))
-    made = [list(row) if isinstance(row, list) else [] for row in rows]
-    for (i, k), text in zip(places, texts, strict=True):
-        made[i][k] = text
-    return made
+            cell.report.warn("ambiguous-point", cell.pointer, assumption(cell.value))
+    for cell, text in zip(written, texts, strict=True):
+        cell.value = text
+    return cells
 
 
 def choice(name: str, help: str, *values: str, default: str | None = None) -> Described:
@@ -241,3 +305,7 @@ FIT: Final = named(
     Described("through_origin", "", "no torque at zero windup (c_1 = 0)", "flag", default=True),
     Described("angles_include_backlash", "", _BACKLASH, "flag", default=False),
 )
+
+
+def listed_schema(listed: Listed, item: Schema, *, text: bool = False) -> Schema:
+    return replace(listed, item=item, text=text).schema()

@@ -18,8 +18,9 @@ from sprag.service.spec.axes.design import read_design
 from sprag.service.spec.axes.sweep import read_sweep, with_sweep
 from sprag.service.spec.derive import check_derived, layout, read_machine
 from sprag.service.spec.draws.tolerances import read_tolerances, warn_of_invalid_drives, with_drives
-from sprag.service.spec.fields import TOLERANCE_FIELDS, read_object
+from sprag.service.spec.fields import TOLERANCE_FIELDS
 from sprag.service.spec.machine.registry import part_of
+from sprag.service.spec.node import Node
 from sprag.service.spec.plan.outline import Outline, chooses, first_round, read_outline
 from sprag.service.spec.report import Report, SpecError
 from sprag.service.spec.starts import read_starts
@@ -82,9 +83,10 @@ def parse_spec(data: object) -> ParsedSpec:
         With all faults, each with its JSON Pointer, the value, and what is allowed.
     """
     report = Report(data)
-    found = read_object(report, "", data, FIELDS)
-    if found is None:
+    spec = Node(report, "", data)
+    if not spec.has(FIELDS):
         raise report.error()
+    found = spec.value
     _read_version(report, found)
     name = _read_name(report, found.get("name", UNNAMED))
     # The spec of an unknown model cannot be read further.
@@ -92,18 +94,18 @@ def parse_spec(data: object) -> ParsedSpec:
     if model is None:
         raise report.error()
     part = part_of(model)
-    machine = read_machine(report, part, found)
-    swept = read_sweep(report, found)
+    report.machine = machine = read_machine(report, part, found)
+    swept = read_sweep(spec)
     outline: Outline | None = None
     combine: Combine = "zip"
     if chooses(found):
-        outline = read_outline(report, found, machine)
+        outline = read_outline(spec)
         axes = None if outline is None else outline.axes
     else:
-        axes, combine = read_design(report, found, machine)
+        axes, combine = read_design(spec)
     if machine.derive and axes is not None and not report.found:
         check_derived(report, found["derive"], machine, layout(machine, axes, combine), ranges=outline is not None)
-    spread = read_tolerances(report, found, machine, axes)
+    spread = read_tolerances(spec, axes)
     if outline is not None and outline.with_drives is None and "tolerances" in found:
         report.fault(
             "/tolerances",
@@ -117,9 +119,9 @@ def parse_spec(data: object) -> ParsedSpec:
     report.raise_if_any()
     study = Study(model, name, _in_order(machine), run, structure=machine.structure, derive=machine.derive)
     given = replace(study, axes=axes or (), combine=combine)
-    study = given if outline is None else first_round(report, study, outline, spread)
+    study = given if outline is None else first_round(spec, study, outline, spread)
     if swept is not None:
-        study = with_sweep(report, study, swept)
+        study = with_sweep(study, *swept)
     if spread is not None and outline is None:
         study = with_drives(report, study, spread)
         warn_of_invalid_drives(report, study)

@@ -11,21 +11,35 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.faults import Fault
 from sprag.service.reading.texts import quantity_text
-from sprag.service.spec.axes.axes import axis_values
+from sprag.service.spec.axes.axes import AXIS, axis_values
+from sprag.service.spec.axes.design import ANYTHING
 from sprag.service.spec.axes.sweep import sweep_of
 from sprag.service.spec.derive import read_machine
+from sprag.service.spec.described import Listed, Record
 from sprag.service.spec.document import ParsedSpec, parse_spec
-from sprag.service.spec.fields import TOLERANCE_FIELDS, WHICH_CASES, read_object
+from sprag.service.spec.fields import TOLERANCE_FIELDS, WHICH_CASES
 from sprag.service.spec.machine.registry import part_of
+from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report, SpecError, join
 from sprag.worker.directions import SWEEP
+from sprag.worker.limits import MAX_AXES
 from sprag.worker.study import without_drives
 
 if TYPE_CHECKING:
-    from sprag.service.spec.machine.machine import Machine
     from sprag.worker.study import Study
 
-FIELDS: Final = ("axes", "cases", "name")
+_AXES: Final = (
+    "further values of axes of a grid; a parameter that did not vary becomes an axis of the base's value and these"
+)
+_CASES: Final = "further cases, which come after those of the study; what they do not vary is as in the base"
+EXTENSION: Final = Record(
+    {
+        "axes": Listed("axes", 1, MAX_AXES, _AXES, item=AXIS),
+        "cases": Listed("cases", 1, MAX_AXES, _CASES, item=ANYTHING),
+        "name": {"type": "string", "description": "name of the new study; by default that of the old one"},
+    },
+    "what is added to a study: either axes or cases",
+)
 
 
 def parse_extended(spec: Mapping[str, Any], study: Study, addition: object) -> ParsedSpec:
@@ -71,8 +85,10 @@ def extended_spec(
         With every fault of ``addition``; pointers refer to it.
     """
     report = Report(addition) if report is None else report
-    found = dict(read_object(report, "", addition, FIELDS) or {})
+    EXTENSION.read(Node(report, "", addition))
     report.raise_if_any()
+    assert isinstance(addition, Mapping)
+    found = dict(addition)
     given = [name for name in ("axes", "cases") if name in found]
     if len(given) != 1:
         report.fault("", "exactly-one", "needs either `axes` or `cases`", given, allowed="one of axes, cases")
@@ -113,34 +129,30 @@ def extended_spec(
     if study.combine != "grid":
         report.fault("/axes", "conflict", "the axes of this study are zipped", allowed="`cases` instead")
         raise report.error()
-    machine = read_machine(Report(), part_of(study.model), spec)
+    report.machine = read_machine(Report(), part_of(study.model), spec)
     for index, item in enumerate(items):
-        _add(report, join("/axes", index), item, places, own, machine)
+        _add(Node(report, join("/axes", index), item), places, own)
     report.raise_if_any()
     return {**kept, "combine": "grid", "axes": own}
 
 
-def _add(
-    report: Report, pointer: str, item: object, study: Study, axes: list[dict[str, Any]], machine: Machine
-) -> None:
+def _add(item: Node, study: Study, axes: list[dict[str, Any]]) -> None:
     """Add the values of one item to the axis of its paths; create the axis where it is missing."""
-    read = axis_values(report, pointer, item, machine)
+    read = axis_values(item)
     if read is None:
         return
-    if isinstance(item, Mapping) and SWEEP in item:
-        report.fault(join(pointer, SWEEP), "conflict", "is as in the study", item[SWEEP])
+    if SWEEP in item:
+        item[SWEEP].refuse("conflict", "is as in the study")
     paths, values = read
     positions = {study.axis_of(path) for path in paths}
     position = next(iter(positions))
     if len(positions) > 1:
-        report.fault(
-            join(pointer, "path"), "conflict", "names parameters of several axes", list(paths), allowed="one axis"
-        )
+        item["path"].refuse("conflict", "names parameters of several axes", list(paths), allowed="one axis")
     elif position is not None:
         axes[position]["values"] = list(dict.fromkeys([*axes[position]["values"], *values.tolist()]))
     else:
         bases = list(dict.fromkeys(study.base[path] for path in paths))
         if len(bases) > 1:
-            texts = [quantity_text(base, machine.parameters[paths[0]].unit) for base in bases]
-            report.fault(join(pointer, "path"), "conflict", "ties parameters whose values in the base differ", texts)
+            texts = [quantity_text(base, item.machine.parameters[paths[0]].unit) for base in bases]
+            item["path"].refuse("conflict", "ties parameters whose values in the base differ", texts)
         axes.append({"path": list(paths), "values": list(dict.fromkeys([*bases, *values.tolist()]))})

@@ -10,7 +10,8 @@ from typing import Any, Final
 from sprag.sentences import Sentence
 from sprag.service.reading.limits import printable_line
 from sprag.service.spec.described import Listed
-from sprag.service.spec.fields import read_flag, read_object
+from sprag.service.spec.fields import read_flag, read_object, values_of
+from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report, join
 from sprag.worker.limits import MAX_NAME_LENGTH, MAX_NOTES_LENGTH, MAX_TAG_LENGTH, MAX_TAGS
 
@@ -31,7 +32,7 @@ SCHEMA: Final[dict[str, Any]] = {
     "properties": {
         "name": {"type": "string", "minLength": 1, "maxLength": MAX_NAME_LENGTH, "description": "its name, one line"},
         "notes": {"type": "string", "maxLength": MAX_NOTES_LENGTH, "description": "notes, plain text"},
-        **{name: found.schema(_TAG) for name, found in _LISTS.items()},
+        **{name: found.schema() for name, found in _LISTS.items()},
         "archived": {"type": "boolean", "description": "whether it is kept out of the usual list"},
     },
 }
@@ -99,7 +100,7 @@ def _read_tags(report: Report, found: Mapping[str, Any], field: str) -> tuple[st
     if field not in found:
         return None
     tags = []
-    for index, value in enumerate(_LISTS[field].read(report, f"/{field}", found[field]) or ()):
+    for index, value in enumerate(values_of(_LISTS[field].read(Node(report, f"/{field}", found[field]))) or ()):
         tag = " ".join(value.split()) if isinstance(value, str) else ""
         if len(tag) <= MAX_TAG_LENGTH and tag.isprintable() and "," not in tag and folded(tag):
             tags.append(tag)

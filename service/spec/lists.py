@@ -2,83 +2,67 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from sprag.sentences import Place
 from sprag.service.reading.numbers import assumption, settle, settled
 from sprag.service.reading.printed import could_be_values
 from sprag.service.reading.together import AMBIGUOUS_UNIT, questions, split_list, with_last_unit
-
-if TYPE_CHECKING:
-    from sprag.service.spec.report import Report
+from sprag.service.spec.node import Node
 
 
-def refuse_mixed(report: Report, items: Iterable[tuple[str, object]], unit: str | Sequence[str]) -> bool:
+def refuse_mixed(nodes: Sequence[Node], unit: str | Sequence[str]) -> bool:
     """Record a fault for each bare number beside quantities in units of another scale; whether there is one.
 
-    ``items`` are JSON Pointers with their values, ``unit`` is their SI unit, or that of each.
+    ``unit`` is their SI unit, or that of each.
     """
-    pairs = list(items)
-    units = [unit] * len(pairs) if isinstance(unit, str) else unit
-    asked = questions([value for _, value in pairs], units)
+    units = [unit] * len(nodes) if isinstance(unit, str) else unit
+    asked = questions([node.value for node in nodes], units)
     for one in asked:
-        pointer, value = pairs[one.place]
-        report.fault(pointer, AMBIGUOUS_UNIT, one.message, value, allowed=one.allowed, unit=units[one.place])
+        nodes[one.place].refuse(AMBIGUOUS_UNIT, one.message, allowed=one.allowed, unit=units[one.place])
     return bool(asked)
 
 
-def refuse_blanks(report: Report, items: Iterable[tuple[str, object]]) -> bool:
-    """Record a fault where an item of a list could also be several values between blanks; whether there is one.
-
-    ``items`` are JSON Pointers with their values.
-    """
-    written = [(pointer, value) for pointer, value in items if isinstance(value, str)]
-    place = could_be_values([text for _, text in written])
+def refuse_blanks(nodes: Sequence[Node]) -> bool:
+    """Record a fault where an item of a list could also be several values between blanks; whether there is one."""
+    written = [node for node in nodes if isinstance(node.value, str)]
+    place = could_be_values([node.value for node in written])
     if place is None:
         return False
-    pointer, text = written[place]
-    report.fault(
-        pointer, "invalid-text", "could be one value or several", text, allowed="separate values, or no blanks"
-    )
+    written[place].refuse("invalid-text", "could be one value or several", allowed="separate values, or no blanks")
     return True
 
 
-def read_list(
-    report: Report, items: Sequence[tuple[str, object]], unit: str | Sequence[str], about: str = ""
-) -> list[object] | None:
+def read_list(nodes: Sequence[Node], unit: str | Sequence[str], about: str = "") -> Sequence[Node] | None:
     """As `read_together`, of a list, whose items could also be several values between blanks."""
-    return None if refuse_blanks(report, items) else read_together(report, items, unit, about)
+    return None if refuse_blanks(nodes) else read_together(nodes, unit, about)
 
 
-def read_together(
-    report: Report, items: Sequence[tuple[str, object]], unit: str | Sequence[str], about: str = ""
-) -> list[object] | None:
+def read_together(nodes: Sequence[Node], unit: str | Sequence[str], about: str = "") -> Sequence[Node] | None:
     """The items of one list or range, their texts with decimal points; None, and faults recorded, where one is unclear.
 
-    ``items`` are JSON Pointers with their values, ``unit`` is their SI unit, or that of each, and ``about`` is the path
-    that varies, where the pointers do not say it. Points that could separate thousands and that no other item settles
-    are decimal, with a warning.
+    ``unit`` is their SI unit, or that of each, and ``about`` is the path that varies, where the pointers do not say it.
+    Points that could separate thousands and that no other item settles are decimal, with a warning.
     """
-    written = [(pointer, value) for pointer, value in items if isinstance(value, str)]
-    texts, doubt = settle([text for _, text in written])
-    rest = iter(texts)
-    pairs = [(pointer, next(rest) if isinstance(value, str) else value) for pointer, value in items]
-    if refuse_mixed(report, pairs, unit):
+    written = [node for node in nodes if isinstance(node.value, str)]
+    texts, doubt = settle([node.value for node in written])
+    doubtful = None if doubt is None else (written[doubt], written[doubt].value)
+    for node, text in zip(written, texts, strict=True):
+        node.value = text
+    if refuse_mixed(nodes, unit):
         return None
-    if doubt is not None:
-        pointer, text = written[doubt]
-        report.warn("ambiguous-point", Place(pointer, about), assumption(text))
-    return [value for _, value in pairs]
+    if doubtful is not None:
+        node, text = doubtful
+        node.report.warn("ambiguous-point", Place(node.pointer, about), assumption(text))
+    return nodes
 
 
-def read_list_text(report: Report, pointer: str, text: str, unit: str, about: str = "") -> list[object] | None:
+def read_list_text(node: Node, unit: str, about: str = "") -> Sequence[Node] | None:
     """The items of a list that is one text, such as ``0; 50; 100 N*mm``; None, and faults recorded, where unclear."""
-    typed = split_list(text)
+    typed = split_list(node.value)
     if len(typed) == 1 and "," in typed[0]:
-        report.fault(
-            pointer, "invalid-text", "could be one value or several", text,
-            allowed="values separated by semicolons, or a list of them",
-        )  # fmt: skip
+        node.refuse("invalid-text", "could be one value or several",
+                    allowed="values separated by semicolons, or a list of them")  # fmt: skip
         return None
-    return read_list(report, [(pointer, item) for item in with_last_unit(settled(typed))], unit, about)
+    items = [Node(node.report, node.pointer, item) for item in with_last_unit(settled(typed))]
+    return read_list(items, unit, about)

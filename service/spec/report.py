@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from sprag.sentences import Place, Sentence, WarningText, plural
 from sprag.service.faults import Code, Fault, FaultError, WarningCode
 from sprag.service.reading.texts import did_you_mean, shorten, shorten_text
 from sprag.worker.limits import MAX_PROBLEMS
+
+if TYPE_CHECKING:
+    from sprag.service.spec.machine.machine import Machine
+    from sprag.worker.models import ResultInfo
 
 
 class SpecError(FaultError):
@@ -27,6 +32,9 @@ class Report:
         #: Number of faults, including those beyond the limit.
         self.found = 0
         self.warnings: list[WarningText] = []
+        #: What further parts of the spec refer to, as soon as they are known: the machine, the results of its study.
+        self.machine: Machine | None = None
+        self.results: Sequence[ResultInfo] = ()
 
     def fault(
         self,

@@ -9,8 +9,9 @@ from sprag.sentences import Amount, Sentence, plural
 from sprag.service.languages import N_
 from sprag.service.reading.units import PERIOD_NAMES, QuantityError, exact_number, parse_exact, split_quantity, to_float
 from sprag.service.spec.described import ANY_RUN, SETTLED_RUN
-from sprag.service.spec.fields import read_object
+from sprag.service.spec.fields import nodes, read_object
 from sprag.service.spec.lists import refuse_mixed
+from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report, join
 from sprag.worker.limits import MAX_RUN_PERIODS
 from sprag.worker.models import MEANS_FROM_PERIODS
@@ -49,7 +50,7 @@ def read_run(report: Report, data: object, frequencies: NDArray[np.float64]) -> 
     run = dict(SETTLED_DEFAULTS if settled else TIMED_DEFAULTS)
     before = report.found
     for name, field in ((SETTLED_RUN | ANY_RUN) if settled else ANY_RUN).items():
-        run[name] = field.read(report, "/run", found)
+        run[name] = field.read(Node(report, "/run", found))
     if settled:
         _warn_of_few_periods(report, run["at_most"])
         return run
@@ -154,7 +155,7 @@ def _read_window(report: Report, data: object) -> list[Time] | None:
             allowed='a list of two times in seconds or excitation periods, such as ["20 periods", "40 periods"]',
         )
         return None
-    if refuse_mixed(report, [(join("/run/window", index), item) for index, item in enumerate(data)], "s"):
+    if refuse_mixed(nodes(report, [(join("/run/window", index), item) for index, item in enumerate(data)]), "s"):
         return None
     times = [_read_time(report, join("/run/window", index), item) for index, item in enumerate(data)]
     return None if None in times else [time for time in times if time is not None]

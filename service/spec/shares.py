@@ -4,23 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sprag.sentences import Amount, Sentence
 from sprag.service.reading.units import QuantityError, split_quantity, to_float
-from sprag.service.spec.report import Report
-
-
-def read_share(report: Report, pointer: str, value: object, low: float, high: float) -> float | None:
-    """A share between ``low`` and ``high``, a plain number or a text such as "1 %"; None, and a fault, for others."""
-    ends = {"low": Amount(100 * low, digits=6), "high": Amount(100 * high, digits=6)}
-    allowed = Sentence('{low} % to {high} %, as in "1 %" or 0.01', **ends)
-    share = share_of(value)
-    if share is None:
-        report.fault(pointer, "not-a-number", "must be a share", value, allowed=allowed)
-    elif not low <= share <= high:
-        report.fault(pointer, "out-of-range", "is out of range", value, allowed=allowed)
-    else:
-        return share
-    return None
 
 
 def share_of(value: object) -> float | None:

@@ -15,8 +15,9 @@ from sprag.service.spec.axes.axes import varied_values
 from sprag.service.spec.described import Described, named, schemas
 from sprag.service.spec.draws.tolerances import expanded
 from sprag.service.spec.draws.unit import unit_sample
-from sprag.service.spec.fields import read_number, read_object
+from sprag.service.spec.fields import nodes, read_number, read_object
 from sprag.service.spec.lists import refuse_mixed
+from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report, join
 from sprag.service.spec.schema.quantity import QUANTITY, Schema, object_schema
 from sprag.worker.limits import MAX_START_RANGES, MAX_STARTS
@@ -51,7 +52,7 @@ def read_starts(
     if data is None:
         return {}
     before = report.found
-    settings = {name: field.read(report, "/starts", data) for name, field in SETTINGS.items()}
+    settings = {name: field.read(Node(report, "/starts", data)) for name, field in SETTINGS.items()}
     ranges = _read_ranges(report, data.get("ranges"), machine)
     _check_locked(report, ranges, machine, axes or ())
     if not is_settled(run):
@@ -146,7 +147,7 @@ def _add_range(
                 allowed=joined(", ", ("[low, high]", range_sentence(entry))), unit=entry.unit,
             )  # fmt: skip
             return
-        if refuse_mixed(report, [(join(pointer, k), end) for k, end in enumerate(ends)], entry.unit):
+        if refuse_mixed(nodes(report, [(join(pointer, k), end) for k, end in enumerate(ends)]), entry.unit):
             return
         low, high = (read_number(report, join(pointer, k), end, entry) for k, end in enumerate(ends))
         if low is None or high is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -15,12 +15,11 @@ from sprag.service.reading.limits import at_most, at_most_cases, unit_list
 from sprag.service.reading.texts import quantity_text
 from sprag.service.spec.axes.blocks import first_rows
 from sprag.service.spec.axes.values import PLANS, Plan, any_count, count_text
-from sprag.service.spec.described import Listed
-from sprag.service.spec.fields import read_object, read_one
-from sprag.service.spec.machine.machine import Machine
+from sprag.service.spec.described import Listed, Record, choice
 from sprag.service.spec.report import Report, join
+from sprag.service.spec.schema.quantity import QUANTITY, Schema
 from sprag.worker.directions import SWEEP
-from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_TIED_PATHS
+from sprag.worker.limits import MAX_AXIS_VALUES, MAX_CASES, MAX_TIED_PATHS
 from sprag.worker.models import Parameter
 from sprag.worker.models.parameters import in_range
 from sprag.worker.study import Axis, Combine
@@ -28,39 +27,89 @@ from sprag.worker.study import Axis, Combine
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-AXES = Listed("axes", 0, MAX_AXES, "what varies from case to case")
+    from sprag.service.spec.machine.machine import Machine
+    from sprag.service.spec.node import Node
+
+_PATH: Final[Schema] = {
+    "type": "string",
+    "examples": ["excitation.frequency", "pendulums.0.spring_rate", "clutch.coefficients.1"],
+}
+#: JSON Schema of what varies.
+PATHS: Final[Schema] = {
+    "anyOf": [
+        _PATH, {"type": "array", "items": _PATH, "minItems": 1, "maxItems": MAX_TIED_PATHS, "uniqueItems": True},
+    ],
+    "description": "what varies; several paths take the same values",
+}  # fmt: skip
+SWEPT: Final = choice(
+    SWEEP,
+    "each case starts from the settled motion of its neighbour on this axis: up from the smallest value to the "
+    "largest, down, or both, which doubles the cases; at most one axis has it",
+    "up",
+    "down",
+    "both",
+)
+_COUNT: Final[Schema] = {"type": "integer", "minimum": 1, "maximum": MAX_AXIS_VALUES}
 
 
-def read_axes(report: Report, data: object, combine: Combine, machine: Machine) -> tuple[Axis, ...] | None:
+def _row(description: str, *items: Schema) -> Schema:
+    """JSON Schema of a list of these items."""
+    ends = {"prefixItems": list(items), "minItems": len(items), "maxItems": len(items)}
+    return {"type": "array", **ends, "description": description}
+
+
+AXIS: Final = Record(
+    {
+        "path": PATHS,
+        "values": Listed("values", 1, MAX_AXIS_VALUES, "the values themselves", item=QUANTITY, text=True),
+        "linspace": _row("[from, to, count], evenly divided, both ends included", QUANTITY, QUANTITY, _COUNT),
+        "geomspace": _row(
+            "[from, to, count], each value the same multiple of the previous one", QUANTITY, QUANTITY, _COUNT
+        ),
+        "range": _row(
+            "[from, to, step], the end included when a whole number of steps leads there", QUANTITY, QUANTITY, QUANTITY
+        ),
+        SWEEP: SWEPT,
+    },
+    required=("path",),
+    either=tuple(PLANS),
+)
+ADAPTIVE: Final = Record(
+    {
+        "path": PATHS,
+        "adaptive": _row("[from, to]: the values between them are chosen by `refine`", QUANTITY, QUANTITY),
+    },
+    required=("path", "adaptive"),
+)
+
+
+def read_axes(node: Node, items: Sequence[Node], combine: Combine) -> tuple[Axis, ...] | None:
     """Read the axes with their values in SI numbers; None when any axis is invalid; the faults are recorded.
 
     Counts are compared with the limits before values are computed, so no spec can allocate much memory.
     """
-    items = AXES.read(report, "/axes", data)
-    if items is None:
-        return None
-    before = report.found
-    read = [read_axis(report, join("/axes", index), item, machine) for index, item in enumerate(items)]
+    report, machine = node.report, node.machine
+    read = [read_axis(item) for item in items]
     check_paths(report, [(paths or ()) for paths, _ in read])
     plans = [plan for _, plan in read if plan is not None]
-    if not _sizes_fit(report, plans, combine) or len(plans) < len(items) or report.found > before:
+    if not _sizes_fit(report, plans, combine) or len(plans) < len(items) or not node.sound:
         return None
     axes: list[Axis] = []
     for paths, plan in read:
         if paths is None or plan is None:
             return None
-        values = expand(report, plan, [machine.parameters[path] for path in paths], combine)
+        values = expand(plan, [machine.parameters[path] for path in paths], combine)
         if values is None:
             return None
         axes.append(Axis(paths, values))
         if plan.listed and combine == "grid":
-            _warn_of_order(report, plan.pointer, values, machine.parameters[paths[0]])
+            _warn_of_order(plan.node, values, machine.parameters[paths[0]])
     if combine == "zip" and not _rows_differ(report, axes, machine):
         return None
     return tuple(axes)
 
 
-def _warn_of_order(report: Report, pointer: str, values: NDArray[np.float64], parameter: Parameter) -> None:
+def _warn_of_order(node: Node, values: NDArray[np.float64], parameter: Parameter) -> None:
     """Warn of values that neither rise nor fall throughout: one of them may be in another unit than was meant."""
     steps = np.diff(values)
     turns = np.flatnonzero(np.sign(steps) != np.sign(steps[0])) if steps.size else steps
@@ -68,74 +117,63 @@ def _warn_of_order(report: Report, pointer: str, values: NDArray[np.float64], pa
         before, after = (Amount(float(values[turns[0] + k]), parameter.unit, 10) for k in (0, 1))
         rising = Sentence("the values rise at first, but {after} stands after {before}", after=after, before=before)
         falling = Sentence("the values fall at first, but {after} stands after {before}", after=after, before=before)
-        report.warn("not-monotonic", Place(pointer, parameter.path), rising if steps[0] > 0.0 else falling)
+        place = Place(node.pointer, parameter.path)
+        node.report.warn("not-monotonic", place, rising if steps[0] > 0.0 else falling)
 
 
-def axis_values(
-    report: Report, pointer: str, data: object, machine: Machine
-) -> tuple[tuple[str, ...], NDArray[np.float64]] | None:
+def axis_values(node: Node) -> tuple[tuple[str, ...], NDArray[np.float64]] | None:
     """Paths and values (SI) of a single axis; None when it is invalid; the faults are recorded."""
-    paths, plan = read_axis(report, pointer, data, machine)
-    if paths is None or plan is None or not _sizes_fit(report, [plan], "grid"):
+    paths, plan = read_axis(node)
+    if paths is None or plan is None or not _sizes_fit(node.report, [plan], "grid"):
         return None
-    values = expand(report, plan, [machine.parameters[path] for path in paths], "grid")
+    values = expand(plan, [node.machine.parameters[path] for path in paths], "grid")
     return None if values is None else (paths, values)
 
 
-def read_axis(
-    report: Report, pointer: str, data: object, machine: Machine
-) -> tuple[tuple[str, ...] | None, Plan | None]:
+def read_axis(node: Node) -> tuple[tuple[str, ...] | None, Plan | None]:
     """The paths of one axis and the plan of its values; None for what could not be read."""
-    found = read_object(report, pointer, data, ("path", *PLANS, SWEEP))
-    if found is None:
+    if not AXIS.read(node):
         return None, None
-    paths = read_paths(report, join(pointer, "path"), found.get("path"), machine)
-    way = read_one(report, pointer, found, tuple(PLANS))
+    paths, way = read_paths(node["path"]), node.one_of(AXIS.either)
     if way is None or paths is None:
         return paths, None
-    return paths, PLANS[way](report, join(pointer, way), found[way], machine.parameters[paths[0]])
+    return paths, PLANS[way](node[way], node.machine.parameters[paths[0]])
 
 
-def read_paths(report: Report, pointer: str, data: object, machine: Machine) -> tuple[str, ...] | None:
+def read_paths(node: Node) -> tuple[str, ...] | None:
     """The paths of one axis; None, with the faults recorded, unless all are known and share one unit."""
-    items = data if isinstance(data, list) else [data]
-    if data is None or not 1 <= len(items) <= MAX_TIED_PATHS:
-        report.fault(
-            pointer,
-            "required" if data is None else "wrong-type",
-            "must name what varies" if data is not None else "is required",
-            data,
-            allowed=Sentence(
-                "a path such as 'excitation.frequency', or a list of 1 to {high} of them", high=str(MAX_TIED_PATHS)
-            ),
+    machine = node.machine
+    items = node.parts() if isinstance(node.value, list) else [node]
+    if node.value is None or not 1 <= len(items) <= MAX_TIED_PATHS:
+        such = Sentence(
+            "a path such as 'excitation.frequency', or a list of 1 to {high} of them", high=str(MAX_TIED_PATHS)
         )
+        missing = node.value is None
+        node.refuse("required" if missing else "wrong-type", "is required" if missing else "must name what varies",
+                    allowed=such)  # fmt: skip
         return None
-    found: list[Parameter] = []
-    for index, path in enumerate(items):
-        where = join(pointer, index) if isinstance(data, list) else pointer
+    known: list[Parameter] = []
+    for item in items:
+        path = item.value
         if not isinstance(path, str):
-            report.fault(
-                where, "wrong-type", "must be a path, as text", path, allowed="a path such as 'excitation.frequency'"
-            )
+            item.refuse("wrong-type", "must be a path, as text", allowed="a path such as 'excitation.frequency'")
         elif path in machine.derive:
-            report.fault(
-                where, "conflict", "is derived from other parameters, so it cannot vary by itself", path,
-                allowed="a path without a formula in `derive`",
-            )  # fmt: skip
+            item.refuse("conflict", "is derived from other parameters, so it cannot vary by itself",
+                        allowed="a path without a formula in `derive`")  # fmt: skip
         elif path in machine.parameters:
-            found.append(machine.parameters[path])
-        elif report.full:
+            known.append(machine.parameters[path])
+        elif node.report.full:
             break
         elif not machine.assumed(path):
-            report.fault(where, "invalid-path", machine.why_not(path), path, allowed="the path of a number in `base`")
-    if len(found) < len(items):
+            item.refuse("invalid-path", machine.why_not(path), allowed="the path of a number in `base`")
+    if len(known) < len(items):
         return None
-    units = list(dict.fromkeys(entry.unit for entry in found))
+    units = list(dict.fromkeys(entry.unit for entry in known))
     if len(units) > 1:
         message = Sentence("ties parameters of different units: {units}", units=unit_list(units))
-        report.fault(pointer, "wrong-unit", message, data, allowed="one unit")
+        node.refuse("wrong-unit", message, allowed="one unit")
         return None
-    return tuple(entry.path for entry in found)
+    return tuple(entry.path for entry in known)
 
 
 def check_paths(report: Report, axes: Sequence[tuple[str, ...]], pointer: str = "/axes") -> None:
@@ -159,12 +197,10 @@ def _sizes_fit(report: Report, plans: list[Plan], combine: Combine) -> bool:
     before = report.found
     for plan in plans:
         if plan.count > MAX_AXIS_VALUES:
-            report.fault(
-                plan.pointer,
-                "too-many",
-                Sentence("asks for {values} values", values=any_count(plan.count)),
+            plan.node.refuse(
+                "too-many", Sentence("asks for {values} values", values=any_count(plan.count)), None,
                 allowed=Sentence("at most {high} values", high=MAX_AXIS_VALUES),
-            )
+            )  # fmt: skip
     if report.found == before and sum(counts) > MAX_AXIS_VALUES:
         report.fault(
             "/axes",
@@ -193,7 +229,7 @@ def _sizes_fit(report: Report, plans: list[Plan], combine: Combine) -> bool:
     return report.found == before
 
 
-def expand(report: Report, plan: Plan, parameters: list[Parameter], combine: Combine) -> NDArray[np.float64] | None:
+def expand(plan: Plan, parameters: list[Parameter], combine: Combine) -> NDArray[np.float64] | None:
     """Expand a plan; None, with a fault recorded, where a value is out of range or repeated on an axis of a grid.
 
     Returns
@@ -207,20 +243,18 @@ def expand(report: Report, plan: Plan, parameters: list[Parameter], combine: Com
     index = min(refused, repeated)
     if index == values.size:
         return values + 0.0  # no negative zero
-    where = join(plan.pointer, index) if plan.listed else plan.pointer
+    where = plan.node[index] if plan.listed else plan.node
     value = float(values[index])
     if refused <= repeated:
         refusing = next(entry for entry in parameters if not accepted[entry.path][index])
-        report.fault(
-            where, "out-of-range",
-            Sentence("value {place} is out of range for {path}", place=str(index), path=refusing.path),
+        where.refuse(
+            "out-of-range", Sentence("value {place} is out of range for {path}", place=str(index), path=refusing.path),
             _shown(plan, value, refusing), allowed=range_sentence(refusing), unit=refusing.unit,
         )  # fmt: skip
     else:
         before = _first(values == value)
-        report.fault(
-            where, "repeated",
-            Sentence("value {place} repeats value {earlier}", place=str(index), earlier=str(before)),
+        where.refuse(
+            "repeated", Sentence("value {place} repeats value {earlier}", place=str(index), earlier=str(before)),
             _shown(plan, value, parameters[0]), allowed="each value once", unit=parameters[0].unit,
         )  # fmt: skip
     return None

@@ -10,13 +10,13 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from sprag.sentences import Sentence, plural
 from sprag.service.reading.texts import quantity_text
-from sprag.service.spec.axes.axes import check_paths, expand, read_axes, read_axis
+from sprag.service.spec.axes.axes import ADAPTIVE, AXIS, check_paths, expand, read_axes, read_axis
 from sprag.service.spec.axes.blocks import (
     Block,
     as_axes,
@@ -28,12 +28,12 @@ from sprag.service.spec.axes.blocks import (
     side_by_side,
 )
 from sprag.service.spec.axes.exclude import kept, read_exclude
-from sprag.service.spec.axes.points import read_points
-from sprag.service.spec.axes.sample import read_sample
+from sprag.service.spec.axes.points import POINTS, read_points
+from sprag.service.spec.axes.sample import SAMPLE, read_sample
 from sprag.service.spec.axes.values import any_count, count_text
-from sprag.service.spec.described import Listed, choice
-from sprag.service.spec.fields import read_object
-from sprag.service.spec.report import Report, join
+from sprag.service.spec.described import Listed, Record, Variants, choice
+from sprag.service.spec.node import Node
+from sprag.service.spec.report import Report
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_COLUMNS
 from sprag.worker.models.formulas import evaluate
 
@@ -48,23 +48,31 @@ _COMBINE_HELP: Final = (
     "other, what does not vary being as in the base, each case once"
 )
 COMBINE: Final = choice("combine", _COMBINE_HELP, "grid", "zip", "union", default="grid")
+_IN_GROUP: Final = (AXIS, SAMPLE, POINTS)
 #: Of a group, and of whatever is not a plain grid or zip.
-GROUPED: Final = Listed("axes", 1, MAX_AXES)
+_GROUPED: Final = Listed("axes", 1, MAX_AXES, item=Variants(_IN_GROUP))
+_GROUP: Final = Record({"combine": COMBINE, "axes": _GROUPED}, "a group of axes", required=("axes",))
+#: Anything that varies cases of a plain study.
+ANYTHING: Final = Variants((*_IN_GROUP, _GROUP))
+AXES: Final = Listed("axes", 0, MAX_AXES, "what varies from case to case", item=Variants((*ANYTHING.ways, ADAPTIVE)))
 
 
-def read_design(report: Report, found: Mapping[str, Any], machine: Machine) -> tuple[tuple[Axis, ...] | None, Combine]:
+def read_design(spec: Node) -> tuple[tuple[Axis, ...] | None, Combine]:
     """Read the axes of the study and their combination from the spec's fields `axes`, `combine` and `exclude`.
 
     The axes are None when they are invalid; the faults are recorded.
     """
-    combine = COMBINE.read(report, "", found)
-    items = found.get("axes", [])
-    plain = not isinstance(items, list) or all(_kind(item) == "axis" for item in items)
-    if plain and combine != "union" and "exclude" not in found:
-        chosen_combine = cast("Combine", combine or "grid")
-        return read_axes(report, items, chosen_combine, machine), chosen_combine
-    conditions = read_exclude(report, found["exclude"], machine) if "exclude" in found else []
-    block = _group(report, "", items, combine, machine)
+    report, machine = spec.report, spec.machine
+    combine = COMBINE.read(spec)
+    node = spec["axes"]
+    items = node.parts() if isinstance(node.value, list) else ()
+    plain = all(_kind(item.value) == "axis" for item in items)
+    if plain and combine != "union" and "exclude" not in spec:
+        chosen_combine: Combine = "zip" if combine == "zip" else "grid"
+        listed = AXES.read(node)
+        return None if listed is None else read_axes(node, listed, chosen_combine), chosen_combine
+    conditions = read_exclude(spec["exclude"]) if "exclude" in spec else []
+    block = _group(spec, combine)
     if block is None or report.faults or not _fits(report, block):
         return None, "zip"
     columns = block.make()
@@ -126,38 +134,32 @@ def _kind(item: object) -> str:
     return "axis"
 
 
-def _group(report: Report, pointer: str, items: object, combine: str | None, machine: Machine) -> Block | None:
-    """The block of a list of axes, samples, points and (at the top) groups."""
-    where = join(pointer, "axes")
-    listed = GROUPED.read(report, where, items)
+def _group(group: Node, combine: str | None) -> Block | None:
+    """The block of the list of axes, samples, points and (at the top) groups of a group, or of the whole spec."""
+    node, top = group["axes"], not group.pointer
+    listed = _GROUPED.read(node.otherwise([]) if top else node)
     if listed is None:
         return None
-    top = not pointer
-    read = [_item(report, join(where, i), item, combine, machine, top=top) for i, item in enumerate(listed)]
+    read = [_item(item, combine, top=top) for item in listed]
     blocks = [block for block in read if block is not None]
     if len(blocks) < len(listed) or combine is None:
         return None
     if combine != "union":
-        check_paths(report, [block.paths for block in blocks], where)
+        check_paths(group.report, [block.paths for block in blocks], node.pointer)
     counts = [block.count for block in blocks]
     if combine == "zip" and len(set(counts)) > 1:
-        report.fault(
-            where,
-            "unequal-lengths",
-            "axes that are zipped must have equally many values",
-            [count_text(number) for number in counts],
-            allowed="axes of one length, or combine: 'grid'",
-        )
+        node.refuse(
+            "unequal-lengths", "axes that are zipped must have equally many values",
+            [count_text(number) for number in counts], allowed="axes of one length, or combine: 'grid'",
+        )  # fmt: skip
         return None
     count = {"grid": math.prod(counts), "zip": counts[0], "union": sum(counts)}[combine]
     paths = tuple(dict.fromkeys(path for block in blocks for path in block.paths))
     lines = blocks[0].lines if top and len(blocks) == 1 else ()
-    return Block(pointer, paths, count, partial(_make, report, where, blocks, combine, machine), lines)
+    return Block(group.pointer, paths, count, partial(_make, node, blocks, combine), lines)
 
 
-def _make(
-    report: Report, where: str, blocks: list[Block], combine: str, machine: Machine
-) -> dict[str, NDArray[np.float64]] | None:
+def _make(node: Node, blocks: list[Block], combine: str) -> dict[str, NDArray[np.float64]] | None:
     tables = made(blocks)
     if tables is None:
         return None
@@ -165,55 +167,52 @@ def _make(
     if combine == "grid":
         return product(tables, counts)
     if combine == "zip" and len(set(counts)) > 1:  # a union inside had the same cases twice
-        report.fault(where, "unequal-lengths", "axes that are zipped must have equally many different cases", counts)
+        node.refuse("unequal-lengths", "axes that are zipped must have equally many different cases", counts)
         return None
     if combine == "zip":
         return side_by_side(tables)
+    machine = node.machine
     # A missing limit is infinite, which cannot be stored as the value of the other cases.
     lacking = [path for path in dict.fromkeys(path for columns in tables for path in columns)
                if path not in machine.values and any(path not in columns for columns in tables)]  # fmt: skip
     for path in lacking:
-        report.fault(
-            where,
-            "required",
-            Sentence(
-                "varies {path} in a part of the cases only, and `base` does not give it for the others", path=path
-            ),
-            allowed="its value in `base` too",
+        message = Sentence(
+            "varies {path} in a part of the cases only, and `base` does not give it for the others", path=path
         )
+        node.refuse("required", message, None, allowed="its value in `base` too")
     return None if lacking else one_after_another(tables, counts, machine.values)
 
 
-def _item(
-    report: Report, pointer: str, data: object, combine: str | None, machine: Machine, *, top: bool
-) -> Block | None:
-    kind = _kind(data)
-    readers: dict[str, Callable[..., Block | None]] = {"sample": read_sample, "points": read_points}
+def _item(item: Node, combine: str | None, *, top: bool) -> Block | None:
+    kind = _kind(item.value)
+    readers: dict[str, Callable[[Node], Block | None]] = {"sample": read_sample, "points": read_points}
     if kind in readers:
-        return readers[kind](report, pointer, data, machine)
+        return readers[kind](item)
     if kind == "axis":
-        return _axis(report, pointer, data, "zip" if combine == "zip" else "grid", machine)
-    found = read_object(report, pointer, data, ("combine", "axes")) or {}
+        return _axis(item, "zip" if combine == "zip" else "grid")
+    _GROUP.read(item)
     if not top:
-        report.fault(pointer, "conflict", "is a group inside a group", allowed="an axis, a sample or points")
+        item.refuse("conflict", "is a group inside a group", None, allowed="an axis, a sample or points")
         return None
-    return _group(report, pointer, found.get("axes"), COMBINE.read(report, pointer, found), machine)
+    inner = COMBINE.read(item)
+    return _group(item, inner)
 
 
-def _axis(report: Report, pointer: str, data: object, combine: Combine, machine: Machine) -> Block | None:
-    paths, plan = read_axis(report, pointer, data, machine)
+def _axis(item: Node, combine: Combine) -> Block | None:
+    paths, plan = read_axis(item)
     if paths is None or plan is None:
         return None
+    parameters = [item.machine.parameters[path] for path in paths]
     counts = Counter(paths)
     if max(counts.values()) > 1:
-        report.fault(join(pointer, "path"), "repeated", "names the same path twice", counts.most_common(1)[0][0])
+        item["path"].refuse("repeated", "names the same path twice", counts.most_common(1)[0][0])
         return None
 
     def make() -> dict[str, NDArray[np.float64]] | None:
-        values = expand(report, plan, [machine.parameters[path] for path in paths], combine)
+        values = expand(plan, parameters, combine)
         return None if values is None else dict.fromkeys(paths, values)
 
-    return Block(pointer, paths, plan.count, make)
+    return Block(item.pointer, paths, plan.count, make)
 
 
 def _fits(report: Report, block: Block) -> bool:

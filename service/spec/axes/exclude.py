@@ -2,104 +2,96 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from sprag.service.reading.limits import one_of
 from sprag.service.reading.together import split_list
-from sprag.service.spec.fields import read_number, read_object
+from sprag.service.spec.described import Record
 from sprag.service.spec.lists import read_list_text, refuse_blanks, refuse_mixed
-from sprag.service.spec.report import Report, join
+from sprag.service.spec.schema.quantity import QUANTITY
 from sprag.worker.limits import MAX_AXIS_VALUES
 from sprag.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
-    from sprag.service.spec.machine.machine import Machine
+    from sprag.service.spec.node import Node
 
-FIELDS: Final = ("above", "below", "at_least", "at_most", "is")
+LIMITS: Final = Record(
+    {
+        **dict.fromkeys(("above", "below", "at_least", "at_most"), QUANTITY),
+        "is": {"anyOf": [QUANTITY, {"type": "array", "minItems": 1, "items": QUANTITY}]},
+    }
+)
+#: JSON Schema of the conditions.
+EXCLUDE: Final[dict[str, Any]] = {
+    "type": "array",
+    "default": [],
+    "items": {
+        "type": "object",
+        "minProperties": 1,
+        "additionalProperties": {**LIMITS.schema(), "minProperties": 1},
+    },
+    "description": "conditions by path; a case is left out when all parts of any one of them hold",
+    "examples": [[{"shaft.load": {"above": "0.5 N*m"}, "excitation.frequency": {"below": "20 Hz"}}]],
+}
 #: path -> [(field, value)]: all of them must hold for a case to be excluded
 Condition = dict[str, list[tuple[str, float]]]
 
 
-def read_exclude(report: Report, data: object, machine: Machine) -> list[Condition]:
+def read_exclude(node: Node) -> list[Condition]:
     """Read the conditions; a case is excluded when all parts of any one condition hold. Faults are recorded."""
-    if not isinstance(data, list):
-        report.fault(
-            "/exclude",
-            "wrong-type",
-            "must be a list of conditions",
-            data,
-            allowed="a list of objects, each by its paths",
-        )
-        return []
-    found = []
-    for index, item in enumerate(data):
-        pointer = join("/exclude", index)
-        if not isinstance(item, Mapping) or not item:
-            report.fault(
-                pointer,
-                "wrong-type",
-                "must say what is excluded",
-                item,
-                allowed='such as {"shaft.load": {"above": "0.5 N*m"}}',
-            )
-            continue
-        parts = {
-            str(path): _parts(report, join(pointer, path), str(path), part, machine) for path, part in item.items()
-        }
-        found.append(parts)
-    return found
+    if not isinstance(node.value, list):
+        node.refuse("wrong-type", "must be a list of conditions", allowed="a list of objects, each by its paths")
+    conditions = []
+    for item in node.parts() if isinstance(node.value, list) else ():
+        if isinstance(item.value, Mapping) and item.value:
+            conditions.append({str(path): _parts(item[path], str(path)) for path in item.value})
+        else:
+            item.refuse("wrong-type", "must say what is excluded",
+                        allowed='such as {"shaft.load": {"above": "0.5 N*m"}}')  # fmt: skip
+    return conditions
 
 
-def _parts(report: Report, pointer: str, path: str, data: object, machine: Machine) -> list[tuple[str, float]]:
-    parameter = machine.parameters.get(path)
+def _parts(node: Node, path: str) -> list[tuple[str, float]]:
+    parameter = node.machine.parameters.get(path)
     if parameter is None:
-        report.fault(pointer, "invalid-path", machine.why_not(path), path, allowed="the path of a number in `base`")
+        node.refuse("invalid-path", node.machine.why_not(path), path, allowed="the path of a number in `base`")
         return []
-    found = read_object(report, pointer, data, FIELDS)
-    if found is None:
+    if not LIMITS.read(node):
         return []
-    if not found:
-        report.fault(pointer, "required", "has no condition", data, allowed=one_of(FIELDS))
-    if refuse_mixed(report, _quantities(pointer, found), parameter.unit):
+    if not node.value:
+        node.refuse("required", "has no condition", allowed=one_of(tuple(LIMITS.fields)))
+    if refuse_mixed([item for limit in node.parts() for item in _quantities(limit)], parameter.unit):
         return []
-    listed = found.get("is")
-    if isinstance(listed, list) and refuse_blanks(report, _quantities(pointer, {"is": listed})):
+    if isinstance(node["is"].value, list) and refuse_blanks(node["is"].parts()):
         return []
     parts: list[tuple[str, float]] = []
-    for name in FIELDS:
-        if name not in found:
+    for name in LIMITS.fields:
+        limit = node[name]
+        if not limit.given:
             continue
-        given = found[name]
-        where = join(pointer, name)
-        if name == "is" and isinstance(given, str) and len(split_list(given)) > 1:
-            items = read_list_text(report, where, given, parameter.unit, path) or []
-            values = [read_number(report, where, item, parameter) for item in items]
-        elif isinstance(given, list):
-            if name != "is" or not 1 <= len(given) <= MAX_AXIS_VALUES:
-                report.fault(
-                    join(pointer, name), "wrong-type", "must be a quantity", given,
-                    allowed="one quantity" if name != "is" else "1 value or more",
-                )  # fmt: skip
-                continue
-            values = [read_number(report, join(pointer, name, i), item, parameter) for i, item in enumerate(given)]
-        else:
-            values = [read_number(report, join(pointer, name), given, parameter)]
+        if isinstance(limit.value, list) and (name != "is" or not 1 <= len(limit.value) <= MAX_AXIS_VALUES):
+            limit.refuse(
+                "wrong-type", "must be a quantity", allowed="one quantity" if name != "is" else "1 value or more"
+            )
+            continue
+        items = _quantities(limit)
+        if name == "is" and isinstance(limit.value, str) and len(split_list(limit.value)) > 1:
+            items = read_list_text(limit, parameter.unit, path) or ()
+        values = [item.number(parameter) for item in items]
         parts += [(name, value) for value in values if value is not None]
     return parts
 
 
-def _quantities(pointer: str, found: Mapping[str, Any]) -> Iterator[tuple[str, object]]:
-    """Every value of a condition with its JSON Pointer."""
-    for name, given in found.items():
-        if isinstance(given, list):
-            yield from ((join(pointer, name, index), item) for index, item in enumerate(given))
-        else:
-            yield join(pointer, name), given
+def _quantities(limit: Node) -> Sequence[Node]:
+    """Every value of a limit."""
+    return limit.parts() if isinstance(limit.value, list) else [limit]
 
 
 def kept(

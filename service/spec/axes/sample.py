@@ -4,45 +4,57 @@ and designs for sensitivities; seeded.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
 from sprag.sentences import Sentence
-from sprag.service.spec.axes.axes import read_paths
+from sprag.service.spec.axes.axes import PATHS, read_paths
 from sprag.service.spec.axes.blocks import Block
-from sprag.service.spec.axes.drawn import SampleDistribution, is_distribution, read_distribution
-from sprag.service.spec.described import Described, Listed, choice, named
-from sprag.service.spec.draws.correlations import read_correlations
+from sprag.service.spec.axes.drawn import DRAWN, SampleDistribution, is_distribution, read_distribution
+from sprag.service.spec.described import Described, Listed, Record, Variants, choice, named
+from sprag.service.spec.draws.correlations import CORRELATIONS, read_correlations
 from sprag.service.spec.draws.unit import cases_of, correlated, unit_sample
-from sprag.service.spec.fields import read_number, read_object
 from sprag.service.spec.lists import refuse_mixed
-from sprag.service.spec.report import Report, join
+from sprag.service.spec.schema.quantity import QUANTITY
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES
 from sprag.worker.planning.goals.draws import exponential, logarithm
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
-    from sprag.service.spec.machine.machine import Machine
+    from sprag.service.spec.node import Node
+    from sprag.worker.models import Parameter
 
 _METHOD_HELP: Final = (
     "latin_hypercube and sobol fill the ranges evenly, random points are independent; saltelli is the design for Sobol "
     "indices, of count * (ranges + 2) cases; morris are count trajectories of ranges + 1 cases, for elementary effects"
 )
 _SECOND_HELP: Final = "of a saltelli sample: indices of pairs too, by count * (2 * ranges + 2) cases"
-SAMPLE: Final = named(
-    choice("sample", _METHOD_HELP, "latin_hypercube", "sobol", "random", "saltelli", "morris"),
-    Described("count", "", "points; sobol and saltelli take a power of 2", "whole", 1, MAX_AXIS_VALUES),
-    Described("seed", "", "seed of the random numbers", "whole", 0, 2**32 - 1, 0),
-    Described("second_order", "", _SECOND_HELP, "flag", default=False),
-)
 MOST_TRAJECTORIES: Final = 1000
-RANGES: Final = Listed("ranges", 1, MAX_AXES)
 SCALE: Final = choice("scale", "log: even in the logarithm", "linear", "log", default="linear")
+_RANGE: Final = Record(
+    {"path": PATHS, "from": QUANTITY, "to": QUANTITY, "scale": SCALE}, required=("path", "from", "to")
+)
+_RANGES: Final = Listed("ranges", 1, MAX_AXES, item=Variants((_RANGE, DRAWN)))
+SAMPLE: Final = Record(
+    {
+        **named(
+            choice("sample", _METHOD_HELP, "latin_hypercube", "sobol", "random", "saltelli", "morris"),
+            Described("count", "", "points; sobol and saltelli take a power of 2", "whole", 1, MAX_AXIS_VALUES),
+            Described("seed", "", "seed of the random numbers", "whole", 0, 2**32 - 1, 0),
+            Described("second_order", "", _SECOND_HELP, "flag", default=False),
+        ),
+        "ranges": _RANGES,
+        "correlations": CORRELATIONS,
+    },
+    "points drawn over ranges and from distributions of parameters",
+    required=("sample", "count", "ranges"),
+)
 
 
 @dataclass(frozen=True)
@@ -66,108 +78,90 @@ class SampleRange:
 Part = SampleRange | SampleDistribution
 
 
-def read_sample(report: Report, pointer: str, data: Mapping[str, Any], machine: Machine) -> Block | None:
+def read_sample(item: Node) -> Block | None:
     """Read the block of a sample; None, with the faults recorded, when it is invalid."""
-    before = report.found
-    found = read_object(report, pointer, data, (*SAMPLE, "ranges", "correlations")) or {}
-    method, count, seed, second_order = (field.read(report, pointer, found) for field in SAMPLE.values())
-    items = RANGES.read(report, join(pointer, "ranges"), found.get("ranges"))
-    if items is None:
+    SAMPLE.read(item)
+    method, count, seed, second_order = SAMPLE.values(item).values()
+    parts = SAMPLE.items(item, "ranges")
+    if not parts:
         return None
-    ranges = [_read_part(report, join(pointer, "ranges", index), item, machine) for index, item in enumerate(items)]
+    read = [read_distribution(part) if is_distribution(part.value) else _read_range(part) for part in parts]
     if count is not None and method in {"sobol", "saltelli"} and count & (count - 1):
-        report.fault(
-            join(pointer, "count"),
-            "out-of-range",
-            Sentence("a {method} sample fills its ranges evenly only with a power of two", method=method),
-            count,
-            allowed="a power of 2",
-        )
+        message = Sentence("a {method} sample fills its ranges evenly only with a power of two", method=method)
+        item["count"].refuse("out-of-range", message, allowed="a power of 2")
     if second_order and method != "saltelli":
-        report.fault(
-            join(pointer, "second_order"),
-            "conflict",
-            Sentence("is given for a {method} sample", method=method or ""),
-            allowed="saltelli samples",
-        )
-    elif second_order and len(items) < 3:
-        report.fault(join(pointer, "ranges"), "out-of-range", "two parameters interact by what total exceeds first "
-                     "order by; indices of pairs are for more", len(items), allowed="at least 3 ranges")  # fmt: skip
+        item["second_order"].refuse("conflict", Sentence("is given for a {method} sample", method=method or ""),
+                                    None, allowed="saltelli samples")  # fmt: skip
+    elif second_order and len(parts) < 3:
+        item["ranges"].refuse(
+            "out-of-range", "two parameters interact by what total exceeds first order by; indices of pairs are for "
+            "more", len(parts), allowed="at least 3 ranges",
+        )  # fmt: skip
     if method == "morris":
-        _check_trajectories(report, pointer, count, items)
-    if report.found > before or method is None or count is None or seed is None:
+        _check_trajectories(item, count, parts)
+    if not item.sound or method is None or count is None or seed is None:
         return None
-    known = tuple(item for item in ranges if item is not None)
-    matrix = _read_correlations(report, pointer, found, method, known)
-    if report.found > before:
+    known = tuple(part for part in read if part is not None)
+    correlations = item["correlations"]
+    matrix = _read_correlations(correlations, method, known)
+    if not correlations.sound:
         return None
     cases = cases_of(method, count, len(known), second_order=second_order)
     make = partial(draw, method, count, seed, known, matrix, second_order=second_order)
-    return Block(pointer, tuple(path for item in known for path in item.paths), cases, make)
+    return Block(item.pointer, tuple(path for part in known for path in part.paths), cases, make)
 
 
-def _check_trajectories(report: Report, pointer: str, count: int | None, items: list[Any]) -> None:
+def _check_trajectories(item: Node, count: int | None, parts: Sequence[Node]) -> None:
     """Refuse a single range, which needs no screening, distributions, and trajectories that share points."""
-    for index, item in enumerate(items):
-        if is_distribution(item):
-            report.fault(join(pointer, "ranges", index), "conflict", "a morris sample steps over ranges",
-                         allowed="from and to")  # fmt: skip
-    if len(items) < 2:
-        report.fault(join(pointer, "ranges"), "out-of-range", "a morris sample compares parameters", len(items),
-                     allowed="at least 2 ranges")  # fmt: skip
+    for part in parts:
+        if is_distribution(part.value):
+            part.refuse("conflict", "a morris sample steps over ranges", None, allowed="from and to")
+    if len(parts) < 2:
+        item["ranges"].refuse("out-of-range", "a morris sample compares parameters", len(parts),
+                              allowed="at least 2 ranges")  # fmt: skip
     if count is not None and count > MOST_TRAJECTORIES:
-        report.fault(join(pointer, "count"), "out-of-range", "is more than elementary effects need", count,
-                     allowed=Sentence("at most {high} trajectories", high=MOST_TRAJECTORIES))  # fmt: skip
+        item["count"].refuse("out-of-range", "is more than elementary effects need",
+                             allowed=Sentence("at most {high} trajectories", high=MOST_TRAJECTORIES))  # fmt: skip
 
 
-def _read_part(report: Report, pointer: str, item: object, machine: Machine) -> Part | None:
-    read = read_distribution if is_distribution(item) else _read_range
-    return read(report, pointer, item, machine)
-
-
-def _read_correlations(
-    report: Report, pointer: str, found: Mapping[str, Any], method: str, parts: tuple[Part, ...]
-) -> NDArray[np.float64] | None:
+def _read_correlations(node: Node, method: str, parts: tuple[Part, ...]) -> NDArray[np.float64] | None:
     """The correlations of a sample; None without."""
-    where = join(pointer, "correlations")
-    if "correlations" not in found:
+    if not node.given:
         return None
     if method in {"saltelli", "morris"}:
         message = Sentence("a {method} sample needs independent parameters", method=method)
-        report.fault(where, "conflict", message, allowed="another sample")
+        node.refuse("conflict", message, None, allowed="another sample")
         return None
     columns = {path: index for index, part in enumerate(parts) for path in part.paths}
-    return read_correlations(report, found["correlations"], columns, len(parts), where)[0]
+    return read_correlations(node, columns, len(parts))[0]
 
 
-def _read_range(report: Report, pointer: str, data: object, machine: Machine) -> SampleRange | None:
-    found = read_object(report, pointer, data, ("path", "from", "to", "scale"))
-    if found is None:
+def _read_range(item: Node) -> SampleRange | None:
+    if not _RANGE.read(item):
         return None
-    paths = read_paths(report, join(pointer, "path"), found.get("path"), machine)
-    scale = SCALE.read(report, pointer, found)
-    unit = "" if paths is None else machine.parameters[paths[0]].unit
-    given = [(join(pointer, name), found.get(name)) for name in ("from", "to")]
-    if paths is None or refuse_mixed(report, given, unit):
+    paths, scale = read_paths(item["path"]), SCALE.read(item)
+    parameters = [item.machine.parameters[path] for path in paths or ()]
+    unit = parameters[0].unit if parameters else ""
+    ends = [item["from"], item["to"]]
+    if paths is None or refuse_mixed(ends, unit):
         return None
-    ends = []
-    for name in ("from", "to"):
-        for path in paths:
-            value = read_number(report, join(pointer, name), found.get(name), machine.parameters[path])
-            if value is None:
-                return None
-        ends.append(value)
-    low, high = (float(end) for end in ends if end is not None)
+    low, high = (_in_all(end, parameters) for end in ends)
+    if low is None or high is None:
+        return None
     if low == high:
-        report.fault(
-            join(pointer, "to"), "invalid-range", "is the same as `from`", high, allowed="another value", unit=unit
-        )
+        ends[1].refuse("invalid-range", "is the same as `from`", allowed="another value", unit=unit)
         return None
     if scale == "log" and low * high <= 0.0:
-        report.fault(pointer, "invalid-range", "a log scale needs two ends of one sign, neither of them 0",
-                       [found.get("from"), found.get("to")], unit=unit)  # fmt: skip
+        item.refuse("invalid-range", "a log scale needs two ends of one sign, neither of them 0",
+                    [end.value for end in ends], unit=unit)  # fmt: skip
         return None
     return None if scale is None else SampleRange(paths, low, high, scale)
+
+
+def _in_all(end: Node, parameters: Sequence[Parameter]) -> float | None:
+    """An end of a range (SI) that all ``parameters`` can have."""
+    numbers = [end.number(parameter) for parameter in parameters]
+    return None if None in numbers else numbers[-1]
 
 
 def draw(

@@ -14,9 +14,8 @@ from sprag.sentences import Sentence
 from sprag.service.languages import N_
 from sprag.service.reading.limits import values_to
 from sprag.service.reading.units import QuantityError, parse_exact, to_float
-from sprag.service.spec.fields import read_exact, read_number, read_whole
 from sprag.service.spec.lists import read_list, read_list_text, read_together
-from sprag.service.spec.report import Report, join
+from sprag.service.spec.node import Node
 from sprag.worker.limits import MAX_AXIS_VALUES
 from sprag.worker.models import Parameter
 from sprag.worker.models.parameters import in_range
@@ -41,8 +40,8 @@ class Plan:
 
     Attributes
     ----------
-    pointer : str
-        JSON Pointer of the field that gives them; the values of a list lie below it, by index.
+    node : Node
+        The field that gives them; the values of a list lie below it, by index.
     count : int
         Number of values; may be huge.
     expand : callable
@@ -51,39 +50,36 @@ class Plan:
         Whether the user listed every value.
     """
 
-    pointer: str
+    node: Node
     count: int
     expand: Callable[[], Values]
     listed: bool = False
 
 
-def plan_values(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:
+def plan_values(node: Node, parameter: Parameter) -> Plan | None:
     """The plan of a plain list of quantities, or of one text with all of them."""
+    data = node.value
     if not isinstance(data, list | str) or not data or not str(data).strip():
         empty = isinstance(data, list | str)
-        report.fault(
-            pointer,
-            "empty" if empty else "wrong-type",
-            "has no values" if empty else "must be a list of values",
-            data,
-            allowed=values_to(MAX_AXIS_VALUES),
-        )
+        node.refuse("empty" if empty else "wrong-type", "has no values" if empty else "must be a list of values",
+                    allowed=values_to(MAX_AXIS_VALUES))  # fmt: skip
         return None
     plain = _plain_numbers(data) if isinstance(data, list) else None
     if plain is not None and in_range(plain, parameter).all():
-        return Plan(pointer, plain.size, lambda: plain, listed=True)
-    if isinstance(data, str):
-        items = read_list_text(report, pointer, data, parameter.unit, parameter.path)
-    else:
-        items = read_list(report, _placed(pointer, data), parameter.unit, parameter.path)
+        return Plan(node, plain.size, lambda: plain, listed=True)
+    read = read_list_text if isinstance(data, str) else _read_items
+    items = read(node, parameter.unit, parameter.path)
     if items is None:
         return None
-    places = [pointer if isinstance(data, str) else join(pointer, index) for index in range(len(items))]
-    numbers = [read_number(report, place, value, parameter) for place, value in zip(places, items, strict=True)]
+    numbers = [item.number(parameter) for item in items]
     known = [number for number in numbers if number is not None]
     if len(known) < len(numbers):
         return None
-    return Plan(pointer, len(known), lambda: np.array(known), listed=True)
+    return Plan(node, len(known), lambda: np.array(known), listed=True)
+
+
+def _read_items(node: Node, unit: str, about: str) -> Sequence[Node] | None:
+    return read_list(node.parts(), unit, about)
 
 
 def _plain_numbers(data: list[Any]) -> Values | None:
@@ -96,68 +92,53 @@ def _plain_numbers(data: list[Any]) -> Values | None:
         return None
 
 
-def _placed(pointer: str, items: Sequence[Any]) -> list[tuple[str, object]]:
-    """The items of a list, each with its JSON Pointer."""
-    return [(join(pointer, index), item) for index, item in enumerate(items)]
-
-
-def _together(report: Report, pointer: str, items: Sequence[Any], parameter: Parameter) -> list[Any] | None:
-    """The ends and the step of a range, with decimal points; None, and faults recorded, where one is unclear."""
-    return read_together(report, _placed(pointer, items), parameter.unit, parameter.path)
-
-
-def plan_linspace(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:
+def plan_linspace(node: Node, parameter: Parameter) -> Plan | None:
     """The plan of ``[from, to, count]``, evenly spaced, both ends included."""
-    division = _division(report, pointer, data, parameter)
+    division = _division(node, parameter)
     if division is None:
         return None
     start, stop, count = division
     step = (stop - start) / max(count - 1, 1)
-    return Plan(pointer, count, lambda: _steps(start, step, count))
+    return Plan(node, count, lambda: _steps(start, step, count))
 
 
-def plan_geomspace(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:
+def plan_geomspace(node: Node, parameter: Parameter) -> Plan | None:
     """The plan of ``[from, to, count]``, geometrically spaced, both ends included."""
-    division = _division(report, pointer, data, parameter)
+    division = _division(node, parameter)
     if division is None:
         return None
     start, stop, count = division
     if start * stop <= 0:
-        report.fault(pointer, "invalid-range", "a geometric range needs two ends of one sign, neither of them 0", data)
+        node.refuse("invalid-range", "a geometric range needs two ends of one sign, neither of them 0")
         return None
-    return Plan(pointer, count, lambda: _multiples(to_float(start), to_float(stop), count))
+    return Plan(node, count, lambda: _multiples(to_float(start), to_float(stop), count))
 
 
-def plan_range(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:
+def plan_range(node: Node, parameter: Parameter) -> Plan | None:
     """The plan of ``[from, to, step]``; ``to`` is included when a whole number of steps reaches it."""
-    three = _three(report, pointer, data, _STEPPED)
-    items = None if three is None else _together(report, pointer, three, parameter)
-    if items is None:
+    three = _three(node, _STEPPED)
+    if three is None or read_together(three, parameter.unit, parameter.path) is None:
         return None
-    start = read_exact(report, join(pointer, 0), items[0], parameter)
-    stop = read_exact(report, join(pointer, 1), items[1], parameter)
+    by = three[2]
+    start, stop = three[0].exact(parameter), three[1].exact(parameter)
     try:
-        step = parse_exact(items[2], parameter.unit)
+        step = parse_exact(by.value, parameter.unit)
     except QuantityError as error:
-        report.fault(join(pointer, 2), error.code, error.message, items[2], unit=parameter.unit)
+        by.refuse(error.code, error.message, unit=parameter.unit)
         return None
     if start is None or stop is None:
         return None
     if step == 0 or (stop - start) * step < 0:
-        report.fault(
-            join(pointer, 2),
-            "invalid-range",
-            "the step is 0" if step == 0 else "the step leads away from the end",
-            items[2],
+        by.refuse(
+            "invalid-range", "the step is 0" if step == 0 else "the step leads away from the end", unit=parameter.unit,
             allowed="a step greater than 0" if stop >= start else "a step less than 0, since the range goes down",
-            unit=parameter.unit,
-        )
+        )  # fmt: skip
         return None
     whole = math.floor((stop - start) / step + _STEP_ROUNDING)
-    return Plan(pointer, whole + 1, lambda: _stepped(start, stop, step, whole))
+    return Plan(node, whole + 1, lambda: _stepped(start, stop, step, whole))
 
 
-PLANS: Final[dict[str, Callable[[Report, str, object, Parameter], Plan | None]]] = {
+PLANS: Final[dict[str, Callable[[Node, Parameter], Plan | None]]] = {
     "values": plan_values,
     "linspace": plan_linspace,
     "geomspace": plan_geomspace,
@@ -178,33 +159,22 @@ def count_text(number: int) -> str:
     return f"{counted:,}" if isinstance(counted, int) else str(counted)
 
 
-def _three(report: Report, pointer: str, data: object, allowed: str) -> Sequence[Any] | None:
-    if isinstance(data, list) and len(data) == 3:
-        return data
-    report.fault(pointer, "wrong-type", "must be a list of three values", data, allowed=allowed)
+def _three(node: Node, allowed: str) -> Sequence[Node] | None:
+    if isinstance(node.value, list) and len(node.value) == 3:
+        return node.parts()
+    node.refuse("wrong-type", "must be a list of three values", allowed=allowed)
     return None
 
 
-def _division(
-    report: Report, pointer: str, data: object, parameter: Parameter
-) -> tuple[Fraction, Fraction, int] | None:
-    three = _three(report, pointer, data, _DIVIDED)
-    ends = None if three is None else _together(report, pointer, three[:2], parameter)
-    if three is None or ends is None:
+def _division(node: Node, parameter: Parameter) -> tuple[Fraction, Fraction, int] | None:
+    three = _three(node, _DIVIDED)
+    if three is None or read_together(three[:2], parameter.unit, parameter.path) is None:
         return None
-    start = read_exact(report, join(pointer, 0), ends[0], parameter)
-    stop = read_exact(report, join(pointer, 1), ends[1], parameter)
-    count = read_whole(report, join(pointer, 2), three[2], 1, MAX_AXIS_VALUES)
+    start, stop, count = three[0].exact(parameter), three[1].exact(parameter), three[2].whole(1, MAX_AXIS_VALUES)
     if start is None or stop is None or count is None:
         return None
     if count == 1 and start != stop:
-        report.fault(
-            join(pointer, 2),
-            "invalid-range",
-            "one value cannot be both ends of a range",
-            count,
-            allowed="2 or more, or equal ends",
-        )
+        three[2].refuse("invalid-range", "one value cannot be both ends of a range", allowed="2 or more, or equal ends")
         return None
     return start, stop, count
 

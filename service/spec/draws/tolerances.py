@@ -16,21 +16,15 @@ from sprag.service.languages import N_
 from sprag.service.reading.catalogue import range_sentence
 from sprag.service.reading.limits import unit_list
 from sprag.service.reading.together import AMBIGUOUS_UNIT, question
-from sprag.service.spec.draws.correlations import read_correlations
-from sprag.service.spec.draws.described import (
-    DISTRIBUTION,
-    DRAWS,
-    SHARED,
-    TOLERANCES,
-    read_measured,
-    read_plus_minus,
-)
+from sprag.service.spec.described import Described, Field, Listed, Record, choice, named
+from sprag.service.spec.draws.correlations import CORRELATIONS, read_correlations
+from sprag.service.spec.draws.described import DISTRIBUTION, FIELDS, read_measured, read_plus_minus
 from sprag.service.spec.draws.distributions import Distribution
 from sprag.service.spec.draws.unit import correlated, unit_sample
-from sprag.service.spec.fields import TOLERANCE_FIELDS, read_object
-from sprag.service.spec.report import Report, join
+from sprag.service.spec.fields import TOLERANCE_FIELDS
+from sprag.service.spec.report import Report
 from sprag.worker.derived import blocks, involved
-from sprag.worker.limits import MAX_AXIS_VALUES, MAX_CASES, MAX_TOLERANCES
+from sprag.worker.limits import MAX_AXIS_VALUES, MAX_CASES, MAX_DRIVES, MAX_TOLERANCES
 from sprag.worker.models.parameters import in_range, parameter_of
 from sprag.worker.spread import DRIVE, Spread, Tolerance
 from sprag.worker.study import Axis
@@ -40,20 +34,45 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from sprag.service.spec.machine.machine import Machine
+    from sprag.service.spec.node import Node
     from sprag.worker.models import Parameter
     from sprag.worker.study import Study
 
-_ITEM: Final = ("path", "plus_minus", "distribution", "values", "shared")
+_PATH: Final = {"type": "string", "examples": ["pendulums.*.backlash", "shaft.load"]}
+_SHARED: Final = Described("shared", "", "whether all its parameters share one draw", "flag", default=False)
+_TOLERANCE: Final = Record(
+    {
+        "path": {
+            "anyOf": [_PATH, {"type": "array", "items": _PATH, "minItems": 1}],
+            "description": "what differs from drive to drive; `*` stands for every pendulum or step",
+        },
+        **FIELDS,
+        "shared": _SHARED,
+    },
+    required=("path",),
+)
+_TOLERANCES: Final = Listed(
+    "tolerances", 1, MAX_TOLERANCES, "what differs from one built drive to the next, and by how much", item=_TOLERANCE
+)
+DRAWS: Final = named(
+    Described("drives", "", "drives that are drawn; the nominal one is added to them", "whole", 1, MAX_DRIVES, 256),
+    Described("seed", "", "seed of the random numbers of the drives", "whole", 0, 2**32 - 1, 1),
+    choice(
+        "draws", "how drives are drawn: sobol (scrambled) and latin_hypercube fill the distributions evenly, random "
+        "draws are independent", "sobol", "latin_hypercube", "random", default="sobol",
+    ),
+)  # fmt: skip
+#: The fields of a spec about tolerances.
+SPREAD: Final[dict[str, Field]] = {"tolerances": _TOLERANCES, **DRAWS, "correlations": CORRELATIONS}
 #: Probability outside the range of a parameter from which on its cut is reported.
 _CUT: Final = 1e-3
 
 
 @dataclass(frozen=True)
 class _Drawn:
-    """A tolerance with its distribution; ``pointer`` is that of its item in the spec."""
+    """A tolerance with its distribution; ``item`` is where the spec describes it."""
 
-    pointer: str
+    item: Node
     tolerance: Tolerance
     distribution: Distribution
 
@@ -67,37 +86,31 @@ class _Nominal:
     varies: bool
 
 
-def read_tolerances(
-    report: Report, found: Mapping[str, Any], machine: Machine, axes: Sequence[Axis] | None
-) -> Spread | None:
+def read_tolerances(spec: Node, axes: Sequence[Axis] | None) -> Spread | None:
     """The tolerances of a spec and the draws of its drives; None without, or, with the faults recorded, if invalid.
 
     ``axes`` are those of the study without drives (of a study that chooses its own cases, the ends of what it may
     choose); None where they could not be read.
     """
-    if "tolerances" not in found:
+    node = spec["tolerances"]
+    if not node.given:
         for name in TOLERANCE_FIELDS:
-            if name in found:
-                report.fault(f"/{name}", "not-used", "has no effect without `tolerances`", found[name])
+            if name in spec:
+                spec[name].refuse("not-used", "has no effect without `tolerances`")
         return None
-    before = report.found
-    settings = {name: field.read(report, "", found) for name, field in DRAWS.items()}
-    items = TOLERANCES.read(report, "/tolerances", found["tolerances"])
-    drawn: list[_Drawn] = []
-    for index, item in enumerate(items or ()):
-        drawn += _read_item(report, join("/tolerances", index), item, machine, axes or ())
-    _check_once(report, drawn)
+    settings = {name: field.read(spec) for name, field in DRAWS.items()}
+    items = _TOLERANCES.read(node)
+    drawn = [one for item in items or () for one in _read_item(item, axes or ())]
+    _check_once(drawn)
     names = {path: k for k, one in enumerate(drawn) for path in one.tolerance.paths}
-    matrix, pairs = read_correlations(report, found.get("correlations", []), names, len(drawn))
-    if report.found > before or axes is None or items is None:
+    matrix, pairs = read_correlations(spec["correlations"], names, len(drawn))
+    if not node.sound or axes is None or items is None:
         return None
     drives = settings["drives"]
     if len(drawn) > MAX_TOLERANCES or drives * len(drawn) > MAX_AXIS_VALUES:
-        report.fault(
-            "/drives", "too-many",
-            Sentence(
-                "asks for {draws} draws of {tolerances} tolerances", draws=drives, tolerances=len(drawn)
-            ),
+        spec["drives"].refuse(
+            "too-many",
+            Sentence("asks for {draws} draws of {tolerances} tolerances", draws=drives, tolerances=len(drawn)),
             drives,
             allowed=Sentence(
                 "at most {draws} draws and {tolerances} tolerances together",
@@ -106,7 +119,7 @@ def read_tolerances(
         )  # fmt: skip
         return None
     for one in drawn:
-        _warn_of_cut(report, one)
+        _warn_of_cut(one)
     unit = correlated(unit_sample(settings["draws"], drives, settings["seed"], len(drawn)), matrix)
     columns = [one.distribution.quantile(unit[:, k]) for k, one in enumerate(drawn)]
     about = {"seed": settings["seed"], "draws": settings["draws"], "correlations": pairs}
@@ -158,25 +171,23 @@ def warn_of_invalid_drives(report: Report, study: Study) -> None:
             )
 
 
-def _read_item(report: Report, pointer: str, data: object, machine: Machine, axes: Sequence[Axis]) -> list[_Drawn]:
-    found = read_object(report, pointer, data, _ITEM)
-    if found is None:
+def _read_item(item: Node, axes: Sequence[Axis]) -> list[_Drawn]:
+    if not _TOLERANCE.read(item):
         return []
-    shared = SHARED.read(report, pointer, found)
-    kind = DISTRIBUTION.read(report, pointer, found)
-    paths = _read_paths(report, join(pointer, "path"), found.get("path"), machine)
+    shared, kind, paths = _SHARED.read(item), DISTRIBUTION.read(item), _read_paths(item["path"])
     if paths is None or shared is None or kind is None:
         return []
     groups = [tuple(paths)] if shared else [(path,) for path in paths]
-    given = found["path"] if isinstance(found["path"], str) else " = ".join(found["path"])
+    path = item["path"].value
+    given = path if isinstance(path, str) else " = ".join(path)
     drawn = []
     for group in groups:
-        nominal = [_nominal(path, machine, axes) for path in group]
+        nominal = [_nominal(item, path, axes) for path in group]
         name = given if len(group) > 1 else group[0]
-        if "values" in found:
-            drawn += _measured(report, pointer, found, name, group, nominal)
+        if "values" in item:
+            drawn += _measured(item, name, group, nominal)
         else:
-            drawn += _around(report, pointer, found, str(kind), name, group, nominal)
+            drawn += _around(item, str(kind), name, group, nominal)
     return drawn
 
 
@@ -186,123 +197,102 @@ def expanded(pattern: str, known: Mapping[str, Any]) -> list[str]:
     return [path for path in known if expression.fullmatch(path)]
 
 
-def _read_paths(report: Report, pointer: str, data: object, machine: Machine) -> list[str] | None:
+def _read_paths(node: Node) -> list[str] | None:
     """The parameters of an item; None, and faults recorded, where one is unknown or derived."""
-    items = data if isinstance(data, list) else [data]
+    machine = node.machine
+    items = node.value if isinstance(node.value, list) else [node.value]
     names = [item for item in items if isinstance(item, str)]
     allowed = N_("a path such as 'pendulums.*.backlash', or a list of paths; `*` stands for every pendulum or step")
     if not items or len(names) < len(items):
-        report.fault(
-            pointer, "required" if data is None else "wrong-type",
-            "is required" if data is None else "must be a path, as text", data, allowed=allowed,
-        )  # fmt: skip
+        missing = node.value is None
+        node.refuse("required" if missing else "wrong-type", "is required" if missing else "must be a path, as text",
+                    allowed=allowed)  # fmt: skip
         return None
-    before = report.found
     paths: list[str] = []
     for item in names:
         known = expanded(item, machine.parameters)
         paths += known
         if not known and not machine.assumed(item):
-            report.fault(pointer, "invalid-path", machine.why_not(item), item, allowed=allowed)
+            node.refuse("invalid-path", machine.why_not(item), item, allowed=allowed)
         for path in known:
             if path in machine.derive:
-                report.fault(
-                    pointer, "conflict",
-                    Sentence("{path} is derived from other parameters, whose tolerances it has", path=path), item,
-                    allowed="a path without a formula in `derive`",
-                )  # fmt: skip
-    return None if report.found > before else paths
+                message = Sentence("{path} is derived from other parameters, whose tolerances it has", path=path)
+                node.refuse("conflict", message, item, allowed="a path without a formula in `derive`")
+    return paths if node.sound else None
 
 
-def _nominal(path: str, machine: Machine, axes: Sequence[Axis]) -> _Nominal:
+def _nominal(item: Node, path: str, axes: Sequence[Axis]) -> _Nominal:
+    machine = item.machine
     axis = next((axis for axis in axes if path in axis.paths), None)
     base = [machine.values[path]] if path in machine.values else []
     values = np.array(base, dtype=np.float64) if axis is None else axis.array
     return _Nominal(machine.parameters[path], values, axis is not None)
 
 
-def _measured(
-    report: Report, pointer: str, found: Mapping[str, Any], name: str, paths: tuple[str, ...], nominal: list[_Nominal]
-) -> list[_Drawn]:
+def _measured(item: Node, name: str, paths: tuple[str, ...], nominal: list[_Nominal]) -> list[_Drawn]:
     """A tolerance given by measured values."""
     for field in ("plus_minus", "distribution"):
-        if field in found:
-            report.fault(join(pointer, field), "conflict", "cannot be combined with `values`", found[field])
+        if field in item:
+            item[field].refuse("conflict", "cannot be combined with `values`")
     varied = [path for path, one in zip(paths, nominal, strict=True) if one.varies]
     if varied:
-        report.fault(
-            join(pointer, "values"), "conflict",
-            Sentence("gives {path} its values, but an axis varies it", path=varied[0]),
-            allowed="plus_minus, which changes the values of the axis",
-        )  # fmt: skip
-    values = read_measured(report, join(pointer, "values"), found["values"], [one.parameter for one in nominal])
+        message = Sentence("gives {path} its values, but an axis varies it", path=varied[0])
+        item["values"].refuse("conflict", message, None,
+                              allowed="plus_minus, which changes the values of the axis")  # fmt: skip
+    values = read_measured(item["values"], [one.parameter for one in nominal])
     if values is None:
         return []
     about = {"distribution": "values", "values": len(values)}
-    return [_Drawn(pointer, Tolerance(name, paths, "value", about), Distribution("values", values=tuple(values)))]
+    return [_Drawn(item, Tolerance(name, paths, "value", about), Distribution("values", values=tuple(values)))]
 
 
-def _mixed(report: Report, where: str, plus_minus: object, nominal: list[_Nominal]) -> bool:
+def _mixed(node: Node, nominal: list[_Nominal]) -> bool:
     """Whether a bare distance stands beside a nominal value in a unit of another scale; it is recorded as a fault."""
-    written = [report.written("/base/" + one.parameter.path.replace(".", "/")) for one in nominal]
+    written = [node.report.written("/base/" + one.parameter.path.replace(".", "/")) for one in nominal]
     texts = [value for value in written if isinstance(value, str)]
-    asked = question([plus_minus, *texts], nominal[0].parameter.unit) if not isinstance(plus_minus, str) else None
-    if asked is not None and asked.place == 0:
-        unit = nominal[0].parameter.unit
-        report.fault(where, AMBIGUOUS_UNIT, asked.message, plus_minus, allowed=asked.allowed, unit=unit)
-    return asked is not None and asked.place == 0
+    unit = nominal[0].parameter.unit
+    asked = question([node.value, *texts], unit) if not isinstance(node.value, str) else None
+    if asked is None or asked.place:
+        return False
+    node.refuse(AMBIGUOUS_UNIT, asked.message, allowed=asked.allowed, unit=unit)
+    return True
 
 
-def _around(
-    report: Report,
-    pointer: str,
-    found: Mapping[str, Any],
-    kind: str,
-    name: str,
-    paths: tuple[str, ...],
-    nominal: list[_Nominal],
-) -> list[_Drawn]:
+def _around(item: Node, kind: str, name: str, paths: tuple[str, ...], nominal: list[_Nominal]) -> list[_Drawn]:
     """A tolerance around the nominal values."""
-    if _mixed(report, join(pointer, "plus_minus"), found.get("plus_minus"), nominal):
+    node = item["plus_minus"]
+    if _mixed(node, nominal):
         return []
     units = list(dict.fromkeys(one.parameter.unit for one in nominal))
-    read = read_plus_minus(report, pointer, found, nominal[0].parameter)
+    read = read_plus_minus(node, nominal[0].parameter)
     if read is None:
         return []
     share, half = read
-    where = join(pointer, "plus_minus")
     if not share and len(units) > 1:
-        report.fault(
-            where, "wrong-unit",
-            Sentence("is shared by parameters of different units: {units}", units=unit_list(units)),
-            found["plus_minus"], allowed='a share, as in "5 %"',
-        )  # fmt: skip
+        message = Sentence("is shared by parameters of different units: {units}", units=unit_list(units))
+        node.refuse("wrong-unit", message, allowed='a share, as in "5 %"')
         return []
     if any(not one.values.size for one in nominal):
-        message = Sentence("{path} has no nominal value in `base`", path=name)
-        report.fault(join(pointer, "path"), "required", message, found["path"])
+        item["path"].refuse("required", Sentence("{path} has no nominal value in `base`", path=name))
         return []
     values = np.unique(np.concatenate([one.values for one in nominal]))
     if kind == "lognormal":
         if values[0] <= 0.0 or (not share and values.size > 1):
-            report.fault(
-                join(pointer, "distribution"), "out-of-range",
+            item["distribution"].refuse(
+                "out-of-range",
                 "a lognormal distribution needs a nominal value above 0, and a share where there are several",
-                kind, allowed="another distribution",
-            )  # fmt: skip
+                allowed="another distribution",
+            )
             return []
         share, half = True, half if share else half / float(values[0])
     if share and not values.any():
-        report.fault(
-            where, "out-of-range",
-            Sentence("is a share of the nominal value of {path}, which is 0", path=name), found["plus_minus"],
-            allowed="a quantity", unit=units[0],
-        )  # fmt: skip
+        message = Sentence("is a share of the nominal value of {path}, which is 0", path=name)
+        node.refuse("out-of-range", message, allowed="a quantity", unit=units[0])
         return []
     low, high = _range(nominal, share=share)
     distribution = Distribution(kind, 1.0 if share else 0.0, half, low=low, high=high)  # type: ignore[arg-type]
-    about = {"distribution": kind, "plus_minus": found["plus_minus"]}
-    return [_Drawn(pointer, Tolerance(name, paths, "scale" if share else "offset", about), distribution)]
+    about = {"distribution": kind, "plus_minus": node.value}
+    return [_Drawn(item, Tolerance(name, paths, "scale" if share else "offset", about), distribution)]
 
 
 def _range(nominal: list[_Nominal], *, share: bool) -> tuple[float, float]:
@@ -320,25 +310,20 @@ def _range(nominal: list[_Nominal], *, share: bool) -> tuple[float, float]:
     return low, max(high, low)
 
 
-def _check_once(report: Report, drawn: Sequence[_Drawn]) -> None:
+def _check_once(drawn: Sequence[_Drawn]) -> None:
     counts = Counter(path for one in drawn for path in one.tolerance.paths)
     for one in drawn:
         again = [path for path in one.tolerance.paths if counts[path] > 1]
         if again:
-            report.fault(
-                join(one.pointer, "path"), "repeated", "has two tolerances", again[0], allowed="each parameter once"
-            )
+            one.item["path"].refuse("repeated", "has two tolerances", again[0], allowed="each parameter once")
 
 
-def _warn_of_cut(report: Report, one: _Drawn) -> None:
+def _warn_of_cut(one: _Drawn) -> None:
     outside = one.distribution.outside
     if outside > _CUT:
-        report.warn(
-            "tolerance-cut",
-            Place(one.pointer, one.tolerance.name),
-            Sentence(
-                "{outside} of the distribution lies outside the range of the parameter; it is left out, and the rest "
-                "is drawn",
-                outside=Amount(outside, digits=2),
-            ),
+        text = Sentence(
+            "{outside} of the distribution lies outside the range of the parameter; it is left out, and the rest is "
+            "drawn",
+            outside=Amount(outside, digits=2),
         )
+        one.item.report.warn("tolerance-cut", Place(one.item.pointer, one.tolerance.name), text)

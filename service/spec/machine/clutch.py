@@ -12,8 +12,9 @@ import numpy as np
 from sprag.sentences import Sentence
 from sprag.service.reading.texts import quantity_text
 from sprag.service.spec.described import FIT, Listed
-from sprag.service.spec.fields import missing, read_number, read_object
+from sprag.service.spec.fields import missing, nodes, read_number, read_object, values_of
 from sprag.service.spec.lists import read_list
+from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report, join
 from sprag.worker import models
 from sprag.worker.limits import MAX_CLUTCH_LAWS, MAX_CLUTCH_ROWS
@@ -117,12 +118,12 @@ def _given(report: Report, pointer: str, data: Mapping[str, Any], prefix: str) -
     limit: float | None = math.inf
     if "windup_limit" in data:
         limit = read_number(report, join(pointer, "windup_limit"), data["windup_limit"], CLUTCH_WINDUP_LIMIT)
-    items = COEFFICIENTS.read(report, where, data.get("coefficients"))
+    items = values_of(COEFFICIENTS.read(Node(report, where, data.get("coefficients"))))
     if items is None:
         return None
     own = [placed(CLUTCH_COEFFICIENT, f"{prefix}coefficients.{k}") for k in range(len(items))]
     given = [(join(where, k), item) for k, item in enumerate(items)]
-    read = read_list(report, given, [entry.unit for entry in own])
+    read = values_of(read_list(nodes(report, given), [entry.unit for entry in own]))
     if read is None:
         return None
     numbers = [read_number(report, join(where, k), item, own[k]) for k, item in enumerate(read)]
@@ -135,13 +136,13 @@ def _measured(
     report: Report, pointer: str, data: Mapping[str, Any], prefix: str, backlashes: Sequence[float]
 ) -> Clutch | None:
     before = report.found
-    rows = ROWS.read_rows(report, join(pointer, "data"), data.get("data"), _ANGLE, _TORQUE)
+    rows = ROWS.read_rows(Node(report, join(pointer, "data"), data.get("data")), _ANGLE, _TORQUE)
     accuracy = None
     if "accuracy" in data:
         accuracy = read_number(report, join(pointer, "accuracy"), data["accuracy"], ACCURACY)
     else:
         missing(report, join(pointer, "accuracy"), ACCURACY)
-    options = {name: field.read(report, pointer, data) for name, field in FIT.items()}
+    options = {name: field.read(Node(report, pointer, data)) for name, field in FIT.items()}
     if options["angles_include_backlash"]:
         if len(set(backlashes)) > 1:
             report.fault(

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 from sprag.sentences import Sentence
 from sprag.service.reading.texts import did_you_mean
 from sprag.service.spec.described import Listed
-from sprag.service.spec.fields import read_number, read_object, read_parameters
+from sprag.service.spec.fields import read_number, read_object, read_parameters, values_of
 from sprag.service.spec.machine.clutch import Clutch, read_clutch
 from sprag.service.spec.machine.machine import Machine
+from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report, join
 from sprag.worker.models import (
     MAX_COEFFICIENTS,
@@ -159,7 +160,7 @@ def _read_section(
 
 
 def _read_pendulums(report: Report, pointer: str, data: object, entries: list[Parameter], machine: Drive) -> None:
-    listed = PENDULUMS.read(report, pointer, data)
+    listed = values_of(PENDULUMS.read(Node(report, pointer, data)))
     if listed is None:
         return
     machine.pendulums = len(listed)

@@ -14,7 +14,7 @@ from sprag.sentences import Sentence
 from sprag.service.languages import N_
 from sprag.service.reading.texts import did_you_mean
 from sprag.service.spec.described import choice
-from sprag.service.spec.fields import read_object
+from sprag.service.spec.fields import nodes, read_object
 from sprag.service.spec.lists import refuse_mixed
 from sprag.service.spec.machine.machine import Machine, read_numbers
 from sprag.service.spec.machine.shaft_check import check_machine
@@ -27,6 +27,7 @@ from sprag.service.spec.machine.shaft_parts import (
     read_operation,
     read_parts,
 )
+from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report, join
 from sprag.worker import models
 from sprag.worker.models import machine_shaft
@@ -121,7 +122,7 @@ def _refuse_mixed_steps(report: Report, found: Mapping[str, Any], machine: Machi
             column = [(join(where, k, name), step[name]) for k, step in enumerate(steps or ()) for name in names
                       if name in step]  # fmt: skip
             if entry is not None:
-                refuse_mixed(report, column, entry.unit)
+                refuse_mixed(nodes(report, column), entry.unit)
 
 
 def check_shaft(report: Report, machine: Machine) -> None:
@@ -141,9 +142,9 @@ def _read_structure(report: Report, found: Mapping[str, Any], places: dict[str, 
     cycle = read_cycle(report, found.get("cycle", 1))
     constants = read_constants(report, found.get("constants", {}))
     balance = read_balance(report, found, drive)
-    mean = MEAN_SPEED_IS.read(report, "/base", found)
+    mean = MEAN_SPEED_IS.read(Node(report, "/base", found))
     before = report.found
-    phi_c = None if found.get("phi_c") is None else PHI_C.read(report, "/base", found)
+    phi_c = None if found.get("phi_c") is None else PHI_C.read(Node(report, "/base", found))
     parts = (drive, mechanism, operation, several, cycle, constants, balance, mean)
     if any(part is None for part in parts) or report.found > before:
         return None

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from sprag.sentences import Sentence
 from sprag.service.spec.described import Listed, choice
-from sprag.service.spec.fields import read_object, read_one
+from sprag.service.spec.fields import read_object, read_one, values_of
 from sprag.service.spec.machine.shaft_parts import (
     ANGLE,
     numbers_of,
@@ -16,6 +16,7 @@ from sprag.service.spec.machine.shaft_parts import (
     refuse_foreign,
     value_in,
 )
+from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report, join
 from sprag.worker.models import Parameter, machine_shaft
 
@@ -40,14 +41,14 @@ def read_balance(report: Report, found: Mapping[str, Any], drive: Mapping[str, A
     """Read how the work over a cycle is made zero; by default a motor does it, and a given torque is kept."""
     motor = drive is not None and drive["motor"] is not None
     given = isinstance(found.get("drive"), Mapping) and "torque" in found["drive"]
-    side = BALANCE_SIDE.read(report, "/base", found)
+    side = BALANCE_SIDE.read(Node(report, "/base", found))
     if side is None or (side == "operation" and not _has_drive(report, motor, given)):
         return None
     acts = found.get("operation") is not None or found.get("parts") is not None
     default = "motor" if motor else "refuse" if given else "constant"
     if side == "operation":
         default = "scale" if acts else "constant"
-    balance: str | None = BALANCE.read(report, "/base", {"balance": default, **found})
+    balance: str | None = BALANCE.read(Node(report, "/base", {"balance": default, **found}))
     if balance is None or drive is None:
         return balance
     if balance == "motor" and not motor:
@@ -107,7 +108,7 @@ def read_drive(report: Report, data: object, places: dict[str, str]) -> dict[str
         flywheel = read_object(
             report, "/base/drive/flywheel", found["flywheel"], ("kind", *numbers_under("drive.flywheel."))
         )
-        kind = None if flywheel is None else FLYWHEEL.read(report, "/base/drive/flywheel", flywheel)
+        kind = None if flywheel is None else FLYWHEEL.read(Node(report, "/base/drive/flywheel", flywheel))
         if kind is None:
             return None
         drive["flywheel"] = kind
@@ -134,10 +135,10 @@ def _read_stages(report: Report, data: object) -> list[str] | None:
     where = "/base/drive/stages"
     before = report.found
     kinds: list[str] = []
-    for index, item in enumerate(STAGES.read(report, where, data) or ()):
+    for index, item in enumerate(values_of(STAGES.read(Node(report, where, data))) or ()):
         pointer = join(where, index)
         found = read_object(report, pointer, item, ("kind", *numbers_under("drive.stages.K.")))
-        kind = None if found is None else STAGE.read(report, pointer, found)
+        kind = None if found is None else STAGE.read(Node(report, pointer, found))
         if found is None or kind is None:
             continue
         own = numbers_of({"drive": {"stages": [kind]}}, "drive.stages.0.")
@@ -151,7 +152,7 @@ def _read_motor(report: Report, data: object, drive: dict[str, Any], places: dic
     found = read_object(report, pointer, data, ("kind", *numbers_under("drive.motor."), *_OF_TABLE))
     if found is None:
         return None
-    kind = MOTOR.read(report, pointer, found)
+    kind = MOTOR.read(Node(report, pointer, found))
     if kind is None:
         return None
     own = numbers_of({"balance": "motor", "drive": {"motor": kind}}, "drive.motor.")

@@ -12,8 +12,9 @@ from sprag.service.languages import N_
 from sprag.service.reading.catalogue import range_sentence
 from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.spec.described import Described, Listed, choice, named
-from sprag.service.spec.fields import read_number, read_object, read_one
+from sprag.service.spec.fields import read_number, read_object, read_one, values_of
 from sprag.service.spec.machine.shaft_tables import read_csv_rows
+from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report, join
 from sprag.worker import models
 from sprag.worker.models import Parameter, machine_shaft
@@ -177,7 +178,7 @@ def read_mechanism(report: Report, data: object, places: dict[str, str], prefix:
         return None
     made: dict[str, Any] = {"kind": kind}
     for name, field in choices.items():
-        value = field.read(report, pointer, own)
+        value = field.read(Node(report, pointer, own))
         # Defaults are left out, so that studies from before these choices keep their hash.
         if name not in _BODIES or value != field.default:
             made["quick_return" if name == "kind" else name] = value
@@ -218,7 +219,7 @@ def read_operation(report: Report, data: object, places: dict[str, str], prefix:
     form = read_one(report, where, found, FORMS)
     if form is None:
         return None
-    chosen = {name: field.read(report, where, found) for name, field in OPERATION_CHOICES.items()}
+    chosen = {name: field.read(Node(report, where, found)) for name, field in OPERATION_CHOICES.items()}
     if None in chosen.values():
         return None
     speed = read_recorded_at(report, where, found, str(chosen["over"]), form)
@@ -259,7 +260,7 @@ def _read_indicator(
     own = (
         None if _beside(report, where, found, "indicator") else read_object(report, pointer, found["indicator"], names)
     )
-    over = None if own is None else INDICATOR_OVER.read(report, pointer, own)
+    over = None if own is None else INDICATOR_OVER.read(Node(report, pointer, own))
     if own is None or over is None:
         return None
     form = read_one(report, pointer, own, ("table", "csv"))
@@ -318,7 +319,7 @@ def _read_gas(report: Report, where: str, found: Mapping[str, Any]) -> dict[str,
 
 def _read_steps(report: Report, where: str, data: object) -> int | None:
     fields = numbers_under("operation.steps.K.")
-    steps = STEPS.read(report, where, data) or ()
+    steps = values_of(STEPS.read(Node(report, where, data))) or ()
     read = [read_object(report, join(where, k), item, fields) for k, item in enumerate(steps)]
     return None if not read or None in read else len(read)
 
@@ -326,7 +327,7 @@ def _read_steps(report: Report, where: str, data: object) -> int | None:
 def read_parts(report: Report, data: object, places: dict[str, str]) -> list[dict[str, Any]] | None:
     """Read the mechanisms of a machine of several with their operations; None, with the faults recorded, if any."""
     before, parts = report.found, []
-    for index, item in enumerate(PARTS.read(report, "/base/parts", data) or ()):
+    for index, item in enumerate(values_of(PARTS.read(Node(report, "/base/parts", data))) or ()):
         found = read_object(report, join("/base/parts", index), item, PART_FIELDS)
         if found is not None:
             prefix = f"parts.{index}."
@@ -349,10 +350,10 @@ def read_diagram(
         return None if form is None else _formula(report, pointer, found)
     before = report.found
     if form == "csv":
-        rows = read_csv_rows(report, join(pointer, "csv"), found["csv"], place, value)
+        rows = read_csv_rows(Node(report, join(pointer, "csv"), found["csv"]), place, value)
     else:
-        rows = ROWS.read_rows(report, join(pointer, "table"), found["table"], place, value)
-    interpolation = INTERPOLATION.read(report, pointer, found)
+        rows = ROWS.read_rows(Node(report, join(pointer, "table"), found["table"]), place, value)
+    interpolation = INTERPOLATION.read(Node(report, pointer, found))
     if report.found > before:
         return None
     return {"form": "table", "table": {"rows": rows, "interpolation": interpolation}, "formula": None}

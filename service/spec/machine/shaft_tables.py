@@ -10,8 +10,7 @@ from sprag.service.reading.catalogue import range_sentence
 from sprag.service.reading.numbers import is_ambiguous, parse_number
 from sprag.service.reading.units import AmbiguousCommaError, QuantityError, has_unit, parse_exact, to_float
 from sprag.service.spec.csv_text import in_cell, read_csv, refuse_mixed_column
-from sprag.service.spec.fields import exact
-from sprag.service.spec.report import Report
+from sprag.service.spec.node import Node, exact
 from sprag.service.spec.table_text import heading_of
 from sprag.worker.models import Parameter, machine_shaft
 
@@ -19,7 +18,7 @@ from sprag.worker.models import Parameter, machine_shaft
 _LAST_WORD: Final = re.compile(r"[\s_/]([^\s_/]+)$")
 
 
-def read_csv_rows(report: Report, where: str, text: object, *columns: Parameter) -> list[list[float]]:
+def read_csv_rows(node: Node, *columns: Parameter) -> list[list[float]]:
     """Rows with an SI number for each of ``columns``; faults, with their lines, are recorded.
 
     A heading is a name and, in brackets or as its last word, a unit, which is SI where there is none: ``angle
@@ -27,52 +26,54 @@ def read_csv_rows(report: Report, where: str, text: object, *columns: Parameter)
     """
     such = ",".join(f"{column.path} [{column.unit}]" for column in columns)
     example = Sentence("headings, then at least two lines, as in {headings}", headings=such)
-    rows = read_csv(report, where, text, (machine_shaft.MAX_ROWS, len(columns)), example)
+    rows = read_csv(node, (machine_shaft.MAX_ROWS, len(columns)), example)
     if rows is None:
         return []
     headings = [heading_of(cell) for cell in rows[0].cells]
     if len(headings) != len(columns) or None in headings:
-        report.fault(
-            where,
+        node.refuse(
             "wrong-type",
             Sentence("must have {count} columns with headings", count=str(len(columns))),
+            None,
             allowed=example,
         )
         return []
     if any(parse_number(cell.replace(",", ".")) is not None for cell in rows[0].cells):
-        report.fault(
-            where, "wrong-type", "must begin with headings: its first line has a number, which would be lost",
-            ", ".join(rows[0].cells), allowed=example,
-        )  # fmt: skip
+        node.refuse(
+            "wrong-type",
+            "must begin with headings: its first line has a number, which would be lost",
+            ", ".join(rows[0].cells),
+            allowed=example,
+        )
         return []
     units = [_unit_of(*(heading or ("", "")), column) for heading, column in zip(headings, columns, strict=True)]
-    before = report.found
+    before = node.report.found
     for unit, column in zip(units, columns, strict=True):
         if column.unit == "1":
             if unit not in {"", "1", "%"}:
                 message = Sentence(
                     "the heading of column {column} has a unit, but its numbers have none", column=column.path
                 )
-                report.fault(where, "wrong-unit", message, unit, allowed="no unit, or %")
+                node.refuse("wrong-unit", message, unit, allowed="no unit, or %")
             continue
         try:
             parse_exact(f"1 {unit}" if unit else 1, column.unit)
         except QuantityError as error:
             message = Sentence("the heading of column {column} {error}", column=column.path, error=error.message)
-            report.fault(where, error.code, message, unit, unit=column.unit)
+            node.refuse(error.code, message, unit, unit=column.unit)
     for place, (unit, column) in enumerate(zip(units, columns, strict=True)):
         if not unit:
-            refuse_mixed_column(report, where, rows[1:], (place, rows[0].cells[place].strip()), column.unit)
-    if report.found > before:
+            refuse_mixed_column(node, rows[1:], (place, rows[0].cells[place].strip()), column.unit)
+    if node.report.found > before:
         return []
     found: list[list[float]] = []
     for row in rows[1:]:
         numbers = [
-            _read_cell(report, where, row.line, cell, unit, column)
+            _read_cell(node, row.line, cell, unit, column)
             for cell, unit, column in zip(row.cells, units, columns, strict=True)
         ]
         found.append([number for number in numbers if number is not None])
-        if report.full:
+        if node.report.full:
             break
     return found
 
@@ -89,7 +90,7 @@ def _unit_of(name: str, unit: str, column: Parameter) -> str:
     return word[1] if column.unit != "1" or word[1] == "%" else ""
 
 
-def _read_cell(report: Report, where: str, line: int, cell: str, unit: str, column: Parameter) -> float | None:
+def _read_cell(node: Node, line: int, cell: str, unit: str, column: Parameter) -> float | None:
     text = cell.strip()
     try:
         value: object = text if has_unit(text) else f"{text} {unit}"
@@ -108,6 +109,7 @@ def _read_cell(report: Report, where: str, line: int, cell: str, unit: str, colu
                 "{error}; without a unit in the heading it is in {unit}",
                 error=message, unit=Typed(column.unit),
             )  # fmt: skip
-        report.fault(where, error.code, in_cell(line, message, column.path), cell,
-                       allowed=range_sentence(column), unit=column.unit)  # fmt: skip
+        node.refuse(
+            error.code, in_cell(line, message, column.path), cell, allowed=range_sentence(column), unit=column.unit
+        )
         return None

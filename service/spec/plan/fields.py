@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from sprag.sentences import Sentence, Typed
 from sprag.service.reading.catalogue import result_of, unknown_result
@@ -10,93 +10,82 @@ from sprag.service.reading.limits import quoted
 from sprag.service.reading.texts import quantity_text
 from sprag.service.reading.units import QuantityError, example, parse_quantity
 from sprag.service.spec.axes.axes import read_paths
-from sprag.service.spec.fields import read_number
 from sprag.service.spec.lists import refuse_mixed
-from sprag.service.spec.report import Report, join
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.spec.machine.machine import Machine
+    from sprag.service.spec.node import Node
     from sprag.worker.models import ResultInfo
 
+#: JSON Schema of the name of a result.
+RESULT: Final[dict[str, Any]] = {"type": "string", "examples": ["shaft.speed.mean", "efficiency", "torque.max"]}
 
-def read_ends(
-    report: Report, pointer: str, paths: Sequence[str], ends: Sequence[tuple[str, object]], machine: Machine
-) -> tuple[float, float] | None:
-    """The ends of a range (SI), the lower first; None, and the faults recorded, where they are none.
 
-    ``ends`` are the two pointers, each with its value.
-    """
-    if refuse_mixed(report, ends, machine.parameters[paths[0]].unit):
+def read_ends(node: Node, paths: Sequence[str], ends: Sequence[Node]) -> tuple[float, float] | None:
+    """The ends of a range (SI), the lower first; None, and the faults recorded, where ``node`` has none."""
+    parameters = [node.machine.parameters[path] for path in paths]
+    unit = parameters[0].unit
+    if refuse_mixed(ends, unit):
         return None
     read: list[float] = []
-    for where, value in ends:
-        numbers = [read_number(report, where, value, machine.parameters[path]) for path in paths]
+    for end in ends:
+        numbers = [end.number(parameter) for parameter in parameters]
         if numbers[0] is None or None in numbers:
             return None
         read.append(numbers[0])
     low, high = sorted(read)
     if low == high:
-        unit = machine.parameters[paths[0]].unit
-        report.fault(pointer, "invalid-range", "begins where it ends", quantity_text(low, unit), allowed="two values")
+        node.refuse("invalid-range", "begins where it ends", quantity_text(low, unit), allowed="two values")
         return None
     return low, high
 
 
-def read_path_of(report: Report, pointer: str, data: object, machine: Machine) -> tuple[str, ...] | None:
+def read_path_of(node: Node) -> tuple[str, ...] | None:
     """The path or the tied paths of what varies, each once; None, and the faults recorded, where they are none."""
-    paths = read_paths(report, join(pointer, "path"), data, machine)
+    paths = read_paths(node)
     if paths is not None and len(set(paths)) < len(paths):
-        report.fault(join(pointer, "path"), "repeated", "names the same path twice", list(paths))
+        node.refuse("repeated", "names the same path twice", list(paths))
         return None
     return paths
 
 
-def read_result(report: Report, pointer: str, value: object, infos: Sequence[ResultInfo]) -> ResultInfo | None:
+def read_result(node: Node) -> ResultInfo | None:
     """The result of that name; None, and a fault recorded, where there is none."""
+    infos = node.report.results
     some = next((info.name for info in infos if info.kind == "real"), "")
     allowed = Sentence("the name of a result of this study, such as '{name}'", name=some)
-    if not isinstance(value, str):
-        missing = value is None
-        report.fault(
-            pointer, "required" if missing else "wrong-type",
-            "is required" if missing else "must be the name of a result", value, allowed=allowed,
-        )  # fmt: skip
+    if node.value is None:
+        node.refuse("required", "is required", allowed=allowed)
         return None
-    info = result_of(infos, value)
+    if not isinstance(node.value, str):
+        node.refuse("wrong-type", "must be the name of a result", allowed=allowed)
+        return None
+    info = result_of(infos, node.value)
     if info is None:
-        report.fault(pointer, "unknown-name", unknown_result(infos, value), value, allowed=allowed)
+        node.refuse("unknown-name", unknown_result(infos, node.value), allowed=allowed)
     return info
 
 
-def read_value(report: Report, pointer: str, value: object, info: ResultInfo) -> float | None:
+def read_numeric_result(node: Node) -> ResultInfo | None:
+    """The result of that name that is a number; None, and a fault recorded, where there is none."""
+    info = read_result(node)
+    if info is not None and info.kind == "category":
+        node.refuse("not-numeric", "is a category, not a number", allowed="a result with a number")
+        return None
+    return info
+
+
+def read_value(node: Node, info: ResultInfo) -> float | None:
     """A value of a result (SI; of a category its number); None, and a fault recorded, where it is none."""
     if info.kind == "category":
-        if value in info.categories:
-            return float(info.categories.index(str(value)))
-        report.fault(pointer, "invalid-choice", "is not a valid choice", value, allowed=quoted(info.categories))
+        if node.value in info.categories:
+            return float(info.categories.index(str(node.value)))
+        node.refuse("invalid-choice", "is not a valid choice", allowed=quoted(info.categories))
         return None
     try:
-        return parse_quantity(value, info.unit)
+        return parse_quantity(node.value, info.unit)
     except QuantityError as error:
         such = Sentence("a number of {unit}, for example {example}", unit=Typed(info.unit), example=example(info.unit))
-        report.fault(pointer, error.code, error.message, value, allowed=such, unit=info.unit)
+        node.refuse(error.code, error.message, allowed=such, unit=info.unit)
         return None
-
-
-def read_results(report: Report, pointer: str, names: Sequence[Any], infos: Sequence[ResultInfo]) -> list[str]:
-    """Names of results that are numbers, each once; faults are recorded."""
-    found: list[str] = []
-    for index, name in enumerate(names):
-        where = join(pointer, index)
-        info = read_result(report, where, name, infos)
-        if info is None:
-            continue
-        if info.kind == "category":
-            report.fault(where, "not-numeric", "is a category, not a number", name, allowed="a result with a number")
-        elif name in found:
-            report.fault(where, "repeated", "is named twice", name, allowed="each result once")
-        else:
-            found.append(name)
-    return found

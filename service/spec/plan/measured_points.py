@@ -14,16 +14,13 @@ from sprag.service.reading.numbers import parse_number
 from sprag.service.reading.texts import did_you_mean, shorten_text
 from sprag.service.reading.units import QuantityError, parse_quantity, to_float
 from sprag.service.spec.csv_text import in_cell, read_csv, refuse_mixed_column
-from sprag.service.spec.fields import exact
-from sprag.service.spec.report import Report
+from sprag.service.spec.node import Node, exact
 from sprag.service.spec.table_text import CsvRow, heading_of
 from sprag.worker.planning.calibrate.plan import MOST_MEASURED, Measured
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.spec.machine.machine import Machine
-    from sprag.worker.models import ResultInfo
 
 #: Heading of a column of standard deviations.
 SIGMA: Final = "sigma"
@@ -67,30 +64,31 @@ class MeasuredTable:
     results: tuple[tuple[Column, Column | None], ...]
 
 
-def read_table(report: Report, where: str, text: object, machine: Machine) -> MeasuredTable | None:
+def read_table(node: Node) -> MeasuredTable | None:
     """Read headings and conditions; None, and the faults recorded, where they are invalid."""
+    machine = node.machine
     example = Sentence("headings, then a line for each point, {example}", example=Sentence(_EXAMPLE))
-    rows = read_csv(report, where, text, (MOST_MEASURED, MOST_COLUMNS), example)
+    rows = read_csv(node, (MOST_MEASURED, MOST_COLUMNS), example)
     if rows is None:
         return None
-    before = report.found
-    columns = _read_headings(report, where, rows[0])
+    before = node.report.found
+    columns = _read_headings(node, rows[0])
     paths = [column for column in columns if column.name in machine.parameters]
     others = [column for column in columns if column.name not in machine.parameters]
     for column in paths:
         if column.name in machine.derive:
-            report.fault(
-                where, "conflict", "has a column of a derived parameter", column.name, allowed="no formula in `derive`"
+            node.refuse(
+                "conflict", "has a column of a derived parameter", column.name, allowed="no formula in `derive`"
             )
-    results = _paired(report, where, others)
-    if report.found > before:
+    results = _paired(node, others)
+    if node.report.found > before:
         return None
     for column in paths:
-        _check_unit(report, where, column, machine.parameters[column.name].unit)
-    if report.found > before:
+        _check_unit(node, column, machine.parameters[column.name].unit)
+    if node.report.found > before:
         return None
-    values = [_conditions(report, where, rows[1:], column, machine) for column in paths]
-    if report.found > before:
+    values = [_conditions(node, rows[1:], column) for column in paths]
+    if node.report.found > before:
         return None
     points = list(zip(*values, strict=True)) if values else [()] * (len(rows) - 1)
     conditions = tuple(dict.fromkeys(points))
@@ -104,21 +102,21 @@ def read_table(report: Report, where: str, text: object, machine: Machine) -> Me
     )
 
 
-def _read_headings(report: Report, where: str, row: CsvRow) -> list[Column]:
+def _read_headings(node: Node, row: CsvRow) -> list[Column]:
     columns: list[Column] = []
     for place, cell in enumerate(row.cells):
         heading = heading_of(cell)
         if heading is None:
-            report.fault(where, "invalid-path", "has a heading without a name", cell, allowed=_EXAMPLE)
+            node.refuse("invalid-path", "has a heading without a name", cell, allowed=_EXAMPLE)
             continue
         column = Column(*heading, place)
         if column.name != SIGMA and any(other.name == column.name for other in columns):
-            report.fault(where, "repeated", "names the same column twice", column.name, allowed="each once")
+            node.refuse("repeated", "names the same column twice", column.name, allowed="each once")
         columns.append(column)
     return columns
 
 
-def _paired(report: Report, where: str, columns: Sequence[Column]) -> tuple[tuple[Column, Column | None], ...]:
+def _paired(node: Node, columns: Sequence[Column]) -> tuple[tuple[Column, Column | None], ...]:
     """Columns of results with those of their deviations: each holds for the results before it that have none yet."""
     pairs: list[tuple[Column, Column | None]] = []
     for column in columns:
@@ -127,52 +125,52 @@ def _paired(report: Report, where: str, columns: Sequence[Column]) -> tuple[tupl
         elif any(own is None for _, own in pairs):
             pairs = [(result, own or column) for result, own in pairs]
         else:
-            report.fault(
-                where, "not-used", "has a column sigma with no result before it", str(column),
+            node.refuse(
+                "not-used",
+                "has a column sigma with no result before it",
+                str(column),
                 allowed="a column of a result, then that of its standard deviation",
-            )  # fmt: skip
+            )
     if not pairs:
-        report.fault(where, "required", "has no column of a result", allowed=_EXAMPLE)
+        node.refuse("required", "has no column of a result", None, allowed=_EXAMPLE)
     return tuple(pairs)
 
 
-def _check_unit(report: Report, where: str, column: Column, unit: str) -> bool:
+def _check_unit(node: Node, column: Column, unit: str) -> bool:
     """Whether the unit of a heading fits; a fault recorded, once for the whole column, where it does not."""
     try:
         _number("1", column.unit, unit)
     except QuantityError as error:
         message = Sentence("column {column}: {message}", column=shorten_text(str(column)), message=error.message)
-        report.fault(where, error.code, message, column.unit, unit=unit)
+        node.refuse(error.code, message, column.unit, unit=unit)
         return False
     return True
 
 
-def _conditions(report: Report, where: str, rows: Sequence[CsvRow], column: Column, machine: Machine) -> list[float]:
+def _conditions(node: Node, rows: Sequence[CsvRow], column: Column) -> list[float]:
     """The values of a parameter; NaN, and a fault recorded, for those that are invalid."""
-    entry = machine.parameters[column.name]
+    entry = node.machine.parameters[column.name]
     values: list[float] = []
-    if not column.unit and refuse_mixed_column(report, where, rows, (column.place, column.name), entry.unit):
+    if not column.unit and refuse_mixed_column(node, rows, (column.place, column.name), entry.unit):
         return values
     for row in rows:
         cell = row.cells[column.place].strip()
         try:
             values.append(to_float(exact(_quantity(cell, column.unit), entry)) + 0.0)
         except QuantityError as error:
-            _fault(report, where, row, column, error, range_sentence(entry), entry.unit)
+            _fault(node, row, column, error, range_sentence(entry), entry.unit)
             values.append(math.nan)
-        if report.full:
+        if node.report.full:
             break
     return values
 
 
-def read_results(
-    report: Report, where: str, table: MeasuredTable, infos: Sequence[ResultInfo]
-) -> tuple[Measured, ...] | None:
+def read_results(node: Node, table: MeasuredTable) -> tuple[Measured, ...] | None:
     """The measured results in SI; None, and the faults recorded, where they are invalid.
 
     Empty cells of a result were not measured.
     """
-    before = report.found
+    before, infos = node.report.found, node.report.results
     measured: list[Measured] = []
     for column, sigma in table.results:
         info = result_of(infos, column.name)
@@ -180,41 +178,42 @@ def read_results(
             known = did_you_mean(column.name, [*(one.name for one in infos), SIGMA])
             message = Sentence("has a column that is neither a parameter nor a result{hint}", hint=known)
             if info is None:
-                report.fault(where, "unknown-name", message, column.name, allowed=_EXAMPLE)
+                node.refuse("unknown-name", message, column.name, allowed=_EXAMPLE)
             else:
-                report.fault(where, "not-numeric", "has a column of a category", column.name, allowed="a number")
+                node.refuse("not-numeric", "has a column of a category", column.name, allowed="a number")
             continue
-        if not _check_unit(report, where, column, info.unit):
+        if not _check_unit(node, column, info.unit):
             continue
-        if not column.unit and refuse_mixed_column(report, where, table.rows, (column.place, column.name), info.unit):
+        if not column.unit and refuse_mixed_column(node, table.rows, (column.place, column.name), info.unit):
             continue
         rows = [(row, at) for row, at in zip(table.rows, table.at, strict=True) if row.cells[column.place].strip()]
-        values = [_value(report, where, row, column, info.unit) for row, _ in rows]
+        values = [_value(node, row, column, info.unit) for row, _ in rows]
         if not rows:
-            report.fault(
-                where, "empty", Sentence("has no value in the column {column}", column=str(column)), allowed="a number"
+            node.refuse(
+                "empty",
+                Sentence("has no value in the column {column}", column=str(column)),
+                None,
+                allowed="a number",
             )
         deviations: list[float] = []
         if sigma is not None and not (sigma.unit or column.unit):
-            refuse_mixed_column(report, where, table.rows, (sigma.place, sigma.name), info.unit)
+            refuse_mixed_column(node, table.rows, (sigma.place, sigma.name), info.unit)
         if sigma is not None:
             pairs = zip(rows, values, strict=True)
-            deviations = [
-                _deviation(report, where, row, sigma, value, (column.unit, info.unit)) for (row, _), value in pairs
-            ]
+            deviations = [_deviation(node, row, sigma, value, (column.unit, info.unit)) for (row, _), value in pairs]
         measured.append(Measured(info.name, tuple(at for _, at in rows), tuple(values), tuple(deviations)))
-    return None if report.found > before else tuple(measured)
+    return None if node.report.found > before else tuple(measured)
 
 
-def _value(report: Report, where: str, row: CsvRow, column: Column, unit: str) -> float:
+def _value(node: Node, row: CsvRow, column: Column, unit: str) -> float:
     try:
         return _number(row.cells[column.place].strip(), column.unit, unit) + 0.0
     except QuantityError as error:
-        _fault(report, where, row, column, error, Sentence("a number of {unit}", unit=Typed(unit)), unit)
+        _fault(node, row, column, error, Sentence("a number of {unit}", unit=Typed(unit)), unit)
         return math.nan
 
 
-def _deviation(report: Report, where: str, row: CsvRow, column: Column, value: float, units: tuple[str, str]) -> float:
+def _deviation(node: Node, row: CsvRow, column: Column, value: float, units: tuple[str, str]) -> float:
     """The standard deviation of a value: a quantity, or a share of the value.
 
     A number without a unit is in that of the column of its result, ``units[0]``, or else in SI, ``units[1]``.
@@ -235,7 +234,7 @@ def _deviation(report: Report, where: str, row: CsvRow, column: Column, value: f
         return deviation
     except QuantityError as error:
         such = Sentence("greater than 0, in {unit}, or as a share [%] of the value", unit=Typed(unit))
-        _fault(report, where, row, column, error, such, unit)
+        _fault(node, row, column, error, such, unit)
         return math.nan
 
 
@@ -254,10 +253,8 @@ def _quantity(cell: str, unit: str) -> str | float:
     return cell if number is None else f"{cell} {unit}" if unit else number
 
 
-def _fault(
-    report: Report, where: str, row: CsvRow, column: Column, error: QuantityError, allowed: str, unit: str
-) -> None:
+def _fault(node: Node, row: CsvRow, column: Column, error: QuantityError, allowed: str, unit: str) -> None:
     cell = row.cells[column.place].strip()
     written = f"{cell} {column.unit}" if column.unit and parse_number(cell) is not None else cell
     message = in_cell(row.line, error.message, shorten_text(str(column)))
-    report.fault(where, error.code, message, written, allowed=allowed, unit=unit)
+    node.refuse(error.code, message, written, allowed=allowed, unit=unit)

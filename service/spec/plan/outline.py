@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag.sentences import Sentence
-from sprag.service.spec.fields import read_object
 from sprag.service.spec.plan import calibrate, goal, refine
-from sprag.service.spec.report import Report
 from sprag.worker import models
 from sprag.worker.planning import planner_of
 from sprag.worker.study import Axis, Study
@@ -20,12 +18,11 @@ from sprag.worker.study import Axis, Study
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.spec.machine.machine import Machine
-    from sprag.worker.models import ResultInfo
+    from sprag.service.spec.node import Node
     from sprag.worker.spread import Spread
 
-#: Fields of a spec by which a study chooses its own cases.
-FIELDS: Final = ("refine", "goal", "calibrate")
+#: Fields of a spec by which a study chooses its own cases, with their descriptions.
+FIELDS: Final = {"refine": refine.REFINE, "goal": goal.GOAL, "calibrate": calibrate.CALIBRATE}
 
 
 @dataclass(frozen=True)
@@ -37,7 +34,7 @@ class Outline:
     """
 
     axes: tuple[Axis, ...]
-    plan: Callable[[Report, Sequence[ResultInfo]], dict[str, Any] | None]
+    plan: Callable[[], dict[str, Any] | None]
     with_drives: Callable[[int], Outline] | None = None
 
 
@@ -48,27 +45,27 @@ def chooses(found: Mapping[str, Any]) -> bool:
     return adaptive or any(name in found for name in FIELDS)
 
 
-def read_outline(report: Report, found: Mapping[str, Any], machine: Machine) -> Outline | None:
+def read_outline(spec: Node) -> Outline | None:
     """The outline of a study that `chooses` its cases; None, and the faults recorded, where it is invalid."""
-    kind = next((name for name in FIELDS if name in found), "refine")
-    before = report.found
+    kind = next((name for name in FIELDS if name in spec), "refine")
+    node = spec[kind]
     for name in ("exclude", "combine", *FIELDS, *(() if kind == "refine" else ("axes",))):
-        if name == kind or name not in found or (name == "combine" and found[name] == "grid"):
+        other = spec[name]
+        if name == kind or not other.given or (name == "combine" and other.value == "grid"):
             continue
         message = Sentence("cannot be combined with `{kind}`", kind=kind)
-        report.fault(f"/{name}", "conflict", message, found[name], allowed=Sentence("without `{field}`", field=name))
-    read = {"refine": _refine, "goal": _goal, "calibrate": _calibrate}[kind]
-    outline = read(report, found, machine)
-    return None if report.found > before else outline
+        other.refuse("conflict", message, allowed=Sentence("without `{field}`", field=name))
+    outline = _refine(spec) if kind == "refine" else {"goal": _goal, "calibrate": _calibrate}[kind](node)
+    return outline if node.sound else None
 
 
-def _refine(report: Report, found: Mapping[str, Any], machine: Machine) -> Outline | None:
-    axes = refine.read_refined_axes(report, found.get("axes", []), machine)
+def _refine(spec: Node) -> Outline | None:
+    axes = refine.read_refined_axes(spec)
     if axes is None:
         return None
 
-    def plan(report: Report, infos: Sequence[ResultInfo]) -> dict[str, Any] | None:
-        read = refine.read_refine(report, found.get("refine"), axes, infos)
+    def plan() -> dict[str, Any] | None:
+        read = refine.read_refine(spec["refine"], axes)
         return None if read is None else read.to_json()
 
     fixed, adaptive = axes
@@ -76,23 +73,22 @@ def _refine(report: Report, found: Mapping[str, Any], machine: Machine) -> Outli
     return Outline(_zipped(ends), plan)
 
 
-def _goal(report: Report, found: Mapping[str, Any], machine: Machine) -> Outline | None:
-    data = read_object(report, "/goal", found["goal"], goal.FIELDS, given=True)
-    if data is None:
+def _goal(node: Node) -> Outline | None:
+    if not goal.GOAL.read(node, null=False):
         return None
-    variables = goal.read_variables(report, data.get("vary"), machine)
-    points = goal.read_points(report, data.get("at", []), machine, variables)
+    variables = goal.read_variables(node)
+    points = goal.read_points(node, variables)
     if variables is None or points is None:
         return None
     ends = [(tuple(v["paths"]), v.get("values") or (v["low"], v["high"])) for v in variables]
     ends += [((path,), [point[path] for point in points]) for path in (points[0] if points else ())]
-    plan = partial(goal.read_goal, data=data, variables=variables, points=points)
+    plan = partial(goal.read_goal, node, variables, points)
     outline = Outline(_zipped(ends), plan)
     return replace(outline, with_drives=lambda drives: replace(outline, plan=partial(plan, drives=drives)))
 
 
-def _calibrate(report: Report, found: Mapping[str, Any], machine: Machine) -> Outline | None:
-    calibration = calibrate.read_calibration(report, found["calibrate"], machine)
+def _calibrate(node: Node) -> Outline | None:
+    calibration = calibrate.read_calibration(node)
     if calibration is None:
         return None
     table = calibration.table
@@ -100,7 +96,7 @@ def _calibrate(report: Report, found: Mapping[str, Any], machine: Machine) -> Ou
         (one.paths, (one.low, one.high)) for one in calibration.unknown
     ]
     ends += [((path,), column) for path, column in zip(table.paths, zip(*table.conditions, strict=True), strict=True)]
-    return Outline(_zipped(ends), partial(calibrate.read_plan, calibration=calibration))
+    return Outline(_zipped(ends), partial(calibrate.read_plan, calibration))
 
 
 def _zipped(ends: Sequence[tuple[tuple[str, ...], Sequence[float]]]) -> tuple[Axis, ...]:
@@ -109,12 +105,13 @@ def _zipped(ends: Sequence[tuple[tuple[str, ...], Sequence[float]]]) -> tuple[Ax
     return tuple(Axis(paths, np.resize(np.asarray(values, dtype=np.float64), length)) for paths, values in ends)
 
 
-def first_round(report: Report, study: Study, outline: Outline, spread: Spread | None = None) -> Study:
+def first_round(spec: Node, study: Study, outline: Outline, spread: Spread | None = None) -> Study:
     """``study`` with its plan, its tolerances and the cases of its first round; SpecError where the plan is invalid."""
     if spread is not None and outline.with_drives is not None:
         outline = outline.with_drives(spread.drives)
-    plan = outline.plan(report, models.study_results(study))
-    report.raise_if_any()
+    spec.report.results = models.study_results(study)
+    plan = outline.plan()
+    spec.report.raise_if_any()
     assert plan is not None
     planner = planner_of(plan)
     points = planner.ask().points

@@ -5,37 +5,36 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.spec.described import Described, Listed
-from sprag.service.spec.report import Report, join
-from sprag.service.spec.shares import read_share
+from sprag.service.spec.node import Node
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from sprag.service.spec.report import Report
+
 #: Fields of a goal or a constraint about the drives.
 ROBUST: Final = ("quantile", "yield")
-QUANTILE: Final = Described(
-    "quantile", "", "the quantile of the result over the drawn drives instead of that of the nominal drive", "text",
-    limits='a share, as in "5 %"',
-)  # fmt: skip
-YIELD: Final = Listed(
-    "conditions", 1, 32, "the share of the drawn drives that meet all these conditions at every operating point"
-)
+#: JSON Schema of the quantile.
+QUANTILE: Final[dict[str, Any]] = {
+    "type": ["number", "string"],
+    "description": "the quantile of the result over the drawn drives instead of that of the nominal drive: a share, as "
+    'in "5 %"',
+}
 
 
-def read_quantile(report: Report, where: str, fields: Mapping[str, Any]) -> dict[str, float] | None:
+def read_quantile(item: Node) -> dict[str, float] | None:
     """The quantile of a goal or a constraint, by name; empty without one, None, and a fault recorded, if invalid."""
-    if "quantile" not in fields:
+    if "quantile" not in item:
         return {}
-    share = read_share(report, join(where, "quantile"), fields["quantile"], 0.0, 1.0)
+    share = item["quantile"].share(0.0, 1.0)
     return None if share is None else {"quantile": share}
 
 
-def refuse_beside_yield(report: Report, where: str, fields: Mapping[str, Any], names: Iterable[str]) -> None:
+def refuse_beside_yield(item: Node, names: Iterable[str]) -> None:
     """Record each of the fields ``names`` that is given beside `yield`."""
     for name in names:
-        if name in fields:
-            report.fault(join(where, name), "conflict", "cannot be combined with `yield`", fields[name])
+        if name in item:
+            item[name].refuse("conflict", "cannot be combined with `yield`")
 
 
 def check_drives(
@@ -43,7 +42,7 @@ def check_drives(
 ) -> None:
     """Record goals about drives in a study without tolerances, and tolerances without such a goal."""
     about = [
-        (join(f"/goal/{part}", index), name)
+        f"/goal/{part}/{index}/{name}"
         for part, items in (("best", best), ("subject_to", constraints))
         for index, item in enumerate(items)
         for name in ROBUST
@@ -54,6 +53,6 @@ def check_drives(
             "/tolerances", "not-used", "have no effect on this goal", allowed="goals or constraints with `quantile` or "
             "`yield`; a study of a design afterwards shows what tolerances make of it",
         )  # fmt: skip
-    for where, name in about if not drives else ():
-        report.fault(join(where, name), "conflict", "is about the drives, of which there is one only",
+    for where in about if not drives else ():
+        report.fault(where, "conflict", "is about the drives, of which there is one only",
                      allowed="`tolerances` in the spec")  # fmt: skip

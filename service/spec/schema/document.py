@@ -6,13 +6,14 @@ the run, sizes of grids, clutch laws) are checked by `sprag.service.spec.documen
 
 from __future__ import annotations
 
-from sprag.service.spec.axes.design import COMBINE
+from sprag.service.spec.axes.design import AXES, COMBINE
+from sprag.service.spec.axes.exclude import EXCLUDE
 from sprag.service.spec.derive import derive_schema
+from sprag.service.spec.described import schema_of
 from sprag.service.spec.document import UNNAMED, VERSION
+from sprag.service.spec.draws.tolerances import SPREAD
 from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.schema.axes import axes_schema, exclude_schema, path_schema
-from sprag.service.spec.schema.draws import tolerances_schema
-from sprag.service.spec.schema.plan import calibrate_schema, goal_schema, refine_schema
+from sprag.service.spec.plan import outline
 from sprag.service.spec.schema.quantity import Schema, object_schema, without_numbers
 from sprag.service.spec.starts import starts_schema
 from sprag.worker import models
@@ -34,15 +35,13 @@ def spec_schema() -> Schema:
             },
             "base": {"type": "object", "description": "the machine that every case begins from"},
             "run": {"type": "object"},
-            "axes": axes_schema(),
+            "axes": {**AXES.schema(), "default": []},
             "combine": COMBINE.schema(),
-            "exclude": exclude_schema(),
-            "refine": refine_schema(),
-            "goal": goal_schema(path_schema()),
-            "calibrate": calibrate_schema(path_schema()),
+            "exclude": EXCLUDE,
+            **{name: record.schema() for name, record in outline.FIELDS.items()},
             "derive": derive_schema(),
             "starts": starts_schema(),
-            **tolerances_schema(),
+            **{name: schema_of(field) for name, field in SPREAD.items()},
         },
         required=("sprag", "model", "base"),
         description="a study: a machine, a run, and what varies",

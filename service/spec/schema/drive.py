@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN, schemas
+from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN, listed_schema, schemas
 from sprag.service.spec.machine.clutch import ACCURACY, COEFFICIENTS, ROWS
 from sprag.service.spec.machine.drive import PENDULUMS, START
 from sprag.service.spec.run import SETTLED_FIELDS, TIMED_FIELDS
@@ -35,7 +35,7 @@ def drive_schema() -> Schema:
             continue
         schema = _section(entries, with_clutch=section == "pendulums")
         if section == "pendulums":
-            schema = PENDULUMS.schema(schema)
+            schema = listed_schema(PENDULUMS, schema)
         properties[section] = schema
         if any(entry.default is None for entry in entries):
             required.append(section)
@@ -57,7 +57,7 @@ def start_schema() -> Schema:
 
 def clutch_schema() -> Schema:
     """Schema of a clutch: a law, or measured data with the accuracy of its fit."""
-    law = {"coefficients": COEFFICIENTS.schema(QUANTITY), "windup_limit": quantity_schema(CLUTCH_WINDUP_LIMIT)}
+    law = {"coefficients": listed_schema(COEFFICIENTS, QUANTITY), "windup_limit": quantity_schema(CLUTCH_WINDUP_LIMIT)}
     return {
         "description": "torque of the freewheel clutch over its windup",
         "oneOf": [
@@ -70,7 +70,7 @@ def clutch_schema() -> Schema:
 def measured_schema(others: Schema | None = None, description: str = "") -> Schema:
     """Schema of measured data with the accuracy of their fit; ``others`` are fields beside them."""
     row = {"type": "array", "minItems": 2, "maxItems": 2, "items": QUANTITY, "description": "angle and torque"}
-    data = {"data": ROWS.schema(row), "accuracy": quantity_schema(ACCURACY)}
+    data = {"data": listed_schema(ROWS, row), "accuracy": quantity_schema(ACCURACY)}
     return object_schema({**data, **schemas(FIT), **(others or {})}, required=data, description=description)
 
 

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from sprag.service.reading.units import examples
-from sprag.service.spec.described import Listed
 from sprag.worker.limits import MAX_QUANTITY_LENGTH
 from sprag.worker.models import Parameter
 
@@ -31,18 +30,6 @@ def object_schema(properties: Schema, required: Iterable[str] = (), description:
 def one_of(schema: Schema, names: Iterable[str]) -> Schema:
     """``schema`` of an object that has exactly one of the fields ``names``."""
     return {**schema, "oneOf": [{"required": [name]} for name in names]}
-
-
-def values_schema(listed: Listed) -> Schema:
-    """Schema of values, as a list or as one text with all of them."""
-    text: Schema = {
-        "type": "string",
-        "minLength": 1,
-        "description": "the values in one text, semicolons between them; a unit at the end holds for the bare numbers "
-        "before it",
-        "examples": ["0; 50; 100 N*mm"],
-    }
-    return {"anyOf": [listed.schema(QUANTITY), text]}
 
 
 def quantities(parameters: Mapping[str, Parameter]) -> Schema:

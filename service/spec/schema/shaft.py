@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from sprag.service.spec.described import schemas
+from sprag.service.spec.described import listed_schema, schemas
 from sprag.service.spec.machine.shaft import MEAN_SPEED_IS
 from sprag.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, FLYWHEEL, MOTOR, STAGE, STAGES
 from sprag.service.spec.machine.shaft_parts import (
@@ -45,7 +45,7 @@ def shaft_schema() -> Schema:
     choices = {field.name: field.schema() for field in (MEAN_SPEED_IS, BALANCE, BALANCE_SIDE, PHI_C)}
     mechanism = {"mechanism": _mechanism(), "operation": _operation()}
     part = object_schema({**quantities(numbers_under("parts.N.")), **mechanism}, description=_PART)
-    parts = {"drive": _drive(), **mechanism, "parts": PARTS.schema(part)}
+    parts = {"drive": _drive(), **mechanism, "parts": listed_schema(PARTS, part)}
     return object_schema(
         {"cycle": _CYCLE, **quantities(numbers_under("")), **choices, "constants": _CONSTANTS, **parts},
         required=("drive",),
@@ -57,7 +57,7 @@ def _diagram(table: str, formula: str) -> Schema:
     """Fields of a course that is given as a table or as a formula."""
     row = {"type": "array", "minItems": 2, "maxItems": 2, "items": QUANTITY}
     return {
-        "table": {**ROWS.schema(row), "description": f"rows of {table}"},
+        "table": {**listed_schema(ROWS, row), "description": f"rows of {table}"},
         "csv": {"type": "string", "description": f"{table} as the text of a CSV file, headings with units in brackets"},
         "interpolation": INTERPOLATION.schema(),
         "formula": {"type": "string", "minLength": 1, "description": formula},
@@ -84,7 +84,7 @@ def _drive() -> Schema:
         description="a motor whose torque depends on its speed",
     )
     stage = numbers_under("drive.stages.K.")
-    stages = STAGES.schema(object_schema({"kind": STAGE.schema(), **quantities(stage)}, required=("kind",)))
+    stages = listed_schema(STAGES, object_schema({"kind": STAGE.schema(), **quantities(stage)}, required=("kind",)))
     wheel = numbers_under("drive.flywheel.")
     flywheel = object_schema(
         {"kind": FLYWHEEL.schema(), **quantities(wheel)},
@@ -123,7 +123,7 @@ def _operation() -> Schema:
         {
             **schemas(OPERATION_CHOICES),
             **quantities(numbers_under("operation.") | recorded),
-            "steps": STEPS.schema(object_schema(quantities(step), required_of(step))),
+            "steps": listed_schema(STEPS, object_schema(quantities(step), required_of(step))),
             **_diagram(
                 table, "force or torque as a formula of phi (rad), t (s), x (fraction of the stroke) and omega (rad/s)"
             ),

@@ -19,12 +19,13 @@ from sprag.service.http.web.form.entries import (
 )
 from sprag.service.http.web.form.parts import PARTS, filled
 from sprag.service.languages import N_, _
-from sprag.service.spec.axes.exclude import FIELDS as KINDS
+from sprag.service.spec.axes.exclude import LIMITS
 from sprag.service.spec.axes.sample import SAMPLE, SCALE
 
 #: Field with the points, as the text of a CSV file.
 POINTS: Final = "/points"
 _SAMPLE: Final = "/sample"
+_KINDS: Final = tuple(LIMITS.fields)
 _NUMBERS: Final = ("count", "seed")
 _WORDS: Final = {
     "above": N_("above"),
@@ -47,12 +48,12 @@ _BOTH: Final = ("", "and/")
 
 def methods() -> list[tuple[str, str]]:
     """The kinds of samples and their labels."""
-    return [(name, _(_METHODS[name])) for name in SAMPLE["sample"].values]
+    return [(name, _(_METHODS[name])) for name in SAMPLE.described["sample"].values]
 
 
 def kinds() -> list[tuple[str, str]]:
     """The kinds of conditions and their labels."""
-    return [(name, _(_WORDS[name])) for name in KINDS]
+    return [(name, _(_WORDS[name])) for name in _KINDS]
 
 
 def blocks_of(values: Mapping[str, str]) -> dict[str, dict[str, Any]]:
@@ -63,8 +64,8 @@ def blocks_of(values: Mapping[str, str]) -> dict[str, dict[str, Any]]:
     if rows or "count" in numbers:
         second = {"second_order": True} if values.get(f"{_SAMPLE}/second_order") == "on" else {}
         ranges = [_range(values, index) for index in rows]
-        found["sample"] = {"sample": values.get(f"{_SAMPLE}/sample", next(iter(SAMPLE["sample"].values))), **numbers,
-                           **second, "ranges": ranges}  # fmt: skip
+        method = values.get(f"{_SAMPLE}/sample", SAMPLE.described["sample"].values[0])
+        found["sample"] = {"sample": method, **numbers, **second, "ranges": ranges}
     if values.get(POINTS, "").strip():
         found["points"] = {"points": values[POINTS].replace("\r\n", "\n")}
     return found
@@ -90,7 +91,7 @@ def repeated_limits(values: Mapping[str, str]) -> Faults:
     faults: Faults = {}
     for index in filled(values, "exclude"):
         parts = _parts(values, index)
-        limits = [(values.get(f"{part}path", ""), values.get(f"{part}kind", KINDS[0])) for part in parts]
+        limits = [(values.get(f"{part}path", ""), values.get(f"{part}kind", _KINDS[0])) for part in parts]
         if len(set(limits)) < len(limits):
             faults[f"{parts[1]}value"] = [_(_TWICE)]
     return faults
@@ -99,7 +100,7 @@ def repeated_limits(values: Mapping[str, str]) -> Faults:
 def _condition(values: Mapping[str, str], index: int) -> dict[str, Any]:
     found: dict[str, dict[str, Any]] = {}
     for part in _parts(values, index):
-        kind, text = values.get(f"{part}kind", KINDS[0]), values.get(f"{part}value", "")
+        kind, text = values.get(f"{part}kind", _KINDS[0]), values.get(f"{part}value", "")
         items = list_of(text) if kind == "is" else []
         several = len(items) > 1 or unclear(items)
         found.setdefault(values.get(f"{part}path", ""), {})[kind] = items if several else plain(text)
@@ -119,7 +120,7 @@ def field_of_block(place: int, rest: str, values: Mapping[str, str]) -> str:
         return POINTS
     match = re.match(r"ranges/(\d+)(?:/([a-z]+))?", rest)
     if match is None:
-        return f"{_SAMPLE}/{rest if rest in SAMPLE else 'count'}"
+        return f"{_SAMPLE}/{rest if rest in SAMPLE.described else 'count'}"
     rows, inner = filled(values, "ranges"), match[2] or "from"
     index = rows[int(match[1])] if int(match[1]) < len(rows) else 0
     return f"{PARTS['ranges'].pointer}/{index}/{inner if inner in {'path', 'to'} else 'from'}"
@@ -134,7 +135,7 @@ def field_of_exclusion(pointer: str, values: Mapping[str, str]) -> str:
     parts = _parts(values, rows[int(match[1])])
     own = [part for part in parts if values.get(f"{part}path", "") == (match[2] or "")]
     kind = (match[3] or "").strip("/").partition("/")[0]
-    part = next((part for part in own if values.get(f"{part}kind", KINDS[0]) == kind), (own or parts)[0])
+    part = next((part for part in own if values.get(f"{part}kind", _KINDS[0]) == kind), (own or parts)[0])
     return f"{part}{'value' if kind else 'path'}"
 
 
@@ -163,7 +164,7 @@ def case_values(blocks: Sequence[Mapping[str, Any]], conditions: Sequence[Mappin
 def _sample_values(block: Mapping[str, Any]) -> Values:
     ranges = block.get("ranges", ())
     known = {"path", "from", "to", SCALE.name}
-    if not set(block) <= {*SAMPLE, "ranges"} or not all(set(item) <= known for item in ranges):
+    if not set(block) <= {*SAMPLE.described, "ranges"} or not all(set(item) <= known for item in ranges):
         raise ValueError("the form has no fields for all of this sample")
     values: Values = {f"{_SAMPLE}/sample": str(block["sample"]), "ranges": str(len(ranges))}
     values |= {f"{_SAMPLE}/{name}": text_of(block[name]) for name in _NUMBERS if name in block}

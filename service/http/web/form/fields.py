@@ -74,24 +74,24 @@ def run_fields() -> dict[str, Field]:
 
 def refine_fields() -> dict[str, Field]:
     """The fields of a refinement, by name."""
-
-    meaning = _("{what}, separated by semicolons", what=_(refine.RESULTS.help))
+    entries = refine.REFINE.described
+    meaning = _("{what}, separated by semicolons", what=_(refine.REFINE.listed["results"].help))
     own = [
         Field("/refine/results", _("Results"), "", "", "", meaning, "", True, "", "shaft.speed.mean; efficiency"),
-        described(refine.ERROR, "/refine"),
+        described(entries["error"], "/refine"),
         replace(
-            described(refine.START, "/refine"),
+            described(entries["start"], "/refine"),
             default=_("{number}, of a map {other}", number=refine.STARTS[1], other=refine.STARTS[2]),
         ),
-        described(refine.FINEST, "/refine"),
-        replace(described(refine.MOST, "/refine"), default=_("no bound")),
+        described(entries["finest"], "/refine"),
+        replace(described(entries["most"], "/refine"), default=_("no bound")),
     ]
     return {field.name.rpartition("/")[2]: field for field in own}
 
 
 def search_fields() -> list[Field]:
     """The fields of a search that take one number each."""
-    return [described(goal.SEARCH[name], "/goal") for name in ("population", "generations", "seed")]
+    return [described(goal.GOAL.described[name], "/goal") for name in ("population", "generations", "seed")]
 
 
 def described(entry: Described, pointer: str) -> Field:

@@ -21,7 +21,7 @@ from sprag.service.http.web.form.entries import (
 from sprag.service.http.web.form.parts import PARTS, filled
 from sprag.service.languages import N_, _
 from sprag.service.reading.together import with_last_unit
-from sprag.service.spec.plan import goal
+from sprag.service.spec.plan.goal import GOAL
 
 #: What a search asks for in a form that was not about one.
 GOAL_DEFAULTS: Final[Values] = {
@@ -31,8 +31,8 @@ GOAL_DEFAULTS: Final[Values] = {
     "at": "0",
     "/goal/vary/0/way": "from",
     "/goal/best/0/toward": "max",
-    "/goal/population": goal.SEARCH["population"].default_text,
-    "/goal/generations": goal.SEARCH["generations"].default_text,
+    "/goal/population": GOAL.described["population"].default_text,
+    "/goal/generations": GOAL.described["generations"].default_text,
     "/goal/over": "worst",
     "/goal/polish": "on",
 }
@@ -112,7 +112,7 @@ def field_of_goal(pointer: str, values: Mapping[str, str]) -> str:
     """The field beside which a fault at ``pointer`` of the spec, in or below `/goal`, is shown."""
     match = re.fullmatch(r"/goal/([a-z_]+)/(\d+)(?:/(.*))?", pointer)
     if match is None:
-        return pointer if pointer.rpartition("/")[2] in {*PARTS, *goal.SEARCH} else "/goal"
+        return pointer if pointer.rpartition("/")[2] in {*PARTS, *GOAL.described} else "/goal"
     part, place, rest = match[1], int(match[2]), (match[3] or "").partition("/")[0]
     rows = filled(values, part)
     if part == "at":

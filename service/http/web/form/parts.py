@@ -10,7 +10,7 @@ from typing import Final
 from sprag.service.http.web.form.entries import Values, count_in
 from sprag.service.http.web.form.machine import BASE, form_of
 from sprag.service.http.web.form.tolerances import OWN
-from sprag.service.spec.plan import goal
+from sprag.service.spec.plan.goal import GOAL
 from sprag.worker.limits import MAX_AXES
 from sprag.worker.models.form import Rows
 
@@ -44,9 +44,9 @@ _MOST_CONDITIONS: Final = 20
 #: By the name of the field with the number of rows.
 PARTS: Final = {
     "axes": Part("/axes", MAX_AXES, ("path", "tied", "values", "from", "to", "count", "step"), {"way": "linspace"}),
-    "vary": Part("/goal/vary", goal.VARY.high, ("path", "tied", "values", "from", "to"), {"way": "from"}),
-    "best": Part("/goal/best", goal.BEST.high, ("result",), {"toward": "max"}),
-    "subject_to": Part("/goal/subject_to", goal.SUBJECT_TO.high, ("result", "value"), {"kind": "at_most"}),
+    "vary": Part("/goal/vary", GOAL.listed["vary"].high, ("path", "tied", "values", "from", "to"), {"way": "from"}),
+    "best": Part("/goal/best", GOAL.listed["best"].high, ("result",), {"toward": "max"}),
+    "subject_to": Part("/goal/subject_to", GOAL.listed["subject_to"].high, ("result", "value"), {"kind": "at_most"}),
     "at": Part("/goal/at", MAX_AXES, ("path", "values")),
     "ranges": Part("/sample/ranges", MAX_AXES, ("path", "tied", "from", "to")),
     "exclude": Part("/exclude", _MOST_CONDITIONS, ("path", "value", "and/path", "and/value")),

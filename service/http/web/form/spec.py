@@ -34,7 +34,7 @@ from sprag.service.http.web.form.parts import count_of
 from sprag.service.http.web.form.tolerances import FIELDS as TOLERANT
 from sprag.service.http.web.form.tolerances import field_of_tolerance, tolerance_values, tolerances_of
 from sprag.service.reading.together import with_last_unit
-from sprag.service.spec.axes.sweep import SWEPT
+from sprag.service.spec.axes.axes import SWEPT
 from sprag.service.spec.derive import formulas_of, with_values
 from sprag.service.spec.plan import refine
 from sprag.service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
@@ -52,7 +52,7 @@ WAYS: Final = {
 #: What is asked of a refinement in a form that was not about one.
 REFINE_DEFAULTS: Final[Values] = {
     "/refine/results": "shaft.speed.mean; efficiency",
-    "/refine/error": refine.ERROR.default_text,
+    "/refine/error": refine.REFINE.described["error"].default_text,
 }
 #: The form's choice for a run of a given time, which a spec expresses by its duration or window.
 TIMED: Final = "time"
@@ -107,7 +107,7 @@ def spec_of(values: Mapping[str, str]) -> tuple[dict[str, Any], Faults]:
 
 def _refine(values: Mapping[str, str]) -> dict[str, Any]:
     """What a form with an adaptive axis asks for."""
-    found = _given(values, "/refine", (name for name in refine.FIELDS if name != "results"))
+    found = _given(values, "/refine", refine.REFINE.described)
     names = names_of(values.get("/refine/results", ""))
     return {**({"results": names} if names else {}), **found}
 

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from sprag.service.spec.machine.registry import part_of
+from sprag.service.spec.node import Node
 from sprag.service.spec.plan.goal import read_goal, read_points, read_variables
 from sprag.service.spec.report import Report
 from sprag.worker import models
@@ -34,13 +35,14 @@ def read(changes: dict[str, Any]) -> tuple[dict[str, Any] | None, Report]:
     """The plan of the goal with other fields, and the report."""
     data = {name: value for name, value in {**GOAL, **changes}.items() if value is not ...}
     report = Report({"goal": data})
-    machine = part_of("vibration-drive").read_base(report, SPEC["base"])
-    variables = read_variables(report, data.get("vary"), machine)
-    points = read_points(report, data.get("at", []), machine, variables)
+    report.machine = part_of("vibration-drive").read_base(report, SPEC["base"])
+    goal = Node(report, "", {"goal": data})["goal"]
+    variables = read_variables(goal)
+    points = read_points(goal, variables)
     if variables is None or points is None:
         return None, report
-    infos = models.study_results(parsed({"/run": {}, "/axes": []}).study)
-    return read_goal(report, infos, data, variables, points), report
+    report.results = models.study_results(parsed({"/run": {}, "/axes": []}).study)
+    return read_goal(goal, variables, points), report
 
 
 def test_a_goal_is_read_in_si() -> None:

@@ -12,8 +12,8 @@ from sprag.service.http.web.form.fields import refine_fields
 from sprag.service.jobs.preview import preview_json
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.longer import longer_spec
+from sprag.service.spec.plan.refine import REFINE as RECORD
 from sprag.service.spec.report import SpecError
-from sprag.service.spec.schema.plan import refine_schema
 from sprag.worker.chunking import Chunking
 from sprag.worker.planning import most_cases, planner_of
 from sprag.worker.study import Study
@@ -56,7 +56,7 @@ def test_settled_studies_are_refined_by_their_regimes() -> None:
 
 
 def test_schema_and_form_name_the_defaults_that_the_reader_takes() -> None:
-    fields = refine_schema()["properties"]
+    fields = RECORD.schema()["properties"]
     given = {name: fields[name]["default"] for name in ("error", "finest")}
     plan = parsed(refined({"/refine": {"results": ["efficiency"]}})).study.plan
     assert parsed(refined({"/refine": {"results": ["efficiency"], **given}})).study.plan == plan

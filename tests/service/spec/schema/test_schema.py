@@ -9,9 +9,9 @@ from typing import Any
 import jsonschema
 import pytest
 
+from sprag.service.spec.axes.axes import AXIS
 from sprag.service.spec.document import SpecError, format_of, load_spec, parse_spec
 from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.schema.axes import axis_schema
 from sprag.service.spec.schema.document import spec_schema
 from sprag.service.spec.schema.drive import clutch_schema, run_schema
 from sprag.worker.models import model_names, parameter_catalogue
@@ -127,5 +127,5 @@ def test_it_follows_the_catalogue() -> None:
 
 
 def test_the_parts_stand_alone() -> None:
-    for part in (axis_schema(), clutch_schema(), run_schema()):
+    for part in (AXIS.schema(), clutch_schema(), run_schema()):
         jsonschema.Draft202012Validator.check_schema(part)
