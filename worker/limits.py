@@ -93,6 +93,11 @@ MAX_DIAGRAM_VALUES: Final = 500
 MAX_DIAGRAM_STROBES: Final = 200
 MAX_SECTION_STROBES: Final = 5_000
 
+#: Designs of a search that one answer gives; quantiles of one ribbon; drives in a list of the worst ones.
+MAX_DESIGNS: Final = 1_000_000
+MAX_QUANTILES: Final = 99
+MAX_WORST: Final = 1_000
+
 #: Priorities of studies lie between this and its negative.
 MAX_PRIORITY: Final = 100
 

@@ -1,6 +1,6 @@
 """``sprag trajectory``, ``branch``, ``basin`` and their like: the views of a case, run here or by a service.
 
-Their options are the settings of the views (`sprag.service.views.questions`); nothing else is loaded before one runs.
+Their options are the settings of the views (`sprag.service.views.setting`); nothing else is loaded before one runs.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ from sprag.service.cli.options import (
 from sprag.service.cli.remote import connection
 from sprag.service.faults import Fault, FaultError
 from sprag.service.languages import N_, _
-from sprag.service.views.questions import CASE_VIEWS, TRANSIENT, About, Asked, settings_of
+from sprag.service.views.case_questions import CASE_VIEWS, TRANSIENT
+from sprag.service.views.setting import About, Asked, settings_of
 
 if TYPE_CHECKING:
     from sprag.service.views.case_view import CaseView

@@ -18,26 +18,24 @@ from starlette.types import ASGIApp
 from sprag.service.http import handlers
 from sprag.service.http.access import Access
 from sprag.service.http.api import (
-    batches,
-    calibrations,
     case_views,
     cases,
     catalogues,
     clutch_fits,
     components,
-    curves,
     events,
-    explore,
-    fronts,
     health,
-    key_answers,
     people,
     saved_views,
     schedules,
-    sensitivity,
+    select,
     studies,
     study_list,
+    study_views,
     workers,
+)
+from sprag.service.http.api import (
+    results as api_results,
 )
 from sprag.service.http.api.document import build_openapi
 from sprag.service.http.compression import Compression
@@ -150,13 +148,9 @@ ROUTED = (
     studies,
     study_list,
     events,
-    curves,
-    sensitivity,
-    batches,
-    calibrations,
-    fronts,
-    explore,
-    key_answers,
+    study_views,
+    api_results,
+    select,
     cases,
     case_views,
     clutch_fits,

@@ -2,45 +2,55 @@
 
 from __future__ import annotations
 
-from inspect import Parameter, Signature
+from functools import wraps
+from inspect import Parameter, Signature, signature
 from typing import TYPE_CHECKING, Annotated, Any
 
 from fastapi import Query
 
-from sprag.service.views.questions import Asked, settings_of
+from sprag.service.views.setting import Asked, settings_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Awaitable, Callable, Collection, Iterable
 
 
-def one_of(names: Any) -> dict[str, Any]:
+def one_of(names: Iterable[str]) -> dict[str, Any]:
     """``json_schema_extra`` of a text with these values only; generated clients still treat it as a text."""
     return {"pattern": f"^({'|'.join(names)})$"}
 
 
-def with_question(
-    endpoint: Callable[..., Any], question: type, before: Mapping[str, Any], after: Mapping[str, Any] | None = None
-) -> None:
-    """Give ``endpoint`` the parameters of a question, between others.
+def asking(
+    endpoint: Callable[..., Awaitable[Any]], question: type, without: Collection[str] = ()
+) -> Callable[..., Awaitable[Any]]:
+    """An operation whose parameter ``question`` is given as its settings, each a parameter of the query.
 
-    ``before`` and ``after`` are annotations by name; those of ``after`` have the default None.
+    The parameters ``without`` are left out and are None.
     """
-    fixed = [Parameter(name, Parameter.KEYWORD_ONLY, annotation=kind) for name, kind in before.items()]
-    last = [
-        Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=kind) for name, kind in (after or {}).items()
-    ]
-    endpoint.__signature__ = Signature([*fixed, *map(_parameter, settings_of(question)), *last])  # type: ignore[attr-defined]
+    settings = settings_of(question)
+    parameters: list[Parameter] = []
+    for own in signature(endpoint, eval_str=True).parameters.values():
+        if own.name == "question":
+            parameters += map(_parameter, settings)
+        elif own.name not in without:
+            parameters.append(own.replace(kind=Parameter.KEYWORD_ONLY))
+
+    @wraps(endpoint)
+    async def asked(**given: Any) -> Any:
+        values = {one.name: given.pop(one.name) for one in settings}
+        return await endpoint(question=question(**values), **given, **dict.fromkeys(without))
+
+    asked.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    return asked
 
 
 def _parameter(asked: Asked) -> Parameter:
     setting = asked.setting
-    limits = {"ge": setting.low, "le": setting.high, "max_length": setting.longest}
-    extra = one_of(setting.choices) if setting.choices else None
+    limits = {"ge": setting.low, "le": setting.high, "min_length": setting.least, "max_length": setting.longest}
     query = Query(
         alias=setting.alias or None,
         description=setting.meaning,
         examples=list(setting.examples) or None,
-        json_schema_extra=extra,
+        json_schema_extra=one_of(setting.choices) if setting.choices else None,
         **{name: limit for name, limit in limits.items() if limit is not None},  # type: ignore[arg-type]
     )
     default = Parameter.empty if asked.default is ... else asked.default

@@ -16,7 +16,6 @@ from sprag.service.http.looks import Looks
 from sprag.service.http.problems import ApiError
 from sprag.service.http.shares import Shares
 from sprag.service.jobs.library import Library
-from sprag.service.results.unaffected import Unaffected
 from sprag.service.settings import Settings
 from sprag.service.storage.store import Store
 from sprag.worker.limits import (
@@ -61,7 +60,7 @@ class Context:
     ``checker`` runs the functions that read, expand, fit or draw user input, and ``library`` gives them the store.
     ``writer`` writes files of rows, and ``sending`` are the places for rows that are sent meanwhile. Requests use all
     of them through `sprag.service.http.work`, which enforces the share of each token.
-    ``unaffected`` finds parameters without effect; ``streams`` are the places for event streams,
+    ``streams`` are the places for event streams,
     ``stream_shares`` the share of each token of them, and ``looks`` what these look at.
     ``ready`` is set when the checker accepts work.
     """
@@ -75,7 +74,6 @@ class Context:
     ending: Event = field(default_factory=Event)
     ready: Ready = field(default_factory=Ready)
     streams: Semaphore = field(default_factory=lambda: Semaphore(MAX_STREAMS))
-    unaffected: Unaffected = field(default_factory=Unaffected)
     compute_shares: Shares = field(default_factory=lambda: Shares(1, MAX_COMPUTATIONS_EACH, MAX_COMPUTATIONS))
     check_shares: Shares = field(default_factory=lambda: Shares(1, MAX_CHECKS_EACH, MAX_CHECKS))
     stream_shares: Shares = field(default_factory=lambda: Shares(MAX_STREAMS_EACH, MAX_STREAMS_EACH, MAX_STREAMS))

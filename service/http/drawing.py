@@ -16,13 +16,10 @@ from sprag.service.formats import MEDIA_TYPES, Format
 from sprag.service.http.respond import entity_tag, not_modified, tagged
 from sprag.service.http.threads import in_thread
 from sprag.service.http.work import Work
-from sprag.service.jobs import answers
-from sprag.service.results.defaults import drawn_numbers
 from sprag.service.results.pictures import curves as pictures
 from sprag.worker import models
 
 if TYPE_CHECKING:
-    from sprag.service.http.context import Context
     from sprag.service.storage.records import StudyRecord
 
 #: Panels in a row of a figure; a narrow place asks for one.
@@ -73,14 +70,6 @@ def table(content: bytes, form: Format, name: str) -> Response:
 def attached(filename: str) -> dict[str, str]:
     """The headers of a file that is downloaded under that name."""
     return {"Content-Disposition": f'attachment; filename="{filename}"'}
-
-
-def placed(context: Context, drawing: Drawing) -> Response | Drawing:
-    """A drawing of `sprag.service.jobs.answers`: made here where it has few numbers, otherwise left to another
-    process.
-    """
-    _, study_id, query, *_ = drawing.args
-    return drawing if drawn_numbers(context.store.study(study_id), query) > answers.FEW else drawing.here()
 
 
 async def conditional(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from sprag.service.jobs.calibrations import Calibrations
 from sprag.service.jobs.columns import Columns
 from sprag.service.jobs.fronts import Fronts
+from sprag.service.results.unaffected import Unaffected
 from sprag.service.storage.store import Store
 from sprag.worker.pool.child_process import uncounted
 
@@ -30,6 +31,7 @@ class Library:
         self.fronts = Fronts(store)
         self.columns = Columns(store)
         self.calibrations = Calibrations(store)
+        self.unaffected = Unaffected()
 
     def __reduce__(self) -> tuple[Callable[[str, Chunking], Library], tuple[str, Chunking]]:
         return _library, (self.store.session.url.render_as_string(hide_password=False), self.store.base_chunking)

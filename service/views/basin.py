@@ -19,8 +19,8 @@ from sprag.service.results.exports import table_csv
 from sprag.service.results.figures.basin import basin_figure
 from sprag.service.results.selection import ends_of_range
 from sprag.service.results.start_states import refuse_impossible
+from sprag.service.views.case_questions import BASIN, BasinQuestion
 from sprag.service.views.case_view import CaseView, Seen
-from sprag.service.views.questions import BASIN, BasinQuestion
 from sprag.worker import models
 from sprag.worker.models import Basin
 from sprag.worker.models.common import case_machine

@@ -19,9 +19,9 @@ from sprag.service.results.directions import case_values
 from sprag.service.results.exports import table_csv
 from sprag.service.results.figures.branch import OwnCases, branch_figure, special_text
 from sprag.service.results.selection import ends_of_range
+from sprag.service.views.case_questions import BRANCH, BranchQuestion
 from sprag.service.views.case_view import CaseView, Said, Seen
 from sprag.service.views.portrait import require_strobes
-from sprag.service.views.questions import BRANCH, BranchQuestion
 from sprag.worker import models
 from sprag.worker.directions import SWEEP
 from sprag.worker.models.abilities import branch_results, run_branch

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from sprag.service.results.figures.figure import Figure
     from sprag.service.results.pictures.curves import Picture
     from sprag.service.storage.store import Store
-    from sprag.service.views.questions import About
+    from sprag.service.views.setting import About
     from sprag.worker.models import KernelShape
     from sprag.worker.study import Study
 

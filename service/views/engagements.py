@@ -11,8 +11,8 @@ from sprag.service.faults import FaultError, choice_of
 from sprag.service.languages import N_, _, decimal
 from sprag.service.results.directions import case_values
 from sprag.service.results.exports import table_csv
+from sprag.service.views.case_questions import ENGAGEMENTS, EngagementsQuestion
 from sprag.service.views.case_view import CaseView, Said, Seen
-from sprag.service.views.questions import ENGAGEMENTS, EngagementsQuestion
 from sprag.worker import models
 from sprag.worker.models import Engagements
 

@@ -9,8 +9,9 @@ from sprag.service.faults import FaultError, choice_of
 from sprag.service.languages import N_
 from sprag.service.results.directions import case_values
 from sprag.service.results.figures.portrait import portrait_figure
+from sprag.service.views.case_questions import STROBES, StrobesQuestion
 from sprag.service.views.case_view import CaseView, Seen
-from sprag.service.views.questions import STROBES, StrobesQuestion, choices_of
+from sprag.service.views.setting import choices_of
 from sprag.service.views.trajectory import timed_values, trajectory_csv
 from sprag.worker import models
 from sprag.worker.models import Portrait

@@ -19,9 +19,9 @@ from sprag.service.results.exports import table_csv
 from sprag.service.results.figures.sections import diagram_figure, section_figure
 from sprag.service.results.start_states import refuse_impossible
 from sprag.service.views.branch import range_of
+from sprag.service.views.case_questions import DIAGRAM, SECTION, DiagramQuestion, SectionQuestion
 from sprag.service.views.case_view import CaseView, Seen
 from sprag.service.views.portrait import require_strobes
-from sprag.service.views.questions import DIAGRAM, SECTION, DiagramQuestion, SectionQuestion
 from sprag.worker.models.abilities import run_sections
 from sprag.worker.models.common import case_machine
 from sprag.worker.models.sections import CaseSections, Sampling

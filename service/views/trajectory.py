@@ -16,8 +16,8 @@ from sprag.service.reading.units import PERIOD_NAMES, QuantityError, parse_quant
 from sprag.service.results.directions import case_values
 from sprag.service.results.exports import read_table
 from sprag.service.results.selection import ends_of_range
+from sprag.service.views.case_questions import TRAJECTORY, TrajectoryQuestion
 from sprag.service.views.case_view import CaseView, Said, Seen
-from sprag.service.views.questions import TRAJECTORY, TrajectoryQuestion
 from sprag.worker import models
 from sprag.worker.models import Trajectory
 

@@ -14,8 +14,8 @@ from sprag.service.reading.numbers import in_language
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.service.reading.wording import number, unit_text
 from sprag.service.results.figures.transient import transient_figure
+from sprag.service.views.case_questions import TRANSIENT, TransientQuestion
 from sprag.service.views.case_view import CaseView, Said, Seen
-from sprag.service.views.questions import TRANSIENT, TransientQuestion
 from sprag.service.views.trajectory import timed_values, trajectory_csv
 from sprag.worker import models
 from sprag.worker.limits import MIN_TRAJECTORY_POINTS

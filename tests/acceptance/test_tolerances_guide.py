@@ -14,9 +14,9 @@ import pytest
 
 from sprag.service.answers.tolerances import RibbonLine, YieldLine
 from sprag.service.cli.batches import yield_text
-from sprag.service.jobs.batch_answers import RibbonQuery, YieldQuery, both
 from sprag.service.jobs.local import run_here
 from sprag.service.spec.document import parse_spec
+from sprag.service.views.drives import RibbonQuery, YieldQuery, both
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "guide-tolerances.md").read_text(encoding="utf-8")

@@ -9,12 +9,12 @@ from starlette.responses import Response
 
 from sprag.service.http.api.document import CASE_PROBLEMS, files, format_query, problems
 from sprag.service.http.api.drawn_format import DrawnFormat
-from sprag.service.http.asked import with_question
+from sprag.service.http.asked import asking
 from sprag.service.http.context import CaseNumber, StartNumber, StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, TABLE_FORMATS, picture, table
 from sprag.service.http.respond import choose_format
 from sprag.service.http.routers import api_router
-from sprag.service.http.work import Attended, Work
+from sprag.service.http.work import Attended
 from sprag.service.reading.reader import Reading
 from sprag.service.results.figures.read import read_figure
 from sprag.service.results.pictures.curves import draw_figure
@@ -29,11 +29,10 @@ router = api_router("cases", "/studies/{study_id:study}/cases")
 
 def _add(view: CaseView[Any, Any, Any]) -> None:
     async def answer(
-        *, work: Work, study_id: str, case: int, which: int | None = None, chosen: Any = None, form: str | None = None,
-        **settings: Any,
+        *, work: Attended, study_id: StudyId, case: CaseNumber, chosen: DrawnFormat, question: Any,
+        which: StartNumber = None, form: Annotated[str | None, format_query(TABLE_FORMATS)] = None,
     ) -> Response:  # fmt: skip
-        written: Any = chosen if view.about.pictures else choose_format(work.request, form, TABLE_FORMATS)
-        question = view.about.question(**settings)
+        written: Any = chosen if about.pictures else choose_format(work.request, form, TABLE_FORMATS)
         study, asked = await work.case_of(study_id, case, partial(view.choose, case=case, question=question), which)
         for shape in view.shapes(study):
             await work.load(shape)
@@ -44,23 +43,19 @@ def _add(view: CaseView[Any, Any, Any]) -> None:
         figure = read_figure(view.figure(seen), Reading(study.model))
         return await picture(draw_figure, written, figure, f"{study.name}, case {case}").response(work)
 
-    answer.__name__, answer.__doc__ = f"get_{view.about.name}", view.about.summary
-    formats = DRAWN_FORMATS if view.about.pictures else TABLE_FORMATS
-    with_question(
-        answer,
-        view.about.question,
-        {
-            "work": Attended, "study_id": StudyId, "case": CaseNumber,
-            **({"chosen": DrawnFormat} if view.about.pictures else {}),
-        },
-        {
-            **({"which": StartNumber} if view.about.starts else {}),
-            **({} if view.about.pictures else {"form": Annotated[str | None, format_query(TABLE_FORMATS)]}),
-        },
-    )  # fmt: skip
-    costly = ("too-costly",) if view.about.pictures else ()
-    responses = {**files(view.content, formats.values()), **problems(*CASE_PROBLEMS, *costly)}
-    router.get(f"/{{case:case}}/{view.about.name}", response_model=view.answer, responses=responses)(answer)
+    about = view.about
+    without = {"form" if about.pictures else "chosen", *(() if about.starts else ("which",))}
+    responses = {
+        **files(view.content, (DRAWN_FORMATS if about.pictures else TABLE_FORMATS).values()),
+        **problems(*CASE_PROBLEMS, *(("too-costly",) if about.pictures else ())),
+    }
+    router.get(
+        f"/{{case:case}}/{about.name}",
+        name=f"get_{about.name}",
+        description=about.summary,
+        response_model=view.answer,
+        responses=responses,
+    )(asking(answer, about.question, without))
 
 
 for _view in CASE_VIEWS.values():

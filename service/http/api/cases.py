@@ -2,31 +2,32 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from fastapi import Query, Request
+from fastapi import Request
 from starlette.responses import Response
 
 from sprag.service.answers import results as m
 from sprag.service.faults import parameter_error
-from sprag.service.http.api.curves import pairs
-from sprag.service.http.api.document import Ranges, next_page, problems
-from sprag.service.http.asked import one_of
+from sprag.service.http.api.document import next_page, problems
+from sprag.service.http.asked import asking
 from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
 from sprag.service.http.respond import json_response, page_response
 from sprag.service.http.routers import api_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.views import study_address
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
-from sprag.service.jobs.answers import FEW
 from sprag.service.jobs.case_pages import by_number, case_page
 from sprag.service.results.directions import case_units, case_values
-from sprag.service.results.explore import ExploreQuery
 from sprag.service.results.exports import row_json, rows_json
 from sprag.service.storage.records import CaseRow
+from sprag.service.views.curves import pairs
+from sprag.service.views.explore import selection
+from sprag.service.views.study_questions import CasesQuestion
+from sprag.service.views.study_view import FEW
 from sprag.worker import models
-from sprag.worker.codes import FLAG_MASKS, PENDING
-from sprag.worker.limits import MAX_PAGE_SIZE, MAX_PAGE_TOKEN
+from sprag.worker.codes import PENDING
 from sprag.worker.models.abilities import has_transients
 
 if TYPE_CHECKING:
@@ -38,73 +39,29 @@ router = api_router("cases", "/studies/{study_id:study}/cases")
 _CASE_PROBLEMS = ("invalid-parameter", "study-not-found", "case-not-found")
 
 
-@router.get(
-    "",
-    response_model=m.CasePage,
-    responses=next_page() | problems("invalid-parameter", "invalid-selection", "study-not-found", *CHECK_PROBLEMS),
-)
-async def list_cases(
-    work: Attended,
-    request: Request,
-    study_id: StudyId,
-    page_size: Annotated[int, Query(ge=1, le=MAX_PAGE_SIZE, description="most cases on the page")] = 100,
-    page_token: Annotated[
-        str | None, Query(min_length=1, max_length=MAX_PAGE_TOKEN, description="`next_page_token` of the page before")
-    ] = None,
-    ending: Annotated[
-        str | None,
-        Query(
-            description="only cases with this ending",
-            examples=["ok"],
-            json_schema_extra=one_of(map(str, models.ENDING_SENTENCES)),
-        ),
-    ] = None,
-    regime: Annotated[
-        str | None,
-        Query(
-            description="only cases of this regime, of a settled study",
-            json_schema_extra=one_of(models.REGIME_SENTENCES),
-        ),
-    ] = None,
-    flag: Annotated[
-        str | None,
-        Query(
-            description="only cases that have this flag", examples=["not_settled"], json_schema_extra=one_of(FLAG_MASKS)
-        ),
-    ] = None,
-    where: Ranges = None,
-    at: Annotated[
-        list[str] | None,
-        Query(
-            description="`path=value`: only cases with this value of an axis, SI or with a unit; may be repeated",
-            examples=[["shaft.load=0.1 N*m"]],
-        ),
-    ] = None,
-    sort: Annotated[
-        str,
-        Query(
-            max_length=100,
-            description='parameter, result, "case", "ending", "flags" or "regime" to sort all rows by; "-" before it: '
-            "from the largest down; cases without it come last",
-            examples=["-efficiency"],
-        ),
-    ] = "case",
-) -> Response:
+async def list_cases(*, work: Attended, request: Request, study_id: StudyId, question: CasesQuestion) -> Response:
     """Finished cases, in order of their numbers or sorted over all rows; of a cancelled study also those never run.
 
     Those that were never run are only in the list by number without `where` and `at`.
     """
-    for name, chosen in (("ending", ending), ("regime", regime), ("flag", flag)):
-        if chosen == "":
+    for name in ("ending", "regime", "flag"):
+        if getattr(question, name) == "":
             raise parameter_error(name, "invalid-choice", "is empty", "", "a name, or no parameter for any")
-    query = ExploreQuery(tuple(where or ()), ending or "", regime or "", flag or "", sort, page_size, at=pairs(at))
+    query = replace(selection(question, question.page_size), at=pairs(question.at))
     context = work.context
-    asked = (context.library, study_id, query, page_token)
+    asked = (context.library, study_id, query, question.page_token)
     study = await in_thread(context.store.study, study_id)
     large = study.cases > FEW and not by_number(query)
     page = await (work.check(case_page, *asked) if large else in_thread(case_page, *asked))
     rows = await in_thread(lambda: list(rows_json(study, page.block)))
     return page_response(request, {"cases": rows, "units": case_units(study), "next_page_token": page.next_token})
+
+
+router.get(
+    "",
+    response_model=m.CasePage,
+    responses=next_page() | problems("invalid-parameter", "invalid-selection", "study-not-found", *CHECK_PROBLEMS),
+)(asking(list_cases, CasesQuestion))
 
 
 @router.get("/{case:case}", response_model=m.CaseDetail, responses=problems(*_CASE_PROBLEMS))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from http import HTTPStatus
-from typing import Annotated, Any, Final, cast
+from typing import Any, Final, cast
 
 from fastapi import FastAPI, Header, Query
 from fastapi.openapi.utils import get_openapi
@@ -146,17 +146,6 @@ def format_query(names: Iterable[str], example: str = "json") -> Any:
     known = list(map(str, names))
     description = f"format of the answer, else that of `Accept`: {', '.join(known)}"
     return Query(alias="format", description=description, examples=[example], json_schema_extra=one_of(known))
-
-
-#: Limits of a selection of cases; a parameter of the lists and files that choose among cases.
-Ranges = Annotated[
-    list[str] | None,
-    Query(
-        description="`NAME >= VALUE` or `NAME <= VALUE` of a parameter that varies or a numeric result, SI or with "
-        "a unit; may be repeated: all must hold",
-        examples=[["shaft.load <= 2 N*m"]],
-    ),
-]
 
 
 def build_openapi(app: FastAPI, extra_schemas: dict[str, Any], prefix: str = "") -> dict[str, Any]:

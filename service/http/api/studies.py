@@ -13,7 +13,6 @@ from sprag.service.answers import studies as m
 from sprag.service.faults import parameter_error, warned
 from sprag.service.http import views
 from sprag.service.http.api import examples
-from sprag.service.http.api.curves import pairs
 from sprag.service.http.api.document import body, key_header, located, problems
 from sprag.service.http.api.document import not_modified as documented_304
 from sprag.service.http.asked import one_of
@@ -28,6 +27,7 @@ from sprag.service.jobs.submission import Submission, take_in
 from sprag.service.results.regimes import UNSETTLED
 from sprag.service.results.rounds import round_json
 from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
+from sprag.service.views.curves import pairs
 from sprag.worker.limits import (
     MAX_NARROW_STEPS,
     MAX_PRIORITY,
@@ -158,7 +158,7 @@ def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
         context.store.kinds(study_id),
         context.store.origins(study_id),
     )
-    unaffected = warned((*record.warnings, *context.unaffected.of(context.store, record)))
+    unaffected = warned((*record.warnings, *context.library.unaffected.of(context.store, record)))
     return tagged(json_response({**data, **unaffected}), tag)
 
 

@@ -15,8 +15,9 @@ from sprag.service.http.routers import page_router
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.views import basin as basins
+from sprag.service.views.case_questions import BasinQuestion
 from sprag.service.views.cases import CASE_VIEWS
-from sprag.service.views.questions import BasinQuestion, question_of, settings_of
+from sprag.service.views.setting import question_of, settings_of
 
 if TYPE_CHECKING:
     pass

@@ -9,22 +9,20 @@ from starlette.responses import Response
 
 from sprag.service.http import views
 from sprag.service.http.context import Context, StudyId
-from sprag.service.http.drawing import Columns, Drawing, conditional
+from sprag.service.http.drawing import Columns
 from sprag.service.http.reading import FileChoice, file_pairs, read_as
-from sprag.service.http.respond import JSON
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
-from sprag.service.http.web.figures import answers as figures
+from sprag.service.http.web.figures.studies import figure_of
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
-from sprag.service.jobs import answers
 from sprag.service.reading.catalogue import unit_of
+from sprag.service.views.calibration import calibration_report
 from sprag.worker import models
 
 if TYPE_CHECKING:
     from sprag.service.answers.calibration import CalibrationReport
-    from sprag.service.storage.records import StudyRecord
 
 router = page_router()
 
@@ -32,7 +30,7 @@ router = page_router()
 @router.get("/studies/{study_id:study}/calibration")
 async def calibration_page(work: Attended, study_id: StudyId) -> Response:
     """Values with their intervals, the measured points on the fitted curve, correlations, residuals."""
-    found = await work.check(answers.calibration_report, work.context.library, study_id)
+    found = await work.check(calibration_report, work.context.library, study_id)
     return await in_thread(_page, work.context, study_id, found)
 
 
@@ -54,10 +52,6 @@ def _page(context: Context, study_id: str, found: CalibrationReport) -> Response
 
 
 @router.get("/studies/{study_id:study}/figures/calibration")
-async def figure_of(work: Attended, study_id: StudyId, choice: FileChoice, columns: Columns = 2) -> Response:
+async def drawn(work: Attended, study_id: StudyId, choice: FileChoice, columns: Columns = 2) -> Response:
     """The figure of the measured points on the fitted curves, and of the residuals."""
-
-    def make(_record: StudyRecord) -> Response | Drawing:
-        return Drawing(figures.calibration_json, (work.context.library, study_id, choice, columns), JSON)
-
-    return await conditional(work, study_id, "figure", make)
+    return await figure_of(work, study_id, "calibration", lambda _study: (), choice, columns)

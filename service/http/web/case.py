@@ -15,7 +15,7 @@ from sprag.service.http.reading import CHOICE, FileChoice, address_pairs
 from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
-from sprag.service.http.web.figures.answers import SAMPLES, motion_figures
+from sprag.service.http.web.figures.motion import SAMPLES, motion_figures
 from sprag.service.http.web.form.own_machine import case_address, has_laboratory
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page

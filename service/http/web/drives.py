@@ -13,19 +13,15 @@ from sprag.sentences import plural
 from sprag.service.faults import SelectionError, refused
 from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
-from sprag.service.http.drawing import Drawing, conditional
 from sprag.service.http.reading import CHOICE, FileChoice, file_read_as, read_as
-from sprag.service.http.respond import JSON
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
-from sprag.service.http.web.figures import answers as figures
+from sprag.service.http.web.figures.studies import figure_of
 from sprag.service.http.web.held import fixed_choices, with_held
 from sprag.service.http.web.results import axis_choices
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
-from sprag.service.http.work import Attended, Work
-from sprag.service.jobs import answers, batch_answers
-from sprag.service.jobs.batch_answers import RibbonQuery, YieldQuery
+from sprag.service.http.work import Attended
 from sprag.service.jobs.reading import reading_of
 from sprag.service.reading.limits import at_most
 from sprag.service.results.choice import held
@@ -33,17 +29,14 @@ from sprag.service.results.defaults import drawn_results, main_query
 from sprag.service.results.tolerances.batch import Asked
 from sprag.service.results.tolerances.conditions import first_condition
 from sprag.service.results.tolerances.ribbons import MOST_QUANTILES, QUANTILES
+from sprag.service.views.drives import RibbonQuery, YieldQuery, both
 from sprag.worker import models
 from sprag.worker.spread import DRIVE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from starlette.datastructures import QueryParams
 
     from sprag.service.answers.tolerances import RibbonReport, YieldReport
-    from sprag.service.reading.reader import Choice
-    from sprag.service.storage.records import StudyRecord
     from sprag.worker.study import Study
 
 router = page_router()
@@ -65,7 +58,7 @@ async def drives_page(context: Ctx, work: Attended, request: Request, study_id: 
     found: tuple[RibbonReport, YieldReport] | None = None
     try:
         ribbon, wanted = _queries(study, given)
-        found = await work.check(batch_answers.both, context.library, study_id, ribbon, wanted)
+        found = await work.check(both, context.library, study_id, ribbon, wanted)
     except SelectionError as error:
         faults = error.faults
     return await in_thread(_page, context, study_id, given, found, faults)
@@ -162,19 +155,12 @@ def _quantiles(texts: list[str]) -> tuple[float, ...]:
 @router.get("/studies/{study_id:study}/figures/ribbon")
 async def ribbon_of(work: Attended, study_id: StudyId, choice: FileChoice) -> Response:
     """The figure of the ribbons."""
-    return await _figure(work, study_id, figures.ribbon_json, 0, choice)
+    given = work.request.query_params
+    return await figure_of(work, study_id, "ribbon", lambda study: _queries(study, given)[0], choice)
 
 
 @router.get("/studies/{study_id:study}/figures/yield")
 async def yield_of(work: Attended, study_id: StudyId, choice: FileChoice) -> Response:
     """The figure of the yield."""
-    return await _figure(work, study_id, figures.yield_json, 1, choice)
-
-
-async def _figure(work: Work, study_id: str, draw: Callable[..., bytes], which: int, choice: Choice) -> Response:
-    def make(record: StudyRecord) -> Response | Drawing:
-        query = _queries(work.context.store.study(study_id), work.request.query_params)[which]
-        drawing = Drawing(draw, (work.context.library, study_id, query, choice), JSON)
-        return drawing if record.cases > answers.FEW // 10 else drawing.here()
-
-    return await conditional(work, study_id, "figure", make)
+    given = work.request.query_params
+    return await figure_of(work, study_id, "yield", lambda study: _queries(study, given)[1], choice)

@@ -18,10 +18,11 @@ from sprag.service.http.threads import in_thread
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
-from sprag.service.jobs import sensitivities
 from sprag.service.languages import N_
 from sprag.service.results.defaults import drawn_results, varying_axes
 from sprag.service.results.pictures.sensitivity import MOST_RESULTS
+from sprag.service.views.sensitivity import SensitivityView, sensitivities_shown
+from sprag.service.views.study_view import study_file
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ async def sensitivity_page(context: Ctx, work: Attended, request: Request, study
     faults: tuple[Any, ...] = ()
     found: list[ResultSensitivity] = []
     try:
-        found = await work.check(sensitivities.sensitivities_shown, context.library, study_id, names)
+        found = await work.check(sensitivities_shown, context.library, study_id, names)
     except SelectionError as error:
         faults = error.faults
     return await in_thread(_page, context, study_id, names, found, faults)
@@ -89,6 +90,6 @@ async def picture_of(
 
     def make(record: StudyRecord) -> Drawing:
         title = record.name or record.model
-        return picture(sensitivities.sensitivities_picture, "svg", work.context.library, study_id, names, choice, title)
+        return picture(study_file, "svg", work.context.library, study_id, SensitivityView(), names, choice, title)
 
     return await conditional(work, study_id, "svg", make)

@@ -12,19 +12,16 @@ from starlette.responses import Response
 from sprag.service.faults import ParameterFault, SelectionError, shown
 from sprag.service.http import views
 from sprag.service.http.context import Context, StudyId
-from sprag.service.http.drawing import Drawing, conditional
 from sprag.service.http.reading import CHOICE, FileChoice, address_pairs, file_pairs
-from sprag.service.http.respond import JSON
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
-from sprag.service.http.web.figures import answers as figures
 from sprag.service.http.web.figures.linked import BELOW, GRID, HEIGHT, TOP, Linked, linked
+from sprag.service.http.web.figures.studies import figure_of
 from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.page import spec_in_form
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
-from sprag.service.jobs.answers import FEW
 from sprag.service.jobs.explore import explored, selection_spec
 from sprag.service.jobs.reading import reading_of
 from sprag.service.languages import _
@@ -36,6 +33,8 @@ from sprag.service.reading.together import with_last_unit
 from sprag.service.results.explore import ROWS, ExploreQuery, explored_json, plan_of, quantities
 from sprag.service.results.figures.explore import chosen_pair
 from sprag.service.results.selection import own_paths
+from sprag.service.views.explore import Chosen
+from sprag.service.views.study_view import FEW
 from sprag.worker import models
 from sprag.worker.limits import MAX_SELECTED
 
@@ -45,7 +44,6 @@ if TYPE_CHECKING:
     from sprag.service.answers.explore import Exploration
     from sprag.service.faults import Fault
     from sprag.service.jobs.library import Library
-    from sprag.service.storage.records import StudyRecord
     from sprag.worker.study import Study
 
 router = page_router()
@@ -241,10 +239,8 @@ async def explore_figure(work: Attended, study_id: StudyId, choice: FileChoice) 
     """The figure of two quantities."""
     given = work.request.query_params
 
-    def make(_record: StudyRecord) -> Response | Drawing:
-        study = work.context.store.study(study_id)
-        query, pair = _whole(read_choice(given, study, Reading(study.model))), (given.get("x", ""), given.get("y", ""))
-        drawing = Drawing(figures.explore_json, (work.context.library, study_id, query, *pair, choice), JSON)
-        return drawing if _many(work.context, study_id) else drawing.here()
+    def chosen(study: Study) -> Chosen:
+        query = _whole(read_choice(given, study, Reading(study.model)))
+        return query, (given.get("x", ""), given.get("y", ""))
 
-    return await conditional(work, study_id, "figure", make)
+    return await figure_of(work, study_id, "explore", chosen, choice)

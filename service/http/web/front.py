@@ -15,17 +15,16 @@ from sprag.service.http.reading import FileChoice, file_pairs, file_read_as, rea
 from sprag.service.http.respond import JSON
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
-from sprag.service.http.web.figures import answers as figures
-from sprag.service.http.web.front_view import FrontView, front_view
+from sprag.service.http.web.figures.studies import figure_of
+from sprag.service.http.web.front_view import FrontPage, front_view, search_picture, search_plot
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
-from sprag.service.http.work import Attended, Work
-from sprag.service.jobs import answers
+from sprag.service.http.work import Attended
 from sprag.service.results.pictures import curves as pictures
+from sprag.service.views.front import FrontView
+from sprag.service.views.study_questions import FrontQuestion
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from sprag.service.storage.records import StudyRecord
 
 router = page_router()
@@ -49,10 +48,10 @@ async def front_page(work: Attended, study_id: StudyId, x: X = "", y: X = "", ex
 
 def _many(context: Context, study_id: str) -> bool:
     """Whether ranking the designs takes so long that another process does it."""
-    return context.store.study(study_id).cases > answers.FEW // 10
+    return not FrontView().small(context.store.study(study_id), FrontQuestion())
 
 
-def _front_page(context: Context, study_id: str, view: FrontView, *, exact: bool) -> Response:
+def _front_page(context: Context, study_id: str, view: FrontPage, *, exact: bool) -> Response:
     drawn = {"x": view.axes[0], "y": view.axes[1]}
     only = {"exact": "true"} if exact else {}
     address = f"{views.study_address(study_id)}/front"
@@ -77,31 +76,26 @@ async def front_of(
     work: Attended, study_id: StudyId, choice: FileChoice, x: X = "", y: X = "", exact: Exact = ""
 ) -> Response:
     """The figure of all designs over two quantities."""
-    shown = (bool(exact), (x or None, y or None), choice)
-    return await _figure(work, study_id, figures.front_json, *shown)
+    question = FrontQuestion(bool(exact), x=x or None, y=y or None)
+    return await figure_of(work, study_id, "front", lambda study: FrontView().choose(study, question), choice)
 
 
 @router.get("/studies/{study_id:study}/figures/search")
 async def search_of(work: Attended, study_id: StudyId, choice: FileChoice, columns: Columns = 2) -> Response:
     """The figure of the search: what each generation has reached."""
-    return await _figure(work, study_id, figures.search_json, choice, columns)
 
-
-async def _figure(work: Work, study_id: str, draw: Callable[..., bytes], *shown: object) -> Response:
     def make(_record: StudyRecord) -> Response | Drawing:
-        drawing = Drawing(draw, (work.context.library, study_id, *shown), JSON)
+        drawing = Drawing(search_plot, (work.context.library, study_id, choice, columns), JSON)
         return drawing if _many(work.context, study_id) else drawing.here()
 
     return await conditional(work, study_id, "figure", make)
 
 
 @router.get("/studies/{study_id:study}/front/search.svg")
-async def search_picture(work: Attended, study_id: StudyId, choice: FileChoice) -> Response:
+async def search_drawn(work: Attended, study_id: StudyId, choice: FileChoice) -> Response:
     """The same as a picture."""
 
     def make(record: StudyRecord) -> Response | Drawing:
-        return picture(
-            answers.search_picture, "svg", work.context.library, study_id, choice, record.name or record.model
-        )
+        return picture(search_picture, "svg", work.context.library, study_id, choice, record.name or record.model)
 
     return await conditional(work, study_id, "svg", make)

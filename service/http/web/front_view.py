@@ -6,8 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.faults import SelectionError
-from sprag.service.results.figures.front import chosen, quantities
+from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.jobs.reading import reading_of
+from sprag.service.json_text import to_bytes
+from sprag.service.results.figures.front import chosen, history_figure, quantities
+from sprag.service.results.figures.read import read_figure
 from sprag.service.results.fronts import design_json, front_json
+from sprag.service.results.pictures.curves import draw_figure
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -16,7 +21,10 @@ if TYPE_CHECKING:
     from sprag.service.answers.goals import Design, FrontReport
     from sprag.service.faults import Fault
     from sprag.service.jobs.library import Library
+    from sprag.service.reading.reader import Choice
+    from sprag.service.results.figures.figure import Figure
     from sprag.service.results.fronts import Designs
+    from sprag.service.results.pictures.curves import Picture
     from sprag.worker.study import Study
 
 #: Designs in the table.
@@ -24,7 +32,7 @@ ROWS: Final = 100
 
 
 @dataclass(frozen=True)
-class FrontView:
+class FrontPage:
     """The designs of a study as the page shows them.
 
     Attributes
@@ -46,7 +54,7 @@ class FrontView:
     along: str | None
 
 
-def front_view(library: Library, study_id: str, exact: bool, x: str | None, y: str | None) -> FrontView:
+def front_view(library: Library, study_id: str, exact: bool, x: str | None, y: str | None) -> FrontPage:
     """The view of a study; raises StudyNotFoundError, and FaultError for a study without a goal."""
     found = library.fronts.of(study_id, exact=exact)
     faults: tuple[Any, ...] = ()
@@ -54,7 +62,7 @@ def front_view(library: Library, study_id: str, exact: bool, x: str | None, y: s
         axes = chosen(found, x, y)
     except SelectionError as error:
         faults, axes = error.faults, chosen(found, None, None)
-    return FrontView(
+    return FrontPage(
         axes=axes,
         faults=faults,
         choices={name: unit for name, (unit, _) in quantities(found).items()},
@@ -78,3 +86,18 @@ def _along(study: Study, found: Designs) -> str | None:
         if path in study.base and path not in study.derive and min(values) > 0.0:
             return path
     return None
+
+
+def search_plot(library: Library, study_id: str, choice: Choice, columns: int) -> bytes:
+    """How a search has come to its designs, as JSON text for the browser."""
+    return to_bytes(plotly_figure(_history(library, study_id, choice, columns)))
+
+
+def search_picture(library: Library, study_id: str, choice: Choice, title: str, form: Picture) -> bytes:
+    """How a search has come to its designs as a picture."""
+    return draw_figure(_history(library, study_id, choice, 2), title, form)
+
+
+def _history(library: Library, study_id: str, choice: Choice, columns: int) -> Figure:
+    figure = history_figure(library.fronts.of(study_id, exact=False), columns)
+    return read_figure(figure, reading_of(library.store, study_id, choice))

@@ -11,18 +11,16 @@ from starlette.responses import RedirectResponse, Response
 from sprag.service.faults import SelectionError
 from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
-from sprag.service.http.drawing import Columns, Drawing, conditional, placed
+from sprag.service.http.drawing import Columns
 from sprag.service.http.reading import CHOICE, FileChoice, address_pairs, file_pairs
-from sprag.service.http.respond import JSON, json_response
 from sprag.service.http.routers import page_router
-from sprag.service.http.web.figures import answers
+from sprag.service.http.web.figures.studies import figure_of
 from sprag.service.http.web.held import fixed_choices, with_held
 from sprag.service.http.web.saved_views import saved_here
 from sprag.service.http.web.study import orders_address, regime_maps, study_frame
 from sprag.service.http.web.study_answers import answers_choice
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
-from sprag.service.jobs.answers import FEW
 from sprag.service.languages import N_, _
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.results.choice import (
@@ -39,19 +37,17 @@ from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import varying_axes
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.refined_maps import map_plan
+from sprag.service.views.answers import AnswersChoice
 from sprag.worker import models
 from sprag.worker.models.starts import has_starts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.storage.records import StudyRecord
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
 
 router = page_router()
-
-_NOTHING: Final[dict[str, Any]] = {"data": [], "layout": {}}
 
 #: Kinds of map: word on the control.
 KINDS: Final = {"heatmap": N_("Colours"), "contour": N_("Lines of equal value")}
@@ -174,53 +170,32 @@ def axis_choices(study: Study) -> list[dict[str, Any]]:
 async def curves_of(work: Attended, study_id: StudyId, choice: FileChoice, columns: Columns = 1) -> Response:
     """The figure of curves: as many points as the eye can distinguish, always including the highest and lowest."""
 
-    def make(_record: StudyRecord) -> Response | Drawing:
-        context = work.context
-        study = context.store.study(study_id)
-        query = curve_query(study, models.study_results(study), work.request.query_params)
-        if query is None:
-            return json_response(_NOTHING)
-        return placed(context, Drawing(answers.curves_json, (context.library, study_id, query, choice, columns), JSON))
+    def chosen(study: Study) -> CurveQuery | None:
+        return curve_query(study, models.study_results(study), work.request.query_params)
 
-    return await conditional(work, study_id, "figure", make)
+    return await figure_of(work, study_id, "curves", chosen, choice, columns)
 
 
 @router.get("/studies/{study_id:study}/figures/answers")
 async def answers_of(work: Attended, study_id: StudyId, choice: FileChoice, columns: Columns = 1) -> Response:
     """The figure of the main results with the answers of the study marked."""
 
-    def make(_record: StudyRecord) -> Response | Drawing:
-        context, given = work.context, work.request.query_params
-        study = context.store.study(study_id)
+    def chosen(study: Study) -> AnswersChoice:
+        given = work.request.query_params
         query = answers_choice(study, given, characteristic(study, models.study_results(study)))
-        shown = (
-            context.library,
-            study_id,
-            query,
-            given.get("point") or None,
-            given.get("curve") or "",
-            choice,
-            columns,
-        )
-        drawing = Drawing(answers.answers_json, shown, JSON)
-        return drawing if study.cases > FEW // 2 else drawing.here()
+        return AnswersChoice(query, given.get("point") or None, given.get("curve") or "")
 
-    return await conditional(work, study_id, "figure", make)
+    return await figure_of(work, study_id, "answers", chosen, choice, columns)
 
 
 @router.get("/studies/{study_id:study}/figures/map")
 async def map_of(work: Attended, study_id: StudyId, choice: FileChoice, kind: str = "heatmap") -> Response:
     """The figure of a map."""
 
-    def make(_record: StudyRecord) -> Response | Drawing:
-        context = work.context
-        study = context.store.study(study_id)
+    def chosen(study: Study) -> tuple[CurveQuery, bool] | None:
         query = map_query(study, models.study_results(study), work.request.query_params)
         if query is None:
-            return json_response(_NOTHING)
-        curves = CurveQuery(query.x, (query.z,), (query.y,), query.at)
-        return placed(
-            context, Drawing(answers.map_json, (context.library, study_id, curves, choice, kind == "contour"), JSON)
-        )
+            return None
+        return CurveQuery(query.x, (query.z,), (query.y,), query.at), kind == "contour"
 
-    return await conditional(work, study_id, "figure", make)
+    return await figure_of(work, study_id, "map", chosen, choice)

@@ -27,7 +27,7 @@ from sprag.service.http.web.saved_views import report_figures, saved_here, view_
 from sprag.service.http.web.study_answers import AnswersView, answers_view
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended, Work
-from sprag.service.jobs import answers, checks
+from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.json_text import timestamp
 from sprag.service.languages import N_, _
@@ -43,6 +43,7 @@ from sprag.service.results.regimes import DOUBTFUL, ORDER, counted
 from sprag.service.results.shown_inputs import inputs, run_settings
 from sprag.service.spec.narrow import narrowed_cases
 from sprag.service.storage.records import Kinds
+from sprag.service.views.study_view import FEW
 from sprag.worker import models
 from sprag.worker.limits import MAX_CASES, NARROW_STEPS
 from sprag.worker.models.starts import has_starts
@@ -153,7 +154,7 @@ def _usual_curves(context: Context, study_id: str) -> tuple[CurveQuery | None, b
     """The curves that are shown first, and whether reading the answers of the study takes long."""
     study = context.store.study(study_id)
     usual = characteristic(study, models.study_results(study))
-    return _with_rows(context, study, study_id, usual), study.cases > answers.FEW // 2
+    return _with_rows(context, study, study_id, usual), study.cases > FEW // 2
 
 
 def _study_page(

@@ -13,7 +13,6 @@ from sprag.service.http import views
 from sprag.service.http.language import language_pairs
 from sprag.service.http.reading import address_pairs
 from sprag.service.http.web.held import with_held
-from sprag.service.jobs.key_answers import answers_of
 from sprag.service.jobs.reading import reading_of
 from sprag.service.languages import decimal
 from sprag.service.reading.catalogue import unit_of
@@ -23,6 +22,7 @@ from sprag.service.results.choice import curve_query, pairs_of, value_choices
 from sprag.service.results.key_answer_words import answer_facts, curve_name, curve_named, note_of, place_text
 from sprag.service.results.key_answers import answers_query
 from sprag.service.results.pictures.curves import MAX_PICTURE_POINTS
+from sprag.service.views.answers import answers_of
 from sprag.worker import models
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import httpx
 import pytest
 
 from sprag.service.http.timeouts import TimeoutProtocol
-from sprag.service.jobs import sensitivities
+from sprag.service.views import sensitivity as sensitivities
 from tests.service.conftest import API, Service
 from tests.service.http.test_timeouts import serving
 

@@ -19,12 +19,12 @@ from sprag.service.client.frames import Curves, grid_of, table_of
 from sprag.service.client.plain import ServiceClient
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.form.spec import field_of, spec_of, values_of
-from sprag.service.jobs.answers import curves_of
 from sprag.service.jobs.local import run_here
 from sprag.service.jobs.start_from import with_start
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import main_query
 from sprag.service.results.figures.curves import curves_figure
+from sprag.service.results.stored_curves import stored_curves
 from sprag.service.results.sweeps import hysteresis
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.narrow import narrowed_spec
@@ -97,10 +97,7 @@ def test_a_figure_tells_directions_by_dashes_and_loads_by_colours(service: Servi
     assert query is not None
     assert (query.x, query.by) == ("excitation.frequency", ("shaft.load", "sweep"))
 
-    class Library:
-        store = service.store
-
-    drawn = curves_of(Library(), study_id, query)  # type: ignore[arg-type]
+    drawn = stored_curves(service.store, study_id, query)
     figure = curves_figure([("", drawn)])
     (panel,) = figure.panels
     assert [(line.name, line.style) for line in panel.lines] == [
@@ -119,10 +116,10 @@ def test_a_figure_tells_directions_by_dashes_and_loads_by_colours(service: Servi
     assert told.endswith("; 4 jumps, each within 1 Hz.")
     dashes = [trace["line"]["dash"] for trace in plotly_figure(figure)["data"] if "line" in trace][:2]
     assert dashes == ["solid", "dash"]
-    alone = curves_of(
-        Library(),
+    alone = stored_curves(
+        service.store,
         study_id,
-        CurveQuery(query.x, query.y, (), (("shaft.load", "0.1"), ("sweep", "up"))),  # type: ignore[arg-type]
+        CurveQuery(query.x, query.y, (), (("shaft.load", "0.1"), ("sweep", "up"))),
     )
     assert hysteresis(alone) == "Along the sweep 1 jump, within 1 Hz."
 
@@ -149,14 +146,10 @@ def test_the_example_of_the_guide_says_what_the_guide_says() -> None:
     def told_by(spec: dict[str, Any]) -> tuple[Study, Any, str]:
         study = parse_spec(spec).study
         with run_here(spec, study, processes=0) as run:
-
-            class Library:
-                store = run.store
-
             query = main_query(study, models.study_results(study))
             assert query is not None
             cases = run.store.cases_of_kind(run.record.id, flag="jumped")
-            return study, cases, hysteresis(curves_of(Library(), run.record.id, query))  # type: ignore[arg-type]
+            return study, cases, hysteresis(stored_curves(run.store, run.record.id, query))
 
     text = (Path(__file__).resolve().parents[3] / "docs" / "sweeps.md").read_text(encoding="utf-8")
     spec = json.loads(text.partition("```json")[2].partition("```")[0])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from starlette.responses import Response
 
-from sprag.service.http.asked import with_question
+from sprag.service.http.asked import asking
 from sprag.service.http.context import CaseNumber, StartNumber, StudyId
 from sprag.service.http.drawing import Columns, unchanging
 from sprag.service.http.reading import FileChoice
@@ -15,14 +15,14 @@ from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.web.figures.plotly import Data, plotly_figure
-from sprag.service.http.work import Attended, Work
+from sprag.service.http.work import Attended
 from sprag.service.jobs.reading import reading_of
 from sprag.service.results.figures.read import read_figure
 from sprag.service.views.case_view import see
 from sprag.service.views.cases import CASE_VIEWS
 
 if TYPE_CHECKING:
-    from sprag.service.reading.reader import Choice, Reading
+    from sprag.service.reading.reader import Reading
     from sprag.service.views.case_view import CaseView
     from sprag.worker.study import Study
 
@@ -46,27 +46,23 @@ def case_figure(
 
 def _add(view: CaseView[Any, Any, Any]) -> None:
     async def drawn(
-        *, work: Work, study_id: str, case: int, choice: Choice, columns: int | None = None, which: int | None = None,
-        **settings: Any,
+        *, work: Attended, study_id: StudyId, case: CaseNumber, choice: FileChoice, question: Any,
+        columns: Columns = 2, which: StartNumber = None,
     ) -> Response:  # fmt: skip
-        look = partial(view.choose, case=case, question=view.about.question(**settings))
-        study, asked = await work.case_of(study_id, case, look, which)
+        study, asked = await work.case_of(study_id, case, partial(view.choose, case=case, question=question), which)
         rows = await in_thread(view.rows, work.context.store, study_id, study, case, asked)
 
         async def make() -> Response:
             for shape in view.shapes(study):
                 await work.load(shape)
             reading = await in_thread(reading_of, work.context.store, study_id, choice)
-            shown = study, case, view, asked, which, columns or 2, rows, reading
+            shown = study, case, view, asked, which, columns, rows, reading
             return json_response(await work.compute(case_figure, *shown))
 
         return await (make() if rows is not None else unchanging(work, study_id, make))
 
-    drawn.__doc__ = view.__doc__
-    before = {"work": Attended, "study_id": StudyId, "case": CaseNumber, "choice": FileChoice}
-    after = {"columns": Columns | None, **({"which": StartNumber} if view.about.starts else {})}
-    with_question(drawn, view.about.question, before, after)
-    router.get(f"/studies/{{study_id:study}}/cases/{{case:case}}/{view.about.name}/figure")(drawn)
+    path = f"/studies/{{study_id:study}}/cases/{{case:case}}/{view.about.name}/figure"
+    router.get(path)(asking(drawn, view.about.question, () if view.about.starts else ("which",)))
 
 
 for _view in CASE_VIEWS.values():

@@ -233,7 +233,7 @@ def test_many_numbers_are_written_by_a_process_that_checks(
     here = service.http.get(address.format(study_id))
     assert here.status_code == 200
     assert service.checker.calls == []
-    monkeypatch.setattr("sprag.service.jobs.answers.FEW", 0)
+    monkeypatch.setattr("sprag.service.views.study_view.FEW", 0)
     elsewhere = service.http.get(address.format(study_id))
     assert len(service.checker.calls) == 1
     pickle.dumps(service.checker.calls)

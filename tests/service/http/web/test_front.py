@@ -152,7 +152,7 @@ def test_many_designs_are_ranked_by_another_process(service: Service, monkeypatc
     study_id = search(service)
     text = service.http.get(f"/studies/{study_id}/front").text
     service.checker.calls.clear()
-    monkeypatch.setattr("sprag.service.jobs.answers.FEW", 100)
+    monkeypatch.setattr("sprag.service.views.study_view.FEW", 100)
     assert service.http.get(f"/studies/{study_id}/front").text == text
     assert [function.__name__ for function, *_ in service.checker.calls] == ["front_view"]
     assert pickle.loads(pickle.dumps(front_view(*service.checker.calls[0][1:]))).axes == (

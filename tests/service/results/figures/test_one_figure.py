@@ -13,12 +13,15 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from sprag.service.http.web.figures.plotly import plotly_figure
-from sprag.service.jobs import answers, key_answers
 from sprag.service.jobs.library import Library
 from sprag.service.presets import preset_text
 from sprag.service.reading.reader import Choice
 from sprag.service.results.curves import CurveQuery
+from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.pictures.legends import MARKERS
+from sprag.service.views.answers import AnswersChoice, AnswersView
+from sprag.service.views.curves import CurvesView
+from sprag.service.views.study_view import study_file
 from sprag.worker import models
 from tests.service.searching import search
 from tests.service.spec_sample import changed
@@ -34,13 +37,13 @@ CHOICE = Choice("speed=rpm,torque=N*mm,frequency=rpm")
 def painted(monkeypatch: pytest.MonkeyPatch, draw: Any, *args: Any) -> tuple[Figure, Described]:
     """What matplotlib paints for a file, and what it was told to paint."""
     found: list[tuple[Figure, Described]] = []
-    paint = answers.pictures.paint_figure
+    paint = pictures.paint_figure
 
     def kept(figure: Figure, drawn: Described, title: str) -> None:
         paint(figure, drawn, title)
         found.append((figure, drawn))
 
-    monkeypatch.setattr(answers.pictures, "paint_figure", kept)
+    monkeypatch.setattr(pictures, "paint_figure", kept)
     draw(*args)
     (only,) = found
     return only
@@ -57,7 +60,7 @@ def test_a_picture_is_the_figure_of_the_page(service: Service, monkeypatch: pyte
         params={"x": query.x, "y": Y, "by": query.by, "at": "excitation.amplitude_x=1 mm", "columns": 2,
                 "units": CHOICE.units},
     ).json()  # fmt: skip
-    picture, described = painted(monkeypatch, answers.curves_picture, library, study_id, query, CHOICE, "", "svg")
+    picture, described = painted(monkeypatch, study_file, library, study_id, CurvesView(), query, CHOICE, "", "svg")
     assert plotly_figure(described)["layout"]["height"] == page["layout"]["height"]
     assert len(page["data"]) == len(plotly_figure(described)["data"]) == 3 * 4
     titles = [page["layout"][f"yaxis{number or ''}"]["title"]["text"] for number in ("", 2, 3)]
@@ -86,7 +89,9 @@ def test_the_answers_of_a_picture_are_those_of_the_page(service: Service, monkey
     service.fill(study_id)
     library: Library = service.app.state.context.library
     page = service.http.get(f"/studies/{study_id}/figures/answers?columns=2&units={CHOICE.units}").json()
-    _, described = painted(monkeypatch, key_answers.answers_picture, library, study_id, None, None, CHOICE, "", "svg")
+    _, described = painted(
+        monkeypatch, study_file, library, study_id, AnswersView(), AnswersChoice(None, None), CHOICE, "", "svg"
+    )
     assert models.presentation_of(service.store.study(study_id)).main
     drawn = plotly_figure(described)
     assert [trace["name"] for trace in drawn["data"]] == [trace["name"] for trace in page["data"]]

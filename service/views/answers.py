@@ -1,0 +1,104 @@
+"""The answers of a study: what one asks of it first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+from sprag.service.answers import key as m
+from sprag.service.faults import refused
+from sprag.service.results.curves import CurveQuery
+from sprag.service.results.figures.answers import answers_figure
+from sprag.service.results.key_answer_words import answers_csv, curve_name, curve_named, report
+from sprag.service.results.key_answers import StudyAnswers, answers_query, find_answers
+from sprag.service.results.pictures.curves import Picture, require_drawable
+from sprag.service.storage.records import CaseColumns
+from sprag.service.views import study_view
+from sprag.service.views.curves import completed_query
+from sprag.service.views.study_questions import ANSWERS, AnswersQuestion
+from sprag.service.views.study_view import Found, StudyView
+from sprag.worker import models
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sprag.service.jobs.library import Library
+    from sprag.service.reading.reader import Reading
+    from sprag.service.results.figures.figure import Figure
+    from sprag.worker.study import Study
+
+
+@dataclass(frozen=True, slots=True)
+class AnswersChoice:
+    """The curves, None for those of the page; the working point; and the name of a curve that a figure picks out."""
+
+    query: CurveQuery | None
+    point: str | None
+    curve: str = ""
+
+
+def answers_of(library: Library, study_id: str, chosen: CurveQuery | None, point: str | None) -> StudyAnswers:
+    """The answers of a study, of the ``chosen`` curves; raises StudyNotFoundError, and SelectionError."""
+    study = library.store.study(study_id)
+    infos = models.study_results(study)
+    query = answers_query(study, infos, chosen)
+    if query is None and chosen is not None:
+        raise refused(
+            "x", "not-used", "the cases of this study lie on no curves", chosen.x, allowed="no choice of curves"
+        )
+    # While a large study runs, all its rows would be read again for each of its chunks.
+    over = library.store.get_study(study_id).over or study.cases <= study_view.FEW
+    whole = partial(_whole, library, study_id) if over else None
+    return find_answers(study, infos, query, point, partial(library.store.rows_for_cases, study_id), whole)
+
+
+def _whole(library: Library, study_id: str, names: Sequence[str]) -> CaseColumns:
+    """Results of all finished cases."""
+    rows = library.columns.of(study_id, names)
+    kinds = [rows.kinds[kind] for kind in rows.kind.tolist()]
+    return CaseColumns(rows.cases, [ending for ending, _ in kinds], rows.values, [flags for _, flags in kinds])
+
+
+class AnswersView(StudyView[AnswersQuestion, AnswersChoice, StudyAnswers]):
+    """No-load speed, largest power, best efficiency, stall torque, a working point."""
+
+    about = ANSWERS
+    content = "Answers, as JSON, a table or a picture."
+    answer = m.AnswerReport
+
+    def choose(self, study: Study, question: AnswersQuestion) -> AnswersChoice:
+        """The curves where some are chosen, and the working point."""
+        chosen = question.x, (), question.by, question.at, question.of
+        return AnswersChoice(completed_query(study, *chosen) if any(chosen) else None, question.point)
+
+    def small(self, study: Study, chosen: AnswersChoice) -> bool:
+        """By the cases of the study."""
+        return study.cases <= study_view.FEW // 2
+
+    def find(self, library: Library, study_id: str, chosen: AnswersChoice, *, drawn: bool = False) -> StudyAnswers:
+        """The answers."""
+        return answers_of(library, study_id, chosen.query, chosen.point)
+
+    def json(self, found: Found[AnswersChoice, StudyAnswers]) -> m.AnswerReport:
+        """The answers as JSON data."""
+        return report(found.study_id, found.study, found.made)
+
+    def csv(self, found: Found[AnswersChoice, StudyAnswers], reading: Reading) -> bytes:
+        """A row for each answer."""
+        return answers_csv(found.study, found.made, reading)
+
+    def figure(self, found: Found[AnswersChoice, StudyAnswers], columns: int = 2) -> Figure | None:
+        """The curves of the main results with their answers marked; None where the cases lie on no curve."""
+        if found.made.drawn is None:
+            return None
+        study = found.study
+        curve = curve_named([curve_name(one, study) for one in found.made.curves], found.chosen.curve)
+        return answers_figure(found.made, columns, chosen=curve)
+
+    def picture(self, found: Found[AnswersChoice, StudyAnswers], reading: Reading, title: str, form: Picture) -> bytes:
+        """Where there is a curve, and not too many."""
+        if found.made.drawn is None:
+            raise refused("format", "not-used", "there is no curve to draw", form, allowed="json or csv")
+        require_drawable([found.made.drawn])
+        return super().picture(found, reading, title, form)

@@ -1,0 +1,211 @@
+"""Curves and maps of a study: what is asked for, the tables as CSV, and the figures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import chain
+from typing import TYPE_CHECKING, Any
+
+from sprag.service.answers import results as m
+from sprag.service.faults import parameter_error
+from sprag.service.json_text import numbers
+from sprag.service.results import exports
+from sprag.service.results.choice import held
+from sprag.service.results.curves import CurveQuery, Curves, Map, flag_names
+from sprag.service.results.defaults import completed, drawn_numbers
+from sprag.service.results.directions import in_words
+from sprag.service.results.figures.curves import curves_figure
+from sprag.service.results.figures.read import read_map
+from sprag.service.results.pictures import curves as pictures
+from sprag.service.results.pictures.maps import draw_map
+from sprag.service.results.refined import not_joined
+from sprag.service.results.regimes import kind_columns
+from sprag.service.results.stored_curves import drawn_curves, stored_curves, stored_map
+from sprag.service.views import study_view
+from sprag.service.views.study_questions import CURVES, MAP, CurvesQuestion, MapQuestion
+from sprag.service.views.study_view import Found, StudyView
+from sprag.worker import models
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from sprag.service.jobs.library import Library
+    from sprag.service.reading.reader import Reading
+    from sprag.service.results.curves import Curve
+    from sprag.service.results.figures.figure import Figure
+    from sprag.worker.study import Study
+
+
+def pairs(texts: Sequence[str] | None, parameter: str = "at") -> tuple[tuple[str, str], ...]:
+    """Paths and values of a setting such as ``at``; raises a fault for a text without a path or a value."""
+    found = []
+    for item in texts or ():
+        path, separator, value = item.partition("=")
+        if not separator or not path.strip() or not value.strip():
+            raise parameter_error(
+                parameter, "invalid-text", "must be path=value", item, "for instance shaft.load=0.1 N*m"
+            )
+        found.append((path.strip(), value.strip()))
+    return tuple(found)
+
+
+def completed_query(
+    study: Study,
+    x: str | None,
+    y: Sequence[str] | None,
+    by: Sequence[str] | None,
+    at: Sequence[str] | None,
+    of: Sequence[str] | None,
+) -> CurveQuery:
+    """The curves of settings; what is not given is as on the page of the study."""
+    infos = models.study_results(study)
+    return completed(study, infos, x, tuple(y or ()), tuple(by or ()), pairs(at), pairs(of, "of"))
+
+
+def _numbered(study: Study, query: CurveQuery, number: int) -> CurveQuery:
+    """The query about the regime with a number; a fault where the cases of the study have one row each."""
+    if number and models.numbered_by(study.model, models.variant_of(study)) is None:
+        allowed = "0; other numbers in studies with `starts`"
+        raise parameter_error("number", "out-of-range", "the cases of this study have one row each", number, allowed)
+    return replace(query, number=number)
+
+
+class CurvesView(StudyView[CurvesQuestion, CurveQuery, Curves]):
+    """Results against one axis."""
+
+    about = CURVES
+    content = "Curves, as JSON, a table or a picture."
+    answer = m.Curves
+
+    def choose(self, study: Study, question: CurvesQuestion) -> CurveQuery:
+        """The query, with the axes held at their usual value if that is wanted."""
+        query = completed_query(study, question.x, question.y, question.by, question.at, question.of)
+        if question.rest == "usual":
+            given = [f"{path}={value}" for path, value in query.at]
+            query = replace(query, at=held(study, given, (query.x, *query.by)))
+        return _numbered(study, query, question.number)
+
+    def small(self, study: Study, chosen: CurveQuery) -> bool:
+        """By the numbers of the curves."""
+        return drawn_numbers(study, chosen) <= study_view.FEW
+
+    def find(self, library: Library, study_id: str, chosen: CurveQuery, *, drawn: bool = False) -> Curves:
+        """The curves; those that are drawn have the points of refined curves between their cases."""
+        return (drawn_curves if drawn else stored_curves)(library.store, study_id, chosen)
+
+    def json(self, found: Found[CurveQuery, Curves]) -> dict[str, Any]:
+        """The curves as JSON data."""
+        return {"study": found.study_id, **found.made.to_json()}
+
+    def csv(self, found: Found[CurveQuery, Curves], reading: Reading) -> bytes:
+        """Every point of every curve as one row: fixed parameters, case, x, results, regime and its order, ending.
+
+        Of refined curves also the results that are not interpolated up to the next point, of a sweep whether the motion
+        jumps between this point and the next.
+        """
+        curves = found.made
+        names = kind_columns(curves.selection.regime)
+        columns: dict[str, list[Any]] = {}
+        for curve in curves.curves:
+            points = len(curve.endings)
+            kinds: Iterable[tuple[str, list[Any]]] = zip(names, (curve.regimes or [], curve.orders or []), strict=False)
+            parts: dict[str, list[Any]] = {
+                **{path: [value] * points for path, value in in_words({**curve.line.by, **curve.line.at}).items()},
+                "case": curve.line.cases.tolist(),
+                curves.selection.x: list(curve.line.x),
+                **{info.name: numbers(curve.y[info.name], info.kind == "count") for info in curves.selection.results},
+                **dict(kinds),
+                **_jumped(curve),
+                **_not_joined(curve, [info.name for info in curves.selection.results]),
+                "flags": [" ".join(names) for names in flag_names(curve.flags or [""] * points)],
+                "ending": curve.endings,
+            }
+            for name, part in parts.items():
+                columns.setdefault(name, []).extend(part)
+        units = {**curves.selection.units, **{info.name: info.unit for info in curves.selection.results}}
+        return exports.read_table(columns, units, reading.units)
+
+    def figure(self, found: Found[CurveQuery, Curves], columns: int = 2) -> Figure:
+        """A panel for each result."""
+        return curves_figure([("", found.made)], columns)
+
+    def picture(self, found: Found[CurveQuery, Curves], reading: Reading, title: str, form: pictures.Picture) -> bytes:
+        """Not too many curves and points."""
+        pictures.require_drawable([found.made])
+        return super().picture(found, reading, title, form)
+
+
+def _jumped(curve: Curve) -> dict[str, list[Any]]:
+    """A column of a sweep: 1 where the motion jumps between the point of a row and the next one."""
+    if curve.jumps is None:
+        return {}
+    lows = {jump["low"] for jump in curve.jumps}
+    return {"jump": [int(x in lows) for x in curve.line.x]}
+
+
+def _not_joined(curve: Curve, names: list[str]) -> dict[str, list[Any]]:
+    """A column of refined curves: the results that are not interpolated from the point of a row to the next one."""
+    if curve.refined is None:
+        return {}
+    texts = [""] * len(curve.endings)
+    for place, text in zip(curve.run().tolist(), not_joined(curve.refined, names), strict=True):
+        texts[place] = text
+    return {"not_joined": texts}
+
+
+class MapView(StudyView[MapQuestion, tuple[CurveQuery, bool], Map]):
+    """One result over two axes; chosen are the query, and whether lines of equal value are drawn."""
+
+    about = MAP
+    content = "A map, as JSON, a table or a picture."
+    answer = m.Map
+
+    def choose(self, study: Study, question: MapQuestion) -> tuple[CurveQuery, bool]:
+        """The query, and the kind of picture."""
+        query = CurveQuery(question.x, (question.z,), (question.y,), pairs(question.at))
+        return _numbered(study, query, question.number), question.kind == "contour"
+
+    def small(self, study: Study, chosen: tuple[CurveQuery, bool]) -> bool:
+        """By the numbers of the map."""
+        return drawn_numbers(study, chosen[0]) <= study_view.FEW
+
+    def find(self, library: Library, study_id: str, chosen: tuple[CurveQuery, bool], *, drawn: bool = False) -> Map:
+        """The map."""
+        return stored_map(library.store, study_id, chosen[0])
+
+    def json(self, found: Found[tuple[CurveQuery, bool], Map]) -> dict[str, Any]:
+        """The map as JSON data."""
+        return {"study": found.study_id, **found.made.to_json()}
+
+    def csv(self, found: Found[tuple[CurveQuery, bool], Map], reading: Reading) -> bytes:
+        """Every point of the map as one row: fixed parameters, y, x, case, result, regime and its order, flags, ending.
+
+        The squares of a refined map are no cases: they have neither regimes nor flags.
+        """
+        drawn = found.made
+        across, points = len(drawn.x_values), drawn.values.size
+        kinds = kind_columns(models.regime_info(models.study_results(found.study)))
+        flags = [""] * points if drawn.flags is None else list(chain.from_iterable(drawn.flags))
+        columns: dict[str, list[Any]] = {
+            **{path: [value] * points for path, value in drawn.at.items()},
+            drawn.y: [y for y in drawn.y_values for _ in range(across)],
+            drawn.x: [*drawn.x_values] * len(drawn.y_values),
+            **({} if drawn.refined else {"case": drawn.cases.reshape(-1).tolist()}),
+            drawn.result.name: numbers(drawn.values.reshape(-1), drawn.result.kind == "count"),
+            **{
+                name: list(chain.from_iterable(rows))
+                for name, rows in zip(kinds, (drawn.regimes, drawn.orders), strict=False)
+                if rows is not None
+            },
+            **({} if drawn.refined else {"flags": [" ".join(names) for names in flag_names(flags)]}),
+            "ending": list(chain.from_iterable(drawn.endings)),
+        }
+        (x_unit, y_unit), result = drawn.units, drawn.result
+        units = {**drawn.at_units, drawn.x: x_unit, drawn.y: y_unit, result.name: result.unit}
+        return exports.read_table(columns, units, reading.units)
+
+    def picture(
+        self, found: Found[tuple[CurveQuery, bool], Map], reading: Reading, title: str, form: pictures.Picture
+    ) -> bytes:
+        """Colours, or lines of equal value."""
+        return draw_map(read_map(found.made, reading), title, form, contours=found.chosen[1])

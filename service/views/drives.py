@@ -1,0 +1,150 @@
+"""What the drives of a study with tolerances do: ribbons of quantiles, and the share that reaches conditions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING
+
+from sprag.service.answers import tolerances as m
+from sprag.service.faults import parameter_error
+from sprag.service.results.defaults import drawn_results
+from sprag.service.results.figures.read import read_map
+from sprag.service.results.figures.ribbons import ribbon_figure, ribbon_map, yield_figure, yield_map
+from sprag.service.results.pictures.curves import Picture
+from sprag.service.results.pictures.maps import draw_map
+from sprag.service.results.tolerances.batch import Asked
+from sprag.service.results.tolerances.ribbons import QUANTILES, Ribbon, ribbon
+from sprag.service.results.tolerances.written import ribbon_csv, ribbon_json, yield_csv, yield_json
+from sprag.service.results.tolerances.yields import Yield, yields
+from sprag.service.views import study_view
+from sprag.service.views.curves import pairs
+from sprag.service.views.study_questions import RIBBON, YIELD, RibbonQuestion, YieldQuestion
+from sprag.service.views.study_view import Found, StudyView
+from sprag.worker import models
+
+if TYPE_CHECKING:
+    from sprag.service.jobs.library import Library
+    from sprag.service.reading.reader import Reading
+    from sprag.service.results.figures.figure import Figure
+    from sprag.worker.study import Study
+
+
+@dataclass(frozen=True, slots=True)
+class RibbonQuery:
+    """Which ribbons: results (by default those drawn first), places, probabilities of quantiles, picture as a map."""
+
+    y: tuple[str, ...] = ()
+    asked: Asked = field(default_factory=Asked)
+    quantiles: tuple[float, ...] = QUANTILES
+    mapped: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class YieldQuery:
+    """Which yield: conditions, places, number of worst drives, picture as a map."""
+
+    conditions: tuple[str, ...]
+    asked: Asked = field(default_factory=Asked)
+    worst: int = 10
+    mapped: bool = False
+
+
+def _asked(question: RibbonQuestion | YieldQuestion) -> Asked:
+    return Asked(question.x, tuple(dict.fromkeys(question.by or ())), pairs(question.at))
+
+
+class RibbonView(StudyView[RibbonQuestion, RibbonQuery, Ribbon]):
+    """Quantiles of results over the drives along an axis."""
+
+    about = RIBBON
+    content = "Quantiles over the drives, as JSON, a table or a picture."
+    answer = m.RibbonReport
+
+    def choose(self, study: Study, question: RibbonQuestion) -> RibbonQuery:
+        """The query; a fault for several quantiles of a map."""
+        given = question.quantile
+        if question.mapped and given is not None and len(given) > 1:
+            raise parameter_error("quantile", "too-many", "a map shows one quantile", given, "one")
+        quantiles = tuple(given) if given else (0.5,) if question.mapped else QUANTILES
+        return RibbonQuery(tuple(dict.fromkeys(question.y or ())), _asked(question), quantiles, question.mapped)
+
+    def small(self, study: Study, chosen: RibbonQuery) -> bool:
+        """By the cases of the study."""
+        return study.cases <= study_view.FEW // 10
+
+    def find(self, library: Library, study_id: str, chosen: RibbonQuery, *, drawn: bool = False) -> Ribbon:
+        """The ribbons; SelectionError as of `ribbon`."""
+        study = library.store.study(study_id)
+        infos = models.study_results(study)
+        fetch = partial(library.store.rows_for_cases, study_id)
+        return ribbon(study, infos, chosen.y or drawn_results(study, infos), chosen.asked, chosen.quantiles, fetch)
+
+    def json(self, found: Found[RibbonQuery, Ribbon]) -> m.RibbonReport:
+        """The ribbons as JSON data."""
+        return ribbon_json(found.study_id, found.made)
+
+    def csv(self, found: Found[RibbonQuery, Ribbon], reading: Reading) -> bytes:
+        """A row for each place and quantile."""
+        return ribbon_csv(found.made)
+
+    def figure(self, found: Found[RibbonQuery, Ribbon], columns: int = 2) -> Figure:
+        """The quantiles over the places."""
+        return ribbon_figure(found.made)
+
+    def picture(self, found: Found[RibbonQuery, Ribbon], reading: Reading, title: str, form: Picture) -> bytes:
+        """The ribbons, or a map of the first quantile."""
+        if not found.chosen.mapped:
+            return super().picture(found, reading, title, form)
+        return draw_map(read_map(ribbon_map(found.made, found.chosen.quantiles[0]), reading), title, form)
+
+
+class YieldView(StudyView[YieldQuestion, YieldQuery, Yield]):
+    """The share of drives that reach conditions."""
+
+    about = YIELD
+    content = "Yields, as JSON, a table or a picture."
+    answer = m.YieldReport
+
+    def choose(self, study: Study, question: YieldQuestion) -> YieldQuery:
+        """The query."""
+        return YieldQuery(tuple(question.condition), _asked(question), question.worst, question.mapped)
+
+    def small(self, study: Study, chosen: YieldQuery) -> bool:
+        """By the cases of the study."""
+        return study.cases <= study_view.FEW // 10
+
+    def find(self, library: Library, study_id: str, chosen: YieldQuery, *, drawn: bool = False) -> Yield:
+        """The yields; SelectionError as of `yields`."""
+        study = library.store.study(study_id)
+        fetch = partial(library.store.rows_for_cases, study_id)
+        return yields(study, models.study_results(study), chosen.conditions, chosen.asked, chosen.worst, fetch)
+
+    def json(self, found: Found[YieldQuery, Yield]) -> m.YieldReport:
+        """The yields as JSON data."""
+        return yield_json(found.study_id, found.made)
+
+    def csv(self, found: Found[YieldQuery, Yield], reading: Reading) -> bytes:
+        """A row for each place."""
+        return yield_csv(found.made)
+
+    def figure(self, found: Found[YieldQuery, Yield], columns: int = 2) -> Figure:
+        """The yield over the places."""
+        return yield_figure(found.made)
+
+    def picture(self, found: Found[YieldQuery, Yield], reading: Reading, title: str, form: Picture) -> bytes:
+        """The yields over the places, or as a map."""
+        if not found.chosen.mapped:
+            return super().picture(found, reading, title, form)
+        return draw_map(read_map(yield_map(found.made), reading), title, form)
+
+
+def both(
+    library: Library, study_id: str, ribbons: RibbonQuery, wanted: YieldQuery
+) -> tuple[m.RibbonReport, m.YieldReport]:
+    """The answers with ribbons and yields, for a page."""
+    ribbon, reached = RibbonView(), YieldView()
+    return (
+        ribbon.json(Found(library, study_id, ribbons, ribbon.find(library, study_id, ribbons))),
+        reached.json(Found(library, study_id, wanted, reached.find(library, study_id, wanted))),
+    )

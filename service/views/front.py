@@ -1,0 +1,58 @@
+"""The designs of a study with a goal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sprag.service.answers import goals as m
+from sprag.service.results.figures.front import front_figure
+from sprag.service.results.fronts import Designs, front_csv, front_json, goal_of
+from sprag.service.results.pictures.curves import MAX_PICTURE_POINTS, Picture, check_size
+from sprag.service.views import study_view
+from sprag.service.views.study_questions import FRONT, FrontQuestion
+from sprag.service.views.study_view import Found, StudyView
+
+if TYPE_CHECKING:
+    from sprag.service.jobs.library import Library
+    from sprag.service.reading.reader import Reading
+    from sprag.service.results.figures.figure import Figure
+    from sprag.worker.study import Study
+
+
+class FrontView(StudyView[FrontQuestion, FrontQuestion, Designs]):
+    """The best designs of a search."""
+
+    about = FRONT
+    content = "Designs, as JSON, a table or a picture."
+    answer = m.FrontReport
+    selects = True
+
+    def choose(self, study: Study, question: FrontQuestion) -> FrontQuestion:
+        """The question; FaultError where the study has no goal."""
+        goal_of(study)
+        return question
+
+    def small(self, study: Study, chosen: FrontQuestion) -> bool:
+        """By the cases of the study: ranking takes a time that grows faster than their number."""
+        return study.cases <= study_view.FEW // 10
+
+    def find(self, library: Library, study_id: str, chosen: FrontQuestion, *, drawn: bool = False) -> Designs:
+        """The ranked designs."""
+        return library.fronts.of(study_id, exact=chosen.exact)
+
+    def json(self, found: Found[FrontQuestion, Designs]) -> m.FrontReport:
+        """The designs as JSON data."""
+        return front_json(found.study_id, found.made, found.chosen.limit)
+
+    def csv(self, found: Found[FrontQuestion, Designs], reading: Reading) -> bytes:
+        """A row for each design."""
+        return front_csv(found.made, found.chosen.limit)
+
+    def figure(self, found: Found[FrontQuestion, Designs], columns: int = 2) -> Figure:
+        """The designs over two quantities."""
+        return front_figure(found.made, found.chosen.x, found.chosen.y)
+
+    def picture(self, found: Found[FrontQuestion, Designs], reading: Reading, title: str, form: Picture) -> bytes:
+        """Not too many designs."""
+        check_size("designs", len(found.made.numbers), MAX_PICTURE_POINTS)
+        return super().picture(found, reading, title, form)

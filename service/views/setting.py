@@ -1,0 +1,131 @@
+"""What a view is asked: its settings with their meaning, limits and examples, from which every front makes its own.
+
+The fields of a question are the parameters of the view's address, under their `Setting.alias` where they have one, and
+the options of its command.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, fields
+from typing import Any, TypeVar, get_type_hints
+
+from sprag.service.faults import parameter_error
+from sprag.service.reading.limits import span
+
+Question = TypeVar("Question")
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """One setting of a question.
+
+    Attributes
+    ----------
+    meaning : str
+        What it is, in half a sentence.
+    alias : str
+        Its name in addresses, where that is no name of Python.
+    examples : tuple
+        Values that work for most studies.
+    low, high : int or None
+        Its range, both ends included.
+    least, longest : int or None
+        Fewest and most characters of a text, or items of a list.
+    choices : tuple of str
+        The only values.
+    option : str
+        Name of its option, where another one has the name of the setting.
+    metavar : str
+        What stands for the value in the help of a command.
+    """
+
+    meaning: str
+    alias: str = ""
+    examples: tuple[Any, ...] = ()
+    low: int | None = None
+    high: int | None = None
+    least: int | None = None
+    longest: int | None = None
+    choices: tuple[str, ...] = ()
+    option: str = ""
+    metavar: str = "VALUE"
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A setting as the fronts make it: its name, its type, its default (``...``: required), and its description."""
+
+    name: str
+    type: Any
+    default: Any
+    setting: Setting
+
+    @property
+    def alias(self) -> str:
+        """Its name in addresses."""
+        return self.setting.alias or self.name
+
+    @property
+    def option(self) -> str:
+        """The name of its option."""
+        return self.setting.option or f"--{self.alias.replace('_', '-')}"
+
+
+def settings_of(question: type) -> tuple[Asked, ...]:
+    """The settings of a question in their order."""
+    hints = get_type_hints(question, include_extras=True)
+    return tuple(
+        Asked(
+            field.name,
+            hints[field.name].__origin__,
+            ... if field.default is MISSING else field.default,
+            hints[field.name].__metadata__[0],
+        )
+        for field in fields(question)
+    )
+
+
+def choices_of(question: type, name: str) -> tuple[str, ...]:
+    """The only values of a setting."""
+    return next(asked.setting.choices for asked in settings_of(question) if asked.name == name)
+
+
+def question_of(question: type[Question], texts: Mapping[str, str]) -> Question:
+    """A question with the texts of a form, by alias; blank ones are not given. FaultError about a whole number."""
+    given = {asked: texts[asked.alias].strip() for asked in settings_of(question) if asked.alias in texts}
+    return question(**{asked.name: _value(asked, text) for asked, text in given.items() if text})
+
+
+def _value(asked: Asked, text: str) -> str | int:
+    if asked.type is not int:
+        return text
+    low, high = asked.setting.low or 0, asked.setting.high or 0
+    if not (text.isdecimal() and text.isascii() and low <= int(text) <= high):
+        raise parameter_error(asked.alias, "out-of-range", "must be a whole number", text, span(low, high))
+    return int(text)
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """A view as every front knows it, without the engine.
+
+    Attributes
+    ----------
+    name : str
+        The last part of its address, and its command.
+    question : type
+        What it is asked.
+    summary : str
+        What it is, a sentence.
+    pictures : bool
+        Whether it is a picture as well; otherwise only JSON and CSV.
+    starts : bool
+        Whether it is that of one start where the case has several.
+    """
+
+    name: str
+    question: type
+    summary: str
+    pictures: bool = True
+    starts: bool = True

@@ -1,0 +1,113 @@
+"""The views of a study: what each is asked, how it is found in the rows of the study, and how it is written and drawn.
+
+One description serves the address of the API (`sprag.service.http.api.study_views`) and the figures of pages
+(`sprag.service.http.web.figures.studies`).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, TypeVar
+
+from sprag.service.jobs.reading import reading_of
+from sprag.service.json_text import to_bytes
+from sprag.service.results.figures.read import read_figure
+from sprag.service.results.pictures.curves import draw_figure
+
+if TYPE_CHECKING:
+    from sprag.service.jobs.library import Library
+    from sprag.service.reading.reader import Choice, Reading
+    from sprag.service.results.figures.figure import Figure
+    from sprag.service.results.pictures.curves import Picture
+    from sprag.service.views.setting import About
+    from sprag.worker.study import Study
+
+#: Numbers of a view that the service itself reads and writes, in about ten milliseconds; more belong in another
+#: process, because they take seconds during which nobody else would be answered.
+FEW: Final = 20_000
+
+Question = TypeVar("Question")
+Chosen = TypeVar("Chosen")
+Made = TypeVar("Made")
+
+
+@dataclass(frozen=True, slots=True)
+class Found(Generic[Chosen, Made]):
+    """A view of a study: of which study, what was chosen, and what was found."""
+
+    library: Library
+    study_id: str
+    chosen: Chosen
+    made: Made
+
+    @property
+    def study(self) -> Study:
+        """The study."""
+        return self.library.store.study(self.study_id)
+
+
+class StudyView(ABC, Generic[Question, Chosen, Made]):
+    """A view of a study.
+
+    Attributes
+    ----------
+    about : About
+        Its name, its question, and what it is.
+    content : str
+        What its files have, a sentence for the API.
+    answer : type
+        The shape of its JSON.
+    file : str
+        The last part of the name of its file, where that is not its name.
+    selects : bool
+        Whether dragging in its figure selects what is drawn there.
+    """
+
+    about: ClassVar[About]
+    content: ClassVar[str]
+    answer: ClassVar[Any]
+    file: ClassVar[str] = ""
+    selects: ClassVar[bool] = False
+
+    @abstractmethod
+    def choose(self, study: Study, question: Question) -> Chosen:
+        """What a question means for a study; FaultError about a setting, or where the study has no such view."""
+
+    def small(self, study: Study, chosen: Chosen) -> bool:
+        """Whether the service itself may find and write it."""
+        return False
+
+    @abstractmethod
+    def find(self, library: Library, study_id: str, chosen: Chosen, *, drawn: bool = False) -> Made:
+        """Find it in the rows of the study, as numbers or to be ``drawn``."""
+
+    @abstractmethod
+    def json(self, found: Found[Chosen, Made]) -> Mapping[str, Any]:
+        """The view as JSON data."""
+
+    @abstractmethod
+    def csv(self, found: Found[Chosen, Made], reading: Reading) -> bytes:
+        """The view as a table, in a reader's units."""
+
+    def figure(self, found: Found[Chosen, Made], columns: int = 2) -> Figure | None:
+        """The view as a described figure with so many panels in a row; None where there is nothing to draw."""
+        raise NotImplementedError  # those that are pictures of another kind
+
+    def picture(self, found: Found[Chosen, Made], reading: Reading, title: str, form: Picture) -> bytes:
+        """The view as a picture; SelectionError where there is more than one can show."""
+        figure = self.figure(found)
+        assert figure is not None
+        return draw_figure(read_figure(figure, reading), title, form)
+
+
+def study_file(
+    library: Library, study_id: str, view: StudyView[Any, Any, Any], chosen: Any, choice: Choice, title: str, form: str
+) -> bytes:
+    """Find the view of a study and write it as JSON, as CSV, or as a picture."""
+    found = Found(library, study_id, chosen, view.find(library, study_id, chosen, drawn=form not in ("json", "csv")))
+    if form == "json":
+        return to_bytes(view.json(found))
+    reading = reading_of(library.store, study_id, choice)
+    return view.csv(found, reading) if form == "csv" else view.picture(found, reading, title, form)  # type: ignore[arg-type]
