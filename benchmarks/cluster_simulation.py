@@ -67,19 +67,19 @@ def dispatch_seconds(url: str, size: int, groups: int = 6) -> float:
     """Least time of a chunk of that many cases, when `GROUP` of them are stored and as many claimed at once."""
     chunks = groups * GROUP
     with Store.open(url, chunking=Chunking(cases=size)) as store:
-        record = store.create_study({}, study_of(size * chunks), fresh=True)
-        epoch = store.take_over("benchmark")
-        waiting, times = store.open_chunks(record.number), []
-        claimed = store.claim(epoch, waiting[:GROUP])
+        record = store.studies.create({}, study_of(size * chunks), fresh=True)
+        epoch = store.work.take_over("benchmark")
+        waiting, times = store.work.open_chunks(record.number), []
+        claimed = store.work.claim(epoch, waiting[:GROUP])
         for first in range(GROUP, chunks + GROUP, GROUP):
             finished = [Finished(chunk, made_up(chunk.first, chunk.count)) for chunk in claimed]
             begin = time.perf_counter()
-            stored, claimed = store.exchange(epoch, finished, waiting[first : first + GROUP])
+            stored, claimed = store.work.exchange(epoch, finished, waiting[first : first + GROUP])
             times.append((time.perf_counter() - begin) / GROUP)
             assert len(stored) == GROUP
-        store.settle(epoch, record.number)
-        store.delete_study(record.id)
-        store.purge()
+        store.work.settle(epoch, record.number)
+        store.studies.delete(record.id)
+        store.purging.purge()
     return min(times[:-1])  # the last transaction claims nothing
 
 

@@ -44,22 +44,22 @@ def chosen(rows: int) -> np.ndarray[Any, Any]:
 def rows_of_postgres(url: str, rows: int) -> tuple[dict[str, float], float]:
     """Seconds and bytes of the store on a server, and the extreme."""
     with Store.open(url, chunking=Chunking(cases=CHUNK)) as store:
-        record = store.create_study({}, study_of(rows), fresh=True)
-        epoch = store.take_over("benchmark")
-        chunks = [chunk for chunk in store.open_chunks(record.number) if chunk.first < rows]
+        record = store.studies.create({}, study_of(rows), fresh=True)
+        epoch = store.work.take_over("benchmark")
+        chunks = [chunk for chunk in store.work.open_chunks(record.number) if chunk.first < rows]
         writing = 0.0
         for first in range(0, len(chunks), GROUP):
-            group = store.claim(epoch, chunks[first : first + GROUP])
+            group = store.work.claim(epoch, chunks[first : first + GROUP])
             finished = [
                 Finished(chunk, ChunkResult(chunk.first, ["ok"] * chunk.count, [""] * chunk.count,
                     values_of(np.arange(chunk.first, chunk.first + chunk.count))))
                 for chunk in group
             ]  # fmt: skip
-            writing += timed(lambda finished=finished: store.exchange(epoch, finished))[0]
-        reading, count = timed(lambda: sum(len(block) for block in store.iter_rows(record.id)))
+            writing += timed(lambda finished=finished: store.work.exchange(epoch, finished))[0]
+        reading, count = timed(lambda: sum(len(block) for block in store.rows.blocks(record.id)))
         assert count == rows
         cases = chosen(rows)
-        picking, found = timed(lambda: store.rows_for_cases(record.id, cases, [INFOS[0].name]))
+        picking, found = timed(lambda: store.rows.for_cases(record.id, cases, [INFOS[0].name]))
         assert len(found.endings) == cases.size
         with store.session.plain() as connection:
             asking, extreme = timed(

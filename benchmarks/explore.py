@@ -42,7 +42,7 @@ def main() -> None:
         path = Path(folder) / "explore.sqlite3"
         study_id, _ = build(path, grid(cases))
         with Store.open(f"sqlite:///{path}") as store:
-            study, columns = store.study(study_id), Columns(store, ColumnFiles(Path(folder) / "columns"))
+            study, columns = store.studies.study(study_id), Columns(store, ColumnFiles(Path(folder) / "columns"))
             where = ("shaft.load <= 0.3 N*m", "efficiency >= 0.2", "shaft.speed.mean >= 0")
             queries = {
                 "the first question (its columns have been read)": ExploreQuery(where, sort="-efficiency", limit=50),

@@ -208,7 +208,7 @@ def running(cases: int) -> Iterator[Place]:
         study, _ = build(service.database, grid(cases))
         with Store.open(f"sqlite:///{service.database}") as store:
             scopes = {"reader": TokenScope.READ, "other": TokenScope.READ, "writer": TokenScope.WRITE}
-            secrets = {who: store.create_token(who, scope)[0] for who, scope in scopes.items()}
+            secrets = {who: store.people.create_token(who, scope)[0] for who, scope in scopes.items()}
         service.start()
         try:
             yield _place(service, study, secrets)

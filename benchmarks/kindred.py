@@ -50,7 +50,7 @@ def previewed(store: Store, cases: int, repeats: int = 15) -> float:
     for _ in range(repeats):
         study = sample(cases, random)
         began = process_time()
-        assert store.reusable(study) == 0
+        assert store.reuse.count(study) == 0
         times.append(process_time() - began)
     return min(times)
 
@@ -97,11 +97,11 @@ def submitted(store: Store, cases: int, random: np.random.Generator) -> None:
     """Print the processor time here of the transaction that submits a sample, with its keys and without."""
     least = dict.fromkeys(("without keys", "with keys"), np.inf)
     for _ in range(20):
-        row = study_row({}, sample(cases, random), store.chunking)
+        row = study_row({}, sample(cases, random), store.dispatchers.chunking)
         bare = {name: value for name, value in row.items() if name != "keys"}
         for what, written in (("without keys", bare), ("with keys", row)):
             began = process_time()
-            store.insert_study(written)
+            store.studies.insert(written)
             least[what] = min(least[what], process_time() - began)
     more = 1e6 * (least["with keys"] - least["without keys"]) / cases
     for what, seconds in least.items():

@@ -45,16 +45,16 @@ def main() -> None:
         folder = Path(name)
         first, there, back = f"sqlite:///{folder}/a.sqlite3", server.url(server.new_database()), f"sqlite:///{folder}/b"
         with Store.open(first, chunking=Chunking(cases=CHUNK)) as store:
-            record = store.create_study({}, study_of(rows), fresh=True)
+            record = store.studies.create({}, study_of(rows), fresh=True)
             through_the_dispatcher(store, record, at_once(numbers(rows), 4), meter)
         seconds = {
             "SQLite to PostgreSQL": moved(first, there, meter),
             "PostgreSQL to SQLite": moved(there, back, meter),
         }
         with Store.open(there, chunking=Chunking(cases=CHUNK)) as store:
-            other = store.create_study({}, study_of(rows), fresh=True)
-            store.cancel_study(other.id)
-            store.settle(store.take_over("benchmark"), other.number)
+            other = store.studies.create({}, study_of(rows), fresh=True)
+            store.studies.cancel(other.id)
+            store.work.settle(store.work.take_over("benchmark"), other.number)
             copy = by_psql(there, record, other, folder, meter).elapsed
     print(f"COPY by psql: {rows / copy:,.0f} rows/s")
     for way, spent in seconds.items():

@@ -76,10 +76,10 @@ def engine_alone(pool: Pool, study: Study, chunk: int) -> float:
 
 def through_the_service(store: Store, study: Study) -> tuple[float, int]:
     """Seconds from submission to the last row in the database, and the cases of a chunk."""
-    record = store.create_study({}, study, fresh=True)
-    while not (record := store.get_study(record.id)).state.terminal:
+    record = store.studies.create({}, study, fresh=True)
+    while not (record := store.studies.get(record.id)).state.terminal:
         time.sleep(_POLL_SECONDS)
-    assert record.ok == study.cases, store.progress(record.id)
+    assert record.ok == study.cases, store.studies.progress(record.id)
     assert record.finished_at is not None
     return (record.finished_at - record.created_at).total_seconds(), record.chunk_cases
 

@@ -34,12 +34,12 @@ _RARE = 997
 def fill(store: Store, axes: list[dict[str, object]], name: str) -> str:
     """A finished study with made-up rows; its id."""
     parsed = parse_spec({**SPEC, "axes": axes, "name": name})
-    record = store.create_study(parsed.spec, parsed.study)
+    record = store.studies.create(parsed.spec, parsed.study)
     infos = models.study_results(parsed.study)
     random = np.random.default_rng(1)
-    epoch = store.take_over("benchmark")
-    while chunks := store.open_chunks(record.number)[:50]:
-        for chunk in store.claim(epoch, chunks):
+    epoch = store.work.take_over("benchmark")
+    while chunks := store.work.open_chunks(record.number)[:50]:
+        for chunk in store.work.claim(epoch, chunks):
             values = random.normal(size=(chunk.count, len(infos)))
             for column, info in enumerate(infos):
                 if info.kind != "real":
@@ -48,8 +48,8 @@ def fill(store: Store, axes: list[dict[str, object]], name: str) -> str:
                 "chatter" if case % _RARE == 0 else "ok" for case in range(chunk.first, chunk.first + chunk.count)
             ]
             values[[ending != "ok" for ending in endings]] = np.nan
-            store.commit(epoch, chunk, ChunkResult(chunk.first, endings, [""] * chunk.count, values))
-    store.settle(epoch, record.number)
+            store.work.commit(epoch, chunk, ChunkResult(chunk.first, endings, [""] * chunk.count, values))
+    store.work.settle(epoch, record.number)
     return record.id
 
 

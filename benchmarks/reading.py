@@ -61,17 +61,17 @@ def build(path: Path, study: Study) -> tuple[str, float]:
     numbers = np.random.default_rng(3)
     seconds = 0.0
     with Store.open(f"sqlite:///{path}", chunking=Chunking(5_000)) as store:
-        record = store.create_study({"sprag": 1}, study)
-        epoch = store.take_over("benchmark")
-        for chunk in store.claim(epoch, store.open_chunks(record.number)):
+        record = store.studies.create({"sprag": 1}, study)
+        epoch = store.work.take_over("benchmark")
+        for chunk in store.work.claim(epoch, store.work.open_chunks(record.number)):
             values = numbers.normal(size=(chunk.count, len(infos)))
             values[:, counts] = numbers.integers(0, 5_000, (chunk.count, len(counts)))
             values[:, categories] = numbers.integers(1, 3, (chunk.count, len(categories)))
             result = ChunkResult(chunk.first, ["ok"] * chunk.count, [""] * chunk.count, values)
             start = time.perf_counter()
-            store.commit(epoch, chunk, result)
+            store.work.commit(epoch, chunk, result)
             seconds += time.perf_counter() - start
-        store.settle(epoch, record.number)
+        store.work.settle(epoch, record.number)
     return record.id, seconds
 
 

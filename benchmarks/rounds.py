@@ -24,6 +24,7 @@ from sprag.service.presets import preset_text
 from sprag.service.spec.document import load_spec, parse_spec
 from sprag.service.storage.part import SystemClock
 from sprag.service.storage.store import Store
+from sprag.service.storage.work import Work
 from sprag.worker import models
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.inline import InlineExecutor
@@ -75,7 +76,7 @@ class Clock:
 
 
 def _over(store: Store, study: str) -> bool:
-    return store.get_study(study).over
+    return store.studies.get(study).over
 
 
 def main() -> None:
@@ -87,16 +88,16 @@ def main() -> None:
     models.warm_up(study)
     engine, rounds, storage, whole = Clock(), Clock(), Clock(), Clock()
     Rounds.advance = rounds.of(Rounds.advance)  # type: ignore[method-assign]
-    Store.exchange = storage.of(Store.exchange)  # type: ignore[method-assign]
+    Work.exchange = storage.of(Work.exchange)  # type: ignore[method-assign]
     with tempfile.TemporaryDirectory() as folder:
         url = f"sqlite:///{Path(folder) / 'rounds.sqlite3'}"
         with Store.open(url) as store:
             for _ in range(repetitions):
-                record = store.create_study({}, study, fresh=True)
+                record = store.studies.create({}, study, fresh=True)
                 executor = InlineExecutor(engine.of(models.run_task))
-                dispatcher = Dispatcher(store, executor, SystemClock(), owner="benchmark")
+                dispatcher = Dispatcher(store.work, executor, SystemClock(), owner="benchmark")
                 whole.of(dispatcher.run)(partial(_over, store, record.id))
-                record = store.get_study(record.id)
+                record = store.studies.get(record.id)
                 assert record.ok == record.cases
     times = ", ".join(
         f"{name} {clock.total / repetitions:.2f} s ({clock.total / engine.total:.1%})"

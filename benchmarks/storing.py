@@ -30,8 +30,7 @@ import sqlalchemy as sa
 from sqlalchemy.engine import make_url
 
 from benchmarks.at_once import AtOnce
-from sprag.service.storage import rows as rows_module
-from sprag.service.storage import storing
+from sprag.service.storage import blocks, work
 from sprag.service.storage.part import SystemClock
 from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.sqlite_files import sqlite_driver
@@ -96,11 +95,11 @@ def at_once(values: np.ndarray[Any, np.dtype[np.float64]], in_flight: int) -> At
 def through_the_dispatcher(store: Store, record: StudyRecord, executor: AtOnce, meter: Meter) -> Spent:
     """Run the study to its end."""
     fingerprint.digest()  # once in a process
-    dispatcher = Dispatcher(store, executor, SystemClock(), news=store.session.news())
+    dispatcher = Dispatcher(store.work, executor, SystemClock(), news=store.session.news())
     with meter:
         # The study is read only when nothing is in flight, so that reading is not measured.
-        dispatcher.run(lambda: not executor.busy and store.get_study(record.id).state.terminal)
-    assert store.get_study(record.id).ok == record.cases
+        dispatcher.run(lambda: not executor.busy and store.studies.get(record.id).state.terminal)
+    assert store.studies.get(record.id).ok == record.cases
     return meter.spent
 
 
@@ -155,29 +154,29 @@ def measure(server: Server, folder: Path, rows: int, size: int, in_flight: int, 
     of_all: list[float] = []
     with Store.open(server.url, chunking=Chunking(cases=size)) as store:
         # Statements are compiled once in a process.
-        warming = store.create_study({}, study, fresh=True)
+        warming = store.studies.create({}, study, fresh=True)
         with DigestCost():
             through_the_dispatcher(store, warming, at_once(values, in_flight), meter)
-        store.delete_study(warming.id)
-        store.purge()
+        store.studies.delete(warming.id)
+        store.purging.purge()
         for _ in range(repeats):
-            record = store.create_study({}, study, fresh=True)
+            record = store.studies.create({}, study, fresh=True)
             at_server = server.processor()
             with DigestCost() as cost:
                 spent = through_the_dispatcher(store, record, at_once(values, in_flight), meter)
             ours.append(Spent(spent.elapsed - cost.doubled, spent.processor - cost.doubled))
             shares.append(cost.total / ours[-1].processor)
             of_all.append(cost.total / (ours[-1].processor + server.processor() - at_server))
-            other = store.create_study({}, study, fresh=True)
-            store.cancel_study(other.id)
-            store.settle(store.take_over("benchmark"), other.number)
+            other = store.studies.create({}, study, fresh=True)
+            store.studies.cancel(other.id)
+            store.work.settle(store.work.take_over("benchmark"), other.number)
             if store.session.on_server:
                 theirs.append(by_psql(server.url, record, other, folder, meter))
             else:
                 theirs.append(by_executemany(store.session.path, record, other, meter))
             for done in (record, other):
-                store.delete_study(done.id)
-            store.purge()
+                store.studies.delete(done.id)
+            store.purging.purge()
             if store.session.on_server:
                 with store.session.plain() as connection:
                     connection.exec_driver_sql("VACUUM vibration_drive_1")
@@ -256,14 +255,14 @@ class DigestCost:
 
     def __enter__(self) -> Self:
         self._steps = [
-            (rows_module, "as_kept"),
-            (storing, "_words"),
-            (storing, "_digests"),
-            (storing, "_finish_chunks"),
+            (blocks, "as_kept"),
+            (work, "_words"),
+            (work, "_digests"),
+            (work, "finish_chunks"),
         ]
         keep, words, digests, mark = self._real = [getattr(module, name) for module, name in self._steps]
         self._keeping = Turns(keep, lambda values: np.isinf(values).any())
-        self._marking = Turns(mark, storing._change_chunks)
+        self._marking = Turns(mark, work.change_chunks)
         new = [self._keep, self._timed(words), self._timed(digests), self._mark]
         for (module, name), step in zip(self._steps, new, strict=True):
             setattr(module, name, step)

@@ -15,8 +15,8 @@ from time import perf_counter
 
 import sqlalchemy as sa
 
+from sprag.service.storage.labels import search_text
 from sprag.service.storage.listing import StudyFilter, StudyOrder
-from sprag.service.storage.searching import search_text
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import STUDIES
 from sprag.worker.chunking import Chunking
@@ -28,7 +28,7 @@ _WORDS = ("feeder", "Förderer", "press", "Zahnrad", "Kurbel", "slider", "drive"
 def fill(store: Store, studies: int) -> None:
     """Make so many rows of studies with names, notes and tags, as copies of one."""
     drawn = random.Random(3)
-    store.create_study({"sprag": 1, "name": "one"}, fakes.study(3, "one"))
+    store.studies.create({"sprag": 1, "name": "one"}, fakes.study(3, "one"))
     with store.session.write() as connection:
         one = dict(connection.execute(sa.select(STUDIES)).mappings().one())
         rows = []
@@ -63,14 +63,14 @@ def main() -> None:
             times = []
             for _ in range(15):
                 began = perf_counter()
-                store.list_studies(50, page, wanted, order)
+                store.studies.page(50, page, wanted, order)
                 times.append(perf_counter() - began)
             return median(times)
 
         unit = timed(StudyFilter(), StudyOrder.NEWEST)
         everything = StudyFilter()
         questions = {f"by {order}, first page": (everything, order, None) for order in StudyOrder}
-        middle = store.list_studies(1000, None, everything, StudyOrder.NAME).next_token
+        middle = store.studies.page(1000, None, everything, StudyOrder.NAME).next_token
         questions["by name, page after the first 1,000"] = (everything, StudyOrder.NAME, middle)
         questions["two words that many have"] = (StudyFilter(search="forderer night"), StudyOrder.NEWEST, None)
         questions["a word that none has"] = (StudyFilter(search="nothing"), StudyOrder.NEWEST, None)

@@ -68,24 +68,24 @@ def study_of(cases: int) -> Study:
 
 def submit(store: Store, cases: int) -> dict[str, Any]:
     """Submit the study."""
-    return {"cases": store.create_study({}, study_of(cases), fresh=True).cases}
+    return {"cases": store.studies.create({}, study_of(cases), fresh=True).cases}
 
 
 def run(store: Store, cases: int) -> dict[str, Any]:
     """Let a dispatcher run it."""
-    (record,) = store.list_studies().studies
+    (record,) = store.studies.page().studies
     executor = AtOnce(lambda first, count: values_of(np.arange(first, first + count)))
-    Dispatcher(store, executor, SystemClock()).run(lambda: store.get_study(record.id).state.terminal)
-    record = store.get_study(record.id)
+    Dispatcher(store.work, executor, SystemClock()).run(lambda: store.studies.get(record.id).state.terminal)
+    record = store.studies.get(record.id)
     assert (record.state, record.ok) == (StudyState.FINISHED, cases), record
     return {"state": record.state.value}
 
 
 def rows(store: Store, cases: int) -> dict[str, Any]:
     """Read every row and compare it."""
-    (record,) = store.list_studies().studies
+    (record,) = store.studies.page().studies
     seen = 0
-    for block in store.iter_rows(record.id):
+    for block in store.rows.blocks(record.id):
         assert np.array_equal(block.cases, np.arange(seen, seen + len(block)))
         assert np.array_equal(block.values, values_of(block.cases))
         seen += len(block)
@@ -97,8 +97,8 @@ def exported(form: Any) -> Callable[[Store, int], dict[str, Any]]:
     """Write the file piece by piece to nowhere."""
 
     def write(store: Store, cases: int) -> dict[str, Any]:
-        (record,) = store.list_studies().studies
-        source = stored(store, record, store.study(record.id))
+        (record,) = store.studies.page().studies
+        source = stored(store, record, store.studies.study(record.id))
         size = lines = 0
         for piece in exports.export(source, form):
             size += len(piece)

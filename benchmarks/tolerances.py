@@ -90,9 +90,9 @@ def cost(drives: int, loads: int) -> None:
         url = f"sqlite:///{Path(folder) / 'tolerances.sqlite3'}"
         with Store.open(url) as store:
             begin = time.process_time()
-            record = store.create_study(parsed.spec, parsed.study, fresh=True)
-            over = lambda: store.get_study(record.id).over  # noqa: E731
-            Dispatcher(store, InlineExecutor(timed), SystemClock(), owner="benchmark").run(over)
+            record = store.studies.create(parsed.spec, parsed.study, fresh=True)
+            over = lambda: store.studies.get(record.id).over  # noqa: E731
+            Dispatcher(store.work, InlineExecutor(timed), SystemClock(), owner="benchmark").run(over)
             whole = time.process_time() - begin
             begin = time.process_time()
             library: Any = Library(store)

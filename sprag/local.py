@@ -84,7 +84,7 @@ def run(
         finish_by=finish_by,
         on_progress=on_progress,
     ) as done:
-        source = stored(done.store, done.record, done.store.study(done.record.id))
+        source = stored(done.store, done.record, done.store.studies.study(done.record.id))
         table = table_of(b"".join(export(source, "parquet")))
     units = {path: unit_of(study, path) for path in study.column_paths}
     table.attrs["units"] = units | {info.name: info.unit for info in source.infos}

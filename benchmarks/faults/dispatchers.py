@@ -68,15 +68,15 @@ def _drill(url: str, count: int, seed: int, studies: int, cases: int) -> dict[st
     with Store.open(url, chunking=Chunking(cases=CHUNK)) as store:
 
         def submit() -> str:
-            return store.create_study({}, study, fresh=True).id
+            return store.studies.create({}, study, fresh=True).id
 
         ids = [submit() for _ in range(studies)]
         seen = _disturb(store, url, count, draw, ids, submit)
         assert seen.gave_up <= seen.ends["cut off"], seen
         expected = models.run_chunk(study, 0, cases)
-        epochs = store.dispatchers()[-1].epoch
+        epochs = store.dispatchers.all()[-1].epoch
         for study_id in ids:
-            record, block = store.get_study(study_id), store.case_rows(study_id, limit=cases)
+            record, block = store.studies.get(study_id), store.rows.block(study_id, limit=cases)
             assert (record.state, record.done, record.ok) == (StudyState.FINISHED, cases, cases)
             np.testing.assert_array_equal(block.cases, np.arange(cases))
             np.testing.assert_array_equal(block.values, expected.values)
@@ -110,7 +110,7 @@ def _disturb(
     gave_up = looks = both = before = 0
     deadline = time.monotonic() + PATIENCE
     try:
-        while (running := not all(store.get_study(study_id).over for study_id in ids)) or ends.total() < count:
+        while (running := not all(store.studies.get(study_id).over for study_id in ids)) or ends.total() < count:
             if not running:
                 ids.append(submit())
             while len(processes) < 2:
@@ -121,7 +121,7 @@ def _disturb(
             time.sleep(_LOOK)
             with store.session.read() as connection:
                 assert connection.exec_driver_sql(_FOREIGN).scalar_one() == 0, "a chunk is claimed by another"
-            looks, both = looks + 1, both + (sum(record.studies > 0 for record in store.dispatchers()) == 2)
+            looks, both = looks + 1, both + (sum(record.studies > 0 for record in store.dispatchers.all()) == 2)
             ended = [process for process in processes if process.poll() is not None]
             for process in ended:
                 processes.remove(process)
@@ -130,7 +130,7 @@ def _disturb(
                 gave_up += process.returncode == _GAVE_UP
                 if process.returncode == -signal.SIGKILL:
                     ends[f"killed before a {said}"] += 1
-            done = sum(store.get_study(study_id).done for study_id in ids)
+            done = sum(store.studies.get(study_id).done for study_id in ids)
             if ended or done != before:
                 before, deadline = done, time.monotonic() + PATIENCE
             assert time.monotonic() < deadline, f"nothing has ended, no case was done for {PATIENCE:g} s: {ends}"
@@ -170,7 +170,7 @@ def main(url: str, fatal: int) -> None:
         try:
             run_dispatcher(
                 WorkerSettings(url, 1, PATIENCE),
-                lambda: not store.active_studies(),
+                lambda: not store.work.active_studies(),
                 executor=lambda _: InlineExecutor(),
             )
         except (EpochLostError, StoreError):

@@ -32,9 +32,9 @@ def flips(folder: Path, *, count: int, seed: int, cases: int) -> dict[str, Any]:
     draw = random.Random(seed)
     whole = folder / "whole.sqlite3"
     with Store.open(f"sqlite:///{whole}", chunking=Chunking(cases=100)) as store:
-        studies = [store.create_study({}, fakes.study(cases, name)).id for name in ("first", "second")]
+        studies = [store.studies.create({}, fakes.study(cases, name)).id for name in ("first", "second")]
         for study in studies:
-            _finish(store, store.get_study(study), np.random.default_rng(seed))
+            _finish(store, store.studies.get(study), np.random.default_rng(seed))
         told, rest = [_told(store, study) for study in studies], [_rest(store, study) for study in studies]
     content = whole.read_bytes()
     used = [place for place, byte in enumerate(content) if byte]  # most of the rest is pages of empty tables
@@ -55,28 +55,35 @@ def flips(folder: Path, *, count: int, seed: int, cases: int) -> dict[str, Any]:
 
 def _finish(store: Store, record: StudyRecord, numbers: np.random.Generator) -> None:
     """Run a study to its end, with results of any size."""
-    epoch = store.take_over("drill")
-    for chunk in store.open_chunks(record.number):
-        store.claim(epoch, [chunk])
+    epoch = store.work.take_over("drill")
+    for chunk in store.work.open_chunks(record.number):
+        store.work.claim(epoch, [chunk])
         shape = fakes.values(chunk.first, chunk.count).shape
         values = np.where(WHOLE, fakes.values(chunk.first, chunk.count), numbers.standard_normal(shape))
         result = fakes.result(chunk.first, chunk.count)
-        store.commit(epoch, chunk, replace(result, values=values))
-    store.settle(epoch, record.number)
+        store.work.commit(epoch, chunk, replace(result, values=values))
+    store.work.settle(epoch, record.number)
 
 
 def _told(store: Store, study: str) -> tuple[Any, ...]:
     """The numbers that are told of a study."""
-    block = store.case_rows(study, limit=1_000_000)
+    block = store.rows.block(study, limit=1_000_000)
     rows = block.cases.tobytes(), tuple(block.endings), tuple(block.flags), block.values.tobytes()
-    record, progress = store.look(study)
-    counts = record.cases, record.done, record.ok, progress.endings, store.kinds(study)
-    return *rows, *counts, store.spec(study), store.study(study).to_json(), record.physics_hash, record.engine_version
+    record, progress = store.studies.look(study)
+    counts = record.cases, record.done, record.ok, progress.endings, store.rows.kinds(study)
+    return (
+        *rows,
+        *counts,
+        store.studies.spec(study),
+        store.studies.study(study).to_json(),
+        record.physics_hash,
+        record.engine_version,
+    )
 
 
 def _rest(store: Store, study: str) -> tuple[Any, ...]:
-    record, progress = store.look(study)
-    return record, progress.rate, store.origins(study)
+    record, progress = store.studies.look(study)
+    return record, progress.rate, store.rows.origins(study)
 
 
 def _outcome(copy: Path, studies: list[str], told: list[tuple[Any, ...]], rest: list[tuple[Any, ...]]) -> str:

@@ -251,7 +251,7 @@ def compare(
     for case, ending in (odd or {}).items():
         endings[case] = ending
     with Store.open(f"sqlite:///{database}") as store:
-        blocks = list(store.iter_rows(study_id))
+        blocks = list(store.rows.blocks(study_id))
         cases = np.concatenate([block.cases for block in blocks])
         missing = set(range(study.cases)) - set(cases.tolist())
         assert not missing, f"{len(missing)} missing rows: {sorted(missing)[:10]}"
@@ -263,7 +263,7 @@ def compare(
             for case in set(odd or ()) & set(range(part.first, part.first + part.count)):
                 part.values[case - part.first] = np.nan
             np.testing.assert_array_equal(values[part.first : part.first + part.count], part.values)
-        counted = store.progress(study_id)
+        counted = store.studies.progress(study_id)
         assert counted.endings == {ending: endings.count(ending) for ending in set(endings)}
         assert (counted.done, counted.ok) == (study.cases, endings.count("ok"))
         problems = [problem for problem in store.check().problems if "can corrupt" not in problem]

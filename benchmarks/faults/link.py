@@ -34,7 +34,7 @@ def link(folder: Path, *, cases: int, periods: float, chunk: int = 10) -> dict[s
         for name in ("one", "two"):
             dask.start_worker(net.begin(name), net.address(name))
         with Store.open(f"sqlite:///{database}", chunking=Chunking(cases=chunk)) as store:
-            study = store.create_study({}, harness.study_of(made)).id
+            study = store.studies.create({}, harness.study_of(made)).id
         command = [*net.begin("desk"), *harness.COMMAND, "worker", "--db", str(database)]
         with log.open("wb") as output:
             dispatcher = subprocess.Popen(

@@ -59,7 +59,7 @@ def nights(folder: Path, *, count: int = 50, seed: int = 1, url: str = "") -> di
         to = {"report_email": list(_MAILS), "report_webhook": f"{hook.address}/in"}
         for name, cron in _CRONS.items():
             fields = {"spec": SPEC, "cron": cron, "zone": "UTC", "name": name, "fresh": True, **to}
-            store.create_schedule(read_fields(fields, clock.now()))
+            store.schedules.create(read_fields(fields, clock.now()))
         while passed < 2 or killed.total() < count:
             clock.seconds = (timedelta(days=passed) + _LAST).total_seconds()
             while killed.total() < count and (end := _go_on(url, box, hook, clock.seconds, draw)) is not None:
@@ -83,12 +83,12 @@ def nights(folder: Path, *, count: int = 50, seed: int = 1, url: str = "") -> di
 def _compare(store: Store, clock: fakes.HandClock, passed: int, box: MailBox, hook: Hook) -> dict[str, int]:
     """Compare what is stored with what has arrived; gives how much that is."""
     since = fakes.HandClock().now()
-    runs = store.runs_between(since, clock.now(), 10 * passed)
+    runs = store.runs.between(since, clock.now(), 10 * passed)
     assert len(runs) == len({(run.schedule, run.due) for run in runs}) == len(_CRONS) * passed
-    studies = store.list_studies(page_size=len(runs) + 1).studies
+    studies = store.studies.page(page_size=len(runs) + 1).studies
     assert {run.outcome.study for run in runs} == {study.id for study in studies}
     assert len(studies) == len(runs)
-    by_run = store.reports_between(since, clock.now())
+    by_run = store.reports.between(since, clock.now())
     assert len(by_run) == len(runs)
     wanted = sorted([*(("email", mail) for mail in _MAILS), ("webhook", f"{hook.address}/in")])
     for reports in by_run.values():
@@ -155,19 +155,19 @@ def main(url: str, port: int, address: str, seconds: float, fatal: int) -> None:
     clock = fakes.HandClock()
     clock.seconds = seconds
     with Store.open(url, clock=clock) as store:
-        recorded = store.report_sent
+        recorded = store.reports.sent
 
         def record(report: Any) -> None:
             nonlocal phase
             recorded(report)
             phase = _SENDING
 
-        store.report_sent = record  # type: ignore[method-assign]
+        store.reports.sent = record  # type: ignore[method-assign]
         reporter.send_mail = around(reporter.send_mail)
         reporter.send_webhook = around(reporter.send_webhook)
         Scheduler(store).look()
         phase = _RUNNING
-        Dispatcher(store, InlineExecutor(fakes.run), clock).run(lambda: not store.active_studies())
+        Dispatcher(store.work, InlineExecutor(fakes.run), clock).run(lambda: not store.work.active_studies())
         phase = _CONCLUDING
         Scheduler(store).look()
         phase = _SENDING

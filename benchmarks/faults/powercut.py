@@ -34,22 +34,22 @@ def say(text):
 
 database, studies = Path(sys.argv[1]), int(sys.argv[2])
 with Store.open(f"sqlite:///{database}", chunking=Chunking(cases=10)) as store:
-    store.list_studies()
+    store.studies.page()
     say("ready")
     sys.stdin.readline()
-    epoch = store.take_over("drill")
+    epoch = store.work.take_over("drill")
     for _ in range(studies):
-        record = store.create_study({}, fakes.study(30), idempotency_key=None)
+        record = store.studies.create({}, fakes.study(30), idempotency_key=None)
         say(f"accepted {record.number}")
-        chunks = store.open_chunks(record.number)
-        store.claim(epoch, chunks[:1])
+        chunks = store.work.open_chunks(record.number)
+        store.work.claim(epoch, chunks[:1])
         # The first alone, with the claim of the others; then these together.
         for some, wanted in ((chunks[:1], chunks[1:]), (chunks[1:], ())):
             done = [Finished(chunk, fakes.result(chunk.first, chunk.count)) for chunk in some]
-            assert store.exchange(epoch, done, wanted) == (list(some), list(wanted))
+            assert store.work.exchange(epoch, done, wanted) == (list(some), list(wanted))
             for chunk in some:
                 say(f"committed {record.number} {chunk.first} {chunk.count}")
-        store.settle(epoch, record.number)
+        store.work.settle(epoch, record.number)
         with store.session.plain() as connection:
             connection.exec_driver_sql("PRAGMA wal_checkpoint(PASSIVE)")
 """

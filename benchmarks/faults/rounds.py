@@ -51,11 +51,11 @@ def rounds(folder: Path, *, count: int = 50, seed: int = 1, url: str = "") -> di
         while killed.total() < count:
             disturbed = create(store)
             studies += 1
-            while store.get_study(disturbed).state is not StudyState.FINISHED:
+            while store.studies.get(disturbed).state is not StudyState.FINISHED:
                 # Once there were kills enough, the last study is left alone.
                 _run(url, disturbed, 0 if killed.total() >= count else draw.randint(1, _EVENTS), killed)
             assert whole(store, disturbed) == whole(store, undisturbed)
-        record = store.get_study(undisturbed)
+        record = store.studies.get(undisturbed)
     return {
         "studies": studies,
         "kills": dict(killed),
@@ -68,7 +68,7 @@ def rounds(folder: Path, *, count: int = 50, seed: int = 1, url: str = "") -> di
 def create(store: Store) -> str:
     """Submit the study; its id."""
     parsed = parse_spec(load_spec(json.dumps(spec()), "json"))
-    return store.create_study(parsed.spec, parsed.study, fresh=True).id
+    return store.studies.create(parsed.spec, parsed.study, fresh=True).id
 
 
 def spec() -> dict[str, Any]:
@@ -104,13 +104,13 @@ def whole(store: Store, study: str) -> tuple[Any, ...]:
             .where(c.study == number)
             .order_by(c.case_number)
         ).all()
-    rounds = [(found.round, found.cases, found.summary) for found in store.rounds(study)]
+    rounds = [(found.round, found.cases, found.summary) for found in store.studies.rounds(study)]
     return text, [tuple(map(repr, row)) for row in rows], rounds
 
 
 def _whole_rounds(url: str, study: str) -> list[Any]:
     with Store.open(url) as store:
-        return [found for found in store.rounds(study) if found.cases]
+        return [found for found in store.studies.rounds(study) if found.cases]
 
 
 def _watched(make: Callable[..., Planner], fate: Fate) -> Callable[..., Planner]:
@@ -135,8 +135,8 @@ def main(url: str, study: str, fatal: int) -> None:
                 planning.PLANNERS[kind] = _watched(make, fate)
             before_commits(fate.meet)
             before_writes(fate.meet)
-        dispatcher = Dispatcher(store, InlineExecutor(), SystemClock(), owner="drill")
-        dispatcher.run(lambda: store.get_study(study).over)
+        dispatcher = Dispatcher(store.work, InlineExecutor(), SystemClock(), owner="drill")
+        dispatcher.run(lambda: store.studies.get(study).over)
 
 
 if __name__ == "__main__":

@@ -47,5 +47,7 @@ def served_rounds(folder: Path, *, count: int, seed: int, processes: int = 2, ch
 def _undisturbed(url: str, chunk: int) -> tuple[Any, ...]:
     with Store.open(url, chunking=Chunking(cases=chunk)) as store:
         study = create(store)
-        Dispatcher(store, InlineExecutor(), SystemClock(), owner="drill").run(lambda: store.get_study(study).over)
+        Dispatcher(store.work, InlineExecutor(), SystemClock(), owner="drill").run(
+            lambda: store.studies.get(study).over
+        )
         return whole(store, study)

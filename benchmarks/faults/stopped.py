@@ -32,7 +32,7 @@ def stopped(folder: Path, *, cases: int, rounds: int, seed: int, periods: float 
     draw = random.Random(seed)
     database, made = folder / "sprag.sqlite3", harness.spec(cases, periods)
     with Store.open(f"sqlite:///{database}", chunking=Chunking(cases=4)) as store:
-        study = store.create_study(made, harness.study_of(made)).id
+        study = store.studies.create(made, harness.study_of(made)).id
     _watch_commits(database)
     logs = [folder / f"worker-{number}.log" for number in range(rounds + 1)]
     workers = [_worker(database, logs[0])]

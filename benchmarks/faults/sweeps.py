@@ -39,7 +39,7 @@ def sweeps(folder: Path, *, count: int, seed: int, lines: int, processes: int = 
         service.finish(swept)
     harness.compare(service.database, swept, made)
     with Store.open(f"sqlite:///{service.database}") as store:
-        assert store.case_rows(swept).flags == whole.flags
+        assert store.rows.block(swept).flags == whole.flags
     return {
         "cases": study.cases,
         "lines": 2 * lines,

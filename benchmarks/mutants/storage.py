@@ -42,7 +42,7 @@ STORAGE: Final = (
     ),
     Mutant(
         "chunks of another dispatcher's study are claimed",
-        "service/storage/storing.py",
+        "service/storage/work.py",
         'sa.func.coalesce(STUDIES.c.dispatcher, sa.bindparam("epoch")) == sa.bindparam("epoch"),',
         'sa.bindparam("epoch", type_=sa.Integer) > 0,',
         ("tests/contract/test_dispatchers.py",),
@@ -77,7 +77,7 @@ STORAGE: Final = (
     ),
     Mutant(
         "rows and the chunk's end in two transactions",
-        "service/storage/storing.py",
+        "service/storage/work.py",
         "        gains = {number: _Gain() for number in kinds}",
         '        connection.exec_driver_sql("COMMIT")\n        connection.exec_driver_sql("BEGIN IMMEDIATE")\n'
         "        gains = {number: _Gain() for number in kinds}",
@@ -85,28 +85,28 @@ STORAGE: Final = (
     ),
     Mutant(
         "a chunk that is not claimed by us is stored with its group",
-        "service/storage/storing.py",
+        "service/storage/work.py",
         "                    stored = [item for item in left if key_of(item.chunk) in ours]",
         "                    stored = left if ours else []",
         (f"{_GROUPS}test_a_chunk_that_is_not_ours_is_left_out_of_its_group",),
     ),
     Mutant(
         "a chunk is claimed that was divided meanwhile",
-        "service/storage/storing.py",
+        "service/storage/chunk_rows.py",
         "    } & keys",
         "    } and keys",
         (f"{_GROUPS}test_a_chunk_that_is_not_ours_is_left_out_of_its_group",),
     ),
     Mutant(
         "a group is stored without a check of its epoch",
-        "service/storage/storing.py",
-        "                    self._own(connection, epoch)\n                    ours",
+        "service/storage/work.py",
+        "                    require_epoch(connection, epoch)\n                    ours",
         "                    ours",
         (f"{_GROUPS}test_a_group_that_cannot_be_stored_changes_nothing",),
     ),
     Mutant(
         "only the last chunk of a group is counted",
-        "service/storage/storing.py",
+        "service/storage/work.py",
         "            gain.cases += chunk.count",
         "            gain.cases = chunk.count",
         (f"{_GROUPS}test_chunks_of_several_studies_are_stored_and_counted_together",),
@@ -120,7 +120,7 @@ STORAGE: Final = (
     ),
     Mutant(
         "a round and its chunks in two transactions",
-        "service/storage/rounds.py",
+        "service/storage/work.py",
         "            chunks = [Chunk(number, first + start, size) for start, size in sizes]",
         '            connection.exec_driver_sql("COMMIT")\n            connection.exec_driver_sql("BEGIN")\n'
         "            chunks = [Chunk(number, first + start, size) for start, size in sizes]",
@@ -128,21 +128,21 @@ STORAGE: Final = (
     ),
     Mutant(
         "a round is appended twice",
-        "service/storage/rounds.py",
+        "service/storage/work.py",
         "    return row.done == row.cases and cases in {None, row.cases}",
         "    return bool(row.done == row.cases)",
         (f"{_ROUNDS}test_a_round_is_appended_once_and_only_while_the_study_is_going",),
     ),
     Mutant(
         "a round is appended before its predecessor is complete",
-        "service/storage/rounds.py",
+        "service/storage/work.py",
         "    return row.done == row.cases and cases in {None, row.cases}",
         "    return cases in {None, row.cases}",
         (f"{_ROUNDS}test_a_round_is_appended_once_and_only_while_the_study_is_going",),
     ),
     Mutant(
         "a held study gets its next round",
-        "service/storage/rounds.py",
+        "service/storage/work.py",
         "    if row is None or row.most_cases is None or not StudyState(row.state).going:",
         "    if row is None or row.most_cases is None or StudyState(row.state).terminal:",
         (f"{_ROUNDS}test_a_round_is_appended_once_and_only_while_the_study_is_going",),

@@ -105,8 +105,8 @@ def _run(parsed: ParsedSpec, db: str | None, processes: int | None) -> tuple[Cal
         processes=processes,
     ) as done:
         study_id, store = done.record.id, done.store
-        rows = partial(store.rows_for_cases, study_id)
-        return calibration_of(store.study(study_id), store.rounds(study_id), rows), study_id
+        rows = partial(store.rows.for_cases, study_id)
+        return calibration_of(store.studies.study(study_id), store.studies.rounds(study_id), rows), study_id
 
 
 def _content(found: Calibration, form: str, title: str) -> bytes:

@@ -55,14 +55,14 @@ def schedules(context: typer.Context, incomplete: str) -> list[tuple[str, str]]:
 
 def tokens(context: typer.Context, incomplete: str) -> list[tuple[str, str]]:
     """Ids of the tokens that are not revoked, each with its name, and names."""
-    found = _stored(context, lambda store: [token for token in store.tokens() if token.revoked_at is None])
+    found = _stored(context, lambda store: [token for token in store.people.tokens() if token.revoked_at is None])
     ids = [(token.id, f"{token.name}, {token.scope.value}") for token in found]
     return ids + _names(incomplete, ((token.name, token.id) for token in found))
 
 
 def users(context: typer.Context) -> list[tuple[str, str]]:
     """Names of the users, each with the role; a removed one too, who can be restored."""
-    return [(user.name, user.role.value) for user in _stored(context, lambda store: store.users())]
+    return [(user.name, user.role.value) for user in _stored(context, lambda store: store.people.users())]
 
 
 def _names(incomplete: str, named: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:

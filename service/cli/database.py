@@ -126,8 +126,8 @@ def prune(
     with named_store(db, quiet=as_json) as store:
         if not dry_run and (problem := distrust(store)):
             raise TroubleError("unavailable", f"{problem}.")
-        found = store.prune(store.clock.now() - timedelta(days=older_than), dry=dry_run)
-        store.purge()
+        found = store.purging.prune(store.clock.now() - timedelta(days=older_than), dry=dry_run)
+        store.purging.purge()
     if as_json:
         deleted = [] if dry_run else found
         write_json({"database": store.session.location, "deleted": deleted, "found": found})
@@ -202,7 +202,7 @@ def audit(
         named = [replace(fault, where=f"--{fault.where}") for fault in error.faults]
         raise WrongInputError("invalid-parameter", _("invalid option"), named) from error
     with named_store(db, quiet=False) as store:
-        write_pieces(output, audit_pieces(store.audit_rows(wanted), form.value))
+        write_pieces(output, audit_pieces(store.audit.rows(wanted), form.value))
 
 
 def _tell_damaged(problems: Sequence[str]) -> None:
@@ -235,8 +235,8 @@ def clock(db: Database = None) -> None:
     """Confirm the clock of this machine, after it jumped ahead or the worker was off for long."""
     with named_store(db, quiet=False) as store:
         now = store.clock.now()
-        store.note_clock(now)
-        store.note_change("database.clock", "", now=now.isoformat(timespec="seconds"))
+        store.dispatchers.note_clock(now)
+        store.audit.note("database.clock", "", now=now.isoformat(timespec="seconds"))
         say(_("the clock is trusted: it is {time}", time=now.isoformat(timespec="seconds")))
 
 
@@ -244,7 +244,7 @@ def clock(db: Database = None) -> None:
 def adopt(db: Database = None) -> None:
     """Confirm that this database, a copy or a moved one, is the deployment: its schedules run, its reports are sent."""
     with named_store(db, quiet=False) as store:
-        if store.adopt_database():
+        if store.deployment.adopt():
             say(_("its schedules are on from now on: see to it that the original is no longer used"))
         else:
             say(_("it was no copy: its schedules were on already"))

@@ -236,7 +236,11 @@ def _schedules(url: str, file: Path | None) -> tuple[bool, str]:
     if file is not None and not file.exists():
         return True, _("none yet")
     with Store.open(url, create=False) as store:
-        late, schedules, off = late_runs(store), len(store.list_schedules()), store.has_schedules() and store.is_copy()
+        late, schedules, off = (
+            late_runs(store),
+            len(store.schedules.all()),
+            store.schedules.any() and store.deployment.is_copy(),
+        )
     if off:
         return False, _(recorded.COPY)
     if late:

@@ -157,7 +157,7 @@ def _reusable(settings: Settings, parsed: ParsedSpec) -> int:
     if file is not None and not file.exists():
         return 0
     with Store.open(settings.database_url, create=False) as store:
-        return store.reusable(parsed.study)
+        return store.reuse.count(parsed.study)
 
 
 def presets(
@@ -238,7 +238,7 @@ def run(
         for piece in _rows(done, written, header or "names"):
             write(piece)
         record, unaffecting = done.record, Unaffected().of(done.store, done.record)
-        progress = done.store.progress(record.id)
+        progress = done.store.studies.progress(record.id)
         endings = progress.endings
     say(*warning_lines(unaffecting))
     seconds = time.monotonic() - start
@@ -332,4 +332,4 @@ def _rows(done: LocalRun, form: Format | ReportFormat, header: Header) -> Iterat
         settings = read_settings()
         block = TitleBlock(office=settings.report_office)
         return iter([write_report(report_of(done.store, done.record.id), block, settings.report_folder, form)])
-    return export(stored(done.store, done.record, done.store.study(done.record.id), header=header), form)
+    return export(stored(done.store, done.record, done.store.studies.study(done.record.id), header=header), form)

@@ -36,7 +36,7 @@ def token_of(store: Store, text: str) -> str:
     from sprag.service.client.matching import Named, meant
 
     with _one("ID", text, _("the id or name of a token"), _("the token is not unique")):
-        tokens = [Named(t.id, t.name, f"{t.id} ({t.name})") for t in store.tokens() if t.revoked_at is None]
+        tokens = [Named(t.id, t.name, f"{t.id} ({t.name})") for t in store.people.tokens() if t.revoked_at is None]
         return meant(text, tokens, "tokens", "tk_")
 
 
@@ -45,7 +45,7 @@ def user_of(store: Store, text: str, where: str = "NAME") -> str:
     from sprag.service.client.matching import Named, meant
 
     with _one(where, text, _("the name of a user"), _("the user is not unique")):
-        return meant(text, [Named(user.name, user.name, user.name) for user in store.users()], "users")
+        return meant(text, [Named(user.name, user.name, user.name) for user in store.people.users()], "users")
 
 
 @contextmanager

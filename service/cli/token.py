@@ -21,7 +21,7 @@ from sprag.worker.limits import MAX_NAME_LENGTH
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from sprag.service.storage.tokens import TokenRecord
+    from sprag.service.storage.people import TokenRecord
 
 _STATES: Final = {
     TokenState.VALID: N_("valid"),
@@ -80,7 +80,7 @@ def create(
     with users_of(db, as_json) as store:
         ends = None if expires is None else store.clock.now() + timedelta(days=expires)
         owner = None if user is None else user_of(store, user, "--user")
-        secret, record = store.create_token(name, scope, owner=owner, expires_at=ends)
+        secret, record = store.people.create_token(name, scope, owner=owner, expires_at=ends)
     if as_json:
         write_json({"database": store.session.location, "token": secret, **_json(record)})
     else:
@@ -93,8 +93,8 @@ def create(
 def list_tokens(db: Database = None, as_json: JsonFlag = False) -> None:
     """List all tokens with owner, state, expiry and last use, newest first, without their secrets."""
     with users_of(db, as_json) as store:
-        now, users = store.clock.now(), {user.name: user for user in store.users()}
-        records = store.tokens()
+        now, users = store.clock.now(), {user.name: user for user in store.people.users()}
+        records = store.people.tokens()
     states = [record.state_at(now, users.get(record.owner or "")) for record in records]
     found = [{**_json(record), "state": state.value} for record, state in zip(records, states, strict=True)]
     if as_json:
@@ -126,7 +126,7 @@ def revoke(
 
     with users_of(db, as_json) as store:
         try:
-            record = store.revoke_token(token_of(store, token_id))
+            record = store.people.revoke_token(token_of(store, token_id))
         except TokenNotFoundError as error:
             raise WrongInputError("token-not-found", str(error)) from error
     if as_json:

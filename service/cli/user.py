@@ -20,8 +20,8 @@ from sprag.service.storage.scopes import MAX_USER_NAME
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from sprag.service.storage.people import Quota, UserRecord
     from sprag.service.storage.store import Store
-    from sprag.service.storage.users import Quota, UserRecord
 
 app = typer.Typer(
     help="Add, list, change and remove users.",
@@ -73,7 +73,7 @@ def add(
         allowed = _("1 to {most} printable characters, no blank at either end", most=MAX_USER_NAME)
         raise wrong_option("NAME", "invalid-text", N_("is not the name of a user"), name, allowed=allowed)
     with users_of(db, as_json) as store:
-        record = store.add_user(name, role or Role.DESIGNER, _quota(cases, storage, checks))
+        record = store.people.add_user(name, role or Role.DESIGNER, _quota(cases, storage, checks))
     _show(
         store,
         record,
@@ -90,7 +90,7 @@ def add(
 def list_users(db: Database = None, as_json: JsonFlag = False) -> None:
     """List all users with role, quotas, and what is used of them."""
     with users_of(db, as_json) as store:
-        found = [(record, store.usage(record.name)) for record in store.users()]
+        found = [(record, store.people.usage(record.name)) for record in store.people.users()]
         where = {"database": store.session.location}
     if as_json:
         write_json({**where, "users": [{**_json(u), "cases": used.cases, "bytes": used.bytes} for u, used in found]})
@@ -122,7 +122,7 @@ def change(
     if role is None and cases is None and storage is None and checks is None:
         raise WrongInputError("invalid-parameter", _("nothing to change; `sprag user change --help` lists the options"))
     with users_of(db, as_json) as store:
-        record = store.change_user(user_of(store, name), role, _quota(cases, storage, checks))
+        record = store.people.change_user(user_of(store, name), role, _quota(cases, storage, checks))
     _show(store, record, as_json, _("{name} is changed: {role}", name=record.name, role=record.role))
 
 
@@ -130,7 +130,7 @@ def change(
 def remove(name: Known, db: Database = None, as_json: JsonFlag = False) -> None:
     """Remove a user, whose tokens and sessions end within two seconds; studies and schedules are kept."""
     with users_of(db, as_json) as store:
-        record = store.change_user(user_of(store, name), removed=True)
+        record = store.people.change_user(user_of(store, name), removed=True)
     _show(
         store,
         record,
@@ -143,7 +143,7 @@ def remove(name: Known, db: Database = None, as_json: JsonFlag = False) -> None:
 def restore(name: Known, db: Database = None, as_json: JsonFlag = False) -> None:
     """Let a removed user in again, with the same tokens."""
     with users_of(db, as_json) as store:
-        record = store.change_user(user_of(store, name), removed=False)
+        record = store.people.change_user(user_of(store, name), removed=False)
     _show(store, record, as_json, _("{name} is a user again: {role}", name=record.name, role=record.role))
 
 
@@ -165,7 +165,7 @@ def hand_over(
     """Give the studies and schedules of one user to another."""
     with users_of(db, as_json) as store:
         name, to = user_of(store, name), user_of(store, to, "--to")
-        studies, schedules = store.hand_over(name, to)
+        studies, schedules = store.people.hand_over(name, to)
     if as_json:
         write_json({"database": store.session.location, "studies": studies, "schedules": schedules})
     else:
@@ -188,7 +188,7 @@ def users_of(db: str | None, as_json: bool) -> Iterator[Store]:
 
 
 def _quota(cases: int | None, storage: int | None, checks: int | None) -> Quota:
-    from sprag.service.storage.users import Quota
+    from sprag.service.storage.people import Quota
 
     return Quota(cases, None if storage is None else storage * 2**20, checks)
 

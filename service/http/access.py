@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final
 
 from sprag.sentences import Sentence
 from sprag.service.actor import Actor, Door, Role, share_of
@@ -28,16 +28,15 @@ from sprag.service.languages import N_
 from sprag.service.languages.recorded import TOKEN_EXPIRED, TOKEN_OF_REMOVED_USER, TOKEN_REVOKED
 from sprag.service.logs import REQUEST_ID
 from sprag.service.storage.part import micros_of
+from sprag.service.storage.people import digest_of
 from sprag.service.storage.scopes import MAX_USER_NAME, TokenScope, TokenState
-from sprag.service.storage.sessions import SessionSecrets
-from sprag.service.storage.tokens import TokenRecord, digest_of
-from sprag.service.storage.users import UserRecord
 
 if TYPE_CHECKING:
     from starlette.datastructures import Headers
     from starlette.types import Scope
 
     from sprag.service.settings import Settings
+    from sprag.service.storage.people import People, SessionSecrets, TokenRecord, UserRecord
 
 COOKIE: Final = "sprag_session"
 SESSION_SECONDS: Final = 12 * 3600
@@ -45,28 +44,6 @@ SESSION_SECONDS: Final = 12 * 3600
 BELIEVED_SECONDS: Final = 2.0
 #: Id of the token from the settings.
 _SETTING: Final = "setting"
-
-
-class TokenStore(Protocol):
-    """The required part of the store."""
-
-    def tokens(self) -> tuple[TokenRecord, ...]:
-        """Every token ever created."""
-
-    def users(self) -> tuple[UserRecord, ...]:
-        """Every user, removed ones included."""
-
-    def note_uses(self, uses: Mapping[str, int]) -> None:
-        """Record when tokens were last used."""
-
-    def session_secrets(self) -> SessionSecrets:
-        """The signing key of sessions, and the sessions that were ended early."""
-
-    def create_session_key(self) -> bytes:
-        """The signing key of sessions; created where there is none."""
-
-    def end_session(self, seal: str, ends_at: int) -> None:
-        """Record that a session was ended early."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,18 +100,18 @@ class Access:
     ----------
     settings : Settings
         `token`, `loopback`.
-    store : TokenStore, optional
+    people : People, optional
         Holds further tokens.
     """
 
-    def __init__(self, settings: Settings, store: TokenStore | None = None) -> None:
+    def __init__(self, settings: Settings, people: People | None = None) -> None:
         self._setting = None if settings.token is None else settings.token.get_secret_value().encode("ascii")
         self._always = settings.token is not None or not settings.loopback or bool(settings.user_header)
         self._user_header = settings.user_header
         self._user_role = Role(settings.user_role) if settings.user_role else None
         self.attempts = Attempts(settings.trusted_proxies)
-        self._store = store
-        self._key = secrets.token_bytes(32) if store is None else None
+        self._people = people
+        self._key = secrets.token_bytes(32) if people is None else None
         self._logged_out: dict[str, int] = {}
         self._by_digest: dict[str, TokenRecord] = {}
         self._by_id: dict[str, TokenRecord] = {}
@@ -147,10 +124,10 @@ class Access:
     async def refresh(self) -> None:
         """Read the tokens again when the cache is stale; raises StoreError."""
         now = time.monotonic()
-        if self._store is None or (self._read_at is not None and now - self._read_at < BELIEVED_SECONDS):
+        if self._people is None or (self._read_at is not None and now - self._read_at < BELIEVED_SECONDS):
             return
         if self._reading is None or self._reading.get_loop() is not asyncio.get_running_loop():
-            self._reading = asyncio.ensure_future(self._read_again(self._store))
+            self._reading = asyncio.ensure_future(self._read_again(self._people))
             self._reading.add_done_callback(self._has_read)
         await asyncio.shield(self._reading)
 
@@ -159,10 +136,10 @@ class Access:
         if not reading.cancelled():
             reading.exception()  # the requests that wait for it raise it
 
-    async def _read_again(self, store: TokenStore) -> None:
+    async def _read_again(self, people: People) -> None:
         """Read the tokens, in a thread that nothing else has: every request waits for it."""
         now = time.monotonic()
-        records, users, found = await in_thread(_read, store, threads=Threads.TOKENS)
+        records, users, found = await in_thread(_read, people, threads=Threads.TOKENS)
         self._key = found.key or self._key
         now_seconds = time.time()
         self._logged_out = {
@@ -259,8 +236,8 @@ class Access:
     def note_uses(self) -> None:
         """Write down when tokens were last used; raises StoreError. May run in another thread."""
         uses, self._uses = self._uses, {}
-        if uses and self._store is not None:
-            self._store.note_uses(uses)
+        if uses and self._people is not None:
+            self._people.note_uses(uses)
 
     def _used(self, record: TokenRecord | None) -> Grant | None:
         """The grant of a token that is being used; None where it is not valid."""
@@ -283,8 +260,8 @@ class Access:
 
     async def log_in(self, grant: Grant) -> str:
         """The value of the session cookie for ``grant``; raises StoreError."""
-        if self._key is None and self._store is not None:
-            self._key = await in_thread(self._store.create_session_key)
+        if self._key is None and self._people is not None:
+            self._key = await in_thread(self._people.create_session_key)
         identity = f"{grant.id}.{int(time.time()) + SESSION_SECONDS}"
         return f"{identity}.{self._sealed(identity)}"
 
@@ -295,8 +272,8 @@ class Access:
         identity, _, seal = cookies[COOKIE].rpartition(".")
         end = int(identity.partition(".")[2])
         self._logged_out[seal] = end  # effective here immediately, even if storing it for other hosts fails
-        if self._store is not None:
-            await in_thread(self._store.end_session, seal, end)
+        if self._people is not None:
+            await in_thread(self._people.end_session, seal, end)
 
     def _sealed(self, identity: str) -> str:
         message = identity.encode("utf-8", "replace")
@@ -312,5 +289,5 @@ def token_in(header: str) -> bytes | None:
     return value.strip().encode("utf-8", "replace") if scheme.lower() == "bearer" else None
 
 
-def _read(store: TokenStore) -> tuple[tuple[TokenRecord, ...], tuple[UserRecord, ...], SessionSecrets]:
-    return store.tokens(), store.users(), store.session_secrets()
+def _read(people: People) -> tuple[tuple[TokenRecord, ...], tuple[UserRecord, ...], SessionSecrets]:
+    return people.tokens(), people.users(), people.session_secrets()

@@ -99,9 +99,9 @@ from sprag.service.spec import labels
 from sprag.service.spec import saved_views as view_spec
 from sprag.service.spec.extend import EXTENSION
 from sprag.service.spec.schema.document import spec_schema
+from sprag.service.storage.people import quota_of
 from sprag.service.storage.readiness import Readiness
 from sprag.service.storage.store import Store
-from sprag.service.storage.users import quota_of
 from sprag.worker.chunking import Chunking
 from sprag.worker.limits import (
     COMPUTATION_BYTES,
@@ -250,14 +250,14 @@ def create_app(
     own_store = store is None
     used_store = store or sound_store(settings, chunking(settings))
     try:
-        settings.require_safe(stored=any(token.revoked_at is None for token in used_store.tokens()))
+        settings.require_safe(stored=any(token.revoked_at is None for token in used_store.people.tokens()))
     except UnsafeSettingsError:
         if own_store:
             used_store.close()
         raise
-    used_store.default_quota = quota_of(settings)
-    used_store.restorable = timedelta(days=settings.restore_days)
-    access = Access(settings, used_store)
+    used_store.people.default_quota = quota_of(settings)
+    used_store.studies.restorable = timedelta(days=settings.restore_days)
+    access = Access(settings, used_store.people)
     used_computer, used_checker = computer or _computer(settings), checker or _checker(settings)
     used_writer = writer or checker or _writer()
 

@@ -129,7 +129,7 @@ StudyId = Annotated[str, Path(description="id of the study", pattern=ID_PATTERN,
 
 def study_with(context: Context, study_id: str, case: int) -> Study:
     """The study, when it has that case; ApiError else."""
-    study = context.store.study(study_id)
+    study = context.store.studies.study(study_id)
     if case >= study.cases:
         raise ApiError("case-not-found", f"The cases of this study are 0 .. {study.cases - 1}.")
     return study

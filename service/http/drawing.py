@@ -78,7 +78,7 @@ async def conditional(
     """The answer of ``make``, or 304 when the client has it; it depends on the study's rows and the query."""
 
     def look() -> tuple[str, Callable[[], Response | Drawing]]:
-        record = work.context.store.get_study(study_id)
+        record = work.context.store.studies.get(study_id)
         return tag_of(work.request, record.id, record.revision, form), partial(make, record)
 
     return await unless_known(work, look)

@@ -122,7 +122,7 @@ class StudyCollector(Collector):
             period = min(RATE_SECONDS, max((now - self._began).total_seconds(), 1e-9))
             rate = sum(work.cases for work in self._recent) / period if self._recent else 0.0
         yield GaugeMetricFamily("sprag_cases_per_second", "Cases per second over the last minute.", rate)
-        figures = self._store.figures()
+        figures = self._store.figures.current()
         studies = GaugeMetricFamily("sprag_studies", "Studies by their state.", labels=("state",))
         for state in StudyState:
             studies.add_metric((state.value,), figures.studies.get(state.value, 0))
@@ -150,7 +150,7 @@ class StudyCollector(Collector):
             yield GaugeMetricFamily("sprag_worker_heartbeat_age_seconds", said, age)
 
     def _look(self, now: datetime) -> None:
-        for work in self._store.finished_since(self._since):
+        for work in self._store.figures.finished_since(self._since):
             each = work.seconds / work.cases
             self._counts[bisect.bisect_left(CASE_BOUNDS, each)] += work.cases
             self._cases += work.cases

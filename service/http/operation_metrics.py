@@ -15,14 +15,14 @@ from prometheus_client.registry import Collector
 from sprag.service.jobs.maintenance import backups
 from sprag.service.jobs.nights import why_off
 from sprag.service.schedules.outcomes import Result
-from sprag.service.storage.schedule_runs import RunState
+from sprag.service.storage.runs import RunState
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from sprag.service.http.shares import Shares
     from sprag.service.settings import Settings
-    from sprag.service.storage.schedule_runs import ScheduleRecord
+    from sprag.service.storage.runs import ScheduleRecord
     from sprag.service.storage.store import Store
 
 #: States of workers in the reports of executors.
@@ -68,14 +68,14 @@ class OperationCollector(Collector):
 
     def collect(self) -> Iterator[Metric]:
         """Read the metrics; raises StoreError."""
-        yield from _schedules(self._store.list_schedules(), off=why_off(self._store) is not None)
+        yield from _schedules(self._store.schedules.all(), off=why_off(self._store) is not None)
         yield from self._backup_files()
         yield from self._space()
         lengths = _family("queue_requests", "Requests that wait for a process or are worked on by one.", "queue")
         for queue in self._queues:
             lengths.add_metric((queue.name,), queue.shares.requests)
         yield lengths
-        alive = [record for record in self._store.dispatchers() if not (record.ended_at or record.silent)]
+        alive = [record for record in self._store.dispatchers.all() if not (record.ended_at or record.silent)]
         yield _gauge("dispatchers", "Dispatchers that respond.", len(alive))
         yield from _executors([record.report for record in alive if record.report])
 
@@ -93,7 +93,7 @@ class OperationCollector(Collector):
             yield _gauge("backup_last_timestamp_seconds", "When the latest backup was made.", when.timestamp())
 
     def _space(self) -> Iterator[Metric]:
-        yield _gauge("database_size_bytes", "Size of the database.", self._store.database_bytes())
+        yield _gauge("database_size_bytes", "Size of the database.", self._store.figures.database_bytes())
         free = _family("disk_free_bytes", "Free space on the disk of the database and of the backups.", "disk")
         size = _family("disk_size_bytes", "Size of the disk of the database and of the backups.", "disk")
         for name, folder in self._disks.items():

@@ -9,11 +9,11 @@ from fastapi import Query
 from sprag.service.answers import filled
 from sprag.service.answers.people import QuotaUse, User
 from sprag.service.storage.audit import TIME_ALLOWED
-from sprag.service.storage.users import Quota
+from sprag.service.storage.people import Quota
 
 if TYPE_CHECKING:
+    from sprag.service.storage.people import UserRecord
     from sprag.service.storage.store import Store
-    from sprag.service.storage.users import UserRecord
 
 Since = Annotated[
     str | None, Query(max_length=40, description=f"from then on: {TIME_ALLOWED}", examples=["2027-01-31"])
@@ -26,7 +26,7 @@ Target = Annotated[str | None, Query(max_length=200, description="only changes o
 
 def quota_json(store: Store, name: str, own: Quota) -> QuotaUse:
     """The quotas of a user, and what is used of them."""
-    quota, used = own.over(store.default_quota), store.usage(name)
+    quota, used = own.over(store.people.default_quota), store.people.usage(name)
     return {
         "cases": used.cases,
         "most_cases": quota.cases or None,

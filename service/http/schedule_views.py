@@ -13,7 +13,7 @@ from sprag.service.jobs.nights import outcome_json, why_off
 from sprag.service.schedules.times import local_time
 
 if TYPE_CHECKING:
-    from sprag.service.storage.schedule_runs import RunRecord, ScheduleRecord
+    from sprag.service.storage.runs import RunRecord, ScheduleRecord
     from sprag.service.storage.store import Store
 
 
@@ -25,7 +25,7 @@ def schedule_address(schedule_id: str) -> str:
 def listed(store: Store) -> ScheduleList:
     """Every schedule, newest first, and why none of them runs."""
     off = why_off(store)
-    return {"off": off, "schedules": [_summary(record, off) for record in store.list_schedules()]}
+    return {"off": off, "schedules": [_summary(record, off) for record in store.schedules.all()]}
 
 
 def _summary(record: ScheduleRecord, off: str | None) -> ScheduleSummary:
@@ -47,7 +47,7 @@ def _summary(record: ScheduleRecord, off: str | None) -> ScheduleSummary:
 def detail(store: Store, record: ScheduleRecord) -> ScheduleDetail:
     """A schedule with everything."""
     zone, off = record.fields.timing.zone, why_off(store)
-    runs = [run_json(run, zone) for run in store.schedule_runs(record.id)]
+    runs = [run_json(run, zone) for run in store.schedules.runs(record.id)]
     return {**_summary(record, off), "off": off, "runs": runs, "spec": record.fields.spec}
 
 

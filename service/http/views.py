@@ -81,7 +81,7 @@ def detail(
     kinds: Kinds,
     origins: Sequence[OriginRecord],
 ) -> StudyDetail:
-    """A study with everything; ``record`` and ``progress`` come from one transaction (`Store.look`)."""
+    """A study with everything; ``record`` and ``progress`` come from one transaction (`Studies.look`)."""
     return {
         **summary(record),
         "progress": progress_json(progress, goal_units(study)),

@@ -28,12 +28,12 @@ class Calibrations:
     def of(self, study_id: str) -> Calibration:
         """A calibration; raises StudyNotFoundError, and FaultError for a study that is not one."""
         store = self._store
-        key = (study_id, store.get_study(study_id).revision)
+        key = (study_id, store.studies.get(study_id).revision)
         with self._lock:
             found = self._kept.get(key)
         if found is None:
             found = calibration_of(
-                store.study(study_id), store.rounds(study_id), partial(store.rows_for_cases, study_id)
+                store.studies.study(study_id), store.studies.rounds(study_id), partial(store.rows.for_cases, study_id)
             )
             with self._lock:
                 self._kept[key] = found

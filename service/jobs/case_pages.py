@@ -52,7 +52,7 @@ def case_page(library: Library, study_id: str, query: ExploreQuery, page_token: 
     places = found.order[: query.limit]
     infos = found.infos
     cases = found.rows.cases[places]
-    rows = library.store.rows_for_cases(study_id, cases, [info.name for info in infos])
+    rows = library.store.rows.for_cases(study_id, cases, [info.name for info in infos])
     block = RowBlock(
         infos,
         cases,
@@ -81,7 +81,7 @@ def _numbered(library: Library, study_id: str, query: ExploreQuery, page_token: 
         raise _not_a_token(page_token)
     kinds = (query.ending or None, query.regime or None, query.flag or None)
     # One more than the page, which shows whether there is another page.
-    block = library.store.case_page(study_id, -1 if page_token is None else int(page_token), query.limit + 1, *kinds)
+    block = library.store.rows.page(study_id, -1 if page_token is None else int(page_token), query.limit + 1, *kinds)
     if len(block) <= query.limit:
         return CasePage(block, None, None)
     own = slice(query.limit)

@@ -66,7 +66,7 @@ def preview(library: Library, content: bytes, form: Format, finish: datetime | N
     store = library.store
     parsed = parse_spec(with_start(store, load_spec(content, form)))
     left = None if finish is None else (finish - now).total_seconds()
-    return to_bytes(preview_json(parsed, store.chunking, store.reusable(parsed.study), left))
+    return to_bytes(preview_json(parsed, store.dispatchers.chunking, store.reuse.count(parsed.study), left))
 
 
 def components(content: bytes, form: Format) -> list[Component]:
@@ -104,8 +104,8 @@ def extended_study(
     Raises SpecError and StudyNotFoundError.
     """
     store = library.store
-    study = store.study(study_id)
-    parsed = parse_extended(accepted(store.spec(study_id), study), study, load_spec(content, form))
+    study = store.studies.study(study_id)
+    parsed = parse_extended(accepted(store.studies.spec(study_id), study), study, load_spec(content, form))
     parsed = replace(parsed, warnings=(*warnings, *parsed.warnings))
     return submission(parsed, store, now, finish_by=finish, given=given)
 
@@ -123,10 +123,10 @@ def longer_study(
     There must be at least one. Raises SpecError and StudyNotFoundError.
     """
     store = library.store
-    study = store.study(study_id)
+    study = store.studies.study(study_id)
     named = {"regime" if models.is_settled(study.run) else "flag": kind}
-    cases = store.cases_of_kind(study_id, **named)
-    parsed = parse_spec(longer_spec(accepted(store.spec(study_id), study), study, cases, at_most))
+    cases = store.rows.cases_of_kind(study_id, **named)
+    parsed = parse_spec(longer_spec(accepted(store.studies.spec(study_id), study), study, cases, at_most))
     return submission(parsed, store, now, given=given)
 
 
@@ -143,7 +143,7 @@ def narrowed_study(
     Raises FaultError where there is no jump, SelectionError, SpecError and StudyNotFoundError.
     """
     store = library.store
-    study, record = store.study(study_id), store.get_study(study_id)
+    study, record = store.studies.study(study_id), store.studies.get(study_id)
     if study.sweep is None:
         raise FaultError("wrong-state", "The study is not a sweep: it has no jumps to narrow.")
     if record.done < record.cases:
@@ -151,13 +151,13 @@ def narrowed_study(
     fixed = {axis: index for axis, (_, index) in locate_axes(study, at).items()}
     if swept_axis(study) in fixed:
         raise parameter_error("at", "conflict", "names the swept axis", study.sweep, "values of the other axes")
-    cases = store.cases_of_kind(study_id, flag=models.JUMPED)
+    cases = store.rows.cases_of_kind(study_id, flag=models.JUMPED)
     indices = study.indices(cases)
     for axis, index in fixed.items():
         cases, indices = cases[indices[axis] == index], tuple(one[indices[axis] == index] for one in indices)
     if not cases.size:
         raise FaultError("wrong-state", "No case of the study has the flag jumped" + (" there." if fixed else "."))
-    parsed = parse_spec(narrowed_spec(accepted(store.spec(study_id), study), study, cases, steps, fixed))
+    parsed = parse_spec(narrowed_spec(accepted(store.studies.spec(study_id), study), study, cases, steps, fixed))
     return submission(parsed, store, now, given=given)
 
 

@@ -42,22 +42,22 @@ class Columns:
 
     def of(self, study_id: str, names: Sequence[str]) -> RowColumns:
         """The rows of a study with at least these results; raises StudyNotFoundError."""
-        record = self._store.get_study(study_id)
+        record = self._store.studies.get(study_id)
         if record.finished_at is None or record.done <= LARGE:
             return self._in_memory(record, names)
         key = _key(record)
         found, missing = self._files.read(key, names)
         if found is not None and not missing:
             return found
-        read = self._store.row_columns(study_id, missing)
+        read = self._store.rows.columns(study_id, missing)
         # A study that was run again since has other rows.
-        if self._store.get_study(study_id).finished_at == record.finished_at:
+        if self._store.studies.get(study_id).finished_at == record.finished_at:
             self._files.write(key, read)
         return read if found is None else replace(read, values={**found.values, **read.values})
 
     def waiting(self) -> list[str]:
         """Large ended studies, latest first, whose usual columns have no files yet."""
-        found = self._store.ended_studies(LARGE, _AHEAD)
+        found = self._store.studies.ended(LARGE, _AHEAD)
         return [record.id for record in found if not self._files.has(_key(record))]
 
     def _in_memory(self, record: StudyRecord, names: Sequence[str]) -> RowColumns:
@@ -67,12 +67,12 @@ class Columns:
         missing = [name for name in names if kept is None or name not in kept.values]
         if kept is not None and not missing:
             return kept
-        read = self._store.row_columns(record.id, missing)
+        read = self._store.rows.columns(record.id, missing)
         # Rows that were added between the two readings belong to a later revision.
         if kept is not None and len(read.cases) == len(kept.cases):
             read = replace(read, values={**kept.values, **read.values})
         elif kept is not None:
-            read = self._store.row_columns(record.id, list(names))
+            read = self._store.rows.columns(record.id, list(names))
         with self._lock, suppress(ValueError):  # too large to be kept
             self._kept[key] = read
         return read

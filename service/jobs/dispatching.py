@@ -24,10 +24,10 @@ from sprag.service.logs import LogFormat
 from sprag.service.storage.errors import DatabaseError
 from sprag.service.storage.lock import DispatcherLock
 from sprag.service.storage.part import SILENT_SECONDS, SystemClock
+from sprag.service.storage.people import Quota, quota_of
 from sprag.service.storage.readiness import LOCKED_SECONDS
 from sprag.service.storage.session import file_of
 from sprag.service.storage.store import Store
-from sprag.service.storage.users import Quota, quota_of
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import Dispatcher
@@ -153,7 +153,7 @@ def run_dispatcher(
     chunking = Chunking(settings.chunk_cases, settings.processes, settings.chunk_timeout)
     with Store.open(settings.database_url, chunking=chunking, create=False) as store:
         store.require_sound()
-        store.default_quota = settings.quota
+        store.people.default_quota = settings.quota
         lock = lock_of(store)
         maintenance = Maintenance(store, _possible(store, settings.maintenance, say))
         reports = [Reporter(store, settings.delivery)] if settings.delivery.wanted else []
@@ -172,7 +172,7 @@ def run_dispatcher(
             who = f"{settings.processes} processes" if settings.executor == "pool" else settings.executor
             say(f"worker with {who} is working on {store.session.location}")
             dispatcher = Dispatcher(
-                store,
+                store.work,
                 executor(settings),
                 SystemClock(),
                 owner=owner_name(),
@@ -198,7 +198,7 @@ def lock_of(store: Store) -> DispatcherLock | ServerLock:
     """What makes this process a dispatcher of the database: the lock of its file, or its presence on the server."""
     if not store.session.on_server:
         return DispatcherLock(store.session.path)
-    store.presence = lock = store.session.server_lock(owner_name())
+    store.dispatchers.presence = lock = store.session.server_lock(owner_name())
     return lock
 
 
@@ -209,7 +209,7 @@ def _end_silent(store: Store, lock: ServerLock, say: Callable[[str], None]) -> N
     now = store.clock.now()
     silent = [
         record
-        for record in store.dispatchers()
+        for record in store.dispatchers.all()
         if record.ended_at is None and (now - record.heartbeat_at).total_seconds() > HUNG_SECONDS
     ]
     lock.end([record.epoch for record in silent])
@@ -228,7 +228,7 @@ def _stand_by(
     while not lock.take():
         if stopping():
             return False
-        if not reported and (silence := store.silence() or 0.0) > SILENT_SECONDS:
+        if not reported and (silence := store.dispatchers.silence() or 0.0) > SILENT_SECONDS:
             reported = True
             say(
                 f"process {lock.holder()} has not responded for {silence:.0f} s; stop it, or continue without it: "
@@ -243,7 +243,7 @@ def _take_over(store: Store, lock: DispatcherLock, say: Callable[[str], None]) -
     if lock.take():
         return
     holder = lock.holder()
-    hung = (store.silence() or 0.0) > HUNG_SECONDS or not store.session.can_write(LOCKED_SECONDS)
+    hung = (store.dispatchers.silence() or 0.0) > HUNG_SECONDS or not store.session.can_write(LOCKED_SECONDS)
     if hung and lock.end_holder():
         say(f"process {holder} hung and was ended")
     lock.seize()

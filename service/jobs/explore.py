@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
 def read_ahead(library: Library, study_id: str) -> None:
     """Read the columns that people see first; raises StudyNotFoundError."""
-    study = library.store.study(study_id)
+    study = library.store.studies.study(study_id)
     library.columns.of(study_id, plan_of(study, ExploreQuery()).results)
 
 
 def explored(library: Library, study_id: str, query: ExploreQuery) -> Explored:
     """The cases that a question selects; raises StudyNotFoundError, and SelectionError as `plan_of` does."""
-    study = library.store.study(study_id)
+    study = library.store.studies.study(study_id)
     plan = plan_of(study, query)
     return explore(study, plan, library.columns.of(study_id, plan.results))
 
@@ -34,6 +34,6 @@ def selection_spec(library: Library, study_id: str, query: ExploreQuery) -> dict
     if not cases:
         raise refused("where", "empty", "no case is selected")
     try:
-        return points_spec(accepted(library.store.spec(study_id), found.study), found.study, cases)
+        return points_spec(accepted(library.store.studies.spec(study_id), found.study), found.study, cases)
     except ValueError as error:
         raise refused("study", "nothing-varies", "no parameter of this study varies") from error

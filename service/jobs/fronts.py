@@ -36,12 +36,12 @@ class Fronts:
     def of(self, study_id: str, *, exact: bool) -> Designs:
         """The designs of a study; raises StudyNotFoundError, and FaultError for a study without a goal."""
         store = self._store
-        key = (study_id, store.get_study(study_id).revision, exact)
+        key = (study_id, store.studies.get(study_id).revision, exact)
         with self._lock:
             found = self._kept.get(key)
         if found is None:
-            fetch = partial(store.rows_for_cases, study_id)
-            found = designs_of(store.study(study_id), store.rounds(study_id), fetch, exact=exact)
+            fetch = partial(store.rows.for_cases, study_id)
+            found = designs_of(store.studies.study(study_id), store.studies.rounds(study_id), fetch, exact=exact)
             with self._lock, suppress(ValueError):  # too large to be kept
                 self._kept[key] = found
         return found

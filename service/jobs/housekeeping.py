@@ -46,10 +46,10 @@ class Scrubbing:
             self._next = now + REST_TIMES * (now - began)
 
     def _look(self) -> None:
-        found = self._store.with_rows_after(self._last)
+        found = self._store.digests.with_rows_after(self._last)
         self._last = 0 if found is None else found[0]
-        if found is not None and not self._store.run_damaged_again(found[1]):
-            self._store.count_endings_again(found[1])
+        if found is not None and not self._store.digests.run_damaged_again(found[1]):
+            self._store.digests.count_endings_again(found[1])
 
 
 class Housekeeping(threading.Thread):
@@ -72,7 +72,7 @@ class Housekeeping(threading.Thread):
         self.purge()
         self.add_keys()
         while not self._ending.is_set():
-            deleted = self._store.deleted.wait(LOOK_SECONDS)
+            deleted = self._store.studies.deleted.wait(LOOK_SECONDS)
             self._do_also()
             if self._ending.is_set():
                 return
@@ -83,17 +83,17 @@ class Housekeeping(threading.Thread):
     def stop(self) -> None:
         """Stop the thread; returns when it has ended, after the current step."""
         self._ending.set()
-        self._store.deleted.set()
+        self._store.studies.deleted.set()
         if self.is_alive():
             self.join()
 
     def purge(self) -> None:
         """Remove deleted studies; after each step, leave the database to others for as long as the step took."""
-        self._store.deleted.clear()
+        self._store.studies.deleted.clear()
         self._failed = False
         try:
             began = time.monotonic()
-            for _ in self._store.purge_steps():
+            for _ in self._store.purging.steps():
                 if self._ending.wait(time.monotonic() - began):
                     return
                 began = time.monotonic()
@@ -105,7 +105,7 @@ class Housekeeping(threading.Thread):
         """Give keys of their cases to studies that have none yet, in turns with other writers."""
         try:
             began = time.monotonic()
-            for _ in self._store.key_steps():
+            for _ in self._store.reuse.key_steps():
                 if self._ending.wait(time.monotonic() - began):
                     return
                 began = time.monotonic()

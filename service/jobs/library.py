@@ -34,7 +34,10 @@ class Library:
         self.unaffected = Unaffected()
 
     def __reduce__(self) -> tuple[Callable[[str, Chunking], Library], tuple[str, Chunking]]:
-        return _library, (self.store.session.url.render_as_string(hide_password=False), self.store.base_chunking)
+        return _library, (
+            self.store.session.url.render_as_string(hide_password=False),
+            self.store.dispatchers.base_chunking,
+        )
 
 
 @lru_cache(maxsize=1)

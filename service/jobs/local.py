@@ -101,7 +101,7 @@ def run_here(
     with tempfile.TemporaryDirectory(prefix=_FOLDER_PREFIX) as folder, marked(Path(folder)), _noted() as interrupted:
         url = database_url or f"sqlite:///{Path(folder) / 'run.sqlite3'}"
         with Store.open(url, chunking=Chunking(chunk_cases, max(processes, 1), chunk_timeout)) as store:
-            record = store.create_study(spec, study, warnings=warnings, fresh=fresh, finish_by=finish_by)
+            record = store.studies.create(spec, study, warnings=warnings, fresh=fresh, finish_by=finish_by)
             settings = WorkerSettings(url, processes, chunk_timeout, executor=setting)
             watch = _Watch(store, record.id, on_progress, interrupted)
             lock = lock_of(store)
@@ -113,7 +113,7 @@ def run_here(
                         renew = None if executor or not processes else partial(renewed_pool, settings)
                         news = store.session.news()
                         Dispatcher(
-                            store, runner, SystemClock(), owner=owner, only=record.number, renew=renew, news=news
+                            store.work, runner, SystemClock(), owner=owner, only=record.number, renew=renew, news=news
                         ).run(watch.ended)
                     else:
                         time.sleep(STANDBY_SECONDS)
@@ -166,10 +166,10 @@ def pool_size(study: Study, most: int, *, asked: bool) -> int:
 def _cancelled(store: Store, study_id: str, *, ours: bool) -> StudyRecord:
     """Cancel the study unless it has ended; ``ours``: no other dispatcher is there to end it."""
     with suppress(TransitionError):
-        record = store.cancel_study(study_id)
+        record = store.studies.cancel(study_id)
         if ours:
-            store.settle(store.take_over(owner_name()), record.number)
-    return store.get_study(study_id)
+            store.work.settle(store.work.take_over(owner_name()), record.number)
+    return store.studies.get(study_id)
 
 
 class _Watch:
@@ -190,9 +190,9 @@ class _Watch:
             raise KeyboardInterrupt
         now = time.monotonic()
         if self._report is not None and now >= self._next_report:
-            self._report(self._store.progress(self._id))
+            self._report(self._store.studies.progress(self._id))
             self._next_report = now + REPORT_SECONDS
-        state = self._store.get_study(self._id).state
+        state = self._store.studies.get(self._id).state
         return state.terminal or state is StudyState.PAUSED
 
     def final(self, *, passing: bool) -> StudyRecord:
@@ -200,9 +200,9 @@ class _Watch:
 
         Nothing resumes by itself here, unlike in a service.
         """
-        record = self._store.get_study(self._id)
+        record = self._store.studies.get(self._id)
         if self._report is not None:
-            self._report(self._store.progress(self._id))
+            self._report(self._store.studies.progress(self._id))
         if not record.over:
             raise StudyHeldError(f"the study was held: {_why_held(record, passing=passing)}")
         return record

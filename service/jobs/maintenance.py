@@ -164,17 +164,17 @@ class Maintenance(threading.Thread):
     def _prune(self, now: datetime, _due: datetime, believed: bool) -> bool:
         if not believed:
             return False
-        gone = self._store.prune(now - timedelta(days=self._plan.study_days))
+        gone = self._store.purging.prune(now - timedelta(days=self._plan.study_days))
         if gone:
             _LOG.info("Deleted studies that ended more than %d days ago: %s.", self._plan.study_days, ", ".join(gone))
         return True
 
     def _prune_audit(self, now: datetime, _due: datetime, believed: bool) -> bool:
         if believed:
-            self._store.prune_audit(now - timedelta(days=self._plan.audit_days))
+            self._store.audit.prune(now - timedelta(days=self._plan.audit_days))
         return believed
 
     def _prune_reports(self, now: datetime, _due: datetime, believed: bool) -> bool:
         if believed:
-            self._store.prune_reports(now - REPORTS_KEPT)
+            self._store.reports.prune(now - REPORTS_KEPT)
         return believed

@@ -21,8 +21,8 @@ from sprag.worker import models
 if TYPE_CHECKING:
     from sprag.service.schedules.outcomes import Outcome
     from sprag.service.storage.reports import ReportRecord
-    from sprag.service.storage.run_outcomes import EndedRun
-    from sprag.service.storage.run_outcomes import NightRun as Run
+    from sprag.service.storage.runs import EndedRun
+    from sprag.service.storage.runs import NightRun as Run
     from sprag.service.storage.store import Store
 
 #: Hours that are looked back on by default, and at most.
@@ -42,8 +42,8 @@ def whole_outcome(store: Store, run: EndedRun | Run) -> Outcome:
     if outcome.study is None or not outcome.result.final or outcome.flags is not None:
         return outcome
     try:
-        study, progress = store.look(outcome.study)
-        kinds = store.kinds(outcome.study)
+        study, progress = store.studies.look(outcome.study)
+        kinds = store.rows.kinds(outcome.study)
     except StudyNotFoundError:  # it was deleted in the meantime
         return outcome
     usual = usual_flags(study.model)
@@ -63,7 +63,7 @@ def whole_outcome(store: Store, run: EndedRun | Run) -> Outcome:
 
 def conclude_runs(store: Store) -> int:
     """Keep the outcomes of the due times that are over by now; returns how many."""
-    return sum(store.conclude_run(run, whole_outcome(store, run)) for run in store.ended_runs())
+    return sum(store.runs.conclude(run, whole_outcome(store, run)) for run in store.runs.ended())
 
 
 def outcome_json(outcome: Outcome) -> RunOutcome:
@@ -79,14 +79,14 @@ def report_json(report: ReportRecord) -> SentReport:
 
 def why_off(store: Store) -> str | None:
     """Why no schedule runs: the database is a copy; None where they run."""
-    return Sentence(recorded.COPY) if store.has_schedules() and store.is_copy() else None
+    return Sentence(recorded.COPY) if store.schedules.any() and store.deployment.is_copy() else None
 
 
 def night(store: Store, hours: float = HOURS) -> Night:
     """The due times of the last ``hours``: first those that need attention, each group latest first."""
     until = store.clock.now()
     since = until - timedelta(hours=hours)
-    found, sent = store.runs_between(since, until, MOST_RUNS), store.reports_between(since, until)
+    found, sent = store.runs.between(since, until, MOST_RUNS), store.reports.between(since, until)
     # Those that ended a moment ago, or were changed since, have not been counted yet.
     found = [replace(run, outcome=whole_outcome(store, run)) for run in found]
     runs = [

@@ -12,4 +12,4 @@ if TYPE_CHECKING:
 
 def reading_of(store: Store, study_id: str, choice: Choice) -> Reading:
     """The reading of a choice; raises StudyNotFoundError, and SelectionError for units that cannot be shown."""
-    return reading_for(store.study(study_id), store.spec(study_id), choice)
+    return reading_for(store.studies.study(study_id), store.studies.spec(study_id), choice)

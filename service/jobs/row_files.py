@@ -24,7 +24,7 @@ def pieces(library: Library, study_id: str, form: Format, units: str, header: He
     Raises StoreError, SelectionError, and FaultError "storage-full".
     """
     store = library.store
-    record, study = store.get_study(study_id), store.study(study_id)
+    record, study = store.studies.get(study_id), store.studies.study(study_id)
     return export(stored(store, record, study, units, header), form, Path(folder) if folder else None)
 
 

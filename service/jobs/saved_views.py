@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 def save_view(store: Store, view: View) -> SavedView:
     """Save a view; raises as the store does, and SelectionError for a figure that the study does not have."""
     if view.in_report and view.study is not None:
-        require_figure(store.study(view.study), view)
-    return store.save_view(view)
+        require_figure(store.studies.study(view.study), view)
+    return store.views.save(view)
 
 
 def change_view(store: Store, view_id: str, change: ViewChange, read: Collection[str] | None = None) -> SavedView:
     """Change a view; raises as the store does, and SelectionError for a figure that the study does not have."""
-    old = store.saved_view(view_id).view
+    old = store.views.get(view_id).view
     in_report = change.place is not None or (old.in_report if change.in_report is None else change.in_report)
     if in_report and old.study is not None and not (old.in_report and change.query is None):
         query = old.query if change.query is None else change.query
-        require_figure(store.study(old.study), replace(old, query=query))
-    return store.change_view(view_id, change, read)
+        require_figure(store.studies.study(old.study), replace(old, query=query))
+    return store.views.change(view_id, change, read)

@@ -26,9 +26,9 @@ from sprag.worker.states import TransitionError
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from sprag.service.storage.schedule_runs import OpenRun, ScheduleRecord
+    from sprag.service.storage.runs import OpenRun, ScheduleRecord
+    from sprag.service.storage.schedules import BoundStudy
     from sprag.service.storage.store import Store
-    from sprag.service.storage.windows import BoundStudy
     from sprag.worker.study import Study
 
 _LOG = logging.getLogger("sprag.schedules")
@@ -57,32 +57,32 @@ class Scheduler(PollingThread):
 
     def look(self) -> None:
         """One check: submit what is due, apply the windows, and keep the outcomes of what is over."""
-        if not self._store.has_schedules():  # as in most databases; then one question each second, instead of five
+        if not self._store.schedules.any():  # as in most databases; then one question each second, instead of five
             return
         if self._is_off():
             return
         now = self._store.clock.now()
         if self._store.clock.monotonic() >= self._next_recovery:
             self._next_recovery = self._store.clock.monotonic() + RECOVERY_SECONDS
-            for schedule in self._store.recover_schedules(now):
+            for schedule in self._store.schedules.recover(now):
                 _LOG.warning("The clock was put back: the schedule %s is due at its next time again.", schedule)
-        for record in self._store.due_schedules(now):
+        for record in self._store.schedules.due(now):
             with act_as(_actor(record.id, record.owner)):
                 self._take(record)
-        for run in self._store.open_runs():
+        for run in self._store.runs.open():
             with act_as(_actor(run.id, run.owner)):
                 if _is_over(run, now):
                     self._give_up(run)
                 elif self._store.clock.monotonic() >= self._next_try.get((run.schedule, run.due), 0.0):
                     self._submit(run)
-        for study in self._store.bound_studies():
+        for study in self._store.schedules.bound_studies():
             with act_as(_actor(study.schedule)):
                 self._apply_window(study, now)
         conclude_runs(self._store)
 
     def _is_off(self) -> bool:
         """Whether this database is a copy of the deployment; its log gets a line whenever that changes."""
-        off = not self._store.is_deployment()
+        off = not self._store.deployment.is_deployment()
         if off and not self._off:
             _LOG.warning("%s", recorded.COPY)
         elif self._off and not off:
@@ -93,18 +93,18 @@ class Scheduler(PollingThread):
     def _apply_window(self, study: BoundStudy, now: datetime) -> None:
         if study.window is None or study.window.open_at(now):
             if study.held:
-                self._store.let_in(study.number)
+                self._store.schedules.let_in(study.number)
             return
         reason = Sentence(recorded.OUTSIDE_WINDOW, window=study.window.sentence)
         if study.state.going or (study.held and study.reason != reason):
-            self._store.hold_for_window(study.number, reason)
+            self._store.schedules.hold_for_window(study.number, reason)
 
     def _take(self, record: ScheduleRecord) -> None:
         """Take up the due times that its policies select; the other missed ones are only counted."""
         now, fields = self._store.clock.now(), record.fields
         assert record.next_due is not None
         dues = due_times(fields.timing, fields.policies, record.next_due, now)
-        if not self._store.take_due(record, dues, fields.next_due(now), now):
+        if not self._store.runs.take_due(record, dues, fields.next_due(now), now):
             return
         missed = dues[0].missed + sum(each.too_late for each in dues)
         if missed:
@@ -115,7 +115,7 @@ class Scheduler(PollingThread):
         self._next_try[run.schedule, run.due] = self._store.clock.monotonic() + RETRY_SECONDS
         if run.problem is None:
             _LOG.warning("The schedule %s was due, but its study is not submitted yet: %s", run.id, problem)
-        self._store.put_off_run(run, problem)
+        self._store.runs.put_off(run, problem)
 
     def _submit(self, run: OpenRun) -> None:
         from dataclasses import replace
@@ -152,25 +152,25 @@ class Scheduler(PollingThread):
 
     def _latest(self, run: OpenRun) -> Study | None:
         """The study of the last due time of that schedule that has one."""
-        study_id = self._store.latest_study(run)
+        study_id = self._store.runs.latest_study(run)
         try:
-            return None if study_id is None else self._store.study(study_id)
+            return None if study_id is None else self._store.studies.study(study_id)
         except StudyNotFoundError:  # deleted in the meantime
             return None
 
     def _may_overlap(self, run: OpenRun) -> bool:
         """Apply the policy for earlier studies that have not ended; False where the run is skipped."""
         overlap = run.fields.policies.overlap
-        earlier = [] if overlap is Overlap.QUEUE else self._store.earlier_studies(run)
+        earlier = [] if overlap is Overlap.QUEUE else self._store.runs.earlier_studies(run)
         if earlier and overlap is Overlap.SKIP:
             _LOG.warning("The schedule %s was due and is skipped: study %s has not ended.", run.id, earlier[-1])
             self._next_try.pop((run.schedule, run.due), None)
-            self._store.close_run(run, Sentence(recorded.EARLIER, study=earlier[-1]), skipped=True)
+            self._store.runs.close(run, Sentence(recorded.EARLIER, study=earlier[-1]), skipped=True)
             return False
         for study in earlier:
             _LOG.warning("The schedule %s was due: its earlier study %s is cancelled.", run.id, study)
             with suppress(StudyNotFoundError, TransitionError):  # it was deleted, or ended, in the meantime
-                self._store.cancel_study(study)
+                self._store.studies.cancel(study)
         return True
 
     def _give_up(self, run: OpenRun) -> None:
@@ -187,7 +187,7 @@ class Scheduler(PollingThread):
     def _refuse(self, run: OpenRun, problem: str) -> None:
         _LOG.error("The schedule %s was due, but its study was not submitted: %s", run.id, problem)
         self._next_try.pop((run.schedule, run.due), None)
-        self._store.close_run(run, problem)
+        self._store.runs.close(run, problem)
 
 
 def _actor(schedule_id: str, owner: str | None = None) -> Actor:

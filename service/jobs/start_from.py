@@ -62,7 +62,7 @@ def _source(report: Report, store: Store, data: object, spec: Mapping[str, Any])
     try:
         if not isinstance(study_id, str):
             raise StudyNotFoundError(str(study_id))
-        study = store.study(study_id)
+        study = store.studies.study(study_id)
     except StudyNotFoundError:
         report.fault(f"{_POINTER}/study", "unknown-name", "is not a study of this service", study_id, allowed="its id")
         return None

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from sprag.service.spec.document import ParsedSpec
     from sprag.service.storage.records import StudyRecord
-    from sprag.service.storage.schedule_runs import OpenRun
+    from sprag.service.storage.runs import OpenRun
     from sprag.service.storage.store import Store
 
 
@@ -69,14 +69,14 @@ def submission(
     deadline "8 h" is a different time in each request.
     """
     asked = [parsed.spec, dict(given)] if given else parsed.spec
-    warnings = (*parsed.warnings, *store.chunking.warnings(parsed.study))
+    warnings = (*parsed.warnings, *store.dispatchers.chunking.warnings(parsed.study))
     if finish_by is not None:
-        to_run = most_cases(parsed.study) - (0 if fresh else store.reusable(parsed.study))
-        seconds = estimated_seconds(parsed.study, store.chunking, to_run)
+        to_run = most_cases(parsed.study) - (0 if fresh else store.reuse.count(parsed.study))
+        seconds = estimated_seconds(parsed.study, store.dispatchers.chunking, to_run)
         warnings += finish_warnings(parsed.study, seconds, (finish_by - now).total_seconds())
     size = estimated_bytes(parsed.study)
     return Submission(
-        {**study_row(parsed.spec, parsed.study, store.chunking, warnings), "estimated_bytes": size},
+        {**study_row(parsed.spec, parsed.study, store.dispatchers.chunking, warnings), "estimated_bytes": size},
         hash_of(asked),
         size,
         fresh,
@@ -108,11 +108,11 @@ def take_in(
 
     It is the study of ``run``, the due time of a schedule: RunClosedError where this has an outcome by now.
     """
-    known = store.study_of_key(idempotency_key, made.body_hash) if idempotency_key else None
+    known = store.studies.of_key(idempotency_key, made.body_hash) if idempotency_key else None
     if known is not None:
         return known
     _require_room(store, made.bytes)
-    return store.insert_study(
+    return store.studies.insert(
         made.row,
         idempotency_key=idempotency_key,
         body_hash=made.body_hash,
@@ -126,7 +126,7 @@ def take_in(
 
 def _require_room(store: Store, needed: int) -> None:
     """Refuse a study whose results would not fit on the disk."""
-    left = max(store.room() - RESERVE_BYTES, 0)
+    left = max(store.room.left() - RESERVE_BYTES, 0)
     if needed > left:
         raise FaultError(
             "storage-full",

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def worker_list(store: Store) -> WorkerList:
     """The dispatchers and their workers, as they last reported them."""
-    found = [_dispatcher(record) for record in store.dispatchers()]
+    found = [_dispatcher(record) for record in store.dispatchers.all()]
     return {
         "usable": sum(item["usable"] for item in found),
         "chunks_in_flight": sum(item["chunks_in_flight"] for item in found if not (item["ended_at"] or item["silent"])),

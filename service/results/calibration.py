@@ -91,7 +91,7 @@ def calibration_of(study: Study, rounds: list[RoundRecord], fetch: Fetch) -> Cal
     Parameters
     ----------
     rounds : list of RoundRecord
-        As `Store.rounds` gives them.
+        As `Studies.rounds` gives them.
     fetch : callable
         Gives rows by numbers of cases and names of results.
     """

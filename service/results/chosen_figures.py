@@ -67,7 +67,7 @@ def chosen_figures(store: Store, study_id: str, choice: Choice) -> tuple[ChosenF
     Raises StudyNotFoundError. A figure that cannot be drawn says why.
     """
     found = []
-    for saved in store.saved_views(study_id):
+    for saved in store.views.all(study_id):
         if saved.place is not None:
             try:
                 found.append(_drawn(store, study_id, saved.view, choice))
@@ -93,9 +93,9 @@ def figure_query(study: Study, view: View) -> CurveQuery | MapQuery:
 
 
 def _drawn(store: Store, study_id: str, view: View, choice: Choice) -> ChosenFigure:
-    study, given = store.study(study_id), Address(view.query)
+    study, given = store.studies.study(study_id), Address(view.query)
     own = Choice(given.get("units") or choice.units, given.get("names") or choice.names)
-    reading = reading_for(study, store.spec(study_id), own)
+    reading = reading_for(study, store.studies.spec(study_id), own)
     query = figure_query(study, view)
     if isinstance(query, MapQuery):
         shown = read_map(stored_map(store, study_id, CurveQuery(query.x, (query.z,), (query.y,), query.at)), reading)

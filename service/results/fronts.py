@@ -117,7 +117,7 @@ def designs_of(study: Study, rounds: list[RoundRecord], fetch: Fetch, *, exact: 
     Parameters
     ----------
     rounds : list of RoundRecord
-        As `Store.rounds` gives them.
+        As `Studies.rounds` gives them.
     fetch : callable
         Gives rows by numbers of cases and names of results.
     exact : bool

@@ -21,14 +21,14 @@ _MOST_FURTHER: Final = 4
 
 def stored_curves(store: Store, study_id: str, query: CurveQuery) -> Curves:
     """The curves of a study; raises StudyNotFoundError, and SelectionError as `select` does."""
-    study = store.study(study_id)
+    study = store.studies.study(study_id)
     selection = select(study, models.study_results(study), query)
-    return draw(selection, partial(store.rows_for_cases, study_id, number=query.number))
+    return draw(selection, partial(store.rows.for_cases, study_id, number=query.number))
 
 
 def drawn_curves(store: Store, study_id: str, query: CurveQuery) -> Curves:
     """The same for a picture: with the other motions of cases that have several, where the most frequent are drawn."""
-    curves, study = stored_curves(store, study_id, query), store.study(study_id)
+    curves, study = stored_curves(store, study_id, query), store.studies.study(study_id)
     further: list[Curve] = []
     if query.number == 0 and models.numbered_by(study.model, models.variant_of(study)) is not None:
         for number in range(1, _MOST_FURTHER + 1):
@@ -42,6 +42,6 @@ def drawn_curves(store: Store, study_id: str, query: CurveQuery) -> Curves:
 
 def stored_map(store: Store, study_id: str, query: CurveQuery) -> Map:
     """The map of the one result of ``query`` over its x and its one axis of by; raises as `stored_curves` does."""
-    study = store.study(study_id)
-    fetch = partial(store.rows_for_cases, study_id, number=query.number)
+    study = store.studies.study(study_id)
+    fetch = partial(store.rows.for_cases, study_id, number=query.number)
     return draw_map(study, models.study_results(study), query.x, query.by[0], query.y[0], query.at, fetch)

@@ -131,4 +131,4 @@ class Unaffected:
         attrgetter("_found"), key=lambda _self, _store, record: (record.id, record.revision), lock=attrgetter("_lock")
     )
     def _of(self, store: Store, record: StudyRecord) -> tuple[str, ...]:
-        return unaffected(store.study(record.id), partial(store.rows_for_cases, record.id))
+        return unaffected(store.studies.study(record.id), partial(store.rows.for_cases, record.id))

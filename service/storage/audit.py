@@ -134,12 +134,12 @@ def by_sender(column: sa.ColumnElement[str]) -> sa.ColumnElement[bool]:
 class Audit(Part):
     """The audit log of a database."""
 
-    def note_change(self, action: str, target: str, /, **detail: Any) -> None:
+    def note(self, action: str, target: str, /, **detail: Any) -> None:
         """Write a row about a change that is not one of the database's own."""
         with self.session.write() as connection:
             note(connection, self._now(), action, target, **detail)
 
-    def audit_log(self, wanted: AuditFilter, page_size: int = 100, page_token: str | None = None) -> AuditPage:
+    def page(self, wanted: AuditFilter, page_size: int = 100, page_token: str | None = None) -> AuditPage:
         """A page of the log, latest first; raises PageTokenError."""
         query = sa.select(AUDIT_LOG).where(*wanted.conditions())
         if page_token is not None:
@@ -151,7 +151,7 @@ class Audit(Part):
         found = tuple(map(_audit_record, rows[:page_size]))
         return AuditPage(found, str(found[-1].number) if len(rows) > page_size else None)
 
-    def audit_rows(self, wanted: AuditFilter) -> Iterator[AuditRecord]:
+    def rows(self, wanted: AuditFilter) -> Iterator[AuditRecord]:
         """All rows of the log, earliest first, read in blocks."""
         last = 0
         query = sa.select(AUDIT_LOG).where(*wanted.conditions()).order_by(_A.number).limit(_BLOCK)
@@ -163,7 +163,7 @@ class Audit(Part):
                 return
             last = rows[-1].number
 
-    def prune_audit(self, before: datetime) -> int:
+    def prune(self, before: datetime) -> int:
         """Delete the rows from before ``before``; returns their number, of which the log keeps a row itself."""
         with self.session.write() as connection:
             gone = connection.execute(sa.delete(AUDIT_LOG).where(_A.at < micros_of(before))).rowcount

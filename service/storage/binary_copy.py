@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from sprag.service.storage.rows import Block, Target
+    from sprag.service.storage.blocks import Block, Target
 
 #: Signature, flags (none) and the length of the extension of the header (none).
 HEADER: Final = b"PGCOPY\n\xff\r\n\0" + struct.pack(">ii", 0, 0)

@@ -1,7 +1,7 @@
 """The keys of the cases of studies: equal cases of other studies are found by them, however many studies there are.
 
 They are stored with the study and its rounds, not with the rows. Studies of before revision 0035 get theirs from
-`CaseKeys.key_steps`; until then, and for studies with very many cases, the studies themselves are compared.
+`Reuse.key_steps`; until then, and for studies with very many cases, the studies themselves are compared.
 """
 
 from __future__ import annotations
@@ -12,17 +12,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import sqlalchemy as sa
 
-from sprag.service.storage.part import MAX_INTEGER, Part
-from sprag.service.storage.reserve import makes_room
-from sprag.service.storage.tables import CASE_KEYS, STUDIES
-from sprag.worker import fingerprint, models
+from sprag.service.storage.part import MAX_INTEGER
+from sprag.worker import fingerprint
 from sprag.worker.case_keys import case_keys
-from sprag.worker.study import Study
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from numpy.typing import NDArray
+
+    from sprag.worker.study import Study
 
     Numbers = NDArray[np.int64]
 
@@ -89,48 +86,3 @@ def newest_with(connection: sa.Connection, keys: Numbers, below: Numbers, own: i
 def any_below(size: int) -> Numbers:
     """The bounds of `newest_with` that allow every study."""
     return np.full(size, MAX_INTEGER, dtype=np.int64)
-
-
-class CaseKeys(Part):
-    """Keys of studies that have none yet, and of those that are removed."""
-
-    def key_steps(self) -> Iterator[int]:
-        """Give keys to the studies of before revision 0035, one in each transaction; yields their numbers.
-
-        Studies of other versions of the engine share no case with any that is still submitted.
-        """
-        c = STUDIES.c
-        without = (c.keyed == NOT_YET) & (c.engine_version == models.ENGINE_VERSION)
-        with self.session.read() as connection:
-            numbers = list(connection.execute(sa.select(c.number).where(without).order_by(c.number.desc())).scalars())
-        for number in numbers:
-            with self.session.write() as connection:
-                row = connection.execute(
-                    sa.select(c.study, c.kin_hash).where(c.number == number, without)
-                ).one_or_none()
-                if row is not None:
-                    keys = keys_of(Study.from_text(row.study), row.kin_hash)
-                    if keys is not None:
-                        add_keys(connection, number, keys)
-                    keyed = TOO_MANY if keys is None else KEYED
-                    connection.execute(sa.update(STUDIES).where(c.number == number).values(keyed=keyed))
-            yield number
-
-    def _keys(self, number: int) -> list[int]:
-        """The keys that a study has."""
-        c = STUDIES.c
-        with self.session.read() as connection:
-            query = sa.select(c.study, c.kin_hash).where(c.number == number, c.keyed == KEYED)
-            row = connection.execute(query).one_or_none()
-        return [] if row is None else sorted(case_keys(Study.from_text(row.study), row.kin_hash).tolist())
-
-    @makes_room
-    def _delete_keys(self, keys: list[int], number: int, rows: int) -> tuple[int, bool]:
-        """Delete about that many of the ``keys`` of a study, which then keeps the others: how many, and whether any are
-        left.
-        """
-        with self.session.write() as connection:
-            mine = CASE_KEYS.c.key.in_(keys[:rows]) & (CASE_KEYS.c.study == number)
-            deleted = connection.execute(sa.delete(CASE_KEYS).where(mine)).rowcount
-        del keys[:rows]
-        return deleted, bool(keys)

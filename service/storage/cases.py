@@ -1,4 +1,4 @@
-"""Reading results: pages, streams and columns of cases."""
+"""Rows of results: pages, streams and columns of cases, and where they come from."""
 
 from __future__ import annotations
 
@@ -12,8 +12,11 @@ import numpy as np
 import sqlalchemy as sa
 from cachetools import LRUCache
 
-from sprag.service.storage.order import Orders
-from sprag.service.storage.part import MAX_INTEGER
+from sprag.service.storage.columns import RowColumns, as_number, conditions, records
+from sprag.service.storage.digests import LOOKED_OVER
+from sprag.service.storage.fingerprints import differences_of
+from sprag.service.storage.origins import CasesOf, Origin
+from sprag.service.storage.part import MAX_INTEGER, Part, row_of
 from sprag.service.storage.records import CaseColumns, CaseRow, Kinds, RowBlock
 from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES, further_table, results_table
 from sprag.worker import models
@@ -26,13 +29,15 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from sprag.service.storage.digests import Digests
+    from sprag.service.storage.order import Orders
     from sprag.service.storage.session import Session
     from sprag.worker.ports import Clock
 
-#: Most cases listed in one statement.
-CASES_AT_ONCE = 5_000
 #: Rows of one block of a stream.
 BLOCK_ROWS = 2_000
+#: Rows of a column that are read at once.
+_COLUMN_ROWS: Final = 20_000
 #: Studies whose counts of regimes and flags are kept.
 _MOST_COUNTED = 256
 _NO_CASES: Final = np.empty(0, dtype=np.int64)
@@ -52,6 +57,20 @@ class _Rows:
     numbered: str | None = None
 
 
+def _rows(connection: sa.Connection, study_id: str) -> _Rows:
+    c = STUDIES.c
+    row = row_of(connection, study_id, c.number, c.model, c.variant, c.cases, c.state)
+    return _Rows(
+        row.number,
+        results_table(row.model, row.variant),
+        models.result_infos(row.model, row.variant),
+        row.cases,
+        row.state == StudyState.CANCELLED.value,
+        further_table(row.model, row.variant),
+        models.numbered_by(row.model, row.variant),
+    )
+
+
 #: A finished chunk: its range of places, and when it finished.
 _Done = tuple[int, int, int]
 
@@ -66,37 +85,30 @@ class _Counted:
     chunks: frozenset[_Done] = frozenset()
 
 
-class Cases(Orders):
-    """Rows of finished cases, and the cases that a cancelled study never ran, which have no rows in the database."""
+class Rows(Part):
+    """Rows of finished cases, and the cases that a cancelled study never ran, which have no rows in the database.
 
-    def __init__(self, session: Session, clock: Clock) -> None:
+    What answers are made of is looked over before (`Digests.require_undamaged`): `page`, `case`, `of_case`, `for_cases`
+    and `columns` raise DatabaseError where rows changed since they were stored. Exports look over the whole study, and
+    then use `blocks`.
+    """
+
+    def __init__(self, session: Session, clock: Clock, orders: Orders, digests: Digests) -> None:
         super().__init__(session, clock)
+        self._orders, self._digests = orders, digests
         self._counted: LRUCache[str, _Counted] = LRUCache(_MOST_COUNTED)
         self._counting = Lock()
 
-    def _rows(self, connection: sa.Connection, study_id: str) -> _Rows:
-        c = STUDIES.c
-        row = self._row(connection, study_id, c.number, c.model, c.variant, c.cases, c.state)
-        return _Rows(
-            row.number,
-            results_table(row.model, row.variant),
-            models.result_infos(row.model, row.variant),
-            row.cases,
-            row.state == StudyState.CANCELLED.value,
-            further_table(row.model, row.variant),
-            models.numbered_by(row.model, row.variant),
-        )
-
-    def case_rows(self, study_id: str, after_case: int = -1, limit: int = BLOCK_ROWS) -> RowBlock:
+    def block(self, study_id: str, after_case: int = -1, limit: int = BLOCK_ROWS) -> RowBlock:
         """At most ``limit`` finished cases with numbers above ``after_case``, in order; raises StudyNotFoundError.
 
         With all rows of cases that have several, in the order of their numbers.
         """
         with self.session.read() as connection:
-            rows = self._rows(connection, study_id)
+            rows = _rows(connection, study_id)
             return _block(rows.infos, _with_further(connection, rows, _read(connection, rows, after_case, limit)))
 
-    def case_page(
+    def page(
         self,
         study_id: str,
         after_case: int = -1,
@@ -109,16 +121,20 @@ class Cases(Orders):
 
         ``ending``, ``regime`` and ``flag`` select the cases with that ending, regime or flag.
         """
+        self._digests.require_undamaged(study_id, np.arange(after_case + 1, after_case + 1 + limit))
         cancelled: str = WorkerEnding.CANCELLED.value
         with self.session.read() as connection:
-            rows = self._rows(connection, study_id)
+            rows = _rows(connection, study_id)
             found = [] if ending == cancelled else _read(connection, rows, after_case, limit, ending, regime, flag)
             if rows.cancelled and ending in {None, cancelled} and regime is None and flag is None:
                 nothing = [None] * len(rows.infos)
                 left = itertools.islice(self._never_run(connection, rows, after_case), limit)
                 found = [*found, *((case, cancelled, "", *nothing) for case in left)]
                 found = sorted(found, key=lambda row: int(row[0]))[:limit]
-        return _block(rows.infos, found)
+        block = _block(rows.infos, found)
+        if any(kind is not None for kind in (ending, regime, flag)):
+            self._digests.require_undamaged(study_id, block.cases)
+        return block
 
     def kinds(self, study_id: str) -> Kinds:
         """How many finished cases have which regime and which flag; raises StudyNotFoundError.
@@ -129,13 +145,13 @@ class Cases(Orders):
         """
         with self.session.read() as connection:
             c = STUDIES.c
-            row = self._row(connection, study_id, c.revision, c.state)
+            row = row_of(connection, study_id, c.revision, c.state)
             with self._counting:
                 kept = self._counted.get(study_id)
             if kept is not None and kept.revision == row.revision:
                 return kept.kinds
-            rows = self._rows(connection, study_id)
-            done = self._done(connection, rows.number)
+            rows = _rows(connection, study_id)
+            done = _done(connection, rows.number)
             if kept is not None and kept.chunks and kept.chunks <= done:
                 counts = kept.rows + self._count_new(connection, rows, done - kept.chunks)
             else:
@@ -151,23 +167,16 @@ class Cases(Orders):
         self, connection: sa.Connection, rows: _Rows, chunks: Iterable[_Done]
     ) -> Counter[tuple[str, int | None]]:
         """Numbers of the rows of these chunks by flags and regime."""
-        cases = [self._cases(Chunk(rows.number, first, count), connection) for first, count, _ in chunks]
+        cases = [self._orders.cases(Chunk(rows.number, first, count), connection) for first, count, _ in chunks]
         counts: Counter[tuple[str, int | None]] = Counter()
         for condition in conditions(rows.table.c.case_number, np.sort(np.concatenate([_NO_CASES, *cases]))):
             counts += _count(connection, rows, condition)
         return counts
 
-    @staticmethod
-    def _done(connection: sa.Connection, number: int) -> frozenset[_Done]:
-        c = CHUNKS.c
-        query = sa.select(c["first"], c["count"], c.finished_at)
-        found = connection.execute(query.where(c.study == number, c.state == ChunkState.DONE)).all()
-        return frozenset((first, count, finished_at) for first, count, finished_at in found)
-
     def cases_of_kind(self, study_id: str, regime: str | None = None, flag: str | None = None) -> NDArray[np.int64]:
         """Numbers of the cases of a regime or with a flag, ascending; raises StudyNotFoundError."""
         with self.session.read() as connection:
-            rows = self._rows(connection, study_id)
+            rows = _rows(connection, study_id)
             kind = _of_kind(rows, regime, flag)
             if kind is None:
                 return _NO_CASES
@@ -176,34 +185,36 @@ class Cases(Orders):
             found = connection.execute(query.order_by(c.case_number)).scalars()
             return np.fromiter(found, dtype=np.int64)
 
-    def iter_rows(self, study_id: str, block: int = BLOCK_ROWS) -> Iterator[RowBlock]:
-        """Every finished case in order, ``block`` cases at a time, each block read in its own short transaction."""
+    def blocks(self, study_id: str, size: int = BLOCK_ROWS) -> Iterator[RowBlock]:
+        """Every finished case in order, ``size`` cases at a time, each block read in its own short transaction."""
         after = -1
-        while len(found := self.case_rows(study_id, after, block)):
+        while len(found := self.block(study_id, after, size)):
             yield found
             after = int(found.cases[-1])
 
-    def case_row(self, study_id: str, case: int) -> CaseRow | None:
+    def case(self, study_id: str, case: int) -> CaseRow | None:
         """One case, None while it is not finished; raises StudyNotFoundError."""
-        found = self.case_page(study_id, case - 1, 1)
+        found = self.page(study_id, case - 1, 1)
         return next(found.rows()) if len(found) and found.cases[0] == case else None
 
-    def all_rows(self, study_id: str, case: int) -> tuple[CaseRow, ...]:
+    def of_case(self, study_id: str, case: int) -> tuple[CaseRow, ...]:
         """Every row of a case in the order of their numbers, none while it is not finished."""
-        return tuple(row for row in self.case_rows(study_id, case - 1, 1).rows() if row.case == case)
+        self._digests.require_undamaged(study_id, np.array([case]))
+        return tuple(row for row in self.block(study_id, case - 1, 1).rows() if row.case == case)
 
-    def rows_for_cases(self, study_id: str, cases: ArrayLike, names: Sequence[str], number: int = 0) -> CaseColumns:
+    def for_cases(self, study_id: str, cases: ArrayLike, names: Sequence[str], number: int = 0) -> CaseColumns:
         """Results ``names`` of the given case numbers (shape (m,), any order), aligned with them.
 
         Of cases with several rows those of the row with that ``number``; a case without one has its ending and no
         results. Raises StudyNotFoundError, and KeyError for a name that is not a result of the study.
         """
         wanted: NDArray[np.int64] = np.asarray(cases, dtype=np.int64).reshape(-1)
+        self._digests.require_undamaged(study_id, wanted)
         unique, position = np.unique(wanted, return_inverse=True)
         endings, flags = np.full(unique.size, None, dtype=object), np.full(unique.size, "", dtype=object)
         values = np.full((unique.size, len(names)), np.nan)
         with self.session.read() as connection:
-            rows = self._rows(connection, study_id)
+            rows = _rows(connection, study_id)
             columns = {info.name: info.column for info in rows.infos}
             wanted_columns = [columns[name] for name in names]
             _fill(connection, rows, rows.table, wanted_columns if number == 0 else [], unique, endings, flags, values)
@@ -219,6 +230,67 @@ class Cases(Orders):
             flags[position].tolist(),
         )
 
+    def columns(self, study_id: str, names: Sequence[str]) -> RowColumns:
+        """Results ``names`` of every finished case; raises StudyNotFoundError, and KeyError for an unknown name."""
+        self._digests.require_undamaged(study_id, np.arange(LOOKED_OVER + 1))
+        kinds: dict[tuple[str, str], int] = {}
+        types = [("case", np.int64), ("ending", object), ("flags", object)]
+        layout = np.dtype([*types, *((f"value{index}", np.float64) for index in range(len(names)))])
+        parts: list[tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]] = []
+        with self.session.read() as connection:
+            rows = _rows(connection, study_id)
+            c, own = rows.table.c, {info.name: rows.table.c[info.column] for info in rows.infos}
+            query = sa.select(c.case_number, c.ending, c.flags, *(as_number(own[name]) for name in names))
+            query = query.where(c.study == rows.number).order_by(c.case_number).limit(_COLUMN_ROWS)
+            last = -1
+            while len(part := records(connection, query.where(c.case_number > last), layout)):
+                pairs = zip(part["ending"].tolist(), part["flags"].tolist(), strict=True)
+                codes = np.array([kinds.setdefault(pair, len(kinds)) for pair in pairs], dtype=np.int32)
+                columns = [part[f"value{index}"] for index in range(len(names))]
+                parts.append((part["case"].copy(), codes, np.array(columns).reshape(len(names), len(part))))
+                last = int(part["case"][-1])
+        if not parts:
+            return RowColumns(np.empty(0, np.int64), (), np.empty(0, np.int32), {name: np.empty(0) for name in names})
+        cases, kind = (np.concatenate([part[index] for part in parts]) for index in (0, 1))
+        values = {name: np.concatenate([part[2][row] for part in parts]) for row, name in enumerate(names)}
+        return RowColumns(cases, tuple(kinds), kind.astype(np.int32), values)
+
+    def origins(self, study_id: str) -> tuple[Origin, ...]:
+        """The origins of the rows of a study, most cases first, those without a fingerprint last.
+
+        Raises StudyNotFoundError.
+        """
+        c = CHUNKS.c
+        cases = sa.func.sum(c["count"])
+        with self.session.read() as connection:
+            number = row_of(connection, study_id, STUDIES.c.number).number
+            query = sa.select(c.host, c.fingerprint, sa.func.count(), cases)
+            query = query.where(c.study == number, c.state == ChunkState.DONE)
+            rows = connection.execute(query.group_by(c.host, c.fingerprint)).all()
+            found = [Origin(host, digest, int(chunks), int(cases)) for host, digest, chunks, cases in rows]
+            # Those without a fingerprint last: the others are compared with the first.
+            found.sort(key=lambda item: (not item.fingerprint, -item.cases, item.host or "", item.fingerprint or ""))
+            differs = differences_of(connection, [item.fingerprint for item in found])
+        return tuple(replace(item, differs=difference) for item, difference in zip(found, differs, strict=True))
+
+    def cases_by_fingerprint(self, study_id: str) -> list[CasesOf]:
+        """The ranges of cases that were computed under one fingerprint, in order; raises StudyNotFoundError.
+
+        [] for a study that is not run in the order of its cases.
+        """
+        c = CHUNKS.c
+        found: list[CasesOf] = []
+        with self.session.read() as connection:
+            study = row_of(connection, study_id, STUDIES.c.number, STUDIES.c.coarse)
+            if study.coarse:
+                return []
+            query = sa.select(c["first"], c["count"], c.fingerprint).order_by(c["first"])
+            query = query.where(c.study == study.number, c.state == ChunkState.DONE, c.fingerprint.is_not(None))
+            for first, count, digest in connection.execute(query):
+                neighbour = found and (found[-1].last, found[-1].fingerprint) == (first - 1, digest)
+                found.append(CasesOf(digest, found.pop().first if neighbour else first, first + count - 1))
+        return found
+
     def _never_run(self, connection: sa.Connection, rows: _Rows, after_case: int) -> Iterator[int]:
         """Cases above ``after_case`` that belong to no finished chunk, in order."""
         c = CHUNKS.c
@@ -227,7 +299,7 @@ class Cases(Orders):
             .where(c.study == rows.number, c.state == ChunkState.DONE)
             .order_by(c["first"])
         )
-        order = self._order(rows.number, connection)
+        order = self._orders.of(rows.number, connection)
         if order is not None:
             never = np.ones(rows.cases, dtype=np.bool_)
             for first, count in connection.execute(done):
@@ -240,6 +312,13 @@ class Cases(Orders):
             yield from range(reached, first)
             reached = max(reached, first + count)
         yield from range(reached, rows.cases)
+
+
+def _done(connection: sa.Connection, number: int) -> frozenset[_Done]:
+    c = CHUNKS.c
+    query = sa.select(c["first"], c["count"], c.finished_at)
+    chunks = connection.execute(query.where(c.study == number, c.state == ChunkState.DONE)).all()
+    return frozenset((first, count, finished_at) for first, count, finished_at in chunks)
 
 
 def _fill(
@@ -350,18 +429,6 @@ def _of_kind(rows: _Rows, regime: str | None, flag: str | None) -> list[sa.Colum
 def _by_frequency(counts: Counter[str], order: Mapping[str, int]) -> dict[str, int]:
     """The counts, largest first; equal ones in ``order``, then by name."""
     return dict(sorted(counts.items(), key=lambda item: (-item[1], order.get(item[0], 0), item[0])))
-
-
-def conditions(column: sa.ColumnElement[Any], cases: NDArray[np.int64]) -> Iterator[sa.ColumnElement[bool]]:
-    """Conditions that together select exactly ``cases`` (ascending, each once)."""
-    if not cases.size:
-        return
-    low, high = int(cases[0]), int(cases[-1])
-    if high - low + 1 == cases.size:
-        yield column.between(low, high)
-        return
-    for start in range(0, cases.size, CASES_AT_ONCE):
-        yield column.in_(cases[start : start + CASES_AT_ONCE].tolist())
 
 
 def _block(infos: tuple[models.ResultInfo, ...], found: Sequence[Sequence[Any]]) -> RowBlock:

@@ -44,7 +44,11 @@ class ClockWatch:
     def believable(self) -> bool:
         """Check the clock: False while it is ahead of the expected time. Raises StoreError."""
         with self._lock:
-            now, elapsed, noted = self._store.clock.now(), self._store.clock.monotonic(), self._store.believed_clock()
+            now, elapsed, noted = (
+                self._store.clock.now(),
+                self._store.clock.monotonic(),
+                self._store.dispatchers.believed_clock(),
+            )
             if self._believed is None or noted is None or noted != self._noted:  # the start, or `sprag db clock`
                 expected, allowed = noted or now, LONGEST_PAUSE
             else:
@@ -60,7 +64,7 @@ class ClockWatch:
             back = self._put_back(now, expected, elapsed)
             self._believed = now if back else max(expected, now), elapsed
             if back or noted is None or now - noted > NOTE_AFTER:
-                self._store.note_clock(now)
+                self._store.dispatchers.note_clock(now)
                 noted = now
             self._noted = noted
             return True
@@ -87,7 +91,7 @@ def jump_message(before: datetime, now: datetime) -> str:
 
 def distrust(store: Store) -> str | None:
     """Why nothing may be deleted by age now, from a single look at the clock; None where nothing speaks against it."""
-    noted, now = store.believed_clock(), store.clock.now()
+    noted, now = store.dispatchers.believed_clock(), store.clock.now()
     if noted is not None and now - noted > LONGEST_PAUSE:
         return jump_message(noted, now)
     return clock_problem(store)
@@ -95,7 +99,7 @@ def distrust(store: Store) -> str | None:
 
 def clock_problem(store: Store) -> str | None:
     """Why the running worker does not trust the clock; None where it does, or no worker is running."""
-    noted, worker, now = store.believed_clock(), store.dispatcher(), store.clock.now()
+    noted, worker, now = store.dispatchers.believed_clock(), store.dispatchers.latest(), store.clock.now()
     if noted is None or worker is None or now - noted <= 2 * JUMP or now - worker.heartbeat_at > JUMP:
         return None
     return jump_message(noted, now)

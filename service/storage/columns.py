@@ -1,23 +1,21 @@
-"""Columns of all rows of a study, read in one pass: for what looks at every case at once."""
+"""Reading many rows at once: chosen cases, and columns of all of them, in one pass."""
 
 from __future__ import annotations
 
 from contextlib import closing
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, cast
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 import sqlalchemy as sa
 
-from sprag.service.storage.cases import Cases
-
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator
 
     from numpy.typing import NDArray
 
-#: Rows that are read at once.
-_PART: Final = 20_000
+#: Most cases listed in one statement.
+CASES_AT_ONCE: Final = 5_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,34 +39,6 @@ class RowColumns:
     values: dict[str, NDArray[np.float64]]
 
 
-class WholeColumns(Cases):
-    """Reading columns of all rows."""
-
-    def row_columns(self, study_id: str, names: Sequence[str]) -> RowColumns:
-        """Results ``names`` of every finished case; raises StudyNotFoundError, and KeyError for an unknown name."""
-        kinds: dict[tuple[str, str], int] = {}
-        types = [("case", np.int64), ("ending", object), ("flags", object)]
-        layout = np.dtype([*types, *((f"value{index}", np.float64) for index in range(len(names)))])
-        parts: list[tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]] = []
-        with self.session.read() as connection:
-            rows = self._rows(connection, study_id)
-            c, own = rows.table.c, {info.name: rows.table.c[info.column] for info in rows.infos}
-            query = sa.select(c.case_number, c.ending, c.flags, *(as_number(own[name]) for name in names))
-            query = query.where(c.study == rows.number).order_by(c.case_number).limit(_PART)
-            last = -1
-            while len(part := records(connection, query.where(c.case_number > last), layout)):
-                pairs = zip(part["ending"].tolist(), part["flags"].tolist(), strict=True)
-                codes = np.array([kinds.setdefault(pair, len(kinds)) for pair in pairs], dtype=np.int32)
-                columns = [part[f"value{index}"] for index in range(len(names))]
-                parts.append((part["case"].copy(), codes, np.array(columns).reshape(len(names), len(part))))
-                last = int(part["case"][-1])
-        if not parts:
-            return RowColumns(np.empty(0, np.int64), (), np.empty(0, np.int32), {name: np.empty(0) for name in names})
-        cases, kind = (np.concatenate([part[index] for part in parts]) for index in (0, 1))
-        values = {name: np.concatenate([part[2][row] for part in parts]) for row, name in enumerate(names)}
-        return RowColumns(cases, tuple(kinds), kind.astype(np.int32), values)
-
-
 def as_number(column: sa.Column[float]) -> sa.ColumnElement[float]:
     """The column with a text that numpy and PostgreSQL read as NaN in place of null."""
     if not isinstance(column.type, sa.Double):
@@ -86,3 +56,15 @@ def records(
             return np.fromiter(cast("Iterable[tuple[object, ...]]", result.cursor), layout)
         except connection.dialect.loaded_dbapi.Error as error:  # SQLAlchemy wraps those of its own steps only
             raise sa.exc.DBAPIError(str(query), None, error) from error
+
+
+def conditions(column: sa.ColumnElement[Any], cases: NDArray[np.int64]) -> Iterator[sa.ColumnElement[bool]]:
+    """Conditions that together select exactly ``cases`` (ascending, each once)."""
+    if not cases.size:
+        return
+    low, high = int(cases[0]), int(cases[-1])
+    if high - low + 1 == cases.size:
+        yield column.between(low, high)
+        return
+    for start in range(0, cases.size, CASES_AT_ONCE):
+        yield column.in_(cases[start : start + CASES_AT_ONCE].tolist())

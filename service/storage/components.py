@@ -44,14 +44,14 @@ class ComponentRecord:
 class Components(Part):
     """The components of a database."""
 
-    def components(self, kind: str | None = None) -> tuple[ComponentRecord, ...]:
+    def all(self, kind: str | None = None) -> tuple[ComponentRecord, ...]:
         """Every component, or those of a kind, by kind and name."""
         query = sa.select(COMPONENTS).order_by(_C.kind, _C.name)
         with self.session.read() as connection:
             rows = connection.execute(query if kind is None else query.where(_C.kind == kind)).all()
         return tuple(map(_record, rows))
 
-    def put_components(self, given: Iterable[Component]) -> tuple[ComponentRecord, ...]:
+    def put(self, given: Iterable[Component]) -> tuple[ComponentRecord, ...]:
         """Add components, all of them or none; those of the same kind and name are replaced.
 
         Raises NotOwnerError for one of another user, and TooManyComponentsError.
@@ -83,7 +83,7 @@ class Components(Part):
         note(connection, self._now(), action, row.id, kind=one.kind, name=one.name, fields=dict(one.fields))
         return _record(row)
 
-    def remove_component(self, component_id: str, read: Collection[str] | None = None) -> None:
+    def remove(self, component_id: str, read: Collection[str] | None = None) -> None:
         """Remove a component; studies that took it keep its values. Raises ComponentNotFoundError, NotOwnerError.
 
         ``read``: the editions (`ComponentRecord.etag`) that are meant; ChangedMeanwhileError for any other.

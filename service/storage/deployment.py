@@ -69,7 +69,7 @@ class Deployment(Part):
         settle(self.session)
         return True
 
-    def adopt_database(self) -> bool:
+    def adopt(self) -> bool:
         """Make this database the deployment; whether it was a copy."""
         with self.session.write() as connection:
             copy = _is_copy(self.session, connection)

@@ -16,11 +16,12 @@ import sqlalchemy as sa
 from cachetools import TTLCache
 
 from sprag.service.storage.audit import note
-from sprag.service.storage.cases import conditions
-from sprag.service.storage.columns import as_number, records
+from sprag.service.storage.columns import as_number, conditions, records
 from sprag.service.storage.errors import DatabaseError
+from sprag.service.storage.part import Part, change_row, move_row, row_of
+from sprag.service.storage.round_table import rounds_of
 from sprag.service.storage.row_hashes import as_kept, digest_of, row_words
-from sprag.service.storage.study_digests import StudyDigests
+from sprag.service.storage.study_digests import counts_differ, require_whole
 from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES, further_table, results_table
 from sprag.worker import models
 from sprag.worker.ports import Chunk
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from sprag.service.storage.order import Orders
     from sprag.service.storage.row_hashes import Words
     from sprag.service.storage.session import Session
     from sprag.worker.ports import Clock
@@ -64,11 +66,12 @@ class DamagedRows:
         return f"the rows of the study {self.study}, {cases}, are not those that were stored"
 
 
-class Digests(StudyDigests):
+class Digests(Part):
     """Looking for rows that are not those that were stored, and running them again."""
 
-    def __init__(self, session: Session, clock: Clock) -> None:
+    def __init__(self, session: Session, clock: Clock, orders: Orders) -> None:
         super().__init__(session, clock)
+        self._orders = orders
         self._looking = Lock()
         #: Revision of the studies whose rows were looked at last.
         self._looked_at: TTLCache[str, int] = TTLCache(1024, _AGAIN)
@@ -85,14 +88,14 @@ class Digests(StudyDigests):
             return []
         with self.session.write() as connection:
             c = STUDIES.c
-            row = self._row(connection, study_id, c.number, c.model, c.variant, c.state)
+            row = row_of(connection, study_id, c.number, c.model, c.variant, c.state)
             state = StudyState(row.state)
             if state in _CANCELLED:
                 _tell(damaged, "they are kept")
                 return damaged
             damaged = [item for item in damaged if self._still_damaged(connection, item.chunk)]
             for item in damaged:
-                cases = self._cases(item.chunk, connection)
+                cases = self._orders.cases(item.chunk, connection)
                 for table, _ in _tables(row.model, row.variant):
                     for these in conditions(table.c.case_number, cases):
                         connection.execute(sa.delete(table).where(table.c.study == row.number, these))
@@ -104,9 +107,9 @@ class Digests(StudyDigests):
                 return []
             _count_again(connection, row)
             if state.terminal:
-                self._move(connection, row.number, StudyEvent.RETRY)
+                move_row(connection, row.number, StudyEvent.RETRY, self._now())
             # They must be run, not copied from a study that may have copied them from here.
-            self._change(connection, row.number, fresh=1)
+            change_row(connection, row.number, fresh=1)
             note(connection, self._now(), "study.damaged", study_id, chunks=len(damaged))
         _tell(damaged, "they are run again")
         return damaged
@@ -128,7 +131,7 @@ class Digests(StudyDigests):
         """
         with self.session.read() as connection:
             c = STUDIES.c
-            now = self._row(connection, study_id, c.number, c.revision, c.state, c.cases)
+            now = row_of(connection, study_id, c.number, c.revision, c.state, c.cases)
             ended = StudyState(now.state).terminal
             if not anew and self._kept(self._looked_at, study_id) == now.revision:
                 return
@@ -158,7 +161,7 @@ class Digests(StudyDigests):
         """
         if not cases.size:
             return []
-        order, c = self._order(number, connection), CHUNKS.c
+        order, c = self._orders.of(number, connection), CHUNKS.c
         places = np.sort(cases if order is None else order.positions(cases))
         query = sa.select(c["first"], c["count"], c.digest).where(
             c.study == number, c.state == ChunkState.DONE, c.digest.is_not(None),
@@ -193,8 +196,8 @@ class Digests(StudyDigests):
         Chunks from before revision 0036 have no digest and are not looked at. Raises DatabaseError as `require_whole`.
         """
         with self.session.read() as connection:
-            self.require_whole(connection, study_id)
-            row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.model, STUDIES.c.variant)
+            require_whole(connection, study_id)
+            row = row_of(connection, study_id, STUDIES.c.number, STUDIES.c.model, STUDIES.c.variant)
             c = CHUNKS.c
             known = connection.execute(
                 sa.select(c["first"], c["count"], c.digest)
@@ -212,13 +215,13 @@ class Digests(StudyDigests):
                 for chunk, digest in zip(known, found, strict=True)
                 if chunk.digest is not None and chunk.digest != digest
             ]
-            return [DamagedRows(study_id, chunk, *_ends(self._cases(chunk, connection))) for chunk in wrong]
+            return [DamagedRows(study_id, chunk, *_ends(self._orders.cases(chunk, connection))) for chunk in wrong]
 
     def _digests(self, connection: sa.Connection, row: Any, known: Sequence[Any]) -> list[int | None]:
         """The digest of the rows of each finished chunk; None where their number is not that of its cases."""
         first, count = (np.array([chunk[at] for chunk in known], dtype=np.int64) for at in (0, 1))
         sums, rows = np.zeros(len(known), dtype=np.uint64), np.zeros(len(known), dtype=np.int64)
-        order = self._order(row.number, connection)
+        order = self._orders.of(row.number, connection)
         for table, further in _tables(row.model, row.variant):
             for cases, words in _stored_words(connection, table, row, further=further):
                 places = cases if order is None else order.positions(cases)
@@ -238,14 +241,29 @@ class Digests(StudyDigests):
 
     def all_damaged_rows(self) -> Iterator[DamagedRows]:
         """Those of every study whose inputs and chunks are what was stored."""
-        with self.session.read() as connection:
-            ids = connection.execute(
-                sa.select(STUDIES.c.id).where(STUDIES.c.deleted_at.is_(None)).order_by(STUDIES.c.number)
-            ).scalars()
-            studies = list(ids)
-        for study_id in studies:
+        for study_id in self._present():
             with suppress(DatabaseError):  # `broken_studies` has it
                 yield from self.damaged_rows(study_id)
+
+    def broken_studies(self) -> Iterator[str]:
+        """A sentence on each study that is not what was stored."""
+        for study_id in self._present():
+            try:
+                with self.session.read() as connection:
+                    require_whole(connection, study_id)
+                    rounds_of(connection, row_of(connection, study_id, STUDIES.c.number).number)
+                    differ = counts_differ(connection, study_id)
+            except DatabaseError as error:
+                yield str(error)
+                continue
+            if differ:
+                yield f"the numbers of cases of the study {study_id} are not those of its rows"
+
+    def _present(self) -> Sequence[str]:
+        """Ids of the studies that are not deleted."""
+        c = STUDIES.c
+        with self.session.read() as connection:
+            return connection.execute(sa.select(c.id).where(c.deleted_at.is_(None)).order_by(c.number)).scalars().all()
 
     def with_rows_after(self, number: int) -> tuple[int, str] | None:
         """Number and id of the next study with rows; None after the last one."""
@@ -266,12 +284,12 @@ class Digests(StudyDigests):
     def count_endings_again(self, study_id: str) -> None:
         """Make the numbers of cases those of the rows, where they are not; raises StudyNotFoundError."""
         with self.session.read() as connection:
-            if not self.counts_differ(connection, study_id):
+            if not counts_differ(connection, study_id):
                 return
         with self.session.write() as connection:
             c = STUDIES.c
             _LOG.error("The numbers of cases of the study %s were not those of its rows: counted again.", study_id)
-            _count_again(connection, self._row(connection, study_id, c.number, c.model, c.variant))
+            _count_again(connection, row_of(connection, study_id, c.number, c.model, c.variant))
 
     def seal(self, connection: sa.Connection, chunk: Chunk) -> None:
         """Give a finished chunk the digest of the rows that the database has."""
@@ -282,7 +300,7 @@ class Digests(StudyDigests):
         """The digest of the rows that the database has for a chunk."""
         c = STUDIES.c
         row = connection.execute(sa.select(c.number, c.model, c.variant).where(c.number == chunk.study)).one()
-        cases = self._cases(chunk, connection)
+        cases = self._orders.cases(chunk, connection)
         found = []
         for table, further in _tables(row.model, row.variant):
             between = table.c.case_number.between(int(cases[0]), int(cases[-1]))

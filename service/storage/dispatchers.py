@@ -15,7 +15,7 @@ import sqlalchemy as sa
 
 from sprag.service.storage.fingerprints import differences_of, remember
 from sprag.service.storage.owners import own_study, why_abandoned
-from sprag.service.storage.part import SILENT_SECONDS, Part, announce, micros_of, moment, optional_moment
+from sprag.service.storage.part import SILENT_SECONDS, Part, announce, micros_of, moment, move_row, optional_moment
 from sprag.service.storage.records import DispatcherRecord
 from sprag.service.storage.tables import CHUNKS, DISPATCHERS, STUDIES
 from sprag.worker import fingerprint
@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from datetime import datetime
 
     from sprag.service.storage.lock import Presence
+    from sprag.service.storage.session import Session
     from sprag.worker.chunking import Chunking
+    from sprag.worker.ports import Clock
 
 #: Seconds for which a dispatcher that has ended is remembered.
 TAKE_OVER_SECONDS = 600
@@ -46,6 +48,19 @@ _OWN = sa.select(DISPATCHERS.c.epoch).where(DISPATCHERS.c.epoch == sa.bindparam(
 def return_claims(connection: sa.Connection, epoch: int) -> None:
     """Return every claim of an epoch to waiting."""
     connection.execute(sa.update(CHUNKS).where(CLAIMED, CHUNKS.c.epoch == epoch).values(WAITING))
+
+
+def require_epoch(connection: sa.Connection, epoch: int) -> None:
+    """Raise EpochLostError when the epoch has ended."""
+    if connection.execute(_OWN, {"epoch": epoch}).scalar_one_or_none() is None:
+        raise EpochLostError(f"another dispatcher has taken over from this one (epoch {epoch})")
+
+
+def may_change(connection: sa.Connection, epoch: int, number: int) -> bool:
+    """Whether a study belongs to no other dispatcher; raises EpochLostError when the epoch has ended."""
+    require_epoch(connection, epoch)
+    query = sa.select(sa.func.coalesce(STUDIES.c.dispatcher, epoch)).where(STUDIES.c.number == number)
+    return connection.execute(query).scalar_one_or_none() == epoch
 
 
 def _record(row: sa.Row[Any], studies: int, differs: str | None, now: datetime) -> DispatcherRecord:
@@ -68,10 +83,13 @@ def _record(row: sa.Row[Any], studies: int, differs: str | None, now: datetime) 
 class Dispatchers(Part):
     """The dispatchers of the database."""
 
-    #: How studies are divided while no worker is known.
-    base_chunking: Chunking
     #: Which of them are at work, on a database that admits several; None: the one that took over last.
     presence: Presence | None = None
+
+    def __init__(self, session: Session, clock: Clock, chunking: Chunking) -> None:
+        super().__init__(session, clock)
+        #: How studies are divided while no worker is known.
+        self.base_chunking = chunking
 
     def take_over(self, owner: str) -> int:
         """Begin an epoch, and end all dispatchers that are not present; returns the epoch.
@@ -114,7 +132,7 @@ class Dispatchers(Part):
             if not connection.execute(sa.select(sa.func.count()).where(gone)).scalar_one():
                 return False
         with self.session.write() as connection:
-            self._own(connection, epoch)
+            require_epoch(connection, epoch)
             # Asked again: one that began in the meantime has its lock since then.
             self._end_all_but(connection, {epoch, *self.presence.present()}, self._now())
         return True
@@ -158,7 +176,7 @@ class Dispatchers(Part):
         query = query.where(STUDIES.c.id == own_study(owner), STUDIES.c.deleted_at.is_(None))
         row = connection.execute(query).one_or_none()
         if row is not None and StudyState(row.state).going:
-            self._move(connection, row.number, StudyEvent.FAULT, why_abandoned(owner))
+            move_row(connection, row.number, StudyEvent.FAULT, self._now(), why_abandoned(owner))
 
     def release(self, epoch: int) -> None:
         """End a dispatcher: return its claims to waiting and free its studies.
@@ -166,7 +184,7 @@ class Dispatchers(Part):
         A `run_owner` keeps its study, which others hold when they find that it is gone.
         """
         with self.session.write() as connection:
-            self._own(connection, epoch)
+            require_epoch(connection, epoch)
             return_claims(connection, epoch)
             owner = sa.select(DISPATCHERS.c.owner).where(DISPATCHERS.c.epoch == epoch)
             if own_study(connection.execute(owner).scalar_one()):
@@ -179,25 +197,14 @@ class Dispatchers(Part):
     def heartbeat(self, epoch: int, report: Mapping[str, Any]) -> None:
         """Record that the dispatcher is alive, and the report of its workers (`sprag.worker.reports`)."""
         with self.session.write() as connection:
-            self._own(connection, epoch)
+            require_epoch(connection, epoch)
             mine = sa.update(DISPATCHERS).where(DISPATCHERS.c.epoch == epoch)
             connection.execute(mine.values(heartbeat_at=self._now(), report=json.dumps(report)))
-
-    def _own(self, connection: sa.Connection, epoch: int) -> None:
-        """Raise EpochLostError when the epoch has ended."""
-        if connection.execute(_OWN, {"epoch": epoch}).scalar_one_or_none() is None:
-            raise EpochLostError(f"another dispatcher has taken over from this one (epoch {epoch})")
-
-    def _may_change(self, connection: sa.Connection, epoch: int, number: int) -> bool:
-        """Whether a study belongs to no other dispatcher; raises EpochLostError when the epoch has ended."""
-        self._own(connection, epoch)
-        query = sa.select(sa.func.coalesce(STUDIES.c.dispatcher, epoch)).where(STUDIES.c.number == number)
-        return connection.execute(query).scalar_one_or_none() == epoch
 
     def adopt(self, epoch: int, number: int) -> bool:
         """Let an unfinished study that belongs to nobody belong to this dispatcher; whether it does."""
         with self.session.write() as connection:
-            if not self._may_change(connection, epoch, number):
+            if not may_change(connection, epoch, number):
                 return False
             this = (STUDIES.c.number == number) & STUDIES.c.state.not_in(_TERMINAL)
             return bool(connection.execute(sa.update(STUDIES).where(this).values(dispatcher=epoch)).rowcount)
@@ -205,7 +212,7 @@ class Dispatchers(Part):
     def leave(self, epoch: int, number: int) -> None:
         """Let a study of this dispatcher, of which nothing is in flight, belong to nobody."""
         with self.session.write() as connection:
-            self._own(connection, epoch)
+            require_epoch(connection, epoch)
             mine = (STUDIES.c.number == number) & (STUDIES.c.dispatcher == epoch)
             connection.execute(sa.update(STUDIES).where(mine).values(dispatcher=None))
             announce(connection)
@@ -220,7 +227,7 @@ class Dispatchers(Part):
             if found.epoch != epoch and found.usable
         ]
 
-    def dispatchers(self) -> tuple[DispatcherRecord, ...]:
+    def all(self) -> tuple[DispatcherRecord, ...]:
         """The dispatchers at work, in order of their beginning; without any, the last one; () before the first."""
         c = STUDIES.c
         having = sa.select(c.dispatcher, sa.func.count()).where(c.state.not_in(_TERMINAL)).group_by(c.dispatcher)
@@ -233,13 +240,13 @@ class Dispatchers(Part):
         pairs = zip(rows, differs, strict=True)
         return tuple(_record(row, studies.get(row.epoch, 0), difference, now) for row, difference in pairs)
 
-    def dispatcher(self) -> DispatcherRecord | None:
+    def latest(self) -> DispatcherRecord | None:
         """The dispatcher that was heard of last; None when there was none."""
-        return max(self.dispatchers(), key=lambda record: (record.heartbeat_at, record.epoch), default=None)
+        return max(self.all(), key=lambda record: (record.heartbeat_at, record.epoch), default=None)
 
     def responding(self) -> list[DispatcherRecord]:
         """The dispatchers that respond and take studies of any kind, unlike a `run_owner`."""
-        return [record for record in self.dispatchers() if not (record.silent or own_study(record.owner))]
+        return [record for record in self.all() if not (record.silent or own_study(record.owner))]
 
     def silence(self) -> float | None:
         """Seconds since the latest heartbeat of a dispatcher that takes studies of any kind; None when there was none.
@@ -247,7 +254,7 @@ class Dispatchers(Part):
         In a file, a `run_owner` counts too, because dispatchers wait for its end. Where only such ones are at work on a
         server, nobody has responded since the first of them began, or longer.
         """
-        found = self.dispatchers()
+        found = self.all()
         if not found:
             return None
         times = [record.heartbeat_at for record in found if not own_study(record.owner)]
@@ -264,15 +271,6 @@ class Dispatchers(Part):
         usable = max((record.usable for record in self.responding()), default=0)
         return replace(self.base_chunking, processes=usable) if usable else self.base_chunking
 
-    def _dispatcher_of(self, connection: sa.Connection, number: int) -> sa.Row[Any] | None:
-        """Owner and heartbeat of the dispatcher that has a study; of a free study, of the one heard of last."""
-        c = DISPATCHERS.c
-        order = (c.ended_at.is_not(None), c.heartbeat_at.desc())
-        query: sa.Select[Any] = sa.select(c.owner, c.heartbeat_at).order_by(*order).limit(1)
-        has = sa.select(STUDIES.c.dispatcher).where(STUDIES.c.number == number).scalar_subquery()
-        found: sa.Row[Any] | None = connection.execute(query.where(c.epoch == has)).one_or_none()
-        return found or connection.execute(query).one_or_none()
-
     def believed_clock(self) -> datetime | None:
         """The last time at which the clock was trusted; None before the first check."""
         c = DISPATCHERS.c
@@ -284,3 +282,13 @@ class Dispatchers(Part):
         """Record that the clock is trusted at ``now``; no effect before the first dispatcher."""
         with self.session.write() as connection:
             connection.execute(sa.update(DISPATCHERS).values(clock_at=micros_of(now)))
+
+
+def dispatcher_of(connection: sa.Connection, number: int) -> sa.Row[Any] | None:
+    """Owner and heartbeat of the dispatcher that has a study; of a free study, of the one heard of last."""
+    c = DISPATCHERS.c
+    order = (c.ended_at.is_not(None), c.heartbeat_at.desc())
+    query: sa.Select[Any] = sa.select(c.owner, c.heartbeat_at).order_by(*order).limit(1)
+    has = sa.select(STUDIES.c.dispatcher).where(STUDIES.c.number == number).scalar_subquery()
+    found: sa.Row[Any] | None = connection.execute(query.where(c.epoch == has)).one_or_none()
+    return found or connection.execute(query).one_or_none()

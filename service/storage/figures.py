@@ -43,7 +43,7 @@ class FinishedWork:
 class Totals(Part):
     """The figures of the metrics."""
 
-    def figures(self) -> Figures:
+    def current(self) -> Figures:
         """The current figures."""
         c = STUDIES.c
         alive = c.deleted_at.is_(None)

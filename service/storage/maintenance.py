@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING
 import sqlalchemy as sa
 
 from sprag.service.stale_files import mark, sweep
-from sprag.service.storage import component_tables, schedule_tables, sessions, tokens, user_tables  # noqa: F401 - their tables are made, too
+from sprag.service.storage import component_tables, schedule_tables, user_tables  # noqa: F401 - their tables are made, too
 from sprag.service.storage.audit import note
 from sprag.service.storage.deployment import settle
 from sprag.service.storage.digests import Digests
 from sprag.service.storage.errors import CREATED_BY, DatabaseError, SchemaError
+from sprag.service.storage.order import Orders
 from sprag.service.storage.part import SystemClock, micros_of
 from sprag.service.storage.private_files import create_private, sync_folder
 from sprag.service.storage.records import CheckReport
@@ -176,7 +177,7 @@ def check(session: Session) -> CheckReport:
             problems += _look_over_file(session)
         if found == HEAD_REVISION and not problems:
             problems += changed_on_disk(session)
-            unchecked = Digests(session, SystemClock()).undigested()
+            unchecked = _digests(session).undigested()
     except (DatabaseError, sa.exc.SQLAlchemyError) as error:
         problems.append(str(error).splitlines()[0])
     if session.on_server:
@@ -202,16 +203,6 @@ def _server_version(session: Session) -> str:
     with suppress(DatabaseError), session.read() as connection:
         return str(connection.exec_driver_sql("SHOW server_version").scalar_one()).split()[0]
     return ""
-
-
-def checkpoint(session: Session) -> None:
-    """Move the write-ahead log into the database file as far as no reader needs the old state; a server does so itself.
-
-    Neither readers nor writers wait for it.
-    """
-    if not session.on_server:
-        with session.plain() as connection:
-            connection.exec_driver_sql("PRAGMA wal_checkpoint(PASSIVE)")
 
 
 def backup(session: Session, path: Path) -> tuple[str, ...]:
@@ -254,5 +245,10 @@ def changed_on_disk(session: Session) -> tuple[str, ...]:
     """Sentences on the studies and rows that are not what was stored; none of a database of another revision."""
     if revision(session) != HEAD_REVISION:
         return ()
-    looking = Digests(session, SystemClock())
+    looking = _digests(session)
     return (*looking.broken_studies(), *map(str, looking.all_damaged_rows()))
+
+
+def _digests(session: Session) -> Digests:
+    clock = SystemClock()
+    return Digests(session, clock, Orders(session, clock))

@@ -35,7 +35,7 @@ class Orders(Part):
         self._orders: LRUCache[int, Order | None] = LRUCache(_KEPT)
         self._orders_lock = Lock()
 
-    def _order(self, number: int, connection: sa.Connection | None = None) -> Order | None:
+    def of(self, number: int, connection: sa.Connection | None = None) -> Order | None:
         """The order of a study; None where its cases run in the order of their numbers.
 
         Without a connection it is read once, in a transaction of its own.
@@ -45,7 +45,7 @@ class Orders(Part):
                 return self._orders[number]
         if connection is None:
             with self.session.read() as own:
-                return self._order(number, own)
+                return self.of(number, own)
         coarse, text = connection.execute(
             sa.select(STUDIES.c.coarse, sa.case((STUDIES.c.coarse != 0, STUDIES.c.study), else_="")).where(
                 STUDIES.c.number == number
@@ -56,20 +56,20 @@ class Orders(Part):
             self._orders[number] = found
         return found
 
-    def _cases(self, chunk: Chunk, connection: sa.Connection | None = None) -> NDArray[np.int64]:
+    def cases(self, chunk: Chunk, connection: sa.Connection | None = None) -> NDArray[np.int64]:
         """Numbers of the cases of a chunk, int64 array of shape (chunk.count,), ascending."""
         positions = np.arange(chunk.first, chunk.first + chunk.count, dtype=np.int64)
-        order = self._order(chunk.study, connection)
+        order = self.of(chunk.study, connection)
         return positions if order is None else np.sort(order.cases(positions))
 
-    def _unit(self, number: int, connection: sa.Connection) -> int:
+    def unit(self, number: int, connection: sa.Connection) -> int:
         """Cases of a study that cannot be run apart: those of a line of a sweep, otherwise 1."""
-        order = self._order(number, connection)
+        order = self.of(number, connection)
         return order.unit if isinstance(order, LineOrder) else 1
 
-    def _coverage(self, connection: sa.Connection, number: int, cases: int) -> Coverage | None:
+    def coverage(self, connection: sa.Connection, number: int, cases: int) -> Coverage | None:
         """The complete part of a study of ``cases`` cases; None where it is not run coarse to fine."""
-        order = self._order(number, connection)
+        order = self.of(number, connection)
         if order is None or not order.passes:
             return None
         c = CHUNKS.c
@@ -81,16 +81,14 @@ class Orders(Part):
         ).one()
         if first_open is not None:
             return coverage(order, first_open)
-        return coverage(order, cases if done == cases else self._first_gap(connection, number))
+        return coverage(order, cases if done == cases else _first_gap(connection, number))
 
-    @staticmethod
-    def _first_gap(connection: sa.Connection, number: int) -> int:
-        """First position without a chunk: a cancelled study has lost its open ones."""
-        ends = (
-            sa.select((CHUNKS.c["first"] + CHUNKS.c["count"]).label("end")).where(CHUNKS.c.study == number).subquery()
-        )
-        begins = sa.select(CHUNKS.c["first"]).where(CHUNKS.c.study == number)
-        if connection.execute(begins.where(CHUNKS.c["first"] == 0)).first() is None:
-            return 0
-        gap: int = connection.execute(sa.select(sa.func.min(ends.c.end)).where(ends.c.end.not_in(begins))).scalar_one()
-        return gap
+
+def _first_gap(connection: sa.Connection, number: int) -> int:
+    """First position without a chunk: a cancelled study has lost its open ones."""
+    ends = sa.select((CHUNKS.c["first"] + CHUNKS.c["count"]).label("end")).where(CHUNKS.c.study == number).subquery()
+    begins = sa.select(CHUNKS.c["first"]).where(CHUNKS.c.study == number)
+    if connection.execute(begins.where(CHUNKS.c["first"] == 0)).first() is None:
+        return 0
+    gap: int = connection.execute(sa.select(sa.func.min(ends.c.end)).where(ends.c.end.not_in(begins))).scalar_one()
+    return gap

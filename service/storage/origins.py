@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-import sqlalchemy as sa
-
 from sprag.service.languages import _, grouped
-from sprag.service.storage.fingerprints import differences_of
-from sprag.service.storage.part import Part
-from sprag.service.storage.tables import CHUNKS, STUDIES
-from sprag.worker.states import ChunkState
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -76,43 +70,3 @@ class CasesOf:
     fingerprint: str
     first: int
     last: int
-
-
-class Origins(Part):
-    """The origins of studies."""
-
-    def origins(self, study_id: str) -> tuple[Origin, ...]:
-        """The origins of the rows of a study, most cases first, those without a fingerprint last.
-
-        Raises StudyNotFoundError.
-        """
-        c = CHUNKS.c
-        cases = sa.func.sum(c["count"])
-        with self.session.read() as connection:
-            number = self._row(connection, study_id, STUDIES.c.number).number
-            query = sa.select(c.host, c.fingerprint, sa.func.count(), cases)
-            query = query.where(c.study == number, c.state == ChunkState.DONE)
-            rows = connection.execute(query.group_by(c.host, c.fingerprint)).all()
-            found = [Origin(host, digest, int(chunks), int(cases)) for host, digest, chunks, cases in rows]
-            # Those without a fingerprint last: the others are compared with the first.
-            found.sort(key=lambda item: (not item.fingerprint, -item.cases, item.host or "", item.fingerprint or ""))
-            differs = differences_of(connection, [item.fingerprint for item in found])
-        return tuple(replace(item, differs=difference) for item, difference in zip(found, differs, strict=True))
-
-    def cases_by_fingerprint(self, study_id: str) -> list[CasesOf]:
-        """The ranges of cases that were computed under one fingerprint, in order; raises StudyNotFoundError.
-
-        [] for a study that is not run in the order of its cases.
-        """
-        c = CHUNKS.c
-        found: list[CasesOf] = []
-        with self.session.read() as connection:
-            study = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.coarse)
-            if study.coarse:
-                return []
-            query = sa.select(c["first"], c["count"], c.fingerprint).order_by(c["first"])
-            query = query.where(c.study == study.number, c.state == ChunkState.DONE, c.fingerprint.is_not(None))
-            for first, count, digest in connection.execute(query):
-                neighbour = found and (found[-1].last, found[-1].fingerprint) == (first - 1, digest)
-                found.append(CasesOf(digest, found.pop().first if neighbour else first, first + count - 1))
-        return found

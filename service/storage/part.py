@@ -1,23 +1,30 @@
-"""The base of every part of the store: the session, the clock, and a study's row."""
+"""The base of every part of the store: the session, the clock, a study's row, and writing on a full disk."""
 
 from __future__ import annotations
 
 import time
 from datetime import UTC, datetime, timedelta
-from typing import TYPE_CHECKING, Any
+from functools import wraps
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 import sqlalchemy as sa
 
-from sprag.service.storage.errors import StudyNotFoundError
+from sprag.service.storage.errors import DatabaseFullError, StudyNotFoundError
+from sprag.service.storage.reserve import spend, spend_share
 from sprag.service.storage.stored_sentences import written
 from sprag.service.storage.tables import CHUNKS, STUDIES
 from sprag.worker.states import ChunkState, StudyEvent, StudyState, follow
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
+    from pathlib import Path
 
     from sprag.service.storage.session import Session
     from sprag.worker.ports import Chunk, Clock
+
+_A = ParamSpec("_A")
+_R = TypeVar("_R")
+_P = TypeVar("_P", bound="Part")
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
@@ -88,49 +95,87 @@ class Part:
         """The current time in microseconds since 1970."""
         return micros_of(self.clock.now())
 
-    def _row(self, connection: sa.Connection, study_id: str, *columns: sa.ColumnElement[Any]) -> sa.Row[Any]:
-        """Columns of the study of that id; raises StudyNotFoundError."""
-        found = connection.execute(
-            sa.select(*columns).where(STUDIES.c.id == study_id, STUDIES.c.deleted_at.is_(None))
-        ).one_or_none()
-        if found is None:
-            raise StudyNotFoundError(study_id)
-        return found
 
-    def _lift_deadline(self, connection: sa.Connection, number: int) -> None:
-        """Let a resumed study run although its deadline has passed."""
-        self._change(connection, number, STUDIES.c.finish_by <= self._now(), finish_by=None)
+def row_of(connection: sa.Connection, study_id: str, *columns: sa.ColumnElement[Any]) -> sa.Row[Any]:
+    """Columns of the study of that id; raises StudyNotFoundError."""
+    row = connection.execute(
+        sa.select(*columns).where(STUDIES.c.id == study_id, STUDIES.c.deleted_at.is_(None))
+    ).one_or_none()
+    if row is None:
+        raise StudyNotFoundError(study_id)
+    return row
 
-    @staticmethod
-    def _change(connection: sa.Connection, number: int, *only: sa.ColumnElement[bool], **values: object) -> None:
-        """Put ``values`` into the row of a study where all of ``only`` hold; its revision tells readers of it."""
-        if "reason" in values:
-            reason = values["reason"]
-            values |= written("reason", reason if isinstance(reason, str) else None)
-        values["revision"] = STUDIES.c.revision + 1
-        connection.execute(sa.update(STUDIES).where(STUDIES.c.number == number, *only).values(values))
 
-    def _move(self, connection: sa.Connection, number: int, event: StudyEvent, reason: str | None = None) -> StudyState:
-        """Apply ``event`` to the study; raises TransitionError where the table of states has no such transition.
+def change_row(connection: sa.Connection, number: int, *only: sa.ColumnElement[bool], **values: object) -> None:
+    """Put ``values`` into the row of a study where all of ``only`` hold; its revision tells readers of it."""
+    if "reason" in values:
+        reason = values["reason"]
+        values |= written("reason", reason if isinstance(reason, str) else None)
+    values["revision"] = STUDIES.c.revision + 1
+    connection.execute(sa.update(STUDIES).where(STUDIES.c.number == number, *only).values(values))
 
-        Afterwards the study does not wait for anything.
-        """
-        before = StudyState(
-            connection.execute(
-                sa.select(STUDIES.c.state).where(STUDIES.c.number == number).with_for_update()
-            ).scalar_one()
-        )
-        after = follow(before, event)
-        if after is before:
-            return after
-        values: dict[str, Any] = {"state": after.value, "reason": reason, "waits_for": None}
-        if after is StudyState.RUNNING:
-            values["started_at"] = sa.func.coalesce(STUDIES.c.started_at, self._now())
-        if after.terminal:
-            values["finished_at"] = self._now()
-            values["dispatcher"] = None
-        elif before.terminal:
-            values["finished_at"] = None
-        self._change(connection, number, **values)
-        announce(connection)
+
+def move_row(
+    connection: sa.Connection, number: int, event: StudyEvent, now: int, reason: str | None = None
+) -> StudyState:
+    """Apply ``event`` to a study at ``now`` (µs since 1970); TransitionError where the table of states has none such.
+
+    Afterwards the study does not wait for anything.
+    """
+    before = StudyState(
+        connection.execute(sa.select(STUDIES.c.state).where(STUDIES.c.number == number).with_for_update()).scalar_one()
+    )
+    after = follow(before, event)
+    if after is before:
         return after
+    values: dict[str, Any] = {"state": after.value, "reason": reason, "waits_for": None}
+    if after is StudyState.RUNNING:
+        values["started_at"] = sa.func.coalesce(STUDIES.c.started_at, now)
+    if after.terminal:
+        values["finished_at"] = now
+        values["dispatcher"] = None
+    elif before.terminal:
+        values["finished_at"] = None
+    change_row(connection, number, **values)
+    announce(connection)
+    return after
+
+
+def lift_deadline(connection: sa.Connection, number: int, now: int) -> None:
+    """Let a resumed study run although its deadline has passed."""
+    change_row(connection, number, STUDIES.c.finish_by <= now, finish_by=None)
+
+
+def holds(method: Callable[Concatenate[_P, _A], _R]) -> Callable[Concatenate[_P, _A], _R]:
+    """A method, one write transaction, that holds studies: on a full disk it may use its share of the reserve."""
+    return _with(method, spend_share)
+
+
+def makes_room(method: Callable[Concatenate[_P, _A], _R]) -> Callable[Concatenate[_P, _A], _R]:
+    """A method, one write transaction, that is a step to more room: on a full disk it may use all of the reserve.
+
+    What makes no room must not: the reserve is there once.
+    """
+    return _with(method, spend_share, spend)
+
+
+def _with(
+    method: Callable[Concatenate[_P, _A], _R], *gains: Callable[[Path], None]
+) -> Callable[Concatenate[_P, _A], _R]:
+    """The method, tried again on a full disk: after the log begins anew, and after each of ``gains``.
+
+    The log first, whose pages would take up what the reserve leaves; then the next write needs no room.
+    """
+
+    @wraps(method)
+    def with_reserve(self: _P, /, *args: _A.args, **options: _A.kwargs) -> _R:
+        for gain in (lambda _: self.session.renew_log(), *gains):
+            try:
+                return method(self, *args, **options)
+            except DatabaseFullError:
+                if self.session.on_server:
+                    raise
+                gain(self.session.path)
+        return method(self, *args, **options)
+
+    return with_reserve

@@ -20,7 +20,7 @@ from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, Datab
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from sprag.service.storage.rows import Block, Target
+    from sprag.service.storage.blocks import Block, Target
 
 #: First key of the advisory locks of Sprag ("SPRA" in ASCII), of which the second key gives the purpose; and of those
 #: of the dispatchers ("SPRB"), whose second key is the epoch.

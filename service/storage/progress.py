@@ -1,4 +1,4 @@
-"""Rate and time left of a study, from its recently finished and running chunks.
+"""Progress of a study: rate and time left, from its recently finished and running chunks.
 
 The cases of a chunk count as done evenly from its claim to its end, so the rate is correct for any number of parallel
 chunks. The interval is designed to hold nine times out of ten for the usual courses of cost (measured by
@@ -11,14 +11,24 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from sprag.service.storage.part import micros_of, optional_moment
+from sprag.service.storage.records import Progress
+from sprag.service.storage.tables import COARSE_TO_FINE
+from sprag.worker import models
+from sprag.worker.states import StudyState
+
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
+    from datetime import datetime
 
     from numpy.typing import NDArray
+
+    from sprag.service.storage.records import RoundProgress
+    from sprag.worker.order import Coverage
 
     Times = NDArray[np.float64]
 
@@ -197,3 +207,32 @@ def _paces(past: _Past, stretches: int) -> Times:
             found.append(past.busy(begin, end) / work)
     paces: Times = np.array(found) / np.mean(found)
     return paces
+
+
+def progress_of(
+    row: Any,
+    endings: dict[str, int],
+    recent: Iterable[Sequence[int]],
+    claimed: Iterable[Sequence[int]],
+    covered: Coverage | None,
+    rounds: RoundProgress | None,
+    now: datetime,
+) -> Progress:
+    """The progress at ``now`` of a study with that row; ``recent``, ``claimed``: times (µs) and cases of its chunks."""
+    state = StudyState(row.state)
+    uneven = models.regime_info(models.result_infos(row.model, row.variant)) is not None
+    rate, left = estimate(
+        row.cases - row.done,
+        [FinishedChunk(begin / 1e6, end / 1e6, count) for begin, end, count in recent],
+        [RunningChunk(begin / 1e6, count) for begin, count in claimed],
+        micros_of(now) / 1e6,
+        row.done,
+        row.coarse == COARSE_TO_FINE,
+        uneven,
+    )
+    if left is not None and rounds is not None and rate:
+        # How many further rounds there will be is unknown: perhaps none, at most all.
+        left = left[0], max(left[1], (rounds.most_cases - row.done) / rate)
+    times = (optional_moment(row.finish_by), now)
+    left = left if state.going else None
+    return Progress(state, row.cases, row.done, row.ok, endings, rate, left, covered, rounds, *times)

@@ -1,40 +1,38 @@
-"""Deletion of studies, its undoing, and removal of their rows in steps, so that other writers can work in between."""
+"""Removal of old studies, and of the rows of deleted ones in steps, so that other writers can work in between."""
 
 from __future__ import annotations
 
 from contextlib import suppress
-from datetime import timedelta
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import sqlalchemy as sa
 
-from sprag.service.storage.audit import note, require_own
-from sprag.service.storage.case_keys import CaseKeys
-from sprag.service.storage.editions import require_edition
+from sprag.service.storage.case_keys import KEYED
 from sprag.service.storage.errors import DatabaseFullError, StudyBusyError, StudyNotFoundError
-from sprag.service.storage.part import micros_of
-from sprag.service.storage.records import record_of
-from sprag.service.storage.reserve import makes_room
+from sprag.service.storage.part import Part, makes_room, micros_of
 from sprag.service.storage.tables import (
+    CASE_KEYS,
     CHUNKS,
     ENDINGS,
     HELD_AT_DEADLINE,
-    IDEMPOTENCY_KEYS,
-    RECORD_COLUMNS,
     ROUNDS,
     STUDIES,
     further_table,
     results_table,
 )
-from sprag.service.storage.users import Users
 from sprag.service.storage.view_tables import SAVED_VIEWS
-from sprag.worker.states import TERMINAL, StudyState
+from sprag.worker.case_keys import case_keys
+from sprag.worker.states import TERMINAL
+from sprag.worker.study import Study
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator
+    from collections.abc import Callable, Iterator
     from datetime import datetime
-    from threading import Event
+
+    from sprag.service.storage.session import Session
+    from sprag.service.storage.studies import Studies
+    from sprag.worker.ports import Clock
 
 #: Rows deleted in one transaction: other writers wait for it.
 PURGED_ROWS: Final = 5_000
@@ -42,59 +40,12 @@ PURGED_ROWS: Final = 5_000
 LEAST_PURGED_ROWS: Final = 50
 
 
-class Purging(Users, CaseKeys):
-    """Deletion of studies, and their rows."""
+class Purging(Part):
+    """Removal of what was deleted, and of what is old."""
 
-    #: Set when a study is deleted whose rows are to be removed now (`Studies`).
-    deleted: Event
-    #: For how long a deleted study can be restored; set by the service.
-    restorable = timedelta(0)
-
-    @makes_room
-    def delete_study(self, study_id: str, *, at_once: bool = False, read: Collection[str] | None = None) -> None:
-        """Delete a study that has ended or is held at its deadline.
-
-        Raises StudyNotFoundError, or StudyBusyError for any other study.
-
-        The study is invisible when this returns, and can be restored for the time `restorable`, unless it is to be
-        deleted ``at_once``; `Purging.purge_steps` removes its rows later. ``read``: the editions (`StudyRecord.etag`)
-        that are meant; ChangedMeanwhileError for any other.
-        """
-        now, c = self._now(), STUDIES.c
-        purge_at = 0 if at_once else now + self.restorable // timedelta(microseconds=1)
-        # One that can be restored takes room as well, until it is deleted for good.
-        there = c.deleted_at.is_(None) | (sa.literal(at_once) & (c.purge_at > now))
-        with self.session.write() as connection:
-            row = connection.execute(sa.select(*RECORD_COLUMNS).where(c.id == study_id, there)).one_or_none()
-            if row is None:
-                raise StudyNotFoundError(study_id)
-            require_own("study", study_id, row.owner)
-            require_edition("study", study_id, record_of(row).etag, read)
-            state = StudyState(row.state)
-            if not state.terminal and row.waits_for != HELD_AT_DEADLINE:
-                raise StudyBusyError(f"the study {study_id} is {state.value}: cancel it before it is deleted")
-            # From now on its key submits a new study.
-            connection.execute(sa.delete(IDEMPOTENCY_KEYS).where(IDEMPOTENCY_KEYS.c.study == row.number))
-            self._change(connection, row.number, deleted_at=now, purge_at=purge_at)
-            note(connection, now, "study.delete", study_id, name=row.name, owner=row.owner)
-        if purge_at <= now:
-            self.deleted.set()
-
-    def restore_study(self, study_id: str) -> None:
-        """Undo the deletion of a study; raises StudyNotFoundError when its rows are being removed."""
-        now, c = self._now(), STUDIES.c
-        with self.session.write() as connection:
-            found = connection.execute(
-                sa.select(c.number, c.owner, c.name).where(
-                    c.id == study_id, c.deleted_at.is_not(None), c.purge_at > now
-                )
-            ).one_or_none()
-            if found is None:
-                self._row(connection, study_id, c.number)  # one that is not deleted stays as it is
-                return
-            require_own("study", study_id, found.owner)
-            self._change(connection, found.number, deleted_at=None, purge_at=None)
-            note(connection, now, "study.restore", study_id, name=found.name)
+    def __init__(self, session: Session, clock: Clock, studies: Studies) -> None:
+        super().__init__(session, clock)
+        self._studies = studies
 
     def prune(self, ended_before: datetime, *, dry: bool = False) -> list[str]:
         """Delete every study that ended, or was held at its deadline, before ``ended_before``; returns their ids.
@@ -110,15 +61,15 @@ class Purging(Users, CaseKeys):
             found = list(connection.execute(sa.select(c.id).where(old).order_by(c.number)).scalars())
         for study_id in () if dry else found:
             with suppress(StudyNotFoundError, StudyBusyError):  # somebody else has deleted it or runs it again
-                self.delete_study(study_id, at_once=True)
+                self._studies.delete(study_id, at_once=True)
         return found
 
     def purge(self) -> None:
         """Remove all of them now."""
-        for _ in self.purge_steps():
+        for _ in self.steps():
             pass
 
-    def purge_steps(self) -> Iterator[int]:
+    def steps(self) -> Iterator[int]:
         """Remove them in short transactions; yields the number of rows that each deleted."""
         c = STUDIES.c
         over = c.deleted_at.is_not(None) & (sa.func.coalesce(c.purge_at, 0) <= self._now())
@@ -135,6 +86,25 @@ class Purging(Users, CaseKeys):
                 yield from _emptied(partial(self._delete_keys, keys, number))
             self._remove(number)
             yield 1
+
+    def _keys(self, number: int) -> list[int]:
+        """The keys that a study has."""
+        c = STUDIES.c
+        with self.session.read() as connection:
+            query = sa.select(c.study, c.kin_hash).where(c.number == number, c.keyed == KEYED)
+            row = connection.execute(query).one_or_none()
+        return [] if row is None else sorted(case_keys(Study.from_text(row.study), row.kin_hash).tolist())
+
+    @makes_room
+    def _delete_keys(self, keys: list[int], number: int, rows: int) -> tuple[int, bool]:
+        """Delete about that many of the ``keys`` of a study, which then keeps the others: how many, and whether any are
+        left.
+        """
+        with self.session.write() as connection:
+            mine = CASE_KEYS.c.key.in_(keys[:rows]) & (CASE_KEYS.c.study == number)
+            deleted = connection.execute(sa.delete(CASE_KEYS).where(mine)).rowcount
+        del keys[:rows]
+        return deleted, bool(keys)
 
     @makes_room
     def _taken_away(self, over: sa.ColumnElement[bool]) -> list[tuple[int, str, str]]:

@@ -69,7 +69,7 @@ class Readiness:
         with suppress(StoreError):
             if problem := clock_problem(self._store):
                 found.append(f"{problem}.")
-            if self._store.has_schedules() and self._store.is_copy():
+            if self._store.schedules.any() and self._store.deployment.is_copy():
                 found.append(Sentence(recorded.COPY))
             found += self._hindered()
             if not self._store.session.on_server and (linked := self._store.session.file.second_name()):
@@ -83,7 +83,7 @@ class Readiness:
 
     def _hindered(self) -> Iterator[str]:
         """What hinders one of several dispatchers."""
-        found = [record for record in self._store.dispatchers() if record.ended_at is None]
+        found = [record for record in self._store.dispatchers.all() if record.ended_at is None]
         for record in found if len(found) > 1 else ():
             shortage = (record.report or {}).get("shortage")
             if record.silent:
@@ -110,7 +110,7 @@ class Readiness:
                     "it hangs or was stopped (`sprag worker --take-over` ends a hung worker).",
                     *self._worker(),
                 ]
-            if held := self._store.full():
+            if held := self._store.room.full():
                 return [f"Studies are held: {held}.", *self._worker()]
             return self._worker()
         except (DatabaseError, StoreError) as error:
@@ -119,8 +119,8 @@ class Readiness:
 
     def _taken_over(self) -> str | None:
         """A sentence when workers take a database in a file from each other, so that none completes its chunks."""
-        times = 0 if self._store.session.on_server else self._store.take_overs()
-        now = self._store.dispatcher() if times >= _TAKE_OVERS else None
+        times = 0 if self._store.session.on_server else self._store.dispatchers.take_overs()
+        now = self._store.dispatchers.latest() if times >= _TAKE_OVERS else None
         if now is None or (self._store.clock.now() - now.started_at).total_seconds() > _YOUNG_SECONDS:
             return None
         return (
@@ -129,7 +129,7 @@ class Readiness:
         )
 
     def _worker(self) -> list[str]:
-        silence = self._store.silence()
+        silence = self._store.dispatchers.silence()
         if silence is not None and silence > SILENT_SECONDS:
             return [f"No worker has responded for {silence:.0f} s: studies are not run."]
         if failing := self._dispatcher_fails():
@@ -137,5 +137,5 @@ class Readiness:
         if fenced := self._taken_over():
             return [fenced]
         # Another dispatcher runs the studies of one whose workers are missing.
-        shortages = [(record.report or {}).get("shortage") for record in self._store.responding()]
+        shortages = [(record.report or {}).get("shortage") for record in self._store.dispatchers.responding()]
         return [shortages[0]] if shortages and all(shortages) and shortages[0] else []

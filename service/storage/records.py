@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class StudyRecord:
-    """A study without its heavy parts (`Store.spec`, `Store.study`).
+    """A study without its heavy parts (`Studies.spec`, `Studies.study`).
 
     ``number`` counts studies in order of submission; ``id`` is the public name. ``done`` counts cases with an ending,
     ``ok`` those that ended ok. ``reason`` states why the study is held or failed. ``revision`` increases with every

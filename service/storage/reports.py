@@ -101,7 +101,7 @@ def add_reports(
 class Reports(Part):
     """The outbox."""
 
-    def claim_report(self) -> Claimed | None:
+    def claim(self) -> Claimed | None:
         """Claim the report that has waited longest; None where none is to be sent now."""
         now = self._now()
         end = now + CLAIM // timedelta(microseconds=1)
@@ -136,13 +136,13 @@ class Reports(Part):
             moment(end),
         )
 
-    def report_sent(self, report: Claimed) -> None:
+    def sent(self, report: Claimed) -> None:
         """Record that the report was sent."""
         with self.session.write() as connection:
             if self._end(connection, report, state=ReportState.SENT.value, ended_at=self._now(), problem=None):
                 note(connection, self._now(), "report.send", report.schedule, **_logged(report))
 
-    def report_failed(self, report: Claimed, problem: str, next_try: datetime | None) -> None:
+    def failed(self, report: Claimed, problem: str, next_try: datetime | None) -> None:
         """Record why the report was not sent; with ``next_try`` None it is given up."""
         with self.session.write() as connection:
             if next_try is not None:
@@ -157,7 +157,7 @@ class Reports(Part):
         own = (_P.number == report.number) & (_P.claimed_until == micros_of(report.claimed_until))
         return bool(connection.execute(sa.update(REPORTS).where(own).values(claimed_until=None, **values)).rowcount)
 
-    def reports_between(self, since: datetime, until: datetime) -> dict[tuple[str, datetime], list[ReportRecord]]:
+    def between(self, since: datetime, until: datetime) -> dict[tuple[str, datetime], list[ReportRecord]]:
         """Reports of the due times from ``since`` until ``until``, by id of the schedule and due time."""
         query = (
             sa.select(REPORTS, _S.id.label("schedule_id"))
@@ -182,7 +182,7 @@ class Reports(Part):
                 found.setdefault((row.schedule_id, moment(row.due)), []).append(record)
         return found
 
-    def prune_reports(self, before: datetime) -> int:
+    def prune(self, before: datetime) -> int:
         """Delete the reports that were sent or given up before ``before``; returns their number."""
         with self.session.write() as connection:
             return connection.execute(sa.delete(REPORTS).where(_P.ended_at < micros_of(before))).rowcount

@@ -1,28 +1,21 @@
-"""Running the failed cases of a study again, and no others; of a sweep the lines that have them."""
+"""The failed cases of a study, to be run again, and no others; of a sweep the lines that have them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from itertools import pairwise, starmap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sqlalchemy as sa
 
-from sprag.service.storage.audit import note, require_own
-from sprag.service.storage.cases import conditions
-from sprag.service.storage.digests import Digests
+from sprag.service.storage.columns import conditions
 from sprag.service.storage.errors import NothingToRetryError
-from sprag.service.storage.records import StudyRecord, record_of
-from sprag.service.storage.reuse import endings_of
-from sprag.service.storage.tables import CHUNKS, ENDINGS, RECORD_COLUMNS, STUDIES, results_table
-from sprag.service.storage.users import Users, require_queue
+from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES, results_table
 from sprag.worker import models
 from sprag.worker.chunking import MAX_CHUNKS
-from sprag.worker.limits import MAX_WAITING_STUDIES
 from sprag.worker.ports import Chunk
-from sprag.worker.states import ChunkState, StudyEvent, StudyState, follow
+from sprag.worker.states import ChunkState
 from sprag.worker.sweeps import LineOrder
 
 if TYPE_CHECKING:
@@ -54,70 +47,21 @@ class _Done:
     digest: int | None
 
 
-class Retries(Users, Digests):
-    """Returning failed cases to waiting."""
-
-    def retry_study(self, study_id: str, endings: Collection[str] | None = None) -> StudyRecord:
-        """Run the cases of an ended study again that did not end ok, or that have one of ``endings``.
-
-        All other rows are kept; of a sweep those of lines without such a case. Raises StudyNotFoundError,
-        TransitionError when the study has not ended or was cancelled, NothingToRetryError when there is no such case,
-        and FaultError when too many studies or cases wait.
-        """
-        c = STUDIES.c
-        while True:
-            with self.session.read() as connection:
-                row = self._row(
-                    connection, study_id, c.number, c.model, c.variant, c.state, c.revision, c.cases, c.owner
-                )
-                require_own("study", study_id, row.owner)
-                follow(StudyState(row.state), StudyEvent.RETRY)
-                counts = _failed(connection, row.number, endings)
-                if not counts:
-                    raise NothingToRetryError(_nothing(endings))
-                order = self._order(row.number, connection)
-                ended = tuple(counts)
-                runs = _runs(connection, row, ended) if order is None else _places(connection, row, ended, order)
-                cases, in_lines = None, isinstance(order, LineOrder)
-                if isinstance(order, LineOrder):
-                    cases = np.sort(order.cases(np.concatenate([np.arange(a, a + n) for a, n in runs])))
-                    counts = dict(endings_of(connection, row.model, row.variant, row.number, cases))
-            if not runs or (not in_lines and sum(count for _, count in runs) != sum(counts.values())):
-                self.require_undamaged(study_id, anew=True)  # rows with these endings are not there
-                self.count_endings_again(study_id)
-                continue
-            with self.session.write() as connection:
-                now = self._row(connection, study_id, c.revision)
-                if now.revision != row.revision:  # it was run again or deleted in the meantime
-                    continue
-                require_queue(connection, MAX_WAITING_STUDIES)
-                self._require_quota(connection, sum(counts.values()), 0)
-                for chunk in _give_back(connection, row, runs, counts, cases, partial(self.has_digest, connection)):
-                    self.seal(connection, chunk)
-                self._move(connection, row.number, StudyEvent.RETRY)
-                self._lift_deadline(connection, row.number)
-                # The cases must be run, not copied from a study in which they failed in the same way.
-                connection.execute(sa.update(STUDIES).where(c.number == row.number).values(fresh=1))
-                note(
-                    connection, self._now(), "study.retry", study_id, cases=sum(counts.values()), endings=sorted(counts)
-                )
-                return record_of(self._row(connection, study_id, *RECORD_COLUMNS))
-
-
-def _nothing(endings: Collection[str] | None) -> str:
+def nothing_to_retry(endings: Collection[str] | None) -> str:
+    """Why there is no case with such an ending."""
     if endings is None:
         return "every case of the study ended ok: there is nothing to run again"
     return f"no case of the study ended as {' or '.join(sorted(endings))}: there is nothing to run again"
 
 
-def _failed(connection: sa.Connection, number: int, endings: Collection[str] | None) -> dict[str, int]:
+def failed_cases(connection: sa.Connection, number: int, endings: Collection[str] | None) -> dict[str, int]:
     """Number of cases to run again, by ending."""
     c = ENDINGS.c
     found = connection.execute(sa.select(c.ending, c.cases).where(c.study == number, c.ending != models.OK)).all()
     return {ending: cases for ending, cases in found if cases and (endings is None or ending in endings)}
 
 
-def _runs(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...]) -> list[Run]:
+def failed_runs(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...]) -> list[Run]:
     """The cases with those endings as runs, in order."""
     c = results_table(row.model, row.variant).c
     # Consecutive cases have the same difference from their index in the list.
@@ -132,7 +76,7 @@ def _runs(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...])
     return _few([(int(number), int(count)) for number, count in connection.execute(query)])
 
 
-def _places(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...], order: Order) -> list[Run]:
+def failed_places(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...], order: Order) -> list[Run]:
     """The same for a study with an order of its own: runs of positions in it; of a sweep whole lines."""
     c = results_table(row.model, row.variant).c
     query = sa.select(c.case_number).where(c.study == row.number, c.ending.in_(endings))
@@ -152,7 +96,7 @@ def _few(runs: list[Run]) -> list[Run]:
     return runs
 
 
-def _give_back(
+def give_back(
     connection: sa.Connection,
     row: sa.Row[Any],
     runs: Sequence[Run],

@@ -13,12 +13,12 @@ import sqlalchemy as sa
 from cachetools import LRUCache
 
 from sprag.sentences import Sentence, WarningText
-from sprag.service.storage.case_keys import KEYED, any_below, newest_with
-from sprag.service.storage.cases import conditions
+from sprag.service.storage.case_keys import KEYED, NOT_YET, TOO_MANY, add_keys, any_below, keys_of, newest_with
+from sprag.service.storage.columns import conditions
 from sprag.service.storage.damage import undecodable
-from sprag.service.storage.digests import Digests
 from sprag.service.storage.errors import DatabaseError, StudyNotFoundError
 from sprag.service.storage.origins import HOSTS_BETWEEN
+from sprag.service.storage.part import Part
 from sprag.service.storage.round_table import latest_place
 from sprag.service.storage.stored_sentences import read_warnings, write_warnings
 from sprag.service.storage.study_digests import WITH_DIGEST, is_sound
@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from sprag.service.storage.digests import Digests
+    from sprag.service.storage.order import Orders
     from sprag.service.storage.session import Session
     from sprag.worker.ports import Chunk, Clock
 
@@ -78,15 +80,16 @@ class _Found:
     there: Cases
 
 
-class Reuse(Digests):
+class Reuse(Part):
     """Equal cases of other studies."""
 
-    def __init__(self, session: Session, clock: Clock) -> None:
+    def __init__(self, session: Session, clock: Clock, orders: Orders, digests: Digests) -> None:
         super().__init__(session, clock)
+        self._orders, self._digests = orders, digests
         self._found: LRUCache[int, _Found | None] = LRUCache(_KEPT)
         self._spans = _Spans()
 
-    def reusable(self, study: Study) -> int:
+    def count(self, study: Study) -> int:
         """Number of cases of an unsubmitted study that need not be run."""
         with self.session.read() as connection:
             found = _find(connection, self._spans, study, kin_hash(study, models.ENGINE_VERSION), 0)
@@ -99,10 +102,10 @@ class Reuse(Digests):
         The search at the first chunk of a study covers all its chunks.
         """
         found = self._of_study(study, chunk.study)
-        plain = self._order(chunk.study) is None
+        plain = self._orders.of(chunk.study) is None
         if found is None and plain:
             return None
-        cases = self._cases(chunk)
+        cases = self._orders.cases(chunk)
         if found is None:
             nothing = np.empty(0, dtype=np.int64)
             return Known(cases, nothing, nothing, nothing)
@@ -116,6 +119,28 @@ class Reuse(Digests):
         at = at[there]
         return Known(cases[~there], found.cases[at], found.studies[at], found.there[at])
 
+    def key_steps(self) -> Iterator[int]:
+        """Give keys to the studies of before revision 0035, one in each transaction; yields their numbers.
+
+        Studies of other versions of the engine share no case with any that is still submitted.
+        """
+        c = STUDIES.c
+        without = (c.keyed == NOT_YET) & (c.engine_version == models.ENGINE_VERSION)
+        with self.session.read() as connection:
+            numbers = list(connection.execute(sa.select(c.number).where(without).order_by(c.number.desc())).scalars())
+        for number in numbers:
+            with self.session.write() as connection:
+                row = connection.execute(
+                    sa.select(c.study, c.kin_hash).where(c.number == number, without)
+                ).one_or_none()
+                if row is not None:
+                    keys = keys_of(Study.from_text(row.study), row.kin_hash)
+                    if keys is not None:
+                        add_keys(connection, number, keys)
+                    keyed = TOO_MANY if keys is None else KEYED
+                    connection.execute(sa.update(STUDIES).where(c.number == number).values(keyed=keyed))
+            yield number
+
     def _leave_damaged(
         self, study: Study, cases: Cases, wanted: NDArray[np.bool_], studies: Cases, there: Cases
     ) -> bool:
@@ -127,13 +152,13 @@ class Reuse(Digests):
         with self.session.read() as connection:
             for source in np.unique(studies[wanted]).tolist():
                 these = np.flatnonzero(wanted & (studies == source))
-                for chunk in self.damaged_chunks(connection, source, there[these]):
-                    wanted[these[np.isin(there[these], self._cases(chunk, connection))]] = False
+                for chunk in self._digests.damaged_chunks(connection, source, there[these]):
+                    wanted[these[np.isin(there[these], self._orders.cases(chunk, connection))]] = False
                     damaged.append(source)
             ids = connection.execute(sa.select(STUDIES.c.id).where(STUDIES.c.number.in_(damaged))).scalars().all()
         for study_id in ids:
             with suppress(StudyNotFoundError, DatabaseError):  # deleted since, or the housekeeping names it
-                self.run_damaged_again(study_id)
+                self._digests.run_damaged_again(study_id)
         if ids and study.sweep is not None:
             # A line of which some cases are missing is run as a whole.
             marked = np.flatnonzero(wanted)
@@ -153,15 +178,15 @@ class Reuse(Digests):
             self._found[number] = found and _Found(found.cases + first, found.studies, found.there)
         return self._found[number]
 
-    def _forget_reuse(self, number: int) -> None:
+    def forget(self, number: int) -> None:
         """Search again at the next chunk of the study, because its sources have changed."""
         self._found.pop(number, None)
 
-    def _hosts_of(self, connection: sa.Connection, known: Known) -> set[str]:
+    def hosts_of(self, connection: sa.Connection, known: Known) -> set[str]:
         """The hosts that computed the rows of other studies which a chunk takes; as far as they were recorded."""
         c, found = CHUNKS.c, set[str]()
         for source in np.unique(known.studies).tolist():
-            there, order = known.there[known.studies == source], self._order(source, connection)
+            there, order = known.there[known.studies == source], self._orders.of(source, connection)
             places = np.sort(there if order is None else order.positions(there))
             begins, ends = int(places[0]), int(places[-1])
             query = sa.select(c["first"], c["count"], c.host).where(

@@ -15,9 +15,10 @@ import sqlalchemy as sa
 
 from sprag.sentences import Amount, Sentence
 from sprag.service.languages import recorded
-from sprag.service.storage.dispatchers import Dispatchers, return_claims
+from sprag.service.storage.dispatchers import require_epoch, return_claims
 from sprag.service.storage.errors import DatabaseFullError
-from sprag.service.storage.reserve import holds, keep_reserve
+from sprag.service.storage.part import Part, change_row, holds, move_row
+from sprag.service.storage.reserve import keep_reserve
 from sprag.service.storage.stored_sentences import sentence_in
 from sprag.service.storage.tables import STUDIES, WAITS_FOR_ROOM
 from sprag.worker.states import GOING, StudyEvent
@@ -79,10 +80,10 @@ def _within(session: Session) -> tuple[int, int]:
     return unused * page, (logged * page if logged == moved else 0)
 
 
-class Room(Dispatchers):
-    """Studies held while the disk is full. Part of `sprag.worker.ports.Store`."""
+class Room(Part):
+    """Studies held while the disk is full."""
 
-    def room(self) -> int:
+    def left(self) -> int:
         """Bytes available to the database."""
         return room(self.session)[0]
 
@@ -91,7 +92,8 @@ class Room(Dispatchers):
         left, limit = room(self.session)
         if left < RESERVE_BYTES:
             return Sentence(recorded.NO_ROOM, limit=limit)
-        keep_reserve(self.session)
+        if not self.session.on_server:
+            keep_reserve(self.session.path)
         return None
 
     def full(self) -> str | None:
@@ -113,22 +115,22 @@ class Room(Dispatchers):
         With ``returned`` every claim of this epoch goes back to waiting in the same transaction.
         """
         with self.session.write() as connection:
-            self._own(connection, epoch)
+            require_epoch(connection, epoch)
             if returned:
                 return_claims(connection, epoch)
             ours = sa.func.coalesce(STUDIES.c.dispatcher, epoch) == epoch
             going = sa.select(STUDIES.c.number).where(STUDIES.c.state.in_(GOING), ours)
             numbers = connection.execute(going).scalars().all()
             for number in numbers:
-                self._move(connection, number, StudyEvent.FAULT, reason)
-                self._change(connection, number, waits_for=WAITS_FOR_ROOM, dispatcher=epoch)
+                move_row(connection, number, StudyEvent.FAULT, self._now(), reason)
+                change_row(connection, number, waits_for=WAITS_FOR_ROOM, dispatcher=epoch)
 
     def let_go(self, epoch: int) -> None:
         """Queue again every study that `hold` paused and nobody has changed since."""
         with self.session.write() as connection:
-            self._own(connection, epoch)
+            require_epoch(connection, epoch)
             ours = sa.func.coalesce(STUDIES.c.dispatcher, epoch) == epoch
             held = sa.select(STUDIES.c.number).where(STUDIES.c.waits_for == WAITS_FOR_ROOM, ours)
             numbers = connection.execute(held)
             for number in numbers.scalars().all():
-                self._move(connection, number, StudyEvent.RESUME)
+                move_row(connection, number, StudyEvent.RESUME, self._now())

@@ -14,7 +14,7 @@ from sprag.service.spec.saved_views import View
 from sprag.service.storage.audit import note, require_own
 from sprag.service.storage.editions import edition_of, require_edition
 from sprag.service.storage.errors import TooManyViewsError, ViewNotFoundError
-from sprag.service.storage.part import Part, moment
+from sprag.service.storage.part import Part, change_row, moment, row_of
 from sprag.service.storage.pools import pool_of
 from sprag.service.storage.tables import STUDIES
 from sprag.service.storage.view_tables import SAVED_VIEWS
@@ -55,10 +55,10 @@ class SavedView:
         return edition_of(self.view.name, self.view.query, self.place)
 
 
-class SavedViews(Part):
+class Views(Part):
     """The saved views of a database."""
 
-    def saved_views(self, study_id: str | None = None) -> tuple[SavedView, ...]:
+    def all(self, study_id: str | None = None) -> tuple[SavedView, ...]:
         """Every view, or those of a study: first the figures of its report in order, then the others by name.
 
         Raises StudyNotFoundError.
@@ -66,27 +66,27 @@ class SavedViews(Part):
         with self.session.read() as connection:
             query = _SHOWN.order_by(*_ORDER)
             if study_id is not None:
-                query = query.where(_V.study == self._row(connection, study_id, STUDIES.c.number).number)
+                query = query.where(_V.study == row_of(connection, study_id, STUDIES.c.number).number)
             return tuple(map(_record, connection.execute(query)))
 
-    def general_views(self) -> tuple[SavedView, ...]:
+    def general(self) -> tuple[SavedView, ...]:
         """The views of pages that belong to no study, by name."""
         with self.session.read() as connection:
             return tuple(map(_record, connection.execute(_SHOWN.where(_V.study.is_(None)).order_by(*_ORDER))))
 
-    def saved_view(self, view_id: str) -> SavedView:
+    def get(self, view_id: str) -> SavedView:
         """One view; raises ViewNotFoundError."""
         with self.session.read() as connection:
             return _record(_found(connection, view_id))
 
-    def save_view(self, view: View) -> SavedView:
+    def save(self, view: View) -> SavedView:
         """Save a view; one of the same study, page and name is replaced.
 
         Raises StudyNotFoundError, NotOwnerError for a view or, for a figure of the report, a study of another user,
         TooManyViewsError, and FaultError for too many figures.
         """
         with self.session.write() as connection:
-            study = None if view.study is None else self._row(connection, view.study, STUDIES.c.number).number
+            study = None if view.study is None else row_of(connection, view.study, STUDIES.c.number).number
             same = (_V.page == view.page, _V.name == view.name, _V.study == study if study else _V.study.is_(None))
             old = connection.execute(sa.select(_V.id, _V.owner).where(*same)).first()
             if old is None:
@@ -107,8 +107,8 @@ class SavedViews(Part):
             self._put_in_report(connection, row, wanted=view.in_report or row.place is not None, place=row.place)
             return _record(_found(connection, identity))
 
-    def change_view(self, view_id: str, change: ViewChange, read: Collection[str] | None = None) -> SavedView:
-        """Change a view; raises as `save_view` does, and ViewNotFoundError, FaultError for a name that is taken.
+    def change(self, view_id: str, change: ViewChange, read: Collection[str] | None = None) -> SavedView:
+        """Change a view; raises as `save` does, and ViewNotFoundError, FaultError for a name that is taken.
 
         ``read``: the editions (`SavedView.etag`) that the change is meant for; ChangedMeanwhileError for any other.
         """
@@ -132,8 +132,8 @@ class SavedViews(Part):
             self._put_in_report(connection, row, wanted=wanted, place=change.place or row.place)
             return _record(_found(connection, view_id))
 
-    def remove_view(self, view_id: str, read: Collection[str] | None = None) -> None:
-        """Remove a view; raises ViewNotFoundError, NotOwnerError; ``read`` as for `change_view`."""
+    def remove(self, view_id: str, read: Collection[str] | None = None) -> None:
+        """Remove a view; raises ViewNotFoundError, NotOwnerError; ``read`` as for `change`."""
         with self.session.write() as connection:
             row = _found(connection, view_id)
             require_own("view", view_id, row.owner)
@@ -163,7 +163,7 @@ class SavedViews(Part):
             connection.execute(sa.update(SAVED_VIEWS).where(_V.id == row.id).values(place=None))
         for number, identity in enumerate(order, start=1):
             connection.execute(sa.update(SAVED_VIEWS).where(_V.id == identity).values(place=number))
-        self._change(connection, row.study)  # the report is another one
+        change_row(connection, row.study)  # the report is another one
 
 
 def inherit_figures(connection: sa.Connection, source: int | None, target: int) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 import re
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Condition
 from time import perf_counter
@@ -16,14 +16,14 @@ import sqlalchemy as sa
 from sqlalchemy.engine import URL, make_url
 
 from sprag.service.storage import sqlite_files
-from sprag.service.storage.errors import DatabaseError, EndingError, busy
+from sprag.service.storage.errors import DatabaseError, DatabaseFullError, EndingError, busy
 from sprag.service.storage.file_news import FileNews
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
     from types import ModuleType
 
-    from sprag.service.storage.rows import Block, Target
+    from sprag.service.storage.blocks import Block, Target
     from sprag.service.storage.server_lock import ServerLock
     from sprag.worker.ports import News
 
@@ -198,6 +198,20 @@ class Session:
                 yield connection
         except sa.exc.DBAPIError as error:
             raise self._explained(error) from error
+
+    def checkpoint(self) -> None:
+        """Move the write-ahead log into the file as far as no reader needs the old state; a server does so itself.
+
+        Neither readers nor writers wait for it.
+        """
+        if not self.on_server:
+            with self.plain() as connection:
+                connection.exec_driver_sql("PRAGMA wal_checkpoint(PASSIVE)")
+
+    def renew_log(self) -> None:
+        """Let the log begin anew where its pages find their place in the file; nothing on a disk too full for that."""
+        with suppress(DatabaseFullError):
+            self.checkpoint()
 
     def server_lock(self, owner: str) -> ServerLock:
         """The presence of the dispatcher ``owner`` (a name for people) on a database server."""

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
+from sprag.service.storage.blocks import tuples
 from sprag.service.storage.errors import CREATED_BY, DatabaseBusyError, DatabaseError, DatabaseFullError, busy, in_use
 from sprag.service.storage.one_name import HeldName, hold, linked
 from sprag.service.storage.private_files import PRIVATE_FOLDER_MODE, create_private
 from sprag.service.storage.reserve import spend_to_open
-from sprag.service.storage.rows import tuples
 from sprag.worker.ports import StoreError
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from sqlalchemy.engine import URL
 
-    from sprag.service.storage.rows import Block, Target
+    from sprag.service.storage.blocks import Block, Target
 
 #: Older libraries can corrupt a write-ahead log that several connections share.
 SAFE_SQLITE: Final = (3, 51, 3)

@@ -6,22 +6,25 @@ from typing import TYPE_CHECKING, Self
 
 from sprag.service.storage import maintenance
 from sprag.service.storage.audit import Audit
+from sprag.service.storage.cases import Rows
 from sprag.service.storage.components import Components
 from sprag.service.storage.deployment import Deployment
+from sprag.service.storage.digests import Digests
+from sprag.service.storage.dispatchers import Dispatchers
 from sprag.service.storage.figures import Totals
-from sprag.service.storage.labelling import Labelling
-from sprag.service.storage.late_runs import LateRuns
-from sprag.service.storage.origins import Origins
+from sprag.service.storage.order import Orders
 from sprag.service.storage.part import SystemClock
+from sprag.service.storage.people import People
 from sprag.service.storage.purging import Purging
-from sprag.service.storage.retry import Retries
+from sprag.service.storage.reports import Reports
+from sprag.service.storage.reuse import Reuse
 from sprag.service.storage.room import Room
-from sprag.service.storage.rounds import Rounds
-from sprag.service.storage.saved_views import SavedViews
+from sprag.service.storage.runs import Runs
+from sprag.service.storage.saved_views import Views
 from sprag.service.storage.schedules import Schedules
 from sprag.service.storage.session import Session
-from sprag.service.storage.sessions import Sessions
-from sprag.service.storage.tokens import Tokens
+from sprag.service.storage.studies import Studies
+from sprag.service.storage.work import Work
 from sprag.worker.chunking import Chunking
 
 if TYPE_CHECKING:
@@ -32,24 +35,31 @@ if TYPE_CHECKING:
     from sprag.worker.ports import Clock
 
 
-class Store(
-    Labelling,
-    Rounds,
-    Purging,
-    Retries,
-    Room,
-    Schedules,
-    Sessions,
-    Tokens,
-    Audit,
-    Totals,
-    Origins,
-    LateRuns,
-    Components,
-    SavedViews,
-    Deployment,
-):
-    """One database. Safe to use from several threads; close it at the end (it is a context manager)."""
+class Store:
+    """One database by parts. Safe to use from several threads; close it at the end (it is a context manager)."""
+
+    def __init__(self, session: Session, clock: Clock, chunking: Chunking) -> None:
+        self.session, self.clock = session, clock
+        self.audit, self.people = Audit(session, clock), People(session, clock)
+        self.components, self.views = Components(session, clock), Views(session, clock)
+        self.schedules, self.runs, self.reports = (
+            Schedules(session, clock),
+            Runs(session, clock),
+            Reports(session, clock),
+        )
+        self.deployment, self.figures, self.room = (
+            Deployment(session, clock),
+            Totals(session, clock),
+            Room(session, clock),
+        )
+        self.dispatchers = Dispatchers(session, clock, chunking)
+        orders = Orders(session, clock)
+        self.digests = Digests(session, clock, orders)
+        self.rows = Rows(session, clock, orders, self.digests)
+        self.reuse = Reuse(session, clock, orders, self.digests)
+        self.studies = Studies(session, clock, self.people, self.dispatchers, orders, self.digests)
+        self.purging = Purging(session, clock, self.studies)
+        self.work = Work(session, clock, self.dispatchers, orders, self.digests, self.rows, self.reuse, self.room)
 
     @classmethod
     def open(
@@ -93,7 +103,7 @@ class Store(
 
     def checkpoint(self) -> None:
         """Move the write-ahead log into the file as far as no reader needs the old state; blocks nobody."""
-        maintenance.checkpoint(self.session)
+        self.session.checkpoint()
 
     def close(self) -> None:
         """Close every connection."""

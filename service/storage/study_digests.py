@@ -13,14 +13,13 @@ import sqlalchemy as sa
 
 from sprag.service.storage.damage import changed, readable
 from sprag.service.storage.errors import DatabaseError
-from sprag.service.storage.order import Orders
-from sprag.service.storage.round_table import rounds_of
+from sprag.service.storage.part import row_of
 from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES, results_table
 from sprag.worker import models
 from sprag.worker.states import ChunkState, StudyState
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Mapping
 
 _C = STUDIES.c
 #: What says which cases a study has and what its numbers mean.
@@ -60,55 +59,37 @@ def grown_digest(connection: sa.Connection, number: int, **values: object) -> in
     return digest_of_study({**row._asdict(), **values})
 
 
-class StudyDigests(Orders):
-    """Looking for studies that are not what was stored."""
+def problem_of(connection: sa.Connection, row: Any) -> str | None:
+    """What is wrong with the inputs or the list of chunks of a study; of its row `WITH_DIGEST`, number and state.
 
-    def problem_of(self, connection: sa.Connection, row: Any) -> str | None:
-        """What is wrong with the inputs or the list of chunks of a study; of its row `WITH_DIGEST`, number and state.
+    Its rows say nothing then: which cases they are of is not known.
+    """
+    if is_sound(row) and _chunks_fit(connection, row):
+        return None
+    what = "list of chunks" if is_sound(row) else "inputs"
+    return changed(row.id, what)
 
-        Its rows say nothing then: which cases they are of is not known.
-        """
-        if is_sound(row) and _chunks_fit(connection, row):
-            return None
-        what = "list of chunks" if is_sound(row) else "inputs"
-        return changed(row.id, what)
 
-    def require_whole(self, connection: sa.Connection, study_id: str) -> None:
-        """Raise DatabaseError where `problem_of` a study is something, and StudyNotFoundError."""
-        with readable(study_id):
-            row = self._row(connection, study_id, *WITH_DIGEST, _C.number, _C.state)
-        if problem := self.problem_of(connection, row):
-            raise DatabaseError(problem, "database-damaged")
+def require_whole(connection: sa.Connection, study_id: str) -> None:
+    """Raise DatabaseError where `problem_of` a study is something, and StudyNotFoundError."""
+    with readable(study_id):
+        row = row_of(connection, study_id, *WITH_DIGEST, _C.number, _C.state)
+    if problem := problem_of(connection, row):
+        raise DatabaseError(problem, "database-damaged")
 
-    def counts_differ(self, connection: sa.Connection, study_id: str) -> bool:
-        """Whether the numbers of cases of a study, by ending and together, are not those of its rows.
 
-        Raises StudyNotFoundError.
-        """
-        row = self._row(connection, study_id, _C.number, _C.model, _C.variant, _C.done, _C.ok)
-        e, c = ENDINGS.c, results_table(row.model, row.variant).c
-        told = connection.execute(sa.select(e.ending, e.cases).where(e.study == row.number)).all()
-        rows = sa.select(c.ending, sa.func.count()).where(c.study == row.number).group_by(c.ending)
-        counted = {ending: int(cases) for ending, cases in connection.execute(rows)}
-        sums = (sum(counted.values()), counted.get(models.OK, 0))
-        return {ending: cases for ending, cases in told if cases} != counted or (row.done, row.ok) != sums
+def counts_differ(connection: sa.Connection, study_id: str) -> bool:
+    """Whether the numbers of cases of a study, by ending and together, are not those of its rows.
 
-    def broken_studies(self) -> Iterator[str]:
-        """A sentence on each study that is not what was stored."""
-        with self.session.read() as connection:
-            known = sa.select(_C.id).where(_C.deleted_at.is_(None)).order_by(_C.number)
-            ids = connection.execute(known).scalars().all()
-        for study_id in ids:
-            try:
-                with self.session.read() as connection:
-                    self.require_whole(connection, study_id)
-                    rounds_of(connection, self._row(connection, study_id, _C.number).number)
-                    differ = self.counts_differ(connection, study_id)
-            except DatabaseError as error:
-                yield str(error)
-                continue
-            if differ:
-                yield f"the numbers of cases of the study {study_id} are not those of its rows"
+    Raises StudyNotFoundError.
+    """
+    row = row_of(connection, study_id, _C.number, _C.model, _C.variant, _C.done, _C.ok)
+    e, c = ENDINGS.c, results_table(row.model, row.variant).c
+    told = connection.execute(sa.select(e.ending, e.cases).where(e.study == row.number)).all()
+    rows = sa.select(c.ending, sa.func.count()).where(c.study == row.number).group_by(c.ending)
+    counted = {ending: int(cases) for ending, cases in connection.execute(rows)}
+    sums = (sum(counted.values()), counted.get(models.OK, 0))
+    return {ending: cases for ending, cases in told if cases} != counted or (row.done, row.ok) != sums
 
 
 def _chunks_fit(connection: sa.Connection, row: Any) -> bool:

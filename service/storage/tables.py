@@ -48,7 +48,7 @@ STUDIES = sa.Table(
     sa.Column("deleted_at", sa.BigInteger),
     # Among the studies of one owner, the one with the higher priority runs first.
     sa.Column("priority", sa.Integer, nullable=False, server_default="0"),
-    # The part of its priority that counts against studies of other owners (`Users._rank`).
+    # The part of its priority that counts against studies of other owners (`sprag.service.storage.pools.rank_of`).
     sa.Column("rank", sa.Integer, nullable=False, server_default="0"),
     # What a paused study waits for (`WAITS_FOR_ROOM` and below); NULL where the user or a fault paused it.
     sa.Column("waits_for", sa.String(12)),
@@ -83,7 +83,7 @@ STUDIES = sa.Table(
     # Until then a deleted study can be restored; 0, or NULL in those deleted before revision 0023: its rows are being
     # removed.
     sa.Column("purge_at", sa.BigInteger),
-    # Name, tags and notes as they are searched (`sprag.service.storage.searching`).
+    # Name, tags and notes as they are searched (`sprag.service.storage.labels`).
     sa.Column("search", sa.Text, nullable=False, server_default=""),
     # Epoch of the dispatcher to which it belongs; NULL: to none, so any of them may take it.
     sa.Column("dispatcher", sa.Integer),

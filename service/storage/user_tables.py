@@ -1,4 +1,4 @@
-"""The tables of users and of the audit log. Times are microseconds since 1970-01-01 UTC."""
+"""The tables of users, their tokens and sessions, and of the audit log. Times are microseconds since 1970-01-01 UTC."""
 
 import sqlalchemy as sa
 
@@ -19,6 +19,42 @@ USERS = sa.Table(
     sa.Column("most_bytes", sa.BigInteger),
     sa.Column("most_checks", sa.Integer),
     sqlite_autoincrement=True,
+)
+
+TOKENS = sa.Table(
+    "tokens",
+    METADATA,
+    sa.Column("number", sa.Integer, primary_key=True, autoincrement=True),
+    sa.Column("id", sa.String(40), nullable=False, unique=True),
+    sa.Column("name", sa.Text, nullable=False),
+    sa.Column("scope", sa.String(8), nullable=False),
+    sa.Column("digest", sa.String(64), nullable=False, unique=True),
+    sa.Column("created_at", sa.BigInteger, nullable=False),
+    # Revoked tokens stay listed, so a service that ever had a token never becomes open again.
+    sa.Column("revoked_at", sa.BigInteger),
+    # Name of the user whose token it is; NULL: nobody's.
+    sa.Column("owner", sa.String(80)),
+    # NULL: it never expires.
+    sa.Column("expires_at", sa.BigInteger),
+    # The last use, to the minute; NULL: never used.
+    sa.Column("used_at", sa.BigInteger),
+    sqlite_autoincrement=True,
+)
+
+SESSION_KEY = sa.Table(
+    "session_key",
+    METADATA,
+    sa.Column("id", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("key", sa.String(64), nullable=False),
+    sa.Column("created_at", sa.BigInteger, nullable=False),
+)
+
+ENDED_SESSIONS = sa.Table(
+    "ended_sessions",
+    METADATA,
+    sa.Column("seal", sa.String(64), primary_key=True),
+    # Seconds since 1970-01-01 UTC, as in the cookie; afterwards the row is useless.
+    sa.Column("ends_at", sa.BigInteger, nullable=False),
 )
 
 #: One row for each change, written in the transaction of the change.

@@ -40,7 +40,7 @@ class AnswersChoice:
 
 def answers_of(library: Library, study_id: str, chosen: CurveQuery | None, point: str | None) -> StudyAnswers:
     """The answers of a study, of the ``chosen`` curves; raises StudyNotFoundError, and SelectionError."""
-    study = library.store.study(study_id)
+    study = library.store.studies.study(study_id)
     infos = models.study_results(study)
     query = answers_query(study, infos, chosen)
     if query is None and chosen is not None:
@@ -48,9 +48,9 @@ def answers_of(library: Library, study_id: str, chosen: CurveQuery | None, point
             "x", "not-used", "the cases of this study lie on no curves", chosen.x, allowed="no choice of curves"
         )
     # While a large study runs, all its rows would be read again for each of its chunks.
-    over = library.store.get_study(study_id).over or study.cases <= study_view.FEW
+    over = library.store.studies.get(study_id).over or study.cases <= study_view.FEW
     whole = partial(_whole, library, study_id) if over else None
-    return find_answers(study, infos, query, point, partial(library.store.rows_for_cases, study_id), whole)
+    return find_answers(study, infos, query, point, partial(library.store.rows.for_cases, study_id), whole)
 
 
 def _whole(library: Library, study_id: str, names: Sequence[str]) -> CaseColumns:

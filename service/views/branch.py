@@ -254,7 +254,7 @@ class BranchView(CaseView[BranchQuestion, tuple[Along, str], CaseBranch]):
         """The finished cases of the study that differ from this one in the parameter only."""
         along, result = chosen
         cases = neighbours(study, case, along)
-        y = store.rows_for_cases(study_id, cases, [result]).values[result]
+        y = store.rows.for_cases(study_id, cases, [result]).values[result]
         x = study.columns(cases)[along.paths[0]] if cases.size else np.empty(0)
         kept = np.isfinite(y)
         return OwnCases(x[kept], y[kept], cases[kept])

@@ -75,9 +75,9 @@ class RibbonView(StudyView[RibbonQuestion, RibbonQuery, Ribbon]):
 
     def find(self, library: Library, study_id: str, chosen: RibbonQuery, *, drawn: bool = False) -> Ribbon:
         """The ribbons; SelectionError as of `ribbon`."""
-        study = library.store.study(study_id)
+        study = library.store.studies.study(study_id)
         infos = models.study_results(study)
-        fetch = partial(library.store.rows_for_cases, study_id)
+        fetch = partial(library.store.rows.for_cases, study_id)
         return ribbon(study, infos, chosen.y or drawn_results(study, infos), chosen.asked, chosen.quantiles, fetch)
 
     def json(self, found: Found[RibbonQuery, Ribbon]) -> m.RibbonReport:
@@ -116,8 +116,8 @@ class YieldView(StudyView[YieldQuestion, YieldQuery, Yield]):
 
     def find(self, library: Library, study_id: str, chosen: YieldQuery, *, drawn: bool = False) -> Yield:
         """The yields; SelectionError as of `yields`."""
-        study = library.store.study(study_id)
-        fetch = partial(library.store.rows_for_cases, study_id)
+        study = library.store.studies.study(study_id)
+        fetch = partial(library.store.rows.for_cases, study_id)
         return yields(study, models.study_results(study), chosen.conditions, chosen.asked, chosen.worst, fetch)
 
     def json(self, found: Found[YieldQuery, Yield]) -> m.YieldReport:

@@ -41,12 +41,12 @@ class SensitivityView(StudyView[SensitivityQuestion, tuple[str, ...], list[Sensi
     ) -> list[Sensitivity]:
         """The sensitivities; raises SelectionError and StudyNotFoundError."""
         store = library.store
-        fetch = partial(store.rows_for_cases, study_id)
-        return sensitivity(store.study(study_id), store.spec(study_id), list(chosen), fetch)
+        fetch = partial(store.rows.for_cases, study_id)
+        return sensitivity(store.studies.study(study_id), store.studies.spec(study_id), list(chosen), fetch)
 
     def json(self, found: Found[tuple[str, ...], list[Sensitivity]]) -> Mapping[str, Any]:
         """The sensitivities as JSON data, with warnings of parameters without effect."""
-        record = found.library.store.get_study(found.study_id)
+        record = found.library.store.studies.get(found.study_id)
         warnings = warned(found.library.unaffected.of(found.library.store, record))
         return {"study": found.study_id, "results": [item.to_json() for item in found.made], **warnings}
 

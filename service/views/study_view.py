@@ -45,7 +45,7 @@ class Found(Generic[Chosen, Made]):
     @property
     def study(self) -> Study:
         """The study."""
-        return self.library.store.study(self.study_id)
+        return self.library.store.studies.study(self.study_id)
 
 
 class StudyView(ABC, Generic[Question, Chosen, Made]):

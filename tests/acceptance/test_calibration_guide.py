@@ -25,8 +25,10 @@ def test_the_example_of_the_guide_has_its_values() -> None:
     parsed = parse_spec({**spec, **json.loads(f"{{{fields}}}")})
     with run_here(parsed.spec, parsed.study, processes=0) as done:
         study_id, store = done.record.id, done.store
-        rows = partial(store.rows_for_cases, study_id)
-        found = calibration_json(study_id, calibration_of(store.study(study_id), store.rounds(study_id), rows))
+        rows = partial(store.rows.for_cases, study_id)
+        found = calibration_json(
+            study_id, calibration_of(store.studies.study(study_id), store.studies.rounds(study_id), rows)
+        )
     assert found["complete"]
     table = re.findall(r"^\| (\S+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$", page, re.MULTILINE)
     assert [row[0] for row in table] == [one["name"] for one in found["parameters"]]

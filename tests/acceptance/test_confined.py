@@ -158,7 +158,7 @@ def test_backups_are_written(served: httpx.Client, root: Path) -> None:
     copy.parent.mkdir(exist_ok=True)
     confined(*COMMAND, "db", "backup", str(copy), cwd=root)
     with Store.open(f"sqlite:///{copy}") as store:
-        assert store.list_studies().studies
+        assert store.studies.page().studies
 
 
 def test_home_and_cache_are_where_the_unit_may_write(root: Path) -> None:

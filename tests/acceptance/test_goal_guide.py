@@ -39,9 +39,9 @@ def test_the_examples_of_the_guide_have_their_designs(section: str) -> None:
     if section == "What it answers":
         assert parsed.study == parse_spec(spec).study
     with run_here(parsed.spec, parsed.study, processes=0) as done:
-        study, rounds = done.store.study(done.record.id), done.store.rounds(done.record.id)
-        found = designs_of(study, rounds, partial(done.store.rows_for_cases, done.record.id))
-        progress = done.store.progress(done.record.id).rounds
+        study, rounds = done.store.studies.study(done.record.id), done.store.studies.rounds(done.record.id)
+        found = designs_of(study, rounds, partial(done.store.rows.for_cases, done.record.id))
+        progress = done.store.studies.progress(done.record.id).rounds
     assert progress is not None
     assert page.split("\n> ")[1].startswith(sentence(progress, StudyState.FINISHED))
     rows = [

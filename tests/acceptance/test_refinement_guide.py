@@ -38,11 +38,11 @@ def test_the_example_of_the_guide_has_its_numbers() -> None:
     planner = planner_of(parsed.study.plan)
     assert f"at most {planner.most_cases} cases in at most {planner.most_rounds} rounds" in page
     with run_here(parsed.spec, parsed.study, processes=0) as done:
-        study = done.store.study(done.record.id)
+        study = done.store.studies.study(done.record.id)
         infos = models.study_results(study)
         query = main_query(study, infos)
         assert query is not None
-        drawn = draw(select(study, infos, query), partial(done.store.rows_for_cases, done.record.id))
+        drawn = draw(select(study, infos, query), partial(done.store.rows.for_cases, done.record.id))
     (told,) = re.findall(r"needs (\d+)\s+cases", page)
     assert study.cases == pytest.approx(int(told), rel=0.05)
     sentence = page.split("\n> ")[1].split(" (")[0]

@@ -11,14 +11,14 @@ SPEC = {"sprag": 1, "name": "Füllung", "axes": [{"path": "shaft.load", "values"
 
 
 def create(store: Store, cases: int = 25, name: str = "a study", **options: str) -> StudyRecord:
-    return store.create_study(SPEC, fakes.study(cases, name), **options)
+    return store.studies.create(SPEC, fakes.study(cases, name), **options)
 
 
 def finish(store: Store, record: StudyRecord, ending: str = models.OK) -> int:
     """Run a study to its end; gives the epoch."""
-    epoch = store.take_over("test")
-    for chunk in store.open_chunks(record.number):
-        assert store.claim(epoch, [chunk]) == [chunk]
-        assert store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count, ending))
-    store.settle(epoch, record.number)
+    epoch = store.work.take_over("test")
+    for chunk in store.work.open_chunks(record.number):
+        assert store.work.claim(epoch, [chunk]) == [chunk]
+        assert store.work.commit(epoch, chunk, fakes.result(chunk.first, chunk.count, ending))
+    store.work.settle(epoch, record.number)
     return epoch

@@ -16,18 +16,18 @@ CLUTCH = Component("clutch", "FW 20", "", {"coefficients": "0; 200"})
 
 
 def test_components_are_kept_replaced_and_removed(store: Store) -> None:
-    made = store.put_components([SPRING, CLUTCH])
+    made = store.components.put([SPRING, CLUTCH])
     assert [record.component for record in made] == [SPRING, CLUTCH]
-    assert [record.component.kind for record in store.components()] == ["clutch", "spring"]
+    assert [record.component.kind for record in store.components.all()] == ["clutch", "spring"]
     changed = Component("spring", "F-120", "", {"spring_rate": "10 N/mm"})
-    again = store.put_components([changed])
+    again = store.components.put([changed])
     assert (again[0].id, again[0].component) == (made[0].id, changed)
-    assert [record.component for record in store.components("spring")] == [changed]
-    store.remove_component(made[0].id)
-    assert store.components("spring") == ()
+    assert [record.component for record in store.components.all("spring")] == [changed]
+    store.components.remove(made[0].id)
+    assert store.components.all("spring") == ()
     with pytest.raises(ComponentNotFoundError):
-        store.remove_component(made[0].id)
-    found = [(entry.action, entry.target) for entry in store.audit_log(AuditFilter()).records[:4]]
+        store.components.remove(made[0].id)
+    found = [(entry.action, entry.target) for entry in store.audit.page(AuditFilter()).records[:4]]
     assert found == [
         ("component.remove", made[0].id),
         ("component.change", made[0].id),
@@ -40,19 +40,19 @@ def test_a_component_of_another_user_is_not_changed(store: Store) -> None:
     dora = Actor(Door.API, "dora", "", "dora", everything=False)
     emil = Actor(Door.API, "emil", "", "emil", everything=False)
     with act_as(dora):
-        made = store.put_components([SPRING])[0]
+        made = store.components.put([SPRING])[0]
         assert made.owner == "dora"
     with act_as(emil):
         with pytest.raises(NotOwnerError):
-            store.put_components([CLUTCH, SPRING])
+            store.components.put([CLUTCH, SPRING])
         with pytest.raises(NotOwnerError):
-            store.remove_component(made.id)
-    assert [record.component for record in store.components()] == [SPRING]  # all or none
+            store.components.remove(made.id)
+    assert [record.component for record in store.components.all()] == [SPRING]  # all or none
 
 
 def test_the_catalogue_has_a_limit(store: Store) -> None:
     many = [Component("spring", f"F-{number}", "", {"spring_rate": "1 N/mm"}) for number in range(MAX_COMPONENTS)]
-    store.put_components(many)
+    store.components.put(many)
     with pytest.raises(TooManyComponentsError):
-        store.put_components([CLUTCH])
-    assert len(store.components()) == MAX_COMPONENTS
+        store.components.put([CLUTCH])
+    assert len(store.components.all()) == MAX_COMPONENTS

@@ -19,7 +19,7 @@ def test_writers_that_look_before_they_write_wait_for_one_another(tmp_path: Path
     """Each has connections of its own, as other processes have. A reader could not become a writer here."""
     url = f"sqlite:///{tmp_path / 'store.sqlite3'}"
     with Store.open(url) as store:
-        store.create_study({}, fakes.study(1))
+        store.studies.create({}, fakes.study(1))
     stores = [Store.open(url) for _ in range(WRITERS)]
     start, errors = Barrier(WRITERS), []
 

@@ -32,7 +32,7 @@ def change(store: Store, case: int, **values: object) -> None:
 
 def damaged(store: Store) -> list[str]:
     """What `sprag db check` says of rows."""
-    found = [str(item) for item in store.all_damaged_rows()]
+    found = [str(item) for item in store.digests.all_damaged_rows()]
     assert [problem for problem in store.check().problems if "rows of the study" in problem] == found
     return found
 
@@ -57,7 +57,7 @@ def test_every_flip_of_a_bit_is_noticed_and_its_chunk_named(
     for case, values in ((3, {"ending": "diverged"}), (24, {"flags": "odd"}), (24, {column.name: None})):
         change(store, case, **values)
         assert len(damaged(store)) == 1, values
-        store.run_damaged_again(record.id)
+        store.digests.run_damaged_again(record.id)
         finish(store, record)
     with store.session.write() as connection:
         connection.execute(sa.delete(TABLE).where(TABLE.c.case_number == 9))
@@ -67,20 +67,20 @@ def test_every_flip_of_a_bit_is_noticed_and_its_chunk_named(
 def test_damaged_rows_are_held_back_and_run_again(store: Store) -> None:
     record = create(store, 25)
     finish(store, record)
-    rows = store.case_rows(record.id)
+    rows = store.rows.block(record.id)
     column = next(c for c in TABLE.c if isinstance(c.type, sa.Double))
     change(store, 13, **{column.name: 1e9})
     with refused(DatabaseError, "database-damaged") as caught:
-        store.require_undamaged(record.id)
+        store.digests.require_undamaged(record.id)
     assert f"study {record.id}, cases 10 to 19" in str(caught.value)
-    waiting = store.get_study(record.id)
+    waiting = store.studies.get(record.id)
     assert (waiting.state, waiting.done) == (StudyState.QUEUED, 15)
-    assert store.case_rows(record.id).cases.tolist() == [*range(10), *range(20, 25)], "no wrong row is left"
+    assert store.rows.block(record.id).cases.tolist() == [*range(10), *range(20, 25)], "no wrong row is left"
     finish(store, record)
-    again = store.case_rows(record.id)
+    again = store.rows.block(record.id)
     np.testing.assert_array_equal(again.values, rows.values)
-    store.require_undamaged(record.id)
-    assert store.get_study(record.id).done == 25
+    store.digests.require_undamaged(record.id)
+    assert store.studies.get(record.id).done == 25
 
 
 def flip(store: Store, case: int) -> None:
@@ -94,18 +94,18 @@ def test_no_answer_is_made_of_damaged_rows(store: Store, most: int, monkeypatch:
     monkeypatch.setattr(digests, "LOOKED_OVER", most)  # of a larger study the chunks with the wanted cases
     record = create(store, 25)
     answers: tuple[Callable[[], object], ...] = (
-        lambda: store.case_row(record.id, 13),
-        lambda: store.case_page(record.id, 12, 5),
-        lambda: store.case_page(record.id, ending="ok", limit=14),
-        lambda: store.all_rows(record.id, 13),
-        lambda: store.rows_for_cases(record.id, [13], [models.result_infos("vibration-drive", "1")[0].name]),
+        lambda: store.rows.case(record.id, 13),
+        lambda: store.rows.page(record.id, 12, 5),
+        lambda: store.rows.page(record.id, ending="ok", limit=14),
+        lambda: store.rows.of_case(record.id, 13),
+        lambda: store.rows.for_cases(record.id, [13], [models.result_infos("vibration-drive", "1")[0].name]),
     )
     for answer in answers:
         finish(store, record)
         flip(store, 13)
         with refused(DatabaseError, "database-damaged"):
             answer()
-        assert store.get_study(record.id).state is StudyState.QUEUED
+        assert store.studies.get(record.id).state is StudyState.QUEUED
     finish(store, record)
     for answer in answers:
         answer()
@@ -117,8 +117,8 @@ def test_numbers_of_cases_are_counted_again_where_all_rows_are_looked_at(store: 
     with store.session.write() as connection:
         connection.execute(sa.update(ENDINGS).values(cases=24))
         connection.execute(sa.update(STUDIES).values(ok=24))
-    store.require_undamaged(record.id, anew=True)
-    found, progress = store.look(record.id)
+    store.digests.require_undamaged(record.id, anew=True)
+    found, progress = store.studies.look(record.id)
     assert (found.done, found.ok, progress.endings) == (25, 25, {"ok": 25})
 
 
@@ -127,52 +127,52 @@ def test_columns_of_all_rows_are_looked_over(store: Store) -> None:
     finish(store, record)
     flip(store, 13)
     with refused(DatabaseError, "database-damaged"):
-        store.row_columns(record.id, [])
-    assert store.row_columns(record.id, []).cases.tolist() == [*range(10), *range(20, 25)]
+        store.rows.columns(record.id, [])
+    assert store.rows.columns(record.id, []).cases.tolist() == [*range(10), *range(20, 25)]
 
 
 def test_rows_that_changed_later_are_noticed_by_exports_at_once(store: Store) -> None:
     record = create(store, 25)
     finish(store, record)
-    store.require_undamaged(record.id)
+    store.digests.require_undamaged(record.id)
     flip(store, 13)
     with refused(DatabaseError, "database-damaged"):
-        store.require_undamaged(record.id, anew=True)
+        store.digests.require_undamaged(record.id, anew=True)
 
 
 def test_damaged_rows_are_not_copied_for_another_study(store: Store) -> None:
     record = create(store, 25)
     finish(store, record)
-    right = store.case_rows(record.id).values
+    right = store.rows.block(record.id).values
     flip(store, 13)
     later, study = create(store, 30, "a larger one"), fakes.study(30, "a larger one")
-    epoch, taken = store.take_over("test"), []
-    for chunk in store.open_chunks(later.number):
-        assert store.claim(epoch, [chunk]) == [chunk]
-        known = store.known(study, chunk)
+    epoch, taken = store.work.take_over("test"), []
+    for chunk in store.work.open_chunks(later.number):
+        assert store.work.claim(epoch, [chunk]) == [chunk]
+        known = store.work.known(study, chunk)
         if known is None:
-            assert store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+            assert store.work.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
             continue
         taken += known.cases.tolist()
-        assert store.commit(epoch, chunk, fakes.result(0, known.missing.size), known)
-    store.settle(epoch, later.number)
+        assert store.work.commit(epoch, chunk, fakes.result(0, known.missing.size), known)
+    store.work.settle(epoch, later.number)
     assert taken == [*range(10), *range(20, 25)]
-    np.testing.assert_array_equal(store.case_rows(later.id).values[:25], right)
-    assert (store.get_study(record.id).state, store.get_study(record.id).done) == (StudyState.QUEUED, 15)
+    np.testing.assert_array_equal(store.rows.block(later.id).values[:25], right)
+    assert (store.studies.get(record.id).state, store.studies.get(record.id).done) == (StudyState.QUEUED, 15)
     assert damaged(store) == []
 
 
 def test_a_key_that_names_another_study_after_a_flip_copies_no_rows_of_another_run(store: Store) -> None:
     """Studies of other runs have the same parameters: only the kin of a study tells its rows apart."""
-    mine, other = create(store, 25), store.create_study({}, fakes.study(25, "of less accuracy", tolerance=1e-6))
+    mine, other = create(store, 25), store.studies.create({}, fakes.study(25, "of less accuracy", tolerance=1e-6))
     for record in (mine, other):
         finish(store, record)
     wanted = fakes.study(30, "a larger one")
-    assert store.reusable(wanted) == 25
+    assert store.reuse.count(wanted) == 25
     with store.session.write() as connection:
         connection.execute(sa.update(CASE_KEYS).where(CASE_KEYS.c.study == other.number).values(study=99))
         connection.execute(sa.update(CASE_KEYS).where(CASE_KEYS.c.study == mine.number).values(study=other.number))
-    assert store.reusable(wanted) == 0
+    assert store.reuse.count(wanted) == 0
 
 
 def test_a_retry_does_not_bless_damaged_rows(store: Store) -> None:
@@ -184,32 +184,32 @@ def test_a_retry_does_not_bless_damaged_rows(store: Store) -> None:
         connection.execute(sa.update(ENDINGS).values(cases=24))
         connection.execute(sa.insert(ENDINGS).values(study=record.number, ending="diverged", cases=1))
         for first in (0, 10, 20):
-            store.seal(connection, Chunk(record.number, first, min(10, 25 - first)))
+            store.digests.seal(connection, Chunk(record.number, first, min(10, 25 - first)))
     flip(store, 15)
-    store.retry_study(record.id)
+    store.studies.retry(record.id)
     assert damaged(store) == [
         f"the rows of the study {record.id}, cases 10 to 11, are not those that were stored",
         f"the rows of the study {record.id}, cases 13 to 19, are not those that were stored",
     ]
-    store.run_damaged_again(record.id)
+    store.digests.run_damaged_again(record.id)
     finish(store, record)
-    assert (damaged(store), store.get_study(record.id).done) == ([], 25)
-    np.testing.assert_array_equal(store.case_rows(record.id).values, fakes.values(0, 25))
+    assert (damaged(store), store.studies.get(record.id).done) == ([], 25)
+    np.testing.assert_array_equal(store.rows.block(record.id).values, fakes.values(0, 25))
 
 
 def test_a_retry_notices_that_the_failed_row_is_gone(store: Store) -> None:
     record = create(store, 25)
-    epoch = store.take_over("test")
-    for chunk in store.open_chunks(record.number):
-        store.claim(epoch, [chunk])
+    epoch = store.work.take_over("test")
+    for chunk in store.work.open_chunks(record.number):
+        store.work.claim(epoch, [chunk])
         ending = models.OK if chunk.first else "diverged"
-        store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count, ending))
-    store.settle(epoch, record.number)
+        store.work.commit(epoch, chunk, fakes.result(chunk.first, chunk.count, ending))
+    store.work.settle(epoch, record.number)
     change(store, 3, ending="diverge$")
     with refused(DatabaseError, "database-damaged"):
-        store.retry_study(record.id)
+        store.studies.retry(record.id)
     finish(store, record)
-    assert (damaged(store), store.get_study(record.id).done, store.get_study(record.id).ok) == ([], 25, 25)
+    assert (damaged(store), store.studies.get(record.id).done, store.studies.get(record.id).ok) == ([], 25, 25)
 
 
 def test_a_retry_with_wrong_numbers_of_endings_counts_again(store: Store) -> None:
@@ -218,60 +218,60 @@ def test_a_retry_with_wrong_numbers_of_endings_counts_again(store: Store) -> Non
     with store.session.write() as connection:
         connection.execute(sa.insert(ENDINGS).values(study=record.number, ending="diverged", cases=1))
     with refused(NothingToRetryError, "wrong-state"):
-        store.retry_study(record.id)
-    assert [ending for ending, _ in store.look(record.id)[1].endings.items()] == ["ok"]
+        store.studies.retry(record.id)
+    assert [ending for ending, _ in store.studies.look(record.id)[1].endings.items()] == ["ok"]
 
 
 @pytest.mark.parametrize("answer", ["export", "page"])
 def test_answers_of_a_study_under_way_are_not_made_of_damaged_rows(store: Store, answer: str) -> None:
     record = create(store, 25)
-    epoch = store.take_over("test")
-    first, second, _ = store.open_chunks(record.number)
+    epoch = store.work.take_over("test")
+    first, second, _ = store.work.open_chunks(record.number)
     for chunk in (first, second):
-        store.claim(epoch, [chunk])
-        store.commit(epoch, chunk, fakes.result(chunk.first, 10))
+        store.work.claim(epoch, [chunk])
+        store.work.commit(epoch, chunk, fakes.result(chunk.first, 10))
     flip(store, 13)
     with refused(DatabaseError, "database-damaged"):
-        store.require_undamaged(record.id, anew=True) if answer == "export" else store.case_row(record.id, 13)
-    assert (store.get_study(record.id).state, store.get_study(record.id).done) == (StudyState.RUNNING, 10)
-    assert store.case_row(record.id, 13) is None
-    assert store.case_row(record.id, 3) is not None
+        store.digests.require_undamaged(record.id, anew=True) if answer == "export" else store.rows.case(record.id, 13)
+    assert (store.studies.get(record.id).state, store.studies.get(record.id).done) == (StudyState.RUNNING, 10)
+    assert store.rows.case(record.id, 13) is None
+    assert store.rows.case(record.id, 3) is not None
 
 
 @pytest.mark.parametrize("paused", [False, True])
 def test_a_damaged_chunk_of_a_study_under_way_is_run_again_by_the_housekeeping(store: Store, paused: bool) -> None:
     record = create(store, 25)
-    epoch = store.take_over("test")
-    first, second, third = store.open_chunks(record.number)
-    store.claim(epoch, [first, second])
-    store.commit(epoch, first, fakes.result(0, 10))
+    epoch = store.work.take_over("test")
+    first, second, third = store.work.open_chunks(record.number)
+    store.work.claim(epoch, [first, second])
+    store.work.commit(epoch, first, fakes.result(0, 10))
     if paused:
-        store.pause_study(record.id)
+        store.studies.pause(record.id)
     flip(store, 3)
     Scrubbing(store).look()
-    assert (store.get_study(record.id).done, store.get_study(record.id).ok) == (0, 0)
-    assert store.commit(epoch, second, fakes.result(10, 10)), "what runs is not disturbed"
-    assert [chunk.first for chunk in store.open_chunks(record.number)] == [first.first, third.first]
+    assert (store.studies.get(record.id).done, store.studies.get(record.id).ok) == (0, 0)
+    assert store.work.commit(epoch, second, fakes.result(10, 10)), "what runs is not disturbed"
+    assert [chunk.first for chunk in store.work.open_chunks(record.number)] == [first.first, third.first]
     if paused:
-        store.resume_study(record.id)
+        store.studies.resume(record.id)
     finish(store, record)
-    assert (damaged(store), store.get_study(record.id).done) == ([], 25)
-    np.testing.assert_array_equal(store.case_rows(record.id).values, fakes.values(0, 25))
+    assert (damaged(store), store.studies.get(record.id).done) == ([], 25)
+    np.testing.assert_array_equal(store.rows.block(record.id).values, fakes.values(0, 25))
 
 
 def test_damaged_rows_of_a_cancelled_study_are_held_back_and_kept(store: Store) -> None:
     record = create(store, 25)
-    epoch = store.take_over("test")
-    first = store.open_chunks(record.number)[0]
-    store.claim(epoch, [first])
-    store.commit(epoch, first, fakes.result(0, 10))
-    store.cancel_study(record.id)
-    store.settle(epoch, record.number)
+    epoch = store.work.take_over("test")
+    first = store.work.open_chunks(record.number)[0]
+    store.work.claim(epoch, [first])
+    store.work.commit(epoch, first, fakes.result(0, 10))
+    store.studies.cancel(record.id)
+    store.work.settle(epoch, record.number)
     flip(store, 3)
     with refused(DatabaseError, "database-damaged") as caught:
-        store.case_row(record.id, 3)
+        store.rows.case(record.id, 3)
     assert "cancelled, so submit it as a new one" in str(caught.value)
-    assert (store.get_study(record.id).state, store.get_study(record.id).done) == (StudyState.CANCELLED, 10)
+    assert (store.studies.get(record.id).state, store.studies.get(record.id).done) == (StudyState.CANCELLED, 10)
 
 
 def test_chunks_without_a_digest_are_said_to_be_unchecked(store: Store) -> None:
@@ -303,7 +303,8 @@ def test_chunks_that_are_stored_together_have_the_digests_of_their_own_rows(stor
     with store.session.read() as connection:
         stored = {row.first: row.digest for row in connection.execute(sa.select(CHUNKS.c["first"], CHUNKS.c.digest))}
         found = {
-            first: store.digest_in(connection, Chunk(record.number, first, min(10, 47 - first))) for first in stored
+            first: store.digests.digest_in(connection, Chunk(record.number, first, min(10, 47 - first)))
+            for first in stored
         }
     assert stored == found
     assert len({*stored.values()}) == len(stored) == 5

@@ -21,129 +21,129 @@ from tests.worker import fakes
 
 @pytest.fixture
 def present(store: Store) -> fakes.Present:
-    store.presence = present = fakes.Present()
+    store.dispatchers.presence = present = fakes.Present()
     return present
 
 
 def test_dispatchers_work_beside_each_other_on_studies_of_their_own(store: Store, present: fakes.Present) -> None:
     one, two = create(store), create(store)
-    first, second = store.take_over("first"), store.take_over("second")
+    first, second = store.work.take_over("first"), store.work.take_over("second")
     assert present.epochs == {first, second}
-    assert [record.owner for record in store.dispatchers()] == ["first", "second"]
-    assert store.adopt(first, one.number)
-    assert store.adopt(first, one.number)
-    assert not store.adopt(second, one.number)
-    assert store.adopt(second, two.number)
-    chunks = store.open_chunks(one.number)
-    assert store.claim(second, chunks) == []
-    assert store.claim(first, chunks[:1]) == chunks[:1]
-    before = store.get_study(one.id)
-    store.note(second, one.number, "not ours")
-    store.fault(second, one.number, "not ours")
-    store.begin_again(second, one.number)
-    store.time_is_over(second, one.number)
-    store.hold(second, "not ours", returned=True)
-    store.let_go(second)
-    assert store.settle(second, one.number) is StudyState.RUNNING
-    assert store.exchange(second, [Finished(chunks[0], fakes.result(0, 10))]) == ([], [])
-    assert store.get_study(one.id) == before
-    assert store.exchange(first, [Finished(chunks[0], fakes.result(0, 10))]) == ([chunks[0]], [])
-    assert {record.owner: record.studies for record in store.dispatchers()} == {"first": 1, "second": 1}
+    assert [record.owner for record in store.dispatchers.all()] == ["first", "second"]
+    assert store.work.adopt(first, one.number)
+    assert store.work.adopt(first, one.number)
+    assert not store.work.adopt(second, one.number)
+    assert store.work.adopt(second, two.number)
+    chunks = store.work.open_chunks(one.number)
+    assert store.work.claim(second, chunks) == []
+    assert store.work.claim(first, chunks[:1]) == chunks[:1]
+    before = store.studies.get(one.id)
+    store.work.note(second, one.number, "not ours")
+    store.work.fault(second, one.number, "not ours")
+    store.work.begin_again(second, one.number)
+    store.work.time_is_over(second, one.number)
+    store.work.hold(second, "not ours", returned=True)
+    store.work.let_go(second)
+    assert store.work.settle(second, one.number) is StudyState.RUNNING
+    assert store.work.exchange(second, [Finished(chunks[0], fakes.result(0, 10))]) == ([], [])
+    assert store.studies.get(one.id) == before
+    assert store.work.exchange(first, [Finished(chunks[0], fakes.result(0, 10))]) == ([chunks[0]], [])
+    assert {record.owner: record.studies for record in store.dispatchers.all()} == {"first": 1, "second": 1}
 
 
 def test_the_studies_of_a_dispatcher_that_is_gone_are_free_and_nothing_else_changes(
     store: Store, present: fakes.Present
 ) -> None:
     one, two, alone = create(store), create(store), create(store)
-    first, second = store.take_over("first"), store.take_over("second")
-    third = store.take_over(run_owner("host:9", alone.id))
+    first, second = store.work.take_over("first"), store.work.take_over("second")
+    third = store.work.take_over(run_owner("host:9", alone.id))
     claims = {}
     for epoch, record in ((first, one), (second, two), (third, alone)):
-        claims[epoch] = store.open_chunks(record.number)[:1]
-        assert store.claim(epoch, claims[epoch]) == claims[epoch]
-    assert not store.end_absent(second)
+        claims[epoch] = store.work.open_chunks(record.number)[:1]
+        assert store.work.claim(epoch, claims[epoch]) == claims[epoch]
+    assert not store.work.end_absent(second)
     present.epochs -= {first, third}
-    assert store.end_absent(second)
-    assert not store.end_absent(second)
-    assert [record.owner for record in store.dispatchers()] == ["second"]
+    assert store.work.end_absent(second)
+    assert not store.work.end_absent(second)
+    assert [record.owner for record in store.dispatchers.all()] == ["second"]
     for epoch in (first, third):
         with pytest.raises(EpochLostError, match="another dispatcher has taken over"):
-            store.exchange(epoch, [Finished(claims[epoch][0], fakes.result(0, 10))])
-    assert store.get_study(alone.id).state is StudyState.PAUSED
-    assert store.claim(second, claims[first]) == claims[first]
-    assert store.exchange(second, [Finished(claims[second][0], fakes.result(0, 10))])[0] == claims[second]
-    active = {study.number: study.dispatcher for study in store.active_studies()}
+            store.work.exchange(epoch, [Finished(claims[epoch][0], fakes.result(0, 10))])
+    assert store.studies.get(alone.id).state is StudyState.PAUSED
+    assert store.work.claim(second, claims[first]) == claims[first]
+    assert store.work.exchange(second, [Finished(claims[second][0], fakes.result(0, 10))])[0] == claims[second]
+    active = {study.number: study.dispatcher for study in store.work.active_studies()}
     assert active == {one.number: second, two.number: second, alone.number: None}
 
 
 def test_who_leaves_lets_others_take_its_studies(store: Store, present: fakes.Present) -> None:
     one, two = create(store), create(store)
-    first, second = store.take_over("first"), store.take_over("second")
+    first, second = store.work.take_over("first"), store.work.take_over("second")
     for record in (one, two):
-        assert store.claim(first, store.open_chunks(record.number)[:1])
-    store.put_back(first, store.open_chunks(one.number)[0], "")
-    store.leave(second, one.number)  # not its own
-    assert not store.adopt(second, one.number)
-    store.leave(first, one.number)
-    assert store.adopt(second, one.number)
-    store.release(first)
+        assert store.work.claim(first, store.work.open_chunks(record.number)[:1])
+    store.work.put_back(first, store.work.open_chunks(one.number)[0], "")
+    store.work.leave(second, one.number)  # not its own
+    assert not store.work.adopt(second, one.number)
+    store.work.leave(first, one.number)
+    assert store.work.adopt(second, one.number)
+    store.work.release(first)
     with pytest.raises(EpochLostError):
-        store.heartbeat(first, fakes.report())
-    assert store.claim(second, store.open_chunks(two.number)) == store.open_chunks(two.number)
-    store.cancel_study(one.id)
-    store.settle(second, one.number)
-    assert not store.adopt(second, one.number), "it has ended"
+        store.work.heartbeat(first, fakes.report())
+    assert store.work.claim(second, store.work.open_chunks(two.number)) == store.work.open_chunks(two.number)
+    store.studies.cancel(one.id)
+    store.work.settle(second, one.number)
+    assert not store.work.adopt(second, one.number), "it has ended"
 
 
 def test_peers_are_those_with_workers_that_take_any_study(
     store: Store, present: fakes.Present, clock: fakes.HandClock
 ) -> None:
     study = create(store)
-    first, second = store.take_over("first"), store.take_over("second")
-    alone = store.take_over(run_owner("host:9", study.id))
-    (digest,) = {record.fingerprint for record in store.dispatchers()}
-    assert store.peers(first) == [], "nobody has reported any worker"
+    first, second = store.work.take_over("first"), store.work.take_over("second")
+    alone = store.work.take_over(run_owner("host:9", study.id))
+    (digest,) = {record.fingerprint for record in store.dispatchers.all()}
+    assert store.work.peers(first) == [], "nobody has reported any worker"
     usable = fakes.report(WorkerReport("a:1", "a", usable=True))
     for epoch in (first, second, alone):
-        store.heartbeat(epoch, usable)
-    store.adopt(second, study.number)
-    assert store.peers(first) == [Peer(digest, 1)]
-    assert store.peers(second) == [Peer(digest, 0)]
-    assert store.chunking.processes == 1, "a study runs on the workers of one dispatcher"
+        store.work.heartbeat(epoch, usable)
+    store.work.adopt(second, study.number)
+    assert store.work.peers(first) == [Peer(digest, 1)]
+    assert store.work.peers(second) == [Peer(digest, 0)]
+    assert store.dispatchers.chunking.processes == 1, "a study runs on the workers of one dispatcher"
     clock.seconds += 100.0
-    assert store.peers(first) == [], "it is silent"
+    assert store.work.peers(first) == [], "it is silent"
     short = fakes.report(WorkerReport("a:1", "a", usable=False, refusal="numpy"), shortage="No worker.")
-    store.heartbeat(second, short)
-    store.heartbeat(alone, usable)
-    assert store.peers(first) == []
+    store.work.heartbeat(second, short)
+    store.work.heartbeat(alone, usable)
+    assert store.work.peers(first) == []
     assert Readiness(store).problems() == ("No worker.",), "neither one that is silent nor a run helps"
     clock.seconds += 100.0
-    store.heartbeat(alone, usable)
+    store.work.heartbeat(alone, usable)
     assert Readiness(store).problems() == ("No worker has responded for 100 s: studies are not run.",)
 
 
 def test_dispatchers_tell_what_their_fingerprints_differ_in(
     store: Store, present: fakes.Present, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    store.take_over("first")
-    store.take_over("second")
-    assert [record.differs for record in store.dispatchers()] == [None, None]
+    store.work.take_over("first")
+    store.work.take_over("second")
+    assert [record.differs for record in store.dispatchers.all()] == [None, None]
     monkeypatch.setattr(fingerprint, "digest", lambda: "another")
     monkeypatch.setattr(fingerprint, "own", partial(dict, fingerprint.own(), Python="2.7"))
-    store.take_over("third")
+    store.work.take_over("third")
     found = worker_list(store)["dispatchers"]
     assert [item["differs"] for item in found] == [None, None, f"Python: 2.7 instead of {platform.python_version()}"]
 
 
 def test_the_last_dispatcher_stays_known_and_so_does_the_clock(store: Store, present: fakes.Present) -> None:
-    first = store.take_over("first")
-    store.note_clock(store.clock.now())
-    second = store.take_over("second")
-    store.release(second)
-    store.release(first)
-    (last,) = store.dispatchers()
+    first = store.work.take_over("first")
+    store.dispatchers.note_clock(store.clock.now())
+    second = store.work.take_over("second")
+    store.work.release(second)
+    store.work.release(first)
+    (last,) = store.dispatchers.all()
     assert (last.owner, last.usable, last.ended_at) == ("second", 0, store.clock.now())
-    third = store.take_over("third")
+    third = store.work.take_over("third")
     assert third > second
-    assert [record.owner for record in store.dispatchers()] == ["third"]
-    assert store.believed_clock() == store.clock.now()
+    assert [record.owner for record in store.dispatchers.all()] == ["third"]
+    assert store.dispatchers.believed_clock() == store.clock.now()

@@ -45,12 +45,12 @@ def _result(*further: tuple[int, int]) -> ChunkResult:
 
 
 def _filled(store: Store, result: ChunkResult) -> tuple[str, int]:
-    record = store.create_study({"sprag": 1}, _study())
-    epoch = store.take_over("test")
-    (chunk,) = store.open_chunks(record.number)
-    store.claim(epoch, [chunk])
-    store.commit(epoch, chunk, result)
-    store.settle(epoch, record.number)
+    record = store.studies.create({"sprag": 1}, _study())
+    epoch = store.work.take_over("test")
+    (chunk,) = store.work.open_chunks(record.number)
+    store.work.claim(epoch, [chunk])
+    store.work.commit(epoch, chunk, result)
+    store.work.settle(epoch, record.number)
     return record.id, record.number
 
 
@@ -69,18 +69,18 @@ def _speeds(rows: Any) -> list[tuple[int, object]]:
 def test_rows_of_a_case_come_back_in_order(store: Store) -> None:
     study_id, _ = _filled(store, _result((2, 1), (2, 2), (0, 1)))
     every = [(0, 0.0), (0, 10.0), (1, 1.0), (2, 2.0), (2, 12.0), (2, 22.0), (3, 3.0)]
-    assert _speeds(store.case_rows(study_id).rows()) == every
-    assert _speeds(row for block in store.iter_rows(study_id, 2) for row in block.rows()) == every
-    assert _speeds(store.all_rows(study_id, 2)) == [(2, 2.0), (2, 12.0), (2, 22.0)]
-    assert [row.flags for row in store.all_rows(study_id, 0)] == [(), ("irregular",)]
-    assert _speeds(store.case_page(study_id).rows()) == [(case, float(case)) for case in range(4)]
+    assert _speeds(store.rows.block(study_id).rows()) == every
+    assert _speeds(row for block in store.rows.blocks(study_id, 2) for row in block.rows()) == every
+    assert _speeds(store.rows.of_case(study_id, 2)) == [(2, 2.0), (2, 12.0), (2, 22.0)]
+    assert [row.flags for row in store.rows.of_case(study_id, 0)] == [(), ("irregular",)]
+    assert _speeds(store.rows.page(study_id).rows()) == [(case, float(case)) for case in range(4)]
 
 
 def test_a_number_chooses_among_the_rows_of_each_case(store: Store) -> None:
     study_id, _ = _filled(store, _result((2, 1), (2, 2), (0, 1)))
-    first = store.rows_for_cases(study_id, [2, 0, 1], [SPEED])
+    first = store.rows.for_cases(study_id, [2, 0, 1], [SPEED])
     assert first.values[SPEED].tolist() == [2.0, 0.0, 1.0]
-    second = store.rows_for_cases(study_id, [2, 0, 1], [SPEED], number=1)
+    second = store.rows.for_cases(study_id, [2, 0, 1], [SPEED], number=1)
     assert second.endings == [models.OK] * 3
     np.testing.assert_array_equal(second.values[SPEED], [12.0, 10.0, np.nan])
 
@@ -95,34 +95,34 @@ def test_a_failure_between_two_rows_of_columns_is_an_error_of_the_database(store
 
 
 def test_rows_of_a_case_are_committed_together(store: Store) -> None:
-    record = store.create_study({"sprag": 1}, _study())
-    epoch = store.take_over("test")
-    (chunk,) = store.open_chunks(record.number)
-    store.claim(epoch, [chunk])
+    record = store.studies.create({"sprag": 1}, _study())
+    epoch = store.work.take_over("test")
+    (chunk,) = store.work.open_chunks(record.number)
+    store.work.claim(epoch, [chunk])
     with pytest.raises(sa.exc.DBAPIError):
-        store.commit(epoch, chunk, _result((2, 1), (3, 1), (3, 1)))  # one key twice
-    assert len(store.case_rows(record.id)) == 0
+        store.work.commit(epoch, chunk, _result((2, 1), (3, 1), (3, 1)))  # one key twice
+    assert len(store.rows.block(record.id)) == 0
     assert _count(store) == 0
-    assert store.commit(epoch, chunk, _result((2, 1), (3, 1)))
-    assert len(store.case_rows(record.id)) == 6
+    assert store.work.commit(epoch, chunk, _result((2, 1), (3, 1)))
+    assert len(store.rows.block(record.id)) == 6
 
 
 def test_further_rows_are_copied_with_their_case(store: Store) -> None:
     _, source = _filled(store, _result((2, 1), (2, 2), (0, 1)))
-    record = store.create_study({"sprag": 1}, _study("again"))
-    epoch = store.take_over("test")
-    (chunk,) = store.open_chunks(record.number)
-    store.claim(epoch, [chunk])
+    record = store.studies.create({"sprag": 1}, _study("again"))
+    epoch = store.work.take_over("test")
+    (chunk,) = store.work.open_chunks(record.number)
+    store.work.claim(epoch, [chunk])
     cases = np.arange(4)
     none = ChunkResult(0, [], [], np.empty((0, len(INFOS))))
     known = Known(np.empty(0, dtype=np.int64), cases, np.full(4, source), cases)
-    assert store.commit(epoch, chunk, none, known)
-    assert _speeds(store.all_rows(record.id, 2)) == [(2, 2.0), (2, 12.0), (2, 22.0)]
+    assert store.work.commit(epoch, chunk, none, known)
+    assert _speeds(store.rows.of_case(record.id, 2)) == [(2, 2.0), (2, 12.0), (2, 22.0)]
 
 
 def test_further_rows_go_with_their_study(store: Store) -> None:
     study_id, _ = _filled(store, _result((2, 1), (2, 2), (0, 1)))
     assert _count(store) == 3
-    store.delete_study(study_id)
-    store.purge()
+    store.studies.delete(study_id)
+    store.purging.purge()
     assert _count(store) == 0

@@ -36,57 +36,59 @@ def _varied(first: int, count: int, seed: int) -> ChunkResult:
 def _open(store: Store, *cases: int) -> tuple[int, list[Chunk]]:
     """An epoch, and the chunks of new studies with that many cases."""
     records = [create(store, count, f"study {count}") for count in cases]
-    return store.take_over("test"), [chunk for record in records for chunk in store.open_chunks(record.number)]
+    return store.work.take_over("test"), [
+        chunk for record in records for chunk in store.work.open_chunks(record.number)
+    ]
 
 
 def _by_id(store: Store) -> dict[int, str]:
-    return {record.number: record.id for record in store.list_studies().studies}
+    return {record.number: record.id for record in store.studies.page().studies}
 
 
 def test_chunks_of_several_studies_are_stored_and_counted_together(store: Store) -> None:
     epoch, chunks = _open(store, 25, 30)
-    assert store.claim(epoch, chunks) == chunks
+    assert store.work.claim(epoch, chunks) == chunks
     results = {chunk: _varied(chunk.first, chunk.count, seed) for seed, chunk in enumerate(chunks)}
-    stored, claimed = store.exchange(epoch, [Finished(chunk, results[chunk]) for chunk in reversed(chunks)])
+    stored, claimed = store.work.exchange(epoch, [Finished(chunk, results[chunk]) for chunk in reversed(chunks)])
     assert (set(stored), claimed) == (set(chunks), [])
     for number, study_id in _by_id(store).items():
         expected = [results[chunk] for chunk in chunks if chunk.study == number]
-        rows = store.case_rows(study_id)
+        rows = store.rows.block(study_id)
         np.testing.assert_array_equal(rows.values, np.concatenate([result.values for result in expected]))
         assert list(rows.endings) == [ending for result in expected for ending in result.endings]
         assert [",".join(row.flags) for row in rows.rows()] == [text for result in expected for text in result.flags]
-        progress = store.progress(study_id)
+        progress = store.studies.progress(study_id)
         assert progress.endings == Counter(rows.endings)
         assert (progress.done, progress.ok) == (len(rows), progress.endings[models.OK])
-        assert store.open_chunks(number) == []
+        assert store.work.open_chunks(number) == []
 
 
 def test_the_next_chunks_are_claimed_with_the_rows(store: Store) -> None:
     epoch, chunks = _open(store, 25, 5)
     first, last = chunks[0], chunks[-1]
-    store.claim(epoch, [first])
-    stored, claimed = store.exchange(epoch, [Finished(first, fakes.result(0, 10))], chunks[1:])
+    store.work.claim(epoch, [first])
+    stored, claimed = store.work.exchange(epoch, [Finished(first, fakes.result(0, 10))], chunks[1:])
     assert (stored, claimed) == ([first], chunks[1:])
     ids = _by_id(store)
-    assert store.get_study(ids[last.study]).state is StudyState.RUNNING
-    assert store.claim(epoch, chunks) == []
+    assert store.studies.get(ids[last.study]).state is StudyState.RUNNING
+    assert store.work.claim(epoch, chunks) == []
 
 
 def test_chunks_keep_where_they_were_computed(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     epoch, chunks = _open(store, 50)
-    store.claim(epoch, chunks)
+    store.work.claim(epoch, chunks)
     (study_id,) = _by_id(store).values()
-    assert store.origins(study_id) == ()
+    assert store.rows.origins(study_id) == ()
     monkeypatch.setattr(fingerprint, "digest", lambda: "one")
     group = [
         Finished(chunk, fakes.result(chunk.first, chunk.count), host=host)
         for chunk, host in zip(chunks[:3], ("left", "right", "left"), strict=True)
     ]
-    store.exchange(epoch, group)
+    store.work.exchange(epoch, group)
     monkeypatch.setattr(fingerprint, "digest", lambda: "two")
-    store.exchange(epoch, [Finished(chunks[3], fakes.result(30, 10), host="left")])
-    store.quarantine(epoch, chunks[4], "crashed", "its process died")
-    assert store.origins(study_id) == (
+    store.work.exchange(epoch, [Finished(chunks[3], fakes.result(30, 10), host="left")])
+    store.work.quarantine(epoch, chunks[4], "crashed", "its process died")
+    assert store.rows.origins(study_id) == (
         Origin("left", "one", 2, 20),
         Origin("left", "two", 1, 10),
         Origin("right", "one", 1, 10),
@@ -96,38 +98,38 @@ def test_chunks_keep_where_they_were_computed(store: Store, monkeypatch: pytest.
 
 def test_copied_rows_keep_where_they_were_computed(store: Store) -> None:
     first = create(store, 50)
-    epoch = store.take_over("test")
-    chunks = store.open_chunks(first.number)
-    store.claim(epoch, chunks)
+    epoch = store.work.take_over("test")
+    chunks = store.work.open_chunks(first.number)
+    store.work.claim(epoch, chunks)
     hosts = ("left", "left", "right", "far", "far")
-    store.exchange(
+    store.work.exchange(
         epoch,
         [
             Finished(chunk, fakes.result(chunk.first, chunk.count), host=host)
             for chunk, host in zip(chunks, hosts, strict=True)
         ],
     )
-    store.settle(epoch, first.number)
+    store.work.settle(epoch, first.number)
     study = fakes.study(50, "another name")
-    second = store.create_study(SPEC, study)
-    for chunk in store.open_chunks(second.number):
-        known = store.known(study, chunk)
+    second = store.studies.create(SPEC, study)
+    for chunk in store.work.open_chunks(second.number):
+        known = store.work.known(study, chunk)
         assert known is not None
         assert known.cases.size == chunk.count
-        store.claim(epoch, [chunk])
-        store.exchange(epoch, [Finished(chunk, no_cases(study), known)])
+        store.work.claim(epoch, [chunk])
+        store.work.exchange(epoch, [Finished(chunk, no_cases(study), known)])
     digest = fingerprint.digest()
-    assert store.origins(second.id) == (
+    assert store.rows.origins(second.id) == (
         Origin("far", digest, 2, 20),
         Origin("left", digest, 2, 20),
         Origin("right", digest, 1, 10),
     )
-    third = store.create_study(SPEC, fakes.study(15, "a smaller one"))
-    for chunk in store.open_chunks(third.number):
-        store.claim(epoch, [chunk])
-        known = store.known(study, chunk)
-        store.exchange(epoch, [Finished(chunk, no_cases(study), known)])
-    assert {origin.host for origin in store.origins(third.id)} == {"left"}
+    third = store.studies.create(SPEC, fakes.study(15, "a smaller one"))
+    for chunk in store.work.open_chunks(third.number):
+        store.work.claim(epoch, [chunk])
+        known = store.work.known(study, chunk)
+        store.work.exchange(epoch, [Finished(chunk, no_cases(study), known)])
+    assert {origin.host for origin in store.rows.origins(third.id)} == {"left"}
 
 
 def test_more_hosts_than_there_is_room_for_are_cut() -> None:
@@ -142,20 +144,20 @@ def test_more_hosts_than_there_is_room_for_are_cut() -> None:
 
 def test_a_chunk_that_is_not_ours_is_left_out_of_its_group(store: Store) -> None:
     epoch, chunks = _open(store, 30)
-    store.claim(epoch, chunks[:2])
+    store.work.claim(epoch, chunks[:2])
     other = dataclasses.replace(chunks[0], count=5)
     group = [Finished(chunk, fakes.result(chunk.first, chunk.count)) for chunk in (other, *chunks[1:])]
-    assert store.exchange(epoch, group)[0] == [chunks[1]]
+    assert store.work.exchange(epoch, group)[0] == [chunks[1]]
     (study_id,) = _by_id(store).values()
-    assert store.case_rows(study_id).cases.tolist() == list(range(10, 20))
-    assert store.get_study(study_id).done == 10
-    assert store.claim(epoch, [dataclasses.replace(chunks[2], count=5)]) == []
+    assert store.rows.block(study_id).cases.tolist() == list(range(10, 20))
+    assert store.studies.get(study_id).done == 10
+    assert store.work.claim(epoch, [dataclasses.replace(chunks[2], count=5)]) == []
 
 
 @pytest.mark.parametrize("fault", ["a key twice", "another epoch"])
 def test_a_group_that_cannot_be_stored_changes_nothing(store: Store, fault: str) -> None:
     epoch, chunks = _open(store, 30)
-    store.claim(epoch, chunks[:2])
+    store.work.claim(epoch, chunks[:2])
     group = [Finished(chunk, fakes.result(chunk.first, chunk.count)) for chunk in chunks[:2]]
     if fault == "a key twice":
         table = "vibration_drive_1"
@@ -164,29 +166,29 @@ def test_a_group_that_cannot_be_stored_changes_nothing(store: Store, fault: str)
                 f"INSERT INTO {table} (study, case_number, ending, flags) VALUES ({chunks[0].study}, 15, 'ok', '')"
             )
         with pytest.raises(sa.exc.DBAPIError):
-            store.exchange(epoch, group, chunks[2:])
+            store.work.exchange(epoch, group, chunks[2:])
         with store.session.write() as connection:
             connection.exec_driver_sql(f"DELETE FROM {table}")
     else:
         with pytest.raises(EpochLostError):
-            store.exchange(store.take_over("another") - 1, group, chunks[2:])
+            store.work.exchange(store.work.take_over("another") - 1, group, chunks[2:])
     (study_id,) = _by_id(store).values()
-    assert (len(store.case_rows(study_id)), store.get_study(study_id).done) == (0, 0)
-    epoch = store.take_over("a third")
-    assert store.claim(epoch, chunks) == chunks
-    assert len(store.exchange(epoch, group)[0]) == 2
+    assert (len(store.rows.block(study_id)), store.studies.get(study_id).done) == (0, 0)
+    epoch = store.work.take_over("a third")
+    assert store.work.claim(epoch, chunks) == chunks
+    assert len(store.work.exchange(epoch, group)[0]) == 2
 
 
 def test_a_count_that_the_column_cannot_hold_is_refused_by_its_name(store: Store) -> None:
     epoch, chunks = _open(store, 10)
-    store.claim(epoch, chunks)
+    store.work.claim(epoch, chunks)
     result = fakes.result(0, 10)
     result.values[3, COUNTS[0]] = 2.0**31
     if store.session.on_server:
         with pytest.raises(OverflowError, match="clutches_driving_max has a value outside -2147483648 to 2147483647"):
-            store.commit(epoch, chunks[0], result)
+            store.work.commit(epoch, chunks[0], result)
         result.values[3, COUNTS[0]] -= 1.0
-    assert store.commit(epoch, chunks[0], result)
-    row = store.case_row(next(iter(_by_id(store).values())), 3)
+    assert store.work.commit(epoch, chunks[0], result)
+    row = store.rows.case(next(iter(_by_id(store).values())), 3)
     assert row is not None
     assert row.results["clutches.driving_max"] == result.values[3, COUNTS[0]]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.storage import reuse
+from sprag.service.storage import reuse, studies
 from sprag.service.storage.case_keys import TOO_MANY, add_keys
 from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.store import Store
@@ -42,21 +42,21 @@ def over_loads(*loads: float, frequency: float = 25.0) -> Study:
 
 def finished(store: Store, study: Study) -> StudyRecord:
     """A study that has run to its end, with what others have taken from them."""
-    record = store.create_study({}, study)
+    record = store.studies.create({}, study)
     finish(store, record, study)
-    return store.get_study(record.id)
+    return store.studies.get(record.id)
 
 
 def finish(store: Store, record: StudyRecord, study: Study) -> None:
-    epoch = store.take_over("test")
-    for chunk in store.open_chunks(record.number):
-        assert store.claim(epoch, [chunk]) == [chunk]
-        known = store.known(study, chunk)
+    epoch = store.work.take_over("test")
+    for chunk in store.work.open_chunks(record.number):
+        assert store.work.claim(epoch, [chunk]) == [chunk]
+        known = store.work.known(study, chunk)
         if known is None:
-            assert store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+            assert store.work.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
         else:
-            assert store.commit(epoch, chunk, fakes.result(0, known.missing.size), known)
-    store.settle(epoch, record.number)
+            assert store.work.commit(epoch, chunk, fakes.result(0, known.missing.size), known)
+    store.work.settle(epoch, record.number)
 
 
 def many_more(store: Store, like: StudyRecord, studies: list[Study], *, keyed: bool = False) -> None:
@@ -102,10 +102,10 @@ def test_an_old_study_is_found_behind_many_newer_ones(store: Store, keyed: bool)
     others += [over_loads(0.2, frequency=26.0 + index) for index in range(100)]
     many_more(store, old, others, keyed=keyed)
     larger = over_loads(0.1, 0.2, 0.3, 0.4)
-    assert store.reusable(larger) == 3
+    assert store.reuse.count(larger) == 3
     record = finished(store, larger)
     assert (record.reused, record.done, record.state) == (3, 4, StudyState.FINISHED)
-    assert store.case_rows(record.id).values[:3].tolist() == store.case_rows(old.id).values.tolist()
+    assert store.rows.block(record.id).values[:3].tolist() == store.rows.block(old.id).values.tolist()
 
 
 def test_studies_that_cannot_have_a_case_are_not_read_again(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -120,10 +120,10 @@ def test_studies_that_cannot_have_a_case_are_not_read_again(store: Store, monkey
     read: list[int] = []
     monkeypatch.setattr(reuse, "shared_cases", counted)
     monkeypatch.setattr(reuse, "span", lambda study: read.append(1) or physics.span(study))  # type: ignore[func-returns-value]
-    assert store.reusable(over_loads(0.1, 0.9)) == 1
+    assert store.reuse.count(over_loads(0.1, 0.9)) == 1
     assert [study.axes[0].values for study in compared] == [(0.1, 0.2)]
     assert len(read) == 300
-    assert store.reusable(over_loads(0.2, 0.8)) == 1
+    assert store.reuse.count(over_loads(0.2, 0.8)) == 1
     assert len(read) == 300
 
 
@@ -135,7 +135,7 @@ def test_kindred_studies_without_a_case_are_not_even_read(store: Store, monkeypa
     many_more(store, old, samples[1:], keyed=True)
     for name in ("shared_cases", "span"):
         monkeypatch.setattr(reuse, name, lambda *_: pytest.fail("a study was read"))
-    assert store.reusable(over_loads(*np.sort(random.uniform(0.1, 0.2, 20)).tolist())) == 0
+    assert store.reuse.count(over_loads(*np.sort(random.uniform(0.1, 0.2, 20)).tolist())) == 0
     monkeypatch.undo()
     compared: list[Study] = []
 
@@ -146,7 +146,7 @@ def test_kindred_studies_without_a_case_are_not_even_read(store: Store, monkeypa
     monkeypatch.setattr(reuse, "shared_cases", counted)
     loads = [float(samples[number].axes[0].values[3]) for number in (0, 7, 7)]
     wanted = over_loads(*sorted({*loads, samples[7].axes[0].values[5], 0.15}))
-    assert store.reusable(wanted) == 3
+    assert store.reuse.count(wanted) == 3
     assert len(compared) == 2
 
 
@@ -154,16 +154,16 @@ def test_a_case_that_the_newest_studies_have_not_run_is_found_in_an_older_one(st
     study = over_loads(0.1, 0.2, 0.3)
     finished(store, study)
     for _ in range(3):
-        store.create_study({}, study)
-    failed = store.create_study({}, study, fresh=True)
-    epoch = store.take_over("test")
-    (chunk,) = store.open_chunks(failed.number)
-    assert store.claim(epoch, [chunk]) == [chunk]
+        store.studies.create({}, study)
+    failed = store.studies.create({}, study, fresh=True)
+    epoch = store.work.take_over("test")
+    (chunk,) = store.work.open_chunks(failed.number)
+    assert store.work.claim(epoch, [chunk]) == [chunk]
     result = fakes.result(0, 3)
     result.endings[1] = "crashed"
-    assert store.commit(epoch, chunk, result)
-    store.settle(epoch, failed.number)
-    assert store.reusable(study) == 3
+    assert store.work.commit(epoch, chunk, result)
+    store.work.settle(epoch, failed.number)
+    assert store.reuse.count(study) == 3
 
 
 def test_studies_of_before_get_keys_and_lose_nothing(store: Store) -> None:
@@ -172,10 +172,10 @@ def test_studies_of_before_get_keys_and_lose_nothing(store: Store) -> None:
         connection.execute(sa.delete(CASE_KEYS))
         connection.execute(sa.update(STUDIES).values(keyed=0))
     wanted = over_loads(0.2, 0.3, 0.4)
-    assert store.reusable(wanted) == 2
-    assert list(store.key_steps()) == [old.number]
-    assert list(store.key_steps()) == []
-    assert store.reusable(wanted) == 2
+    assert store.reuse.count(wanted) == 2
+    assert list(store.reuse.key_steps()) == [old.number]
+    assert list(store.reuse.key_steps()) == []
+    assert store.reuse.count(wanted) == 2
     with store.session.read() as connection:
         assert len(connection.execute(sa.select(CASE_KEYS)).all()) == 3
 
@@ -183,7 +183,7 @@ def test_studies_of_before_get_keys_and_lose_nothing(store: Store) -> None:
 def test_studies_with_many_cases_have_no_keys_and_are_found(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sprag.service.storage.case_keys.MAX_KEYED", 2)
     finished(store, over_loads(0.1, 0.2, 0.3))
-    assert store.reusable(over_loads(0.2, 0.3)) == 2
+    assert store.reuse.count(over_loads(0.2, 0.3)) == 2
     with store.session.read() as connection:
         assert connection.execute(sa.select(CASE_KEYS)).all() == []
         assert connection.execute(sa.select(STUDIES.c.keyed)).scalars().all() == [TOO_MANY]
@@ -195,14 +195,14 @@ def test_many_wanted_cases_are_compared_with_the_few_studies_there_are(
     finished(store, over_loads(0.1, 0.2, 0.3))
     monkeypatch.setattr(reuse, "_CASES_A_STUDY", 2)
     monkeypatch.setattr(reuse, "newest_with", lambda *_: pytest.fail("keys were looked up"))
-    assert store.reusable(over_loads(0.2, 0.3, 0.4)) == 2
+    assert store.reuse.count(over_loads(0.2, 0.3, 0.4)) == 2
 
 
 def test_keys_go_with_their_study(store: Store) -> None:
     one, other = finished(store, over_loads(0.1, 0.2, 0.3)), finished(store, over_loads(0.2, 0.3, 0.4))
-    store.delete_study(one.id)
-    assert store.reusable(over_loads(0.1, 0.2)) == 1
-    store.purge()
+    store.studies.delete(one.id)
+    assert store.reuse.count(over_loads(0.1, 0.2)) == 1
+    store.purging.purge()
     with store.session.read() as connection:
         assert connection.execute(sa.select(CASE_KEYS.c.study)).scalars().all() == [other.number] * 3
 
@@ -213,14 +213,14 @@ def test_memory_of_studies_is_bounded(store: Store, monkeypatch: pytest.MonkeyPa
     old = finished(store, over_loads(0.1, 0.2))
     many_more(store, old, [over_loads(1.0 + index) for index in range(20)])
     for _ in range(2):
-        assert store.reusable(over_loads(0.1, 0.2, 0.3)) == 2
+        assert store.reuse.count(over_loads(0.1, 0.2, 0.3)) == 2
 
 
 def test_a_look_is_of_one_moment(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     study = over_loads(0.1, 0.2, 0.3)
     finished(store, study)
-    again = store.create_study({}, study)
-    row = store._row
+    again = store.studies.create({}, study)
+    row = studies.row_of
 
     def ended_meanwhile(*arguments: Any) -> Any:
         found = row(*arguments)
@@ -228,10 +228,10 @@ def test_a_look_is_of_one_moment(store: Store, monkeypatch: pytest.MonkeyPatch) 
         finish(store, again, study)
         return found
 
-    monkeypatch.setattr(store, "_row", ended_meanwhile)
-    record, progress = store.look(again.id)
+    monkeypatch.setattr(studies, "row_of", ended_meanwhile)
+    record, progress = store.studies.look(again.id)
     assert (record, progress.state, progress.done) == (again, StudyState.QUEUED, 0)
     assert progress.endings == {}
-    record, progress = store.look(again.id)
+    record, progress = store.studies.look(again.id)
     assert (record.reused, record.done, record.state) == (3, 3, StudyState.FINISHED)
     assert (progress.endings, progress.state) == ({"ok": 3}, StudyState.FINISHED)

@@ -36,27 +36,27 @@ def in_ukrainian(text: str | None) -> str:
 @pytest.mark.parametrize("how", ["hold", "fault", "note", "window"])
 def test_the_reason_of_a_study_is_whole_in_every_language(store: Store, how: str) -> None:
     record = create(store)
-    epoch = store.take_over("test")
+    epoch = store.work.take_over("test")
     if how == "hold":
-        store.hold(epoch, FULL, returned=False)
-        assert in_ukrainian(store.full()) == UKRAINIAN
+        store.work.hold(epoch, FULL, returned=False)
+        assert in_ukrainian(store.room.full()) == UKRAINIAN
     elif how == "fault":
-        store.fault(epoch, record.number, FULL)
+        store.work.fault(epoch, record.number, FULL)
     elif how == "note":
-        store.note(epoch, record.number, FULL)
-        noted = store.get_study(record.id)
-        store.note(epoch, record.number, FULL)
-        assert store.get_study(record.id).revision == noted.revision
+        store.work.note(epoch, record.number, FULL)
+        noted = store.studies.get(record.id)
+        store.work.note(epoch, record.number, FULL)
+        assert store.studies.get(record.id).revision == noted.revision
     else:
-        store.hold_for_window(record.number, WINDOW)
-        store.hold_for_window(record.number, FULL)
-    reason = store.get_study(record.id).reason
+        store.schedules.hold_for_window(record.number, WINDOW)
+        store.schedules.hold_for_window(record.number, FULL)
+    reason = store.studies.get(record.id).reason
     assert reason == ENGLISH
     assert isinstance(reason, Sentence)
     assert in_ukrainian(reason) == UKRAINIAN
-    (listed,) = store.list_studies().studies
+    (listed,) = store.studies.page().studies
     assert in_ukrainian(listed.reason) == UKRAINIAN
-    store.resume_study(record.id) if how != "note" else store.note(epoch, record.number, None)
+    store.studies.resume(record.id) if how != "note" else store.work.note(epoch, record.number, None)
     with store.session.read() as connection:
         kept = connection.execute(sa.select(STUDIES.c.reason, STUDIES.c.reason_values)).one()
     assert tuple(kept) == (None, None)
@@ -64,34 +64,34 @@ def test_the_reason_of_a_study_is_whole_in_every_language(store: Store, how: str
 
 def test_a_reason_that_an_earlier_release_wrote_is_read_as_before(store: Store) -> None:
     record = create(store)
-    epoch = store.take_over("test")
-    store.fault(epoch, record.number, WINDOW)
+    epoch = store.work.take_over("test")
+    store.work.fault(epoch, record.number, WINDOW)
     with store.session.write() as connection:
         connection.execute(sa.update(STUDIES).values(reason=ENGLISH))
-    reason = store.get_study(record.id).reason
+    reason = store.studies.get(record.id).reason
     assert (reason, isinstance(reason, Sentence)) == (ENGLISH, False)
     assert in_ukrainian(reason) == UKRAINIAN.replace("3,2", "3.2")
 
 
 def test_the_problem_of_a_due_time_keeps_its_values(store: Store) -> None:
-    schedule = store.create_schedule(read_fields({"spec": SPEC, "cron": "@hourly"}, NEW_YEAR))
+    schedule = store.schedules.create(read_fields({"spec": SPEC, "cron": "@hourly"}, NEW_YEAR))
     assert schedule.next_due is not None
-    assert store.take_due(schedule, [DueTime(schedule.next_due)], None, schedule.next_due)
-    (run,) = store.open_runs()
+    assert store.runs.take_due(schedule, [DueTime(schedule.next_due)], None, schedule.next_due)
+    (run,) = store.runs.open()
     problem = Sentence(recorded.TRIED_AGAIN, problem=Sentence(recorded.MANY_STUDIES, count="64"), time="06:00")
-    store.put_off_run(run, problem)
-    (run,) = store.open_runs()
+    store.runs.put_off(run, problem)
+    (run,) = store.runs.open()
     assert run.problem == "64 studies have not ended yet. It is tried again until 06:00."
     assert in_ukrainian(run.problem) == "Досліджень, які ще не закінчилися: 64. Спроби повторюються до 06:00."
-    (expected,) = store.expected_runs(store.clock.now().replace(year=2027))
+    (expected,) = store.runs.expected(store.clock.now().replace(year=2027))
     assert in_ukrainian(expected.problem) == in_ukrainian(problem)
-    store.close_run(run, problem)
-    (closed,) = store.schedule_runs(schedule.id)
+    store.runs.close(run, problem)
+    (closed,) = store.schedules.runs(schedule.id)
     assert in_ukrainian(closed.problem) == in_ukrainian(closed.outcome.reason) == in_ukrainian(problem)
     with store.session.read() as connection:
         assert connection.execute(sa.select(SCHEDULE_RUNS.c.problem)).scalar_one() == str(problem)
-    (ended,) = store.ended_runs()
-    assert store.conclude_run(ended, ended.outcome)
+    (ended,) = store.runs.ended()
+    assert store.runs.conclude(ended, ended.outcome)
     with store.session.read() as connection:
         kept = connection.execute(sa.select(SCHEDULE_RUNS.c.outcome)).scalar_one()
     assert in_ukrainian(Outcome.of_json(json.loads(kept)).reason) == in_ukrainian(problem)

@@ -47,7 +47,7 @@ def kind() -> Iterator[None]:
 
 
 def create(store: Store, study: Study | None = None, **options: Any) -> StudyRecord:
-    return store.create_study(SPEC, study or toy.study(), **options)
+    return store.studies.create(SPEC, study or toy.study(), **options)
 
 
 def numbers(loads: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -63,20 +63,20 @@ def results(study: Study, first: int, count: int) -> ChunkResult:
 
 
 def run_chunks(store: Store, epoch: int, number: int) -> None:
-    study = store.study_of(number)
-    for chunk in store.open_chunks(number):
-        assert store.claim(epoch, [chunk]) == [chunk]
-        known = store.known(study, chunk)
+    study = store.work.study_of(number)
+    for chunk in store.work.open_chunks(number):
+        assert store.work.claim(epoch, [chunk]) == [chunk]
+        known = store.work.known(study, chunk)
         assert known is None
-        assert store.commit(epoch, chunk, results(study, chunk.first, chunk.count))
+        assert store.work.commit(epoch, chunk, results(study, chunk.first, chunk.count))
 
 
 def finish(store: Store, record: StudyRecord, rounds: int = 9) -> int:
-    epoch = store.take_over("test")
-    planner = Rounds(store)
+    epoch = store.work.take_over("test")
+    planner = Rounds(store.work)
     for _ in range(rounds):
         run_chunks(store, epoch, record.number)
-        if planner.advance(epoch, record.number, store.study_of(record.number)) is None:
+        if planner.advance(epoch, record.number, store.work.study_of(record.number)) is None:
             break
     return epoch
 
@@ -86,20 +86,20 @@ def whole(store: Store, record: StudyRecord) -> list[Any]:
     with store.session.read() as connection:
         query = sa.select(ROUNDS.c.round, ROUNDS.c.first, ROUNDS.c["count"], ROUNDS.c.summary)
         rounds = connection.execute(query.where(ROUNDS.c.study == record.number).order_by(ROUNDS.c.round)).all()
-    block = store.case_rows(record.id, limit=10_000)
-    found = store.get_study(record.id)
-    study = store.study_of(record.number).to_json()
+    block = store.rows.block(record.id, limit=10_000)
+    found = store.studies.get(record.id)
+    study = store.work.study_of(record.number).to_json()
     return [rounds, block.cases.tolist(), block.endings, block.values.tobytes(), found.state, found.cases, study]
 
 
 def test_a_study_has_its_rounds_and_ends_with_the_last(store: Store) -> None:
     record = create(store)
     assert (record.cases, record.most_cases, record.most_rounds) == (25, 100, 4)
-    assert store.look(record.id)[1].rounds is not None
+    assert store.studies.look(record.id)[1].rounds is not None
     finish(store, record)
-    ended, progress = store.look(record.id)
+    ended, progress = store.studies.look(record.id)
     assert (ended.state, ended.cases, ended.done, ended.ok) == (StudyState.FINISHED, 100, 100, 100)
-    rounds = store.rounds(record.id)
+    rounds = store.studies.rounds(record.id)
     assert [found.cases for found in rounds] == [
         range(25), range(25, 50), range(50, 75), range(75, 100), range(100, 100)
     ]  # fmt: skip
@@ -107,18 +107,18 @@ def test_a_study_has_its_rounds_and_ends_with_the_last(store: Store) -> None:
     assert progress.rounds is not None
     assert (progress.rounds.latest, progress.rounds.most, progress.rounds.most_cases) == (rounds[-1], 4, 100)
     # The study in memory is the one with all its cases.
-    assert store.study(record.id).cases == 100
-    assert len(store.case_rows(record.id, limit=200)) == 100
+    assert store.studies.study(record.id).cases == 100
+    assert len(store.rows.block(record.id, limit=200)) == 100
 
 
 def test_a_study_in_memory_grows_with_its_rounds(store: Store) -> None:
     record = create(store)
-    assert store.study(record.id).cases == 25
-    epoch = store.take_over("test")
+    assert store.studies.study(record.id).cases == 25
+    epoch = store.work.take_over("test")
     run_chunks(store, epoch, record.number)
-    Rounds(store).advance(epoch, record.number, store.study_of(record.number))
-    assert store.study(record.id) == store.study_of(record.number)
-    assert store.study(record.id).cases == 50
+    Rounds(store.work).advance(epoch, record.number, store.work.study_of(record.number))
+    assert store.studies.study(record.id) == store.work.study_of(record.number)
+    assert store.studies.study(record.id).cases == 50
 
 
 @pytest.mark.parametrize("kills", [2, 7])
@@ -128,19 +128,19 @@ def test_an_interrupted_study_ends_as_an_undisturbed_one(store: Store, kills: in
     record = create(store, fresh=True)
     # A process that ends before or after any step knows nothing of the steps before.
     steps = 0
-    while not store.get_study(record.id).over:
-        epoch = store.take_over("test")
+    while not store.studies.get(record.id).over:
+        epoch = store.work.take_over("test")
         for _ in range(kills):
-            study = store.study_of(record.number)
-            waiting = store.open_chunks(record.number)
+            study = store.work.study_of(record.number)
+            waiting = store.work.open_chunks(record.number)
             if waiting:
-                (chunk,) = store.claim(epoch, waiting[:1])
+                (chunk,) = store.work.claim(epoch, waiting[:1])
                 if steps % 3:
-                    store.commit(epoch, chunk, results(study, chunk.first, chunk.count))
+                    store.work.commit(epoch, chunk, results(study, chunk.first, chunk.count))
                 else:
-                    store.put_back(epoch, chunk, "")
+                    store.work.put_back(epoch, chunk, "")
             else:
-                Rounds(store).advance(epoch, record.number, study)
+                Rounds(store.work).advance(epoch, record.number, study)
             steps += 1
     assert whole(store, record)[0:] == whole(store, other)[0:]
 
@@ -148,34 +148,34 @@ def test_an_interrupted_study_ends_as_an_undisturbed_one(store: Store, kills: in
 def test_a_round_is_appended_once_and_only_while_the_study_is_going(store: Store) -> None:
     record = create(store)
     number = record.number
-    epoch = store.take_over("test")
-    study = store.study_of(number)
+    epoch = store.work.take_over("test")
+    study = store.work.study_of(number)
     grown = study.with_points(np.array([[0.5], [0.25]]))
-    assert store.rounds_done(number) is None  # its cases are still to be run
-    assert store.append_round(epoch, number, grown, 25, {}) is None
+    assert store.work.rounds_done(number) is None  # its cases are still to be run
+    assert store.work.append_round(epoch, number, grown, 25, {}) is None
     run_chunks(store, epoch, number)
-    assert store.rounds_done(number) == [range(25)]
-    assert store.append_round(epoch, number, grown, 20, {}) is None  # another round
-    store.pause_study(record.id)
-    assert store.rounds_done(number) is None
-    assert store.append_round(epoch, number, grown, 25, {}) is None
-    assert store.settle(epoch, number) is StudyState.PAUSED
-    store.resume_study(record.id)
-    before = store.get_study(record.id).revision
-    chunks = store.append_round(epoch, number, grown, 25, {"error": 0.5})
+    assert store.work.rounds_done(number) == [range(25)]
+    assert store.work.append_round(epoch, number, grown, 20, {}) is None  # another round
+    store.studies.pause(record.id)
+    assert store.work.rounds_done(number) is None
+    assert store.work.append_round(epoch, number, grown, 25, {}) is None
+    assert store.work.settle(epoch, number) is StudyState.PAUSED
+    store.studies.resume(record.id)
+    before = store.studies.get(record.id).revision
+    chunks = store.work.append_round(epoch, number, grown, 25, {"error": 0.5})
     assert chunks is not None
-    assert chunks == store.open_chunks(number)
+    assert chunks == store.work.open_chunks(number)
     assert [(chunk.first, chunk.count) for chunk in chunks] == [(25, 2)]
-    after = store.get_study(record.id)
+    after = store.studies.get(record.id)
     assert (after.cases, after.done, after.revision > before) == (27, 25, True)
-    assert store.append_round(epoch, number, grown, 25, {}) is None  # once more
-    assert store.study_of(number) == grown
-    assert store.rounds(record.id)[-1].summary == {"error": 0.5}
-    new = store.take_over("another")
+    assert store.work.append_round(epoch, number, grown, 25, {}) is None  # once more
+    assert store.work.study_of(number) == grown
+    assert store.studies.rounds(record.id)[-1].summary == {"error": 0.5}
+    new = store.work.take_over("another")
     run_chunks(store, new, number)
     with pytest.raises(EpochLostError):
-        store.append_round(epoch, number, grown.with_points(np.array([[0.75]])), 27, {})
-    assert store.get_study(record.id).cases == 27
+        store.work.append_round(epoch, number, grown.with_points(np.array([[0.75]])), 27, {})
+    assert store.studies.get(record.id).cases == 27
 
 
 class BrokenOffError(Exception):
@@ -184,10 +184,10 @@ class BrokenOffError(Exception):
 
 def test_a_round_that_breaks_off_changes_nothing(store: Store) -> None:
     record = create(store)
-    epoch = store.take_over("test")
+    epoch = store.work.take_over("test")
     run_chunks(store, epoch, record.number)
     before, last, broken = whole(store, record), False, 0
-    study = store.study_of(record.number)
+    study = store.work.study_of(record.number)
     left = 0
 
     def meet(_connection: object, _cursor: object, statement: str, *_: object) -> None:
@@ -200,64 +200,64 @@ def test_a_round_that_breaks_off_changes_nothing(store: Store) -> None:
         left = broken + 1
         sa.event.listen(sa.engine.Engine, "after_cursor_execute", meet)
         try:
-            last = Rounds(store).advance(epoch, record.number, study) is not None
+            last = Rounds(store.work).advance(epoch, record.number, study) is not None
         except BrokenOffError:
             broken += 1
         finally:
             sa.event.remove(sa.engine.Engine, "after_cursor_execute", meet)
         if not last:
             assert whole(store, record) == before
-            assert store.open_chunks(record.number) == []
+            assert store.work.open_chunks(record.number) == []
     assert broken >= 4  # an earlier end of the rounds, the round, its chunks, the study
-    assert store.get_study(record.id).cases == 50
+    assert store.studies.get(record.id).cases == 50
 
 
 def test_a_study_with_rounds_is_not_ended_between_them(store: Store) -> None:
     record = create(store)
-    epoch = store.take_over("test")
+    epoch = store.work.take_over("test")
     run_chunks(store, epoch, record.number)
-    assert store.settle(epoch, record.number) is StudyState.RUNNING
-    store.cancel_study(record.id)
-    assert store.rounds_done(record.number) is None
-    assert store.settle(epoch, record.number) is StudyState.CANCELLED
-    assert len(store.case_page(record.id, limit=200)) == 25
+    assert store.work.settle(epoch, record.number) is StudyState.RUNNING
+    store.studies.cancel(record.id)
+    assert store.work.rounds_done(record.number) is None
+    assert store.work.settle(epoch, record.number) is StudyState.CANCELLED
+    assert len(store.rows.page(record.id, limit=200)) == 25
 
 
 def test_a_deadline_between_two_rounds_holds_the_study(store: Store, clock: fakes.HandClock) -> None:
     record = create(store, finish_by=clock.now() + timedelta(hours=1))
     assert not record.coarse
-    epoch = store.take_over("test")
+    epoch = store.work.take_over("test")
     run_chunks(store, epoch, record.number)
     clock.seconds += 7200.0
-    store.time_is_over(epoch, record.number)
-    held = store.get_study(record.id)
+    store.work.time_is_over(epoch, record.number)
+    held = store.studies.get(record.id)
     assert (held.state, held.time_over) == (StudyState.PAUSED, True)
     assert held.reason is not None
     assert "round 1 of at most 4 is done" in held.reason
-    store.resume_study(record.id)
+    store.studies.resume(record.id)
     finish(store, record)
-    assert store.get_study(record.id).cases == 100
+    assert store.studies.get(record.id).cases == 100
 
 
 def test_cases_that_are_run_again_may_lead_to_another_end(store: Store) -> None:
     record = create(store, toy.study(rounds=2))
-    epoch = store.take_over("test")
-    study = store.study_of(record.number)
-    for chunk in store.open_chunks(record.number):
-        store.claim(epoch, [chunk])
+    epoch = store.work.take_over("test")
+    study = store.work.study_of(record.number)
+    for chunk in store.work.open_chunks(record.number):
+        store.work.claim(epoch, [chunk])
         failed = results(study, chunk.first, chunk.count)
         failed.endings[0] = models.Ending.DIVERGED.value
-        store.commit(epoch, chunk, failed)
-    planner = Rounds(store)
-    while planner.advance(epoch, record.number, store.study_of(record.number)) is not None:
+        store.work.commit(epoch, chunk, failed)
+    planner = Rounds(store.work)
+    while planner.advance(epoch, record.number, store.work.study_of(record.number)) is not None:
         run_chunks(store, epoch, record.number)
-    first_end = store.rounds(record.id)[-1]
-    assert store.get_study(record.id).state is StudyState.FINISHED
-    store.retry_study(record.id)
+    first_end = store.studies.rounds(record.id)[-1]
+    assert store.studies.get(record.id).state is StudyState.FINISHED
+    store.studies.retry(record.id)
     finish(store, record)
-    ended = store.get_study(record.id)
+    ended = store.studies.get(record.id)
     assert (ended.state, ended.cases, ended.ok) == (StudyState.FINISHED, 50, 50)
-    rounds = store.rounds(record.id)
+    rounds = store.studies.rounds(record.id)
     assert [len(found.cases) for found in rounds] == [25, 25, 0]
     assert rounds[-1].summary != first_end.summary
 
@@ -266,62 +266,62 @@ def test_rows_of_an_equal_study_are_copied_round_by_round(store: Store) -> None:
     first = create(store)
     finish(store, first)
     second = create(store)
-    epoch = store.take_over("test")
-    planner = Rounds(store)
+    epoch = store.work.take_over("test")
+    planner = Rounds(store.work)
     while True:
-        study = store.study_of(second.number)
-        for chunk in store.open_chunks(second.number):
-            store.claim(epoch, [chunk])
-            known = store.known(study, chunk)
+        study = store.work.study_of(second.number)
+        for chunk in store.work.open_chunks(second.number):
+            store.work.claim(epoch, [chunk])
+            known = store.work.known(study, chunk)
             assert known is not None
             assert known.missing.size == 0
             assert known.cases.tolist() == list(range(chunk.first, chunk.last + 1))
             nothing = ChunkResult(0, [], [], np.empty((0, fakes.RESULTS)))
-            assert store.commit(epoch, chunk, nothing, known)
+            assert store.work.commit(epoch, chunk, nothing, known)
         if planner.advance(epoch, second.number, study) is None:
             break
-    assert store.get_study(second.id).reused == 100
+    assert store.studies.get(second.id).reused == 100
     assert whole(store, second) == whole(store, first)
 
 
 def test_a_growing_study_is_a_source_with_all_its_cases(store: Store) -> None:
     first, second = create(store), create(store)
-    epoch = store.take_over("test")
-    assert store.reusable(toy.study()) == 0  # its span is known from here on
+    epoch = store.work.take_over("test")
+    assert store.reuse.count(toy.study()) == 0  # its span is known from here on
     finish(store, first)
-    late = store.study_of(first.number)
-    assert store.reusable(late) == 100
-    store.cancel_study(second.id)
-    store.settle(epoch + 1, second.number)
+    late = store.work.study_of(first.number)
+    assert store.reuse.count(late) == 100
+    store.studies.cancel(second.id)
+    store.work.settle(epoch + 1, second.number)
 
 
 def test_a_deleted_study_takes_its_rounds_with_it(store: Store) -> None:
     record = create(store)
     finish(store, record)
-    store.delete_study(record.id)
+    store.studies.delete(record.id)
     with pytest.raises(StudyNotFoundError):
-        store.rounds(record.id)
-    store.purge()
+        store.studies.rounds(record.id)
+    store.purging.purge()
     with store.session.read() as connection:
         assert connection.execute(sa.select(sa.func.count()).select_from(ROUNDS)).scalar_one() == 0
 
 
 def test_a_round_that_cannot_be_planned_says_why(store: Store) -> None:
     record = create(store, toy.study(broken_at=1))
-    epoch = store.take_over("test")
+    epoch = store.work.take_over("test")
     run_chunks(store, epoch, record.number)
     with pytest.raises(PlanError, match="cannot be planned: ValueError: there is no such round"):
-        Rounds(store).advance(epoch, record.number, store.study_of(record.number))
-    assert store.get_study(record.id).cases == 25
+        Rounds(store.work).advance(epoch, record.number, store.work.study_of(record.number))
+    assert store.studies.get(record.id).cases == 25
 
 
 def test_a_derived_value_out_of_range_in_a_later_round_is_not_run(store: Store) -> None:
     record = create(store, replace(toy.study(), derive={"shaft.inertia": "0.5 - shaft.load"}))
-    epoch = store.take_over("test")
+    epoch = store.work.take_over("test")
     run_chunks(store, epoch, record.number)
     with pytest.raises(PlanError, match=r"case \d+ would derive shaft.inertia = -.*allowed is > 0"):
-        Rounds(store).advance(epoch, record.number, store.study_of(record.number))
-    assert store.get_study(record.id).cases == 25
+        Rounds(store.work).advance(epoch, record.number, store.work.study_of(record.number))
+    assert store.studies.get(record.id).cases == 25
 
 
 def spread(task: ChunkTask) -> ChunkResult:
@@ -332,16 +332,18 @@ def spread(task: ChunkTask) -> ChunkResult:
 
 def dispatch(store: Store, record: StudyRecord) -> None:
     ended = {StudyState.FINISHED, StudyState.PAUSED}
-    Dispatcher(store, InlineExecutor(spread), SystemClock()).run(lambda: store.get_study(record.id).state in ended)
+    Dispatcher(store.work, InlineExecutor(spread), SystemClock()).run(
+        lambda: store.studies.get(record.id).state in ended
+    )
 
 
 def test_the_dispatcher_runs_all_rounds_and_holds_what_cannot_be_planned(store: Store) -> None:
     record, broken = create(store), create(store, toy.study(broken_at=2), fresh=True)
     dispatch(store, record)
     dispatch(store, broken)
-    assert store.get_study(record.id).state is StudyState.FINISHED
-    assert store.get_study(record.id).cases == 100
-    held = store.get_study(broken.id)
+    assert store.studies.get(record.id).state is StudyState.FINISHED
+    assert store.studies.get(record.id).cases == 100
+    held = store.studies.get(broken.id)
     assert (held.state, held.cases) == (StudyState.PAUSED, 50)
     assert held.reason == "the next round cannot be planned: ValueError: there is no such round"
 
@@ -357,8 +359,8 @@ def test_no_round_is_chosen_from_rows_that_changed_on_the_disk(store: Store) -> 
     with store.session.write() as connection:
         this = (table.c.study == record.number) & (table.c.case_number == 53)
         connection.execute(sa.update(table).where(this).values({column.name: 1e9}))
-    assert store.rounds_done(record.number) is None
-    assert store.get_study(record.id).done < store.get_study(record.id).cases
+    assert store.work.rounds_done(record.number) is None
+    assert store.studies.get(record.id).done < store.studies.get(record.id).cases
     finish(store, record)
     assert whole(store, record) == whole(store, whole_one)
 
@@ -378,27 +380,27 @@ def test_a_round_that_changed_is_named_and_its_summary_not_told(store: Store, co
     """A summary has the error of a curve, and the best design, as numbers."""
     record = chosen(store)
     assert not [problem for problem in store.check().problems if record.id in problem]
-    assert [found.summary.get("told") for found in store.rounds(record.id)] == [None, 1, 2, 3, 4]
+    assert [found.summary.get("told") for found in store.studies.rounds(record.id)] == [None, 1, 2, 3, 4]
     with store.session.write() as connection:
         this = (ROUNDS.c.study == record.number) & (ROUNDS.c.round == 2)
         connection.execute(sa.update(ROUNDS).where(this).values({column: value}))
     named = f"the rounds of the study {record.id} changed on the disk"
     assert any(problem.startswith(named) for problem in store.check().problems)
     with refused(DatabaseError, "database-damaged"):
-        store.rounds(record.id)
-    assert store.look(record.id)[0].done == 100
+        store.studies.rounds(record.id)
+    assert store.studies.look(record.id)[0].done == 100
 
 
 def test_progress_has_no_numbers_of_a_summary_that_changed(store: Store) -> None:
     record = chosen(store)
-    progress = store.look(record.id)[1].rounds
+    progress = store.studies.look(record.id)[1].rounds
     assert progress is not None
     assert progress.latest.summary["told"] == 4
     with store.session.write() as connection:
         this = (ROUNDS.c.study == record.number) & (ROUNDS.c.round == 4)
         text = connection.execute(sa.select(ROUNDS.c.summary).where(this)).scalar_one()
         connection.execute(sa.update(ROUNDS).where(this).values(summary=text.replace('"told": 4', '"told": 5')))
-    progress = store.look(record.id)[1].rounds
+    progress = store.studies.look(record.id)[1].rounds
     assert progress is not None
     assert (progress.latest.summary, progress.latest.cases) == ({}, range(100, 100))
 
@@ -409,4 +411,4 @@ def test_summaries_from_before_have_no_digest(store: Store) -> None:
         connection.execute(
             sa.update(ROUNDS).where(ROUNDS.c.study == record.number, ROUNDS.c.round == 3).values(summary='{"told": 30}')
         )
-    assert [found.summary.get("told") for found in store.rounds(record.id)] == [None, 1, 2, 30, 4]
+    assert [found.summary.get("told") for found in store.studies.rounds(record.id)] == [None, 1, 2, 30, 4]

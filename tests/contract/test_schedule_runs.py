@@ -13,7 +13,7 @@ from sprag.service.schedules.outcomes import Result
 from sprag.service.schedules.policies import DueTime
 from sprag.service.storage.audit import AuditFilter
 from sprag.service.storage.errors import RunClosedError
-from sprag.service.storage.schedule_runs import OpenRun, RunState, ScheduleRecord
+from sprag.service.storage.runs import OpenRun, RunState, ScheduleRecord
 from sprag.service.storage.store import Store
 from sprag.service.storage.study_row import study_row
 from tests.service.timed_spec import SPEC
@@ -24,23 +24,23 @@ End = Callable[[Store, ScheduleRecord], None]
 
 
 def pause(store: Store, schedule: ScheduleRecord) -> None:
-    store.change_schedule(schedule.id, change_fields(schedule.fields, {"enabled": False}, store.clock.now()))
+    store.schedules.change(schedule.id, change_fields(schedule.fields, {"enabled": False}, store.clock.now()))
 
 
 def delete(store: Store, schedule: ScheduleRecord) -> None:
-    store.delete_schedule(schedule.id)
+    store.schedules.delete(schedule.id)
 
 
 def submit(store: Store, run: OpenRun) -> None:
-    store.insert_study(study_row(SPEC, fakes.study(1), store.chunking, ()), run=run)
+    store.studies.insert(study_row(SPEC, fakes.study(1), store.dispatchers.chunking, ()), run=run)
 
 
 @pytest.fixture
 def schedule(store: Store) -> ScheduleRecord:
     """A schedule whose first due time was taken up."""
-    record = store.create_schedule(read_fields({"spec": SPEC, "cron": "@hourly"}, NEW_YEAR))
+    record = store.schedules.create(read_fields({"spec": SPEC, "cron": "@hourly"}, NEW_YEAR))
     assert record.next_due is not None
-    assert store.take_due(record, [DueTime(record.next_due)], None, record.next_due)
+    assert store.runs.take_due(record, [DueTime(record.next_due)], None, record.next_due)
     return record
 
 
@@ -48,31 +48,31 @@ def schedule(store: Store) -> ScheduleRecord:
 def test_a_run_that_was_refused_in_the_meantime_gets_no_study(
     store: Store, schedule: ScheduleRecord, end: End, verb: str
 ) -> None:
-    (run,) = store.open_runs()
+    (run,) = store.runs.open()
     end(store, schedule)
     with pytest.raises(RunClosedError):
         submit(store, run)
-    store.put_off_run(run, "no room")
-    store.close_run(run, "given up")
-    assert store.list_studies().studies == ()
-    (found,) = store.runs_between(NEW_YEAR, datetime(2027, 1, 1, tzinfo=UTC), 9)  # those of deleted schedules too
+    store.runs.put_off(run, "no room")
+    store.runs.close(run, "given up")
+    assert store.studies.page().studies == ()
+    (found,) = store.runs.between(NEW_YEAR, datetime(2027, 1, 1, tzinfo=UTC), 9)  # those of deleted schedules too
     assert found.outcome.result is Result.REFUSED
     assert found.outcome.reason == f"The schedule was {verb} before a study was submitted."
-    (refused,) = store.audit_rows(AuditFilter(action="schedule.refuse"))
+    (refused,) = store.audit.rows(AuditFilter(action="schedule.refuse"))
     assert (refused.target, refused.detail["due"]) == (schedule.id, "2026-01-01T01:00:00+00:00")
 
 
 def test_a_run_gets_one_study(store: Store, schedule: ScheduleRecord) -> None:
-    (run,) = store.open_runs()
+    (run,) = store.runs.open()
     submit(store, run)
     with pytest.raises(RunClosedError):
         submit(store, run)
-    store.close_run(run, "given up", skipped=True)
+    store.runs.close(run, "given up", skipped=True)
     pause(store, schedule)
-    (study,) = store.list_studies().studies
-    (found,) = store.schedule_runs(schedule.id)
+    (study,) = store.studies.page().studies
+    (found,) = store.schedules.runs(schedule.id)
     assert (found.state, found.study, found.problem) == (RunState.SUBMITTED, study.id, None)
-    assert list(store.audit_rows(AuditFilter(action="schedule.refuse"))) == []
+    assert list(store.audit.rows(AuditFilter(action="schedule.refuse"))) == []
 
 
 @pytest.fixture
@@ -85,7 +85,7 @@ def other(url: str, store: Store) -> Iterator[Store]:
 def test_of_two_processes_that_submit_and_pause_one_is_first(
     store: Store, other: Store, schedule: ScheduleRecord
 ) -> None:
-    (run,) = store.open_runs()
+    (run,) = store.runs.open()
     refused = []
 
     def submitting() -> None:
@@ -99,6 +99,6 @@ def test_of_two_processes_that_submit_and_pause_one_is_first(
         thread.start()
     for thread in threads:
         thread.join()
-    (found,) = store.schedule_runs(schedule.id)
-    studies = len(store.list_studies().studies)
+    (found,) = store.schedules.runs(schedule.id)
+    studies = len(store.studies.page().studies)
     assert (found.state, studies) == ((RunState.REFUSED, 0) if refused else (RunState.SUBMITTED, 1))

@@ -12,9 +12,9 @@ from sprag.service.faults import FaultError
 from sprag.service.spec.components import Component
 from sprag.service.spec.saved_views import View
 from sprag.service.storage.errors import TooManyComponentsError, TooManyViewsError
+from sprag.service.storage.people import Quota
 from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.study_row import study_row
-from sprag.service.storage.users import Quota
 from sprag.worker.states import StudyState
 from tests.contract.filling import create, finish
 from tests.worker import fakes
@@ -31,14 +31,14 @@ QUEUE = 16
 @pytest.fixture
 def office(store: Store) -> Store:
     for actor in (DORA, EMIL, FINN):
-        store.add_user(actor.name, Role.DESIGNER)
-    store.add_user(ADA.name, Role.ADMINISTRATOR)
+        store.people.add_user(actor.name, Role.DESIGNER)
+    store.people.add_user(ADA.name, Role.ADMINISTRATOR)
     return store
 
 
 def submit(store: Store, priority: int = 0) -> StudyRecord:
-    row = study_row({}, fakes.study(3), store.chunking)
-    return store.insert_study({**row, "estimated_bytes": 1}, queue=QUEUE, priority=priority)
+    row = study_row({}, fakes.study(3), store.dispatchers.chunking)
+    return store.studies.insert({**row, "estimated_bytes": 1}, queue=QUEUE, priority=priority)
 
 
 def fill(store: Store, actor: Actor) -> int:
@@ -51,7 +51,7 @@ def fill(store: Store, actor: Actor) -> int:
                 with pytest.raises(FaultError) as refused:
                     submit(store)
                 return number if refused.value.code == "queue-full" else -1
-            store.pause_study(record.id)
+            store.studies.pause(record.id)
     raise AssertionError("the queue has no end")
 
 
@@ -61,16 +61,16 @@ def test_nobody_fills_the_queue(office: Store) -> None:
 
 
 def test_nobody_fills_it_with_ended_studies_that_are_run_again(office: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sprag.service.storage.retry.MAX_WAITING_STUDIES", 4)
+    monkeypatch.setattr("sprag.service.storage.studies.MAX_WAITING_STUDIES", 4)
     with act_as(DORA):
         made = [create(office, 3) for _ in range(3)]
     for record in made:
         finish(office, record, "chatter")
     with act_as(DORA):
-        assert office.retry_study(made[0].id).state is StudyState.QUEUED
-        assert office.retry_study(made[1].id).state is StudyState.QUEUED
+        assert office.studies.retry(made[0].id).state is StudyState.QUEUED
+        assert office.studies.retry(made[1].id).state is StudyState.QUEUED
         with pytest.raises(FaultError) as refused:
-            office.retry_study(made[2].id)
+            office.studies.retry(made[2].id)
     assert refused.value.code == "queue-full"
 
 
@@ -86,17 +86,17 @@ def test_nobody_takes_all_views_and_components(office: Store, monkeypatch: pytes
             views = [View("studies", f"{actor.name} {number}", "") for number in range(most + 1)]
             springs = [Component("spring", view.name, "", {"spring_rate": "9 N/mm"}) for view in views]
             with pytest.raises(TooManyComponentsError):
-                office.put_components(springs)
-            assert len(office.put_components(springs[:most])) == most
-            assert len(office.put_components(springs[:most])) == most  # replaced
+                office.components.put(springs)
+            assert len(office.components.put(springs[:most])) == most
+            assert len(office.components.put(springs[:most])) == most  # replaced
             for view in views[:most]:
-                office.save_view(view)
+                office.views.save(view)
             with pytest.raises(TooManyViewsError):
-                office.save_view(views[-1])
+                office.views.save(views[-1])
 
 
 def ranks(store: Store) -> dict[int, tuple[int, int]]:
-    return {study.number: (study.rank, study.priority) for study in store.active_studies()}
+    return {study.number: (study.rank, study.priority) for study in store.work.active_studies()}
 
 
 def test_a_priority_counts_against_others_only_where_an_administrator_gave_it(office: Store) -> None:
@@ -109,13 +109,13 @@ def test_a_priority_counts_against_others_only_where_an_administrator_gave_it(of
         (0, 100), (0, 100), (100, 100), (0, 100), (100, 100), (0, 100),
     ]  # fmt: skip
     with act_as(ADA):
-        office.prioritize_study(made["dora"].id, 50)
+        office.studies.prioritize(made["dora"].id, 50)
     assert ranks(office)[made["dora"].number] == (50, 50)
     with act_as(DORA):
-        office.prioritize_study(made["dora"].id, 50)
+        office.studies.prioritize(made["dora"].id, 50)
     assert ranks(office)[made["dora"].number] == (0, 50)
     with act_as(DORA):
-        office.prioritize_study(made["dora"].id, -5)
+        office.studies.prioritize(made["dora"].id, -5)
     assert ranks(office)[made["dora"].number] == (-5, -5)
 
 
@@ -128,12 +128,12 @@ def test_without_users_every_priority_counts(store: Store) -> None:
 def held_at_deadline(store: Store, clock: fakes.HandClock, count: int) -> list[StudyRecord]:
     """So many studies of three cases of the present user, held at their deadline."""
     end = store.clock.now() + timedelta(hours=1)
-    made = [store.create_study({}, fakes.study(3), finish_by=end) for _ in range(count)]
+    made = [store.studies.create({}, fakes.study(3), finish_by=end) for _ in range(count)]
     clock.seconds += 3601.0
-    epoch = store.take_over("test")
+    epoch = store.work.take_over("test")
     for record in made:
-        store.time_is_over(epoch, record.number)
-        assert store.get_study(record.id).time_over
+        store.work.time_is_over(epoch, record.number)
+        assert store.studies.get(record.id).time_over
     return made
 
 
@@ -144,16 +144,16 @@ def test_nobody_fills_the_queue_with_studies_that_were_held_at_their_deadline(
     with act_as(DORA):
         made = held_at_deadline(office, clock, 3)
         for record in made[:2]:
-            assert office.resume_study(record.id).state is StudyState.QUEUED
-            office.pause_study(record.id)
-            office.resume_study(record.id)  # it waits already
-        office.pause_study(made[2].id)
+            assert office.studies.resume(record.id).state is StudyState.QUEUED
+            office.studies.pause(record.id)
+            office.studies.resume(record.id)  # it waits already
+        office.studies.pause(made[2].id)
         with pytest.raises(FaultError) as refused:
-            office.resume_study(made[2].id)
+            office.studies.resume(made[2].id)
         assert refused.value.code == "queue-full"
-        assert office.get_study(made[2].id).time_over
+        assert office.studies.get(made[2].id).time_over
         finish(office, made[0])
-        assert office.resume_study(made[2].id).state is StudyState.QUEUED
+        assert office.studies.resume(made[2].id).state is StudyState.QUEUED
 
 
 def test_cases_that_wait_again_count_against_the_quota(office: Store, clock: fakes.HandClock) -> None:
@@ -161,14 +161,14 @@ def test_cases_that_wait_again_count_against_the_quota(office: Store, clock: fak
     with act_as(DORA):
         (late,) = held_at_deadline(office, clock, 1)
         failed = create(office, 3)
-        office.change_user("dora", quota=Quota(cases=3, bytes=1))
+        office.people.change_user("dora", quota=Quota(cases=3, bytes=1))
         with pytest.raises(FaultError) as refused:
-            office.resume_study(late.id)
+            office.studies.resume(late.id)
         assert refused.value.code == "quota-exceeded"
         finish(office, failed, "chatter")
-        assert office.resume_study(late.id).state is StudyState.QUEUED
+        assert office.studies.resume(late.id).state is StudyState.QUEUED
         with pytest.raises(FaultError) as refused:
-            office.retry_study(failed.id)
+            office.studies.retry(failed.id)
         assert refused.value.code == "quota-exceeded"
         finish(office, late)
-        assert office.retry_study(failed.id).state is StudyState.QUEUED
+        assert office.studies.retry(failed.id).state is StudyState.QUEUED

@@ -46,7 +46,7 @@ def test_inputs_that_changed_are_named_and_not_used(store: Store, column: str) -
     assert problems(store) == []
     change(store, STUDIES, record.number, **{column: flipped(store, record.number, column)})
     assert f"the inputs of the study {record.id} changed on the disk" in problems(store)[0]
-    for answer in (store.spec, store.study, store.run_damaged_again):
+    for answer in (store.studies.spec, store.studies.study, store.digests.run_damaged_again):
         with refused(DatabaseError, "database-damaged"):
             answer(record.id)
 
@@ -56,9 +56,9 @@ def test_a_study_with_inputs_that_changed_is_held(store: Store) -> None:
     with store.session.read() as connection:
         text = connection.execute(sa.select(STUDIES.c.study).where(STUDIES.c.number == record.number)).scalar_one()
     change(store, STUDIES, record.number, study="[" + text[1:])
-    dispatcher = Dispatcher(store, InlineExecutor(compute), store.clock)
-    dispatcher.run(lambda: store.get_study(other.id).state.terminal)
-    held = store.get_study(record.id)
+    dispatcher = Dispatcher(store.work, InlineExecutor(compute), store.clock)
+    dispatcher.run(lambda: store.studies.get(other.id).state.terminal)
+    held = store.studies.get(record.id)
     assert (held.state, held.done) == (StudyState.PAUSED, 0)
     assert held.reason is not None
     assert "changed on the disk" in held.reason
@@ -78,18 +78,18 @@ def test_a_text_that_cannot_be_read_any_more_is_named(store: Store) -> None:
         "submit it again"
     ]
     with refused(DatabaseError, "database-damaged"):
-        store.study(record.id)
+        store.studies.study(record.id)
     with pytest.raises(UnreadableStudyError, match="changed on the disk"):
-        store.study_of(record.number)
-    assert store.reusable(fakes.study(25, "later")) in {0, 25}
+        store.work.study_of(record.number)
+    assert store.reuse.count(fakes.study(25, "later")) in {0, 25}
 
 
 def test_no_rows_are_taken_from_a_study_whose_inputs_changed(store: Store) -> None:
     record = create(store, 25)
     finish(store, record)
-    assert store.reusable(fakes.study(25, "later")) == 25
+    assert store.reuse.count(fakes.study(25, "later")) == 25
     change(store, STUDIES, record.number, study=flipped(store, record.number, "study"))
-    assert store.reusable(fakes.study(25, "later")) == 0
+    assert store.reuse.count(fakes.study(25, "later")) == 0
 
 
 @pytest.mark.parametrize("change_of", [{"count": 14}, {"first": 13}, {"count": -6}])
@@ -101,15 +101,15 @@ def test_a_list_of_chunks_that_changed_is_named_and_not_run(store: Store, change
         connection.execute(sa.update(CHUNKS).where(this).values(change_of))
     assert f"the list of chunks of the study {record.id} changed on the disk" in problems(store)[0]
     with refused(DatabaseError, "database-damaged"):
-        store.run_damaged_again(record.id)
-    assert store.get_study(record.id).state is StudyState.FINISHED
+        store.digests.run_damaged_again(record.id)
+    assert store.studies.get(record.id).state is StudyState.FINISHED
 
 
 @pytest.mark.parametrize("where", ["done", "ok", "endings", "ending"])
 def test_numbers_of_cases_that_changed_are_named_and_counted_again(store: Store, where: str) -> None:
     record = create(store, 25)
     finish(store, record)
-    right = store.look(record.id)
+    right = store.studies.look(record.id)
     if where in {"done", "ok"}:
         change(store, STUDIES, record.number, **{where: 24})
     else:
@@ -117,7 +117,7 @@ def test_numbers_of_cases_that_changed_are_named_and_counted_again(store: Store,
     assert problems(store) == [f"the numbers of cases of the study {record.id} are not those of its rows"]
     Scrubbing(store).look()
     assert problems(store) == []
-    assert store.look(record.id) == right
+    assert store.studies.look(record.id) == right
 
 
 def test_each_covered_column_changes_the_digest(store: Store) -> None:

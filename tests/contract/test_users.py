@@ -18,13 +18,13 @@ from sprag.service.faults import FaultError
 from sprag.service.spec.components import Component
 from sprag.service.spec.labels import StudyChange
 from sprag.service.spec.saved_views import View
-from sprag.service.storage import purging
+from sprag.service.storage import studies as studies_of_store
 from sprag.service.storage.audit import AuditFilter
 from sprag.service.storage.errors import IdempotencyConflictError, NotOwnerError, UserExistsError, UserNotFoundError
+from sprag.service.storage.people import STUDY_BYTES, TEXTS, Quota
 from sprag.service.storage.scopes import TokenScope
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import STUDIES
-from sprag.service.storage.users import STUDY_BYTES, TEXTS, Quota
 from sprag.worker.limits import MAX_NOTES_LENGTH
 from sprag.worker.states import StudyState
 from tests.contract.filling import create, finish
@@ -38,24 +38,24 @@ def user(name: str, role: Role = Role.DESIGNER) -> Actor:
 
 def actions(store: Store) -> list[tuple[str, str, str]]:
     """Actor, action and target of every row, earliest first."""
-    return [(row.actor, row.action, row.target) for row in store.audit_rows(AuditFilter())]
+    return [(row.actor, row.action, row.target) for row in store.audit.rows(AuditFilter())]
 
 
 def test_users_are_added_changed_removed_and_restored(store: Store) -> None:
-    made = store.add_user("dora", Role.DESIGNER, Quota(cases=7))
+    made = store.people.add_user("dora", Role.DESIGNER, Quota(cases=7))
     assert (made.name, made.role, made.removed_at, made.quota) == ("dora", "designer", None, Quota(cases=7))
     with pytest.raises(UserExistsError):
-        store.add_user("dora", Role.VIEWER)
-    assert store.change_user("dora", quota=Quota(bytes=3)).quota == Quota(7, 3)
-    assert store.change_user("dora", Role.VIEWER).role is Role.VIEWER
-    assert store.change_user("dora", removed=True).removed_at == store.clock.now()
+        store.people.add_user("dora", Role.VIEWER)
+    assert store.people.change_user("dora", quota=Quota(bytes=3)).quota == Quota(7, 3)
+    assert store.people.change_user("dora", Role.VIEWER).role is Role.VIEWER
+    assert store.people.change_user("dora", removed=True).removed_at == store.clock.now()
     with pytest.raises(UserExistsError):
-        store.add_user("dora", Role.VIEWER)
+        store.people.add_user("dora", Role.VIEWER)
     with pytest.raises(UserNotFoundError):
-        store.create_token("hers", TokenScope.WRITE, owner="dora")
-    assert store.change_user("dora", removed=False).removed_at is None
+        store.people.create_token("hers", TokenScope.WRITE, owner="dora")
+    assert store.people.change_user("dora", removed=False).removed_at is None
     with pytest.raises(UserNotFoundError):
-        store.change_user("emil", removed=True)
+        store.people.change_user("emil", removed=True)
     assert [row[1] for row in actions(store)] == [
         "user.add", "user.change", "user.change", "user.remove", "user.restore",
     ]  # fmt: skip
@@ -64,7 +64,7 @@ def test_users_are_added_changed_removed_and_restored(store: Store) -> None:
 def test_everybody_has_idempotency_keys_of_their_own(store: Store) -> None:
     """The key of somebody else with the same body is a key that nobody has sent."""
     for name in ("dora", "emil"):
-        store.add_user(name, Role.DESIGNER)
+        store.people.add_user(name, Role.DESIGNER)
     tokens = [Actor(Door.API, name, "192.0.2.1", token=name) for name in ("tk_1", "tk_2")]
     senders = [of_machine(Door.PROGRAM), user("dora"), user("emil"), *tokens]
     made = []
@@ -76,12 +76,12 @@ def test_everybody_has_idempotency_keys_of_their_own(store: Store) -> None:
     assert len(set(made)) == len(senders)
     for sender, study_id in zip(senders, made, strict=True):
         with act_as(sender):
-            known = store.study_of_key("k", "a")
+            known = store.studies.of_key("k", "a")
             assert known is not None
             assert known.id == study_id
             assert create(store, idempotency_key="k", body_hash="a").id == study_id
             with pytest.raises(IdempotencyConflictError):
-                store.study_of_key("k", "b")
+                store.studies.of_key("k", "b")
     with act_as(replace(user("dora"), token="tk_3")):  # whatever token
         assert create(store, idempotency_key="k", body_hash="a").id == made[1]
     with act_as(senders[0]):
@@ -89,36 +89,36 @@ def test_everybody_has_idempotency_keys_of_their_own(store: Store) -> None:
     with act_as(tokens[0]):
         assert create(store, idempotency_key="before", body_hash="a").id == kept
     with act_as(user("dora")):
-        assert store.study_of_key("before", "a") is None
+        assert store.studies.of_key("before", "a") is None
 
 
 def test_what_users_make_is_theirs_and_is_handed_over(store: Store) -> None:
     for name in ("dora", "emil"):
-        store.add_user(name, Role.DESIGNER)
+        store.people.add_user(name, Role.DESIGNER)
     with act_as(user("dora")):
         made = create(store)
-        store.put_components([Component("spring", "F-120", "", {"spring_rate": "9 N/mm"})])
-        store.save_view(View("studies", "mine", "owner=dora"))
+        store.components.put([Component("spring", "F-120", "", {"spring_rate": "9 N/mm"})])
+        store.views.save(View("studies", "mine", "owner=dora"))
     finish(store, made)
-    assert store.get_study(made.id).owner == "dora"
-    for change in (store.retry_study, store.delete_study, lambda i: store.prioritize_study(i, 3)):
+    assert store.studies.get(made.id).owner == "dora"
+    for change in (store.studies.retry, store.studies.delete, lambda i: store.studies.prioritize(i, 3)):
         with act_as(user("emil")), pytest.raises(NotOwnerError):
             change(made.id)
-    store.restorable = timedelta(days=1)
+    store.studies.restorable = timedelta(days=1)
     with act_as(user("dora")):
         deleted = create(store)
         finish(store, deleted)
-        store.delete_study(deleted.id)
-    assert store.hand_over("dora", "emil") == (2, 0)
+        store.studies.delete(deleted.id)
+    assert store.people.hand_over("dora", "emil") == (2, 0)
     with act_as(user("emil")):
-        store.restore_study(deleted.id)
-    assert [one.owner for one in (*store.components(), *store.saved_views())] == ["emil", "emil"]
+        store.studies.restore(deleted.id)
+    assert [one.owner for one in (*store.components.all(), *store.views.all())] == ["emil", "emil"]
     with pytest.raises(UserNotFoundError):
-        store.hand_over("emil", "nobody")
+        store.people.hand_over("emil", "nobody")
     with act_as(user("dora")), pytest.raises(NotOwnerError):
-        store.delete_study(made.id)
+        store.studies.delete(made.id)
     with act_as(user("emil")):
-        store.delete_study(made.id)
+        store.studies.delete(made.id)
     assert actions(store)[-3:] == [
         (acting().name, "user.hand-over", "dora"), ("emil", "study.restore", deleted.id),
         ("emil", "study.delete", made.id),
@@ -136,10 +136,10 @@ def test_a_change_that_fails_leaves_no_row_and_a_row_that_fails_no_change(
         raise RuntimeError("the process dies here")
 
     with monkeypatch.context() as patch:
-        patch.setattr(purging, "note", fail)
+        patch.setattr(studies_of_store, "note", fail)
         with pytest.raises(RuntimeError):
-            store.delete_study(made.id)
-    assert store.get_study(made.id).state is StudyState.FINISHED
+            store.studies.delete(made.id)
+    assert store.studies.get(made.id).state is StudyState.FINISHED
     connections = store.session.write
 
     @contextmanager
@@ -151,14 +151,14 @@ def test_a_change_that_fails_leaves_no_row_and_a_row_that_fails_no_change(
     with monkeypatch.context() as patch:
         patch.setattr(store.session, "write", dying)
         with pytest.raises(RuntimeError):
-            store.delete_study(made.id)
-    assert store.get_study(made.id).state is StudyState.FINISHED
+            store.studies.delete(made.id)
+    assert store.studies.get(made.id).state is StudyState.FINISHED
     assert actions(store) == before
 
 
 def test_quotas_count_what_waits_and_what_is_stored(store: Store) -> None:
-    store.add_user("dora", Role.DESIGNER, Quota(cases=50))
-    store.default_quota = Quota(cases=10)
+    store.people.add_user("dora", Role.DESIGNER, Quota(cases=50))
+    store.people.default_quota = Quota(cases=10)
     with act_as(user("dora")):
         first = create(store, 30)
         with pytest.raises(FaultError) as refused:
@@ -172,27 +172,27 @@ def test_quotas_count_what_waits_and_what_is_stored(store: Store) -> None:
         connection.execute(sa.update(STUDIES).where(STUDIES.c.id == first.id).values(estimated_bytes=900))
         studies = connection.execute(sa.select(STUDIES).where(STUDIES.c.owner == "dora")).mappings().all()
         texts = sum(STUDY_BYTES + sum(len(study[name].encode()) for name in TEXTS) for study in studies)
-    assert (store.usage("dora").cases, store.usage("dora").bytes) == (50, 900 + texts)
-    store.default_quota = Quota(cases=10, bytes=1000 + STUDY_BYTES + texts)
-    store.change_user("dora", quota=Quota(cases=0))
+    assert (store.people.usage("dora").cases, store.people.usage("dora").bytes) == (50, 900 + texts)
+    store.people.default_quota = Quota(cases=10, bytes=1000 + STUDY_BYTES + texts)
+    store.people.change_user("dora", quota=Quota(cases=0))
     row = {"name": "", "spec": "{}"}
     with (
         act_as(user("dora")),
         pytest.raises(FaultError, match=r"about 20,480 MiB more, and dora has used 0\.0 of 0\.0 MiB"),
     ):
-        store.insert_study({**_row(store), **row, "estimated_bytes": 20 * 2**30})
+        store.studies.insert({**_row(store), **row, "estimated_bytes": 20 * 2**30})
     with act_as(user("dora")), pytest.raises(FaultError, match="MiB"):
-        store.insert_study({**_row(store), **row, "estimated_bytes": 101})
-    store.restorable = timedelta(days=1)
-    store.delete_study(first.id)
+        store.studies.insert({**_row(store), **row, "estimated_bytes": 101})
+    store.studies.restorable = timedelta(days=1)
+    store.studies.delete(first.id)
     with act_as(user("dora")), pytest.raises(FaultError, match="MiB"):  # it lies on the disk as before
-        store.insert_study({**_row(store), **row, "estimated_bytes": 101})
-    store.delete_study(first.id, at_once=True)
+        store.studies.insert({**_row(store), **row, "estimated_bytes": 101})
+    store.studies.delete(first.id, at_once=True)
     with act_as(user("dora")), pytest.raises(FaultError, match="MiB"):
-        store.insert_study({**_row(store), **row, "estimated_bytes": 101})
-    store.purge()
+        store.studies.insert({**_row(store), **row, "estimated_bytes": 101})
+    store.purging.purge()
     with act_as(user("dora")):
-        store.insert_study({**_row(store), **row, "estimated_bytes": 1000})
+        store.studies.insert({**_row(store), **row, "estimated_bytes": 1000})
     create(store, 1000)  # of nobody
 
 
@@ -214,48 +214,48 @@ def on_disk(store: Store) -> int:
 )
 def test_notes_count_as_they_lie_on_the_disk(store: Store, letters: str) -> None:
     """Of any alphabet; and nobody writes more of them than the quota allows."""
-    store.add_user("dora", Role.DESIGNER)
+    store.people.add_user("dora", Role.DESIGNER)
     chance = random.Random(5)
     before = on_disk(store)
     notes = ["".join(chance.choices(letters, k=MAX_NOTES_LENGTH)) for _ in range(30)]
     with act_as(user("dora")):
         made = [create(store, 3) for _ in notes]
         for study, text in zip(made, notes, strict=True):
-            store.change_study(study.id, StudyChange(notes=text))
+            store.studies.change(study.id, StudyChange(notes=text))
         taken = on_disk(store) - before
         # PostgreSQL packs long texts, and leaves room between them.
         most = 2.5 if store.session.on_server else 1.3
-        assert 0.6 < store.usage("dora").bytes / taken < most
-        store.change_user("dora", quota=Quota(bytes=store.usage("dora").bytes))
+        assert 0.6 < store.people.usage("dora").bytes / taken < most
+        store.people.change_user("dora", quota=Quota(bytes=store.people.usage("dora").bytes))
         with pytest.raises(FaultError, match="MiB more") as refused:
-            store.change_study(made[0].id, StudyChange(notes=notes[0] + "more"))
+            store.studies.change(made[0].id, StudyChange(notes=notes[0] + "more"))
         assert refused.value.code == "quota-exceeded"
-        assert store.get_study(made[0].id).notes == notes[0]
+        assert store.studies.get(made[0].id).notes == notes[0]
         for shorter in (notes[0][:-1], "", notes[0]):
-            assert store.change_study(made[0].id, StudyChange(notes=shorter)).notes == shorter
+            assert store.studies.change(made[0].id, StudyChange(notes=shorter)).notes == shorter
 
 
 def test_an_ended_study_is_restored_over_the_quota_of_cases(store: Store) -> None:
-    store.add_user("dora", Role.DESIGNER)
-    store.restorable = timedelta(days=1)
+    store.people.add_user("dora", Role.DESIGNER)
+    store.studies.restorable = timedelta(days=1)
     with act_as(user("dora")):
         ended = create(store, 3)
         finish(store, ended)
         create(store, 30)
-        store.delete_study(ended.id)
-        store.change_user("dora", quota=Quota(cases=10))
-        store.restore_study(ended.id)
-    assert store.get_study(ended.id).id == ended.id
+        store.studies.delete(ended.id)
+        store.people.change_user("dora", quota=Quota(cases=10))
+        store.studies.restore(ended.id)
+    assert store.studies.get(ended.id).id == ended.id
 
 
 def _row(store: Store) -> dict[str, Any]:
     from sprag.service.storage.study_row import study_row
 
-    return study_row({}, fakes.study(3), store.chunking)
+    return study_row({}, fakes.study(3), store.dispatchers.chunking)
 
 
 def test_submissions_side_by_side_do_not_exceed_a_quota_together(store: Store) -> None:
-    store.add_user("dora", Role.DESIGNER, Quota(cases=100))
+    store.people.add_user("dora", Role.DESIGNER, Quota(cases=100))
 
     def submit(_: int) -> bool:
         with act_as(user("dora")):
@@ -267,33 +267,33 @@ def test_submissions_side_by_side_do_not_exceed_a_quota_together(store: Store) -
 
     with ThreadPoolExecutor(8) as pool:
         assert sum(pool.map(submit, range(16))) == 3
-    assert store.usage("dora").cases == 90
+    assert store.people.usage("dora").cases == 90
 
 
 def test_the_log_is_kept_as_long_as_told(store: Store, clock: fakes.HandClock) -> None:
     for _ in range(3):
         create(store)
         clock.seconds += 86_400.0
-    assert store.prune_audit(store.clock.now() - timedelta(days=2)) == 1
-    assert [row.action for row in store.audit_rows(AuditFilter())] == ["study.create", "study.create", "audit.delete"]
-    assert store.prune_audit(store.clock.now() - timedelta(days=2)) == 0
-    page = store.audit_log(AuditFilter(action="study.create"), 1)
+    assert store.audit.prune(store.clock.now() - timedelta(days=2)) == 1
+    assert [row.action for row in store.audit.rows(AuditFilter())] == ["study.create", "study.create", "audit.delete"]
+    assert store.audit.prune(store.clock.now() - timedelta(days=2)) == 0
+    page = store.audit.page(AuditFilter(action="study.create"), 1)
     assert page.next_token is not None
-    assert store.audit_log(AuditFilter(action="study.create"), 1, page.next_token).next_token is None
+    assert store.audit.page(AuditFilter(action="study.create"), 1, page.next_token).next_token is None
 
 
 def test_tokens_have_an_end_and_a_last_use(store: Store, clock: fakes.HandClock) -> None:
-    store.add_user("dora", Role.DESIGNER)
+    store.people.add_user("dora", Role.DESIGNER)
     end = store.clock.now() + timedelta(days=1)
-    _, made = store.create_token("laptop", TokenScope.WRITE, owner="dora", expires_at=end)
-    (dora,) = store.users()
+    _, made = store.people.create_token("laptop", TokenScope.WRITE, owner="dora", expires_at=end)
+    (dora,) = store.people.users()
     assert made.state_at(end - timedelta(microseconds=1), dora) == "valid"
     assert made.state_at(end, dora) == "expired"
-    assert made.state_at(store.clock.now(), store.change_user("dora", removed=True)) == "user-removed"
-    assert store.revoke_token(made.id).state_at(end, dora) == "revoked"
+    assert made.state_at(store.clock.now(), store.people.change_user("dora", removed=True)) == "user-removed"
+    assert store.people.revoke_token(made.id).state_at(end, dora) == "revoked"
     for micros, expected in ((2_000_000, 2), (1_000_000, 2), (3_000_000, 3)):
-        store.note_uses({made.id: micros, "tk_none": micros})
-        (kept,) = store.tokens()
+        store.people.note_uses({made.id: micros, "tk_none": micros})
+        (kept,) = store.people.tokens()
         assert kept.used_at is not None
         assert kept.used_at.timestamp() == expected
     assert (kept.owner, kept.expires_at) == ("dora", end)

@@ -19,22 +19,22 @@ FOLDER = Path(__file__).parent / "frozen"
 
 def fill(store: Store) -> None:
     """One finished study with a quarantined case, one half done, one waiting."""
-    finished = store.create_study(
+    finished = store.studies.create(
         {"sprag": 1, "name": "finished"}, fakes.study(5, "finished"), idempotency_key="key", body_hash="hash"
     )
-    running = store.create_study({"sprag": 1, "name": "running"}, fakes.study(5, "running"), warnings=["odd"])
-    store.create_study({"sprag": 1, "name": "queued"}, fakes.study(5, "queued"))
-    epoch = store.take_over("frozen")
-    for chunk in store.open_chunks(finished.number):
-        store.claim(epoch, [chunk])
+    running = store.studies.create({"sprag": 1, "name": "running"}, fakes.study(5, "running"), warnings=["odd"])
+    store.studies.create({"sprag": 1, "name": "queued"}, fakes.study(5, "queued"))
+    epoch = store.work.take_over("frozen")
+    for chunk in store.work.open_chunks(finished.number):
+        store.work.claim(epoch, [chunk])
         if chunk.count == 1:
-            store.quarantine(epoch, chunk, "crashed", "its process died")
+            store.work.quarantine(epoch, chunk, "crashed", "its process died")
         else:
-            store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
-    store.settle(epoch, finished.number)
-    chunks = store.open_chunks(running.number)
-    store.claim(epoch, chunks[:2])
-    store.commit(epoch, chunks[0], fakes.result(0, 2))
+            store.work.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+    store.work.settle(epoch, finished.number)
+    chunks = store.work.open_chunks(running.number)
+    store.work.claim(epoch, chunks[:2])
+    store.work.commit(epoch, chunks[0], fakes.result(0, 2))
 
 
 def main() -> None:

@@ -108,28 +108,28 @@ def test_a_frozen_database_is_upgraded_and_then_used(
     assert upgrade(url) == (frozen.stem, HEAD_REVISION)
     with Store.open(url) as store:
         assert not [problem for problem in store.check().problems if "SQLite" not in problem]
-        queued, running, finished = store.list_studies().studies
+        queued, running, finished = store.studies.page().studies
         assert [queued.name, running.name, finished.name] == ["queued", "running", "finished"]
         assert (finished.state, finished.done, finished.ok) == (StudyState.FINISHED, 5, 4)
-        assert store.progress(finished.id).endings == {"ok": 4, "crashed": 1}
-        block = store.case_rows(finished.id)
+        assert store.studies.progress(finished.id).endings == {"ok": 4, "crashed": 1}
+        block = store.rows.block(finished.id)
         np.testing.assert_array_equal(block.values, before)
         assert running.warnings == ("odd",)
         expected = fakes.study(5, "running")
-        stored = store.study(running.id)
+        stored = store.studies.study(running.id)
         base = {path: value for path, value in expected.base.items() if path in stored.base or path not in _LATER}
         assert stored == replace(expected, base=base)
-        assert store.create_study({}, fakes.study(5), idempotency_key="key", body_hash="hash").id == finished.id
-        epoch = store.take_over("test")
-        chunks = store.open_chunks(running.number)
+        assert store.studies.create({}, fakes.study(5), idempotency_key="key", body_hash="hash").id == finished.id
+        epoch = store.work.take_over("test")
+        chunks = store.work.open_chunks(running.number)
         assert [chunk.first for chunk in chunks] == [2, 4]
-        assert store.claim(epoch, chunks) == chunks
+        assert store.work.claim(epoch, chunks) == chunks
         for chunk in chunks:
-            assert store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
-        assert store.settle(epoch, running.number) is StudyState.FINISHED
-        np.testing.assert_array_equal(store.case_rows(running.id).values, then)
-        store.delete_study(finished.id)
-        assert store.create_study({}, fakes.study(3)).number > queued.number
+            assert store.work.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+        assert store.work.settle(epoch, running.number) is StudyState.FINISHED
+        np.testing.assert_array_equal(store.rows.block(running.id).values, then)
+        store.studies.delete(finished.id)
+        assert store.studies.create({}, fakes.study(3)).number > queued.number
 
 
 def test_rows_of_before_a_result_stay_empty_in_it(file: Path, url: str) -> None:
@@ -143,8 +143,8 @@ def test_rows_of_before_a_result_stay_empty_in_it(file: Path, url: str) -> None:
     names = [info.name for info in models.result_infos("vibration-drive", "1")]
     assert np.flatnonzero(np.isnan(before[0])).tolist() == [names.index("runup.time")]
     with Store.open(url) as store:
-        (finished,) = (study for study in store.list_studies().studies if study.name == "finished")
-        np.testing.assert_array_equal(store.case_rows(finished.id).values, before)
+        (finished,) = (study for study in store.studies.page().studies if study.name == "finished")
+        np.testing.assert_array_equal(store.rows.block(finished.id).values, before)
 
 
 def test_the_number_of_pendulums_became_the_variant(file: Path, url: str) -> None:
@@ -156,7 +156,7 @@ def test_the_number_of_pendulums_became_the_variant(file: Path, url: str) -> Non
     connection.close()
     upgrade(url)
     with Store.open(url) as store:
-        assert [study.variant for study in store.list_studies().studies] == ["", "3", "1"]
+        assert [study.variant for study in store.studies.page().studies] == ["", "3", "1"]
 
 
 def test_a_key_goes_to_the_owner_of_its_study_or_schedule(file: Path, url: str) -> None:
@@ -174,13 +174,13 @@ def test_a_key_goes_to_the_owner_of_its_study_or_schedule(file: Path, url: str) 
     connection.close()
     upgrade(url)
     with Store.open(url) as store:
-        assert store.study_of_key("hers", "hash") is None
-        assert store.schedule_of_key("nights", "hash") is None
-        assert store.study_of_key("key", "hash") is not None
+        assert store.studies.of_key("hers", "hash") is None
+        assert store.schedules.of_key("nights", "hash") is None
+        assert store.studies.of_key("key", "hash") is not None
         with act_as(Actor(Door.API, "dora", "", "dora", everything=False)):
-            hers, nights = store.study_of_key("hers", "hash"), store.schedule_of_key("nights", "hash")
+            hers, nights = store.studies.of_key("hers", "hash"), store.schedules.of_key("nights", "hash")
             assert (hers and hers.name, nights and nights.id) == ("running", "sc_1")
-            assert store.study_of_key("key", "hash") is None
+            assert store.studies.of_key("key", "hash") is None
 
 
 @pytest.mark.parametrize(
@@ -211,12 +211,12 @@ def test_a_stored_spec_keeps_the_run_that_it_meant(
     connection.close()
     assert upgrade(url) == ("0013", HEAD_REVISION)
     with Store.open(url) as store:
-        (schedule,) = store.list_schedules()
-        studies = {record.number: record.id for record in store.list_studies().studies}
-        for spec in (store.spec(studies[1]), schedule.fields.spec):
+        (schedule,) = store.schedules.all()
+        studies = {record.number: record.id for record in store.studies.page().studies}
+        for spec in (store.studies.spec(studies[1]), schedule.fields.spec):
             assert spec == {**drive, "run": then}
             assert "until" not in parse_spec(spec).study.run
-        assert [store.spec(studies[number]) for number in (2, 3)] == others
+        assert [store.studies.spec(studies[number]) for number in (2, 3)] == others
 
 
 def test_a_server_has_the_variants_too(postgres_server: postgres.Server) -> None:
@@ -239,7 +239,7 @@ def test_a_server_has_the_variants_too(postgres_server: postgres.Server) -> None
     session.close()
     assert upgrade(url) == ("0012", HEAD_REVISION)
     with Store.open(url) as store:
-        assert [study.variant for study in store.list_studies().studies] == ["", "3"]
+        assert [study.variant for study in store.studies.page().studies] == ["", "3"]
 
 
 def schema(session: Session) -> dict[str, object]:
@@ -282,7 +282,7 @@ def test_code_and_migrations_have_the_same_tables(url: str) -> None:
 
 def test_an_empty_database_is_made_ready_by_opening_it(url: str, file: Path) -> None:
     with Store.open(url) as store:
-        assert store.list_studies().studies == ()
+        assert store.studies.page().studies == ()
         store.ping()
     connection = sqlite_driver().connect(file)
     assert connection.execute("PRAGMA journal_mode").fetchone() == ("wal",)
@@ -292,7 +292,7 @@ def test_an_empty_database_is_made_ready_by_opening_it(url: str, file: Path) -> 
 def test_two_that_open_a_new_database_at_once_both_get_it(url: str) -> None:
     def ready(_: int) -> int:
         with Store.open(url) as store:
-            return len(store.list_studies().studies)
+            return len(store.studies.page().studies)
 
     with ThreadPoolExecutor(4) as threads:
         assert list(threads.map(ready, range(4))) == [0, 0, 0, 0]
@@ -343,7 +343,7 @@ def test_what_is_no_database_is_told_in_one_sentence(url: str, file: Path) -> No
 def test_damage_is_found(url: str, file: Path) -> None:
     with Store.open(url) as store:
         for _ in range(20):
-            store.create_study({"text": "x" * 10_000}, fakes.study(50))
+            store.studies.create({"text": "x" * 10_000}, fakes.study(50))
         with store.session.plain() as connection:
             connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
     data = bytearray(file.read_bytes())
@@ -378,4 +378,4 @@ def test_a_new_database_that_cannot_be_made_stays_empty(url: str, monkeypatch: p
         with pytest.raises(sa.exc.IntegrityError, match="version_num"):
             Store.open(url)
     with Store.open(url) as store:
-        assert store.list_studies().studies == ()
+        assert store.studies.page().studies == ()

@@ -75,14 +75,14 @@ def calibration(service: Service, rounds: int = 999, *, kills: bool = False, **f
     With ``kills`` the process ends after every third round, with a chunk that it claimed and did not return.
     """
     store = service.store
-    store.base_chunking = Chunking(100_000, 1, 60.0)  # one transaction a round
+    store.dispatchers.base_chunking = Chunking(100_000, 1, 60.0)  # one transaction a round
     study_id = service.submit(spec_of(**fields))
-    number, epoch, planner = store.get_study(study_id).number, store.take_over("test"), Rounds(store)
+    number, epoch, planner = store.studies.get(study_id).number, store.work.take_over("test"), Rounds(store.work)
     for turn in range(rounds):
         if kills and turn % 3 == 2:
-            store.claim(epoch, store.open_chunks(number))
-            epoch, planner = store.take_over("test"), Rounds(store)
+            store.work.claim(epoch, store.work.open_chunks(number))
+            epoch, planner = store.work.take_over("test"), Rounds(store.work)
         run_round(store, number, epoch, rows_of)
-        if planner.advance(epoch, number, store.study(study_id)) is None:
+        if planner.advance(epoch, number, store.studies.study(study_id)) is None:
             break
     return study_id

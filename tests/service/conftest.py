@@ -96,17 +96,17 @@ class Service:
 
         A study with nothing left is brought to its end. Gives the rows of the whole study.
         """
-        record, study = self.store.get_study(study_id), self.store.study(study_id)
+        record, study = self.store.studies.get(study_id), self.store.studies.study(study_id)
         whole = made_up(study)
-        epoch = self.store.take_over("test")
+        epoch = self.store.work.take_over("test")
         wanted = range(study.cases) if cases is None else cases
-        chunks = [chunk for chunk in self.store.open_chunks(record.number) if chunk.first in wanted]
-        for chunk in self.store.claim(epoch, chunks):
+        chunks = [chunk for chunk in self.store.work.open_chunks(record.number) if chunk.first in wanted]
+        for chunk in self.store.work.claim(epoch, chunks):
             part = slice(chunk.first, chunk.first + chunk.count)
             result = ChunkResult(chunk.first, whole.endings[part], whole.flags[part], whole.values[part])
-            assert self.store.commit(epoch, chunk, result)
-        if not self.store.open_chunks(record.number):
-            self.store.settle(epoch, record.number)
+            assert self.store.work.commit(epoch, chunk, result)
+        if not self.store.work.open_chunks(record.number):
+            self.store.work.settle(epoch, record.number)
         return whole
 
     def get(self, path: str, **params: Any) -> Any:

@@ -99,14 +99,14 @@ def fetched(study: Study, done: int | None = None) -> Any:
 def fill(service: Service, study_id: str, rounds: int = 99) -> None:
     """Commit the rows of so many rounds of a stored study, as a dispatcher would."""
     store = service.store
-    number, study = store.get_study(study_id).number, store.study(study_id)
+    number, study = store.studies.get(study_id).number, store.studies.study(study_id)
     names = [info.name for info in models.study_results(study)]
-    epoch, planned = store.take_over("test"), Rounds(store)
+    epoch, planned = store.work.take_over("test"), Rounds(store.work)
     for _ in range(rounds):
-        for chunk in store.claim(epoch, store.open_chunks(number)):
+        for chunk in store.work.claim(epoch, store.work.open_chunks(number)):
             points = study.points(range(chunk.first, chunk.first + chunk.count))
             values = np.stack([value_of(name, points) for name in names], axis=1)
-            assert store.commit(
+            assert store.work.commit(
                 epoch, chunk, ChunkResult(chunk.first, [models.OK] * chunk.count, [""] * chunk.count, values)
             )
         appended = planned.advance(epoch, number, study)

@@ -11,6 +11,6 @@ from sprag.worker.study import Study
 
 def run_round(store: Store, number: int, epoch: int, rows_of: Callable[[Study, range], ChunkResult]) -> None:
     """Give every waiting case its row, by ``rows_of``."""
-    study = store.study_of(number)
-    for chunk in store.claim(epoch, store.open_chunks(number)):
-        assert store.commit(epoch, chunk, rows_of(study, range(chunk.first, chunk.first + chunk.count)))
+    study = store.work.study_of(number)
+    for chunk in store.work.claim(epoch, store.work.open_chunks(number)):
+        assert store.work.commit(epoch, chunk, rows_of(study, range(chunk.first, chunk.first + chunk.count)))

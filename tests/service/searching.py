@@ -57,9 +57,9 @@ def search(service: Service, rounds: int = 99, **fields: Any) -> str:
     """The id of a study with a goal that has had at most so many rounds; it has ended where there are no more."""
     study_id = service.submit(spec_of(**fields))
     store = service.store
-    number, epoch, planner = store.get_study(study_id).number, store.take_over("test"), Rounds(store)
+    number, epoch, planner = store.studies.get(study_id).number, store.work.take_over("test"), Rounds(store.work)
     for _ in range(rounds):
         run_round(store, number, epoch, rows_of)
-        if planner.advance(epoch, number, store.study(study_id)) is None:
+        if planner.advance(epoch, number, store.studies.study(study_id)) is None:
             break
     return study_id

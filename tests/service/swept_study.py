@@ -44,13 +44,13 @@ def rows_of(study: Study) -> ChunkResult:
 def swept_study(service: Service) -> str:
     """The id of the study, which has ended."""
     found = service.submit(SPEC)
-    record, study = service.store.get_study(found), service.store.study(found)
-    whole, epoch = rows_of(study), service.store.take_over("test")
-    for chunk in service.store.claim(epoch, service.store.open_chunks(record.number)):
-        known = service.store.known(study, chunk)
+    record, study = service.store.studies.get(found), service.store.studies.study(found)
+    whole, epoch = rows_of(study), service.store.work.take_over("test")
+    for chunk in service.store.work.claim(epoch, service.store.work.open_chunks(record.number)):
+        known = service.store.work.known(study, chunk)
         assert known is not None
         rows = known.missing.tolist()
         part = ChunkResult(0, ["ok"] * len(rows), [whole.flags[row] for row in rows], whole.values[rows])
-        assert service.store.commit(epoch, chunk, part, known)
-    service.store.settle(epoch, record.number)
+        assert service.store.work.commit(epoch, chunk, part, known)
+    service.store.work.settle(epoch, record.number)
     return found

@@ -103,19 +103,19 @@ def test_every_field_of_a_component_is_one_of_the_form() -> None:
 def stored(service: Service, *given: dict[str, Any]) -> dict[str, str]:
     """Id of each component by name."""
     return {
-        one.component.name: one.id for one in service.store.put_components(read_components({"components": list(given)}))
+        one.component.name: one.id for one in service.store.components.put(read_components({"components": list(given)}))
     }
 
 
 def test_a_drive_takes_a_spring_and_a_clutch(service: Service) -> None:
     ids = stored(service, *ALL)
     values = values_of(SPEC) | {"component": ids["F-120"]}
-    take_component(values, service.store.components())
+    take_component(values, service.store.components.all())
     values["component"] = ids["FW 20"]
-    take_component(values, service.store.components())
+    take_component(values, service.store.components.all())
     values["component"] = ids["1LE1 4 kW"]  # no drive has this motor
     before = dict(values)
-    take_component(values, service.store.components())
+    take_component(values, service.store.components.all())
     assert values == before
     base = parse_spec(spec_of(values)[0]).study.base
     assert base["pendulums.0.spring_rate"] == 9000.0
@@ -125,7 +125,7 @@ def test_a_drive_takes_a_spring_and_a_clutch(service: Service) -> None:
 
 def test_a_shaft_takes_a_motor(service: Service) -> None:
     values = empty("machine-shaft") | {"component": stored(service, MOTOR)["1LE1 4 kW"]}
-    take_component(values, service.store.components())
+    take_component(values, service.store.components.all())
     motor = spec_of(values)[0]["base"]["drive"]["motor"]
     assert motor["kind"] == "kloss"
     assert motor["synchronous_speed"] == "1500 об/мин"
@@ -154,8 +154,8 @@ def test_the_page_keeps_shows_refuses_and_removes(service: Service) -> None:
     assert "line 2, column kind: is not a kind of component" in refused.text
     sent = {"do": "csv", "csv": "kind;name;coefficients\nclutch;C;0 200\n"}
     assert "1 component is read." in service.http.post("/components", data=sent, follow_redirects=True).text
-    assert [one.component.name for one in service.store.components()] == ["C", "F-120"]
-    component = service.store.components("spring")[0].id
+    assert [one.component.name for one in service.store.components.all()] == ["C", "F-120"]
+    component = service.store.components.all("spring")[0].id
     assert f'href="/components?edit={component}#spring:name"' in service.http.get("/components").text
     changed = service.http.get(f"/components?edit={component}").text
     assert '<details class="columns" open><summary>Add or change a spring' in changed
@@ -163,7 +163,7 @@ def test_the_page_keeps_shows_refuses_and_removes(service: Service) -> None:
     assert 'name="fields/spring_rate" value="9 N/mm"' in changed
     assert service.http.get("/components?edit=cm_none").status_code == 404
     service.http.post(f"/components/{component}/delete")
-    assert service.store.components("spring") == ()
+    assert service.store.components.all("spring") == ()
 
 
 def test_the_client_and_the_interface(service: Service, portal: Any) -> None:
@@ -197,9 +197,9 @@ def test_commands_read_and_write_them(
     assert sprag("component", "put", file).code == 0
     written = tmp_path / "components.csv"
     assert sprag("component", "list", "-o", written).code == 0
-    assert read_components({"csv": written.read_text()}) == [one.component for one in service.store.components()]
+    assert read_components({"csv": written.read_text()}) == [one.component for one in service.store.components.all()]
     listed = sprag("component", "list", "--kind", "spring", "--json").data["components"]
     assert [one["fields"] for one in listed] == [SPRING["fields"]]
     assert sprag("component", "delete", listed[0]["id"]).code == 0
     assert sprag("component", "put", written).code == 0
-    assert len(service.store.components()) == 3
+    assert len(service.store.components.all()) == 3

@@ -37,11 +37,11 @@ def test_the_form_reads_them_and_keeps_what_was_typed(service: Service, spec: di
     answer = service.http.post("/new", data=values, follow_redirects=False)
     assert answer.status_code == 303, answer.text
     study_id = answer.headers["location"].rpartition("/")[2]
-    base = service.store.study(study_id).base
+    base = service.store.studies.study(study_id).base
     assert base["excitation.frequency"] == pytest.approx(1500.5 / 60)
     assert base["pendulums.0.spring_rate"] == 9000.0
     assert base["pendulums.0.mass"] == 0.5
-    kept = values_of(service.store.spec(study_id))
+    kept = values_of(service.store.studies.spec(study_id))
     assert kept["/base/pendulums/0/backlash"] == "0,3 град"
     refused = service.http.post("/new", data={**values, "/base/pendulums/0/mass": "1,234 кг"})
     assert refused.status_code == 422

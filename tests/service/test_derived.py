@@ -76,14 +76,14 @@ def test_it_is_extended_with_its_formula(filled: tuple[Service, str]) -> None:
     addition = {"axes": [{"path": "pendulums.0.mass", "values": [0.7]}]}
     answer = service.http.post(f"/api/v1/studies/{study_id}:extend", json=addition)
     assert answer.status_code == 202, answer.text
-    wider = service.store.study(answer.json()["id"])
+    wider = service.store.studies.study(answer.json()["id"])
     assert (wider.cases, wider.derive) == (6, {INERTIA: STORED})
-    assert service.store.reusable(wider) == 4
+    assert service.store.reuse.count(wider) == 4
 
 
 def test_it_is_scheduled(filled: tuple[Service, str]) -> None:
     service, study_id = filled
-    given = {"name": "nightly", "cron": "0 2 * * *", "zone": "UTC", "spec": service.store.spec(study_id)}
+    given = {"name": "nightly", "cron": "0 2 * * *", "zone": "UTC", "spec": service.store.studies.spec(study_id)}
     kept = service.http.post("/api/v1/schedules", json=given)
     assert kept.status_code == 201, kept.text
     given["spec"]["derive"] = {INERTIA: "2 * pendulums.0.mass"}

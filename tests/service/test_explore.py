@@ -44,7 +44,7 @@ def filled(service: Service, spec: dict[str, Any]) -> tuple[Service, str]:
 
 def best(service: Service, study_id: str, name: str, most: float) -> list[int]:
     """Cases with a load of at most ``most``, the largest result first."""
-    study, block = service.store.study(study_id), service.store.case_rows(study_id)
+    study, block = service.store.studies.study(study_id), service.store.rows.block(study_id)
     values = block.values[:, [info.name for info in block.infos].index(name)]
     load = study.columns(block.cases)["shaft.load"]
     places = [place for place in np.argsort(-values, kind="stable").tolist() if load[place] <= most]
@@ -92,13 +92,13 @@ def test_columns_are_read_once_until_there_are_other_rows(
     study_id = service.submit({**spec, "axes": AXES})
     service.fill(study_id, range(10))
     columns, reads = Columns(service.store), list[list[str]]()
-    read = service.store.row_columns
+    read = service.store.rows.columns
 
     def counting(study: str, names: list[str]) -> Any:
         reads.append(list(names))
         return read(study, names)
 
-    monkeypatch.setattr(service.store, "row_columns", counting)
+    monkeypatch.setattr(service.store.rows, "columns", counting)
     assert len(columns.of(study_id, ["efficiency"]).cases) == 10
     both = columns.of(study_id, ["efficiency", "torque.mean"])
     assert set(both.values) == {"efficiency", "torque.mean"}
@@ -106,7 +106,7 @@ def test_columns_are_read_once_until_there_are_other_rows(
     assert reads == [["efficiency"], ["torque.mean"]]
     service.fill(study_id)
     whole = columns.of(study_id, ["efficiency"])
-    block = service.store.case_rows(study_id)
+    block = service.store.rows.block(study_id)
     np.testing.assert_array_equal(
         whole.values["efficiency"], block.values[:, [info.name for info in block.infos].index("efficiency")]
     )
@@ -226,10 +226,10 @@ def test_a_selection_becomes_a_new_study_of_its_cases(service: Service, spec: di
         f"/studies/{study_id}/explore?{query}").text  # fmt: skip
     wanted = service.get(f"/studies/{study_id}/explore", where="shaft.load <= 0.2", sort="-efficiency", limit=1000)
     made = service.submit(selection_spec_of(service, study_id, query))
-    study = service.store.study(made)
+    study = service.store.studies.study(made)
     assert study.cases == wanted["selected"] == 36
     assert [study.case_parameters(case) for case in range(36)] == [row["parameters"] for row in wanted["cases"]]
-    assert study.base.items() >= {k: v for k, v in service.store.study(study_id).base.items()
+    assert study.base.items() >= {k: v for k, v in service.store.studies.study(study_id).base.items()
                                   if k not in study.column_paths}.items()  # fmt: skip
     refused = service.http.get(f"/studies/{study_id}/explore/new?min:shaft.load=7")
     assert refused.status_code == 422
@@ -250,7 +250,7 @@ def test_so_it_does_by_the_client_as_the_documentation_shows(
         assert study.select(limit=10, key="once").id == study.select(limit=10, key="once").id
         with pytest.raises(RefusedError, match="no case is selected"):
             study.select("shaft.load >= 7")
-    made = service.store.study(names["made"].id)
+    made = service.store.studies.study(names["made"].id)
     wanted = [case["parameters"] for case in names["found"]["cases"]]
     assert [made.case_parameters(case) for case in range(made.cases)] == wanted
     assert len(wanted) == 10
@@ -273,7 +273,9 @@ def test_cases_side_by_side(filled: tuple[Service, str]) -> None:
     assert "No finished case is chosen" in service.http.get(f"/studies/{study_id}/explore/compare").text
     for wrong in ("case=30", "case=x", "case=1e999", "case=nan", "&".join(f"case={case}" for case in range(11))):
         assert service.http.get(f"/studies/{study_id}/explore/compare?{wrong}").status_code == 422
-    waiting = service.submit({"axes": AXES} | {k: v for k, v in service.store.spec(study_id).items() if k != "axes"})
+    waiting = service.submit(
+        {"axes": AXES} | {k: v for k, v in service.store.studies.spec(study_id).items() if k != "axes"}
+    )
     assert "Not finished: 2." in service.http.get(f"/studies/{waiting}/explore/compare?case=2").text
 
 

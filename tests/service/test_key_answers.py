@@ -47,7 +47,7 @@ def test_answers_are_those_of_the_rows(filled: tuple[Service, str], portal: Bloc
     service, study_id = filled
     found = service.get(f"/studies/{study_id}/answers", point="0.2 N*m")
     assert (found["x"], found["unit"], found["point"], len(found["curves"])) == ("shaft.load", "N*m", 0.2, 6)
-    block = service.store.case_rows(study_id)
+    block = service.store.rows.block(study_id)
     column = [info.name for info in block.infos].index("power.useful.mean")
     ok = np.array([ending == "ok" for ending in block.endings])
     best = int(np.nanargmax(np.where(ok, block.values[:, column], np.nan)))

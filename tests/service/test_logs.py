@@ -73,7 +73,7 @@ def test_every_line_of_a_request_names_token_user_and_address(
 ) -> None:  # fmt: skip
     """The line of the request and those that are written while it is answered, from whatever thread."""
     office = Office(settings, service, connect)
-    monkeypatch.setattr(service.store, "list_studies", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr(service.store.studies, "page", lambda *_, **__: 1 / 0)
     client = office.program("dora")
     client.get("/api/v1/studies", headers={"X-Forwarded-For": "10.1.2.3"})
     client.get("/api/v1/models")
@@ -159,7 +159,7 @@ def test_a_refused_path_reaches_the_log_as_text(
     handler.setFormatter(TextFormatter())
     logging.getLogger("sprag.service").addHandler(handler)
     app = create_app(settings, store=service.store, computer=service.computer, checker=service.checker)
-    monkeypatch.setattr(service.store, "tokens", lambda: (_ for _ in ()).throw(StoreError("gone")))
+    monkeypatch.setattr(service.store.people, "tokens", lambda: (_ for _ in ()).throw(StoreError("gone")))
     try:
         assert connect(app).get("/%1b%5b2J%0aforged").status_code == 503
     finally:
@@ -172,7 +172,7 @@ def test_a_refused_path_reaches_the_log_as_text(
 def test_a_fault_is_told_with_its_trace_and_request(
     service: Service, log: io.StringIO, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(service.store, "list_studies", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr(service.store.studies, "page", lambda *_, **__: 1 / 0)
     answer = service.http.get("/api/v1/studies")
     assert answer.status_code == 500
     told = [line for line in lines(log) if line["level"] == "error"]

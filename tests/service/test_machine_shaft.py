@@ -55,11 +55,11 @@ RESULTS = [info.name for info in models.result_infos("machine-shaft", "")]
 def filled(service: Service) -> tuple[Service, str]:
     """A service with the press, its rows computed and committed as a dispatcher does."""
     study_id = service.submit(PRESS)
-    study, number = service.store.study(study_id), service.store.get_study(study_id).number
-    epoch = service.store.take_over("test")
-    for chunk in service.store.claim(epoch, service.store.open_chunks(number)):
-        assert service.store.commit(epoch, chunk, models.run_chunk(study, chunk.first, chunk.count))
-    service.store.settle(epoch, number)
+    study, number = service.store.studies.study(study_id), service.store.studies.get(study_id).number
+    epoch = service.store.work.take_over("test")
+    for chunk in service.store.work.claim(epoch, service.store.work.open_chunks(number)):
+        assert service.store.work.commit(epoch, chunk, models.run_chunk(study, chunk.first, chunk.count))
+    service.store.work.settle(epoch, number)
     return service, study_id
 
 
@@ -71,8 +71,8 @@ def engine_rows(study_id_study: Any) -> np.ndarray[Any, Any]:
 
 def test_rows_are_the_engines(filled: tuple[Service, str]) -> None:
     service, study_id = filled
-    block = service.store.case_rows(study_id)
-    np.testing.assert_array_equal(block.values, engine_rows(service.store.study(study_id)))
+    block = service.store.rows.block(study_id)
+    np.testing.assert_array_equal(block.values, engine_rows(service.store.studies.study(study_id)))
     page = service.get(f"/studies/{study_id}/cases", page_size=52)
     fits(results.CasePage, page)
     row = page["cases"][30]
@@ -87,7 +87,7 @@ def test_rows_are_the_engines(filled: tuple[Service, str]) -> None:
 
 def test_curves_and_maps(filled: tuple[Service, str]) -> None:
     service, study_id = filled
-    rows = engine_rows(service.store.study(study_id)).reshape(4, 13, -1)
+    rows = engine_rows(service.store.studies.study(study_id)).reshape(4, 13, -1)
     curves = service.get(
         f"/studies/{study_id}/curves", x="drive.inertia", y=["irregularity", "omega.min"], at="mean_speed=120 rpm"
     )
@@ -109,7 +109,7 @@ def test_curves_and_maps(filled: tuple[Service, str]) -> None:
 
 def test_trajectories_are_tables_over_the_angle(filled: tuple[Service, str]) -> None:
     service, study_id = filled
-    study = service.store.study(study_id)
+    study = service.store.studies.study(study_id)
     case = study.case_number((2, 6))
     own = NUMBERS | study.case_parameters(case)
     table = service.get(f"/studies/{study_id}/cases/{case}/trajectory", points=73)
@@ -174,7 +174,7 @@ def test_faults_by_http_and_by_command(
 def test_run_and_preview(service: Service, examples: Path) -> None:
     parsed = parse_spec(load_spec((examples / "press.toml").read_bytes(), format_of("press.toml")))
     with run_here(parsed.spec, parsed.study, processes=1, executor=InlineExecutor()) as done:
-        np.testing.assert_array_equal(done.store.case_rows(done.record.id).values, engine_rows(parsed.study))
+        np.testing.assert_array_equal(done.store.rows.block(done.record.id).values, engine_rows(parsed.study))
         assert (done.record.ok, done.record.cases) == (49, 52)
     preview = service.http.post("/api/v1/studies:preview", json=PRESS).json()
     fits(studies.Preview, preview)
@@ -187,12 +187,12 @@ def test_rows_of_another_structure_are_not_reused(tmp_path: Path) -> None:
     other = plain | {"/base/mechanism": {"formula": "2*sin(phi)^2"}}
     with Store.open(f"sqlite:///{tmp_path / 'a.sqlite3'}") as store:
         first, second = (parse_spec(changed(spec)) for spec in (plain, other))
-        record = store.create_study(first.spec, first.study)
-        epoch = store.take_over("test")
-        for chunk in store.claim(epoch, store.open_chunks(record.number)):
-            store.commit(epoch, chunk, models.run_chunk(first.study, chunk.first, chunk.count))
-        assert store.reusable(first.study) == first.study.cases
-        assert store.reusable(second.study) == 0
+        record = store.studies.create(first.spec, first.study)
+        epoch = store.work.take_over("test")
+        for chunk in store.work.claim(epoch, store.work.open_chunks(record.number)):
+            store.work.commit(epoch, chunk, models.run_chunk(first.study, chunk.first, chunk.count))
+        assert store.reuse.count(first.study) == first.study.cases
+        assert store.reuse.count(second.study) == 0
 
 
 def test_rows_as_a_file(filled: tuple[Service, str]) -> None:

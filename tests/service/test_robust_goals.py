@@ -62,10 +62,10 @@ def ended(service: Service) -> tuple[Service, str]:
     """Such a study after all its rounds."""
     study_id = service.submit(robust())
     store = service.store
-    number, epoch, planner = store.get_study(study_id).number, store.take_over("test"), Rounds(store)
+    number, epoch, planner = store.studies.get(study_id).number, store.work.take_over("test"), Rounds(store.work)
     for _ in range(9):
         run_round(store, number, epoch, rows_of)
-        if planner.advance(epoch, number, store.study(study_id)) is None:
+        if planner.advance(epoch, number, store.studies.study(study_id)) is None:
             break
     return service, study_id
 
@@ -78,7 +78,7 @@ def test_the_designs_have_their_quantiles_and_yields(ended: tuple[Service, str])
     assert share == "yield (shaft.speed.mean at least 6)"
     assert found["best"][0]["result"] == "efficiency (25 % quantile)"
     assert found["counts"]["known"] == 16
-    study = service.store.study(study_id)
+    study = service.store.studies.study(study_id)
     columns = study.columns(range(study.cases))
     for design in found["designs"]:
         first = design["cases"][0]
@@ -98,7 +98,7 @@ def test_the_designs_have_their_quantiles_and_yields(ended: tuple[Service, str])
 
 def test_a_design_is_studied_further_with_the_same_drives(ended: tuple[Service, str]) -> None:
     service, study_id = ended
-    spec, study = service.store.spec(study_id), service.store.study(study_id)
+    spec, study = service.store.studies.spec(study_id), service.store.studies.study(study_id)
     own = parse_spec(design_spec(spec, study, 0)).study
     assert own.shape == (DRIVES + 1,)
     assert own.spread == study.spread
@@ -109,10 +109,10 @@ def test_a_design_is_studied_further_with_the_same_drives(ended: tuple[Service, 
 
 def test_designs_of_unfinished_rounds_are_pending(service: Service) -> None:
     study_id = service.submit(robust())
-    study = service.store.study(study_id)
+    study = service.store.studies.study(study_id)
 
     def fetch(cases: Any, names: Any) -> Any:
-        return service.store.rows_for_cases(study_id, cases, names)
+        return service.store.rows.for_cases(study_id, cases, names)
 
     assert designs_of(study, [], fetch).pending == 8
 

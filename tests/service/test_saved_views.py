@@ -139,7 +139,7 @@ def test_the_report_has_the_chosen_figures_in_order(service: Service, study: str
 
 def test_a_figure_that_cannot_be_drawn_says_so(service: Service, study: str) -> None:
     saved = save(service, page="curves", study=study, name="Broken", query=TORQUE, in_report=True)
-    service.store.save_view(read_view({"page": "curves", "study": study, "name": "Broken", "query": "y=none"}))
+    service.store.views.save(read_view({"page": "curves", "study": study, "name": "Broken", "query": "y=none"}))
     (figure,) = report_of(service.store, study).figures
     assert (figure.shown, "Broken" in figure.caption) == (None, True)
     sections = document_of(report_of(service.store, study), TitleBlock()).sections
@@ -159,7 +159,7 @@ def test_pages_save_list_order_and_remove_views(service: Service, study: str) ->
     assert back.startswith(f"/studies/{study}/curves?x=shaft.load&y=torque.mean")
     assert "(figure 1 of the report)" in service.http.get(back).text
     save(service, page="map", study=study, name="Speeds", query=MAP, in_report=True)
-    first, second = service.store.saved_views(study)
+    first, second = service.store.views.all(study)
     shown = service.http.get(f"/studies/{study}").text
     assert f'data-figure="/studies/{study}/figures/map?' in shown
     for address in re.findall(r'src="(/api/v1/studies/[^"]*)"', shown):
@@ -169,11 +169,11 @@ def test_pages_save_list_order_and_remove_views(service: Service, study: str) ->
     both = ["Speeds", first.view.name]
     for done, places in (("later", both), ("take-out", ["Speeds"]), ("report", both), ("later", both)):
         assert service.http.post(f"/views/{first.id}", data={"do": done}, follow_redirects=False).status_code == 303
-        assert [one.view.name for one in service.store.saved_views(study) if one.place] == places
+        assert [one.view.name for one in service.store.views.all(study) if one.place] == places
     service.http.post(f"/views/{second.id}", data={"do": "rename", "name": "Map of speeds"})
-    assert service.store.saved_view(second.id).view.name == "Map of speeds"
+    assert service.store.views.get(second.id).view.name == "Map of speeds"
     service.http.post(f"/views/{second.id}", data={"do": "delete"})
-    assert [one.id for one in service.store.saved_views(study)] == [first.id]
+    assert [one.id for one in service.store.views.all(study)] == [first.id]
 
 
 def test_the_same_name_is_not_proposed_for_other_choices(service: Service, study: str) -> None:

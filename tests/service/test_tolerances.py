@@ -44,7 +44,7 @@ def rows_of(service: Service, study_id: str) -> list[dict[str, str]]:
 
 def test_files_have_the_drive_and_the_drawn_values(filled: tuple[Service, str]) -> None:
     service, study_id = filled
-    study = service.store.study(study_id)
+    study = service.store.studies.study(study_id)
     columns = study.columns(range(10))
     rows = rows_of(service, study_id)
     assert [float(row[DRIVE]) for row in rows] == [0, 1, 2, 3, 4] * 2
@@ -80,8 +80,8 @@ def test_the_page_of_a_running_study_shows_the_place_of_a_drawn_case(service: Se
     ]
     spec |= {"tolerances": [{"path": "excitation.frequency", "plus_minus": "5 %"}], "drives": 511}
     study_id = service.submit(spec)
-    chunks = service.store.open_chunks(service.store.get_study(study_id).number)
-    study = service.store.study(study_id)
+    chunks = service.store.work.open_chunks(service.store.studies.get(study_id).number)
+    study = service.store.studies.study(study_id)
     first = next(chunk.first for chunk in chunks if chunk.first % 512)
     service.fill(study_id, range(first, first + 1))
     text = service.http.get(f"/studies/{study_id}").text
@@ -99,7 +99,7 @@ def test_a_caption_has_the_values_of_the_drive() -> None:
 
 def test_pages_show_the_drive_of_a_case_and_its_values(filled: tuple[Service, str]) -> None:
     service, study_id = filled
-    drawn = service.store.study(study_id).case_parameters(7)
+    drawn = service.store.studies.study(study_id).case_parameters(7)
     case = service.get(f"/studies/{study_id}/cases/7")
     assert case["parameters"] == drawn
     text = service.http.get(f"/studies/{study_id}/cases/7").text
@@ -114,17 +114,17 @@ def test_pages_show_the_drive_of_a_case_and_its_values(filled: tuple[Service, st
 
 def test_a_clone_has_the_same_cases_and_another_seed_only_the_nominal_ones(filled: tuple[Service, str]) -> None:
     service, study_id = filled
-    spec = service.store.spec(study_id)
+    spec = service.store.studies.spec(study_id)
     again = service.get(f"/studies/{study_id}")["spec"]
     assert again["tolerances"] == spec["tolerances"]
     changes = {f"/{name}": value for name, value in spec.items()}
-    assert service.store.reusable(parsed(changes).study) == 10
-    assert service.store.reusable(parsed(changes | {"/seed": 2}).study) == 2
+    assert service.store.reuse.count(parsed(changes).study) == 10
+    assert service.store.reuse.count(parsed(changes | {"/seed": 2}).study) == 2
     wider = {"axes": [{"path": "shaft.load", "values": [0.5]}]}
     answer = service.http.post(f"/api/v1/studies/{study_id}:extend", json=wider)
     assert answer.status_code == 202, answer.text
-    extended = service.store.study(answer.json()["id"])
-    assert (extended.cases, service.store.reusable(extended)) == (15, 10)
+    extended = service.store.studies.study(answer.json()["id"])
+    assert (extended.cases, service.store.reuse.count(extended)) == (15, 10)
 
 
 def test_the_preview_counts_all_drives(service: Service, spec: dict[str, Any]) -> None:
@@ -161,7 +161,7 @@ def test_a_drive_that_is_no_machine_is_a_failed_case_and_the_others_are_run() ->
 
 def test_the_motion_of_a_drive_has_its_drawn_values(filled: tuple[Service, str]) -> None:
     service, study_id = filled
-    study = service.store.study(study_id)
+    study = service.store.studies.study(study_id)
     values = study.case_parameters(7)
     alone = replace(
         study, base=study.base | {path: values[path] for path in (BACKLASH, "shaft.load")}, axes=(), spread=None

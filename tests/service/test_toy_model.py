@@ -127,7 +127,7 @@ def finished(service: Service) -> tuple[Service, str]:
     """The study, submitted by HTTP and run by the dispatcher."""
     study_id = service.submit(SPEC)
     store = service.store
-    Dispatcher(store, InlineExecutor(), SystemClock()).run(lambda: store.get_study(study_id).state.terminal)
+    Dispatcher(store.work, InlineExecutor(), SystemClock()).run(lambda: store.studies.get(study_id).state.terminal)
     return service, study_id
 
 
@@ -209,7 +209,7 @@ def test_its_form_is_filled_in_and_submitted(service: Service) -> None:
     assert parse_spec(spec_of(values)[0]).study == parse_spec(SPEC).study
     answer = service.http.post("/new", data={**shown, **values, "do": "submit"}, follow_redirects=False)
     assert answer.status_code == 303
-    study = service.store.study(answer.headers["location"].rpartition("/")[2])
+    study = service.store.studies.study(answer.headers["location"].rpartition("/")[2])
     assert study.physics_hash("1") == parse_spec(SPEC).study.physics_hash("1")
 
 
@@ -236,10 +236,10 @@ def test_a_new_parameter_of_a_drive_is_in_the_form_by_itself(monkeypatch: pytest
 
 def test_rows_are_the_models(finished: tuple[Service, str]) -> None:
     service, study_id = finished
-    study = service.store.study(study_id)
-    record = service.store.get_study(study_id)
+    study = service.store.studies.study(study_id)
+    record = service.store.studies.get(study_id)
     assert (record.state, record.ok, record.variant) == ("finished", 12, "")
-    block = service.store.case_rows(study_id)
+    block = service.store.rows.block(study_id)
     np.testing.assert_array_equal(block.values[:, 1], expected(study))
     row = service.get(f"/studies/{study_id}/cases/7")
     assert isinstance(row["results"]["swings"], int)
@@ -247,7 +247,7 @@ def test_rows_are_the_models(finished: tuple[Service, str]) -> None:
 
 def test_curves_maps_sensitivity_and_trajectories(finished: tuple[Service, str]) -> None:
     service, study_id = finished
-    values = expected(service.store.study(study_id)).reshape(4, 3)
+    values = expected(service.store.studies.study(study_id)).reshape(4, 3)
     curves = service.get(f"/studies/{study_id}/curves", x="body.spring_rate", y="displacement.end", by="body.mass")
     assert [curve["y"]["displacement.end"] for curve in curves["curves"]] == values.T.tolist()
     drawn = service.get(f"/studies/{study_id}/map", x="body.mass", y="body.spring_rate", z="displacement.end")
@@ -267,7 +267,7 @@ def test_every_export_has_its_rows(finished: tuple[Service, str], form: str) -> 
     assert answer.content
     if form == "csv":
         rows = list(csv.DictReader(io.StringIO(answer.text)))
-        values = expected(service.store.study(study_id))
+        values = expected(service.store.studies.study(study_id))
         assert [float(row["displacement.end"]) for row in rows] == values.tolist()
 
 
@@ -315,10 +315,10 @@ def test_derived_parameters_are_computed_and_their_rows_reused(finished: tuple[S
     assert preview["derive"] == {"body.mass": "body.spring_rate / 200.0 * 1.0"}
     study_id = service.submit(DERIVED)
     store = service.store
-    Dispatcher(store, InlineExecutor(), SystemClock()).run(lambda: store.get_study(study_id).state.terminal)
+    Dispatcher(store.work, InlineExecutor(), SystemClock()).run(lambda: store.studies.get(study_id).state.terminal)
     rates, dampings = np.repeat([100.0, 200.0, 300.0, 400.0], 2), np.tile([0.1, 0.2], 4)
     by_hand = displacement({"body.spring_rate": rates, "body.mass": rates / 200.0, "damping": dampings}, END)
-    np.testing.assert_array_equal(store.case_rows(study_id).values[:, 1], by_hand)
+    np.testing.assert_array_equal(store.rows.block(study_id).values[:, 1], by_hand)
     motion = service.get(f"/studies/{study_id}/cases/7/trajectory", points=2)
     assert motion["values"]["displacement"][-1] == by_hand[7]
     # The other way: cases that were derived are those of a study that gives the same numbers.

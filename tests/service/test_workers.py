@@ -41,7 +41,7 @@ def team() -> list[WorkerReport]:
 
 def report(service: Service, *workers: WorkerReport, shortage: str = "") -> None:
     """Let a dispatcher take over and report those workers."""
-    service.store.heartbeat(service.store.take_over("head:7"), fakes.report(*workers, shortage=shortage))
+    service.store.work.heartbeat(service.store.work.take_over("head:7"), fakes.report(*workers, shortage=shortage))
 
 
 def test_before_the_first_dispatcher_there_is_none(service: Service) -> None:
@@ -49,7 +49,7 @@ def test_before_the_first_dispatcher_there_is_none(service: Service) -> None:
     fits(WorkerList, found)
     assert (found["usable"], found["dispatchers"]) == (0, [])
     assert "No dispatcher has worked" in service.http.get("/workers").text
-    service.store.take_over("head:7")
+    service.store.work.take_over("head:7")
     (found,) = service.get("/workers")["dispatchers"]
     assert found["executor"] is None, "it has not reported yet"
 
@@ -111,7 +111,7 @@ def test_a_report_of_an_earlier_version_names_no_processor(service: Service, tea
     earlier = fakes.report(*team)
     for host in earlier["hosts"]:
         del host["processor"]
-    service.store.heartbeat(service.store.take_over("head:7"), earlier)
+    service.store.work.heartbeat(service.store.work.take_over("head:7"), earlier)
     found = service.get("/workers")
     fits(WorkerList, found)
     assert [host["processor"] for host in found["dispatchers"][0]["hosts"]] == ["", ""]
@@ -125,11 +125,11 @@ def test_a_difference_says_from_which_dispatcher(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     connected(workers)
-    monkeypatch.setattr(service.store, "presence", fakes.Present())
-    service.store.take_over("head:7")
+    monkeypatch.setattr(service.store.dispatchers.all, "presence", fakes.Present())
+    service.store.work.take_over("head:7")
     monkeypatch.setattr(fingerprint, "digest", lambda: "another")
     monkeypatch.setattr(fingerprint, "own", partial(dict, fingerprint.own(), Python="2.7"))
-    service.store.take_over("other:8")
+    service.store.work.take_over("other:8")
     difference = f"Python: 2.7 instead of {platform.python_version()}"
     assert f"<code>another</code> (differs from that of head:7: {difference})" in service.http.get("/workers").text
     assert execute(["workers"]) == 0
@@ -171,8 +171,8 @@ def test_estimates_and_chunks_follow_the_workers_that_there_are(service: Service
     report(service, *(WorkerReport(f"tls://a:{port}", "a", usable=True) for port in range(100)))
     many = service.http.post("/api/v1/studies:preview", json=spec).json()["estimated_seconds"]
     assert many < alone
-    assert service.store.chunking.processes == 100
+    assert service.store.dispatchers.chunking.processes == 100
     report(service, *team)
-    assert service.store.chunking.processes == 5
+    assert service.store.dispatchers.chunking.processes == 5
     report(service, REFUSED)
-    assert service.store.chunking == service.store.base_chunking
+    assert service.store.dispatchers.chunking == service.store.dispatchers.base_chunking

@@ -18,7 +18,7 @@ from tests.worker import fakes
 
 
 def submit(store: Store, cases: int = 20, name: str = "a study") -> StudyRecord:
-    return store.create_study({"name": name}, fakes.study(cases, name), fresh=True)
+    return store.studies.create({"name": name}, fakes.study(cases, name), fresh=True)
 
 
 def work(store: Store, executor: Executor, only: int | None = None) -> None:
@@ -26,16 +26,17 @@ def work(store: Store, executor: Executor, only: int | None = None) -> None:
 
     def idle() -> bool:
         return all(
-            study.state is StudyState.PAUSED or only not in {None, study.number} for study in store.active_studies()
+            study.state is StudyState.PAUSED or only not in {None, study.number}
+            for study in store.work.active_studies()
         )
 
-    Dispatcher(store, executor, SystemClock(), only=only).run(idle)
+    Dispatcher(store.work, executor, SystemClock(), only=only).run(idle)
 
 
 def endings(store: Store, record: StudyRecord) -> dict[int, str]:
     return {
         int(case): ending
-        for block in store.iter_rows(record.id)
+        for block in store.rows.blocks(record.id)
         for case, ending in zip(block.cases, block.endings, strict=True)
     }
 

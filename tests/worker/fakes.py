@@ -8,11 +8,11 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from collections.abc import Set as AbstractSet
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,10 @@ from sprag.worker.models import ChunkResult, ChunkTask, KernelShape
 from sprag.worker.pool.child_process import uncounted
 from sprag.worker.reports import ExecutorReport, Reporter, WorkerReport
 from sprag.worker.study import Axis, Study
+
+if TYPE_CHECKING:
+    from sprag.service.storage.store import Store
+    from sprag.worker.ports import Clock
 
 BASE = {
     "excitation.frequency": 25.0,
@@ -256,6 +260,18 @@ class HandClock:
 
     def monotonic(self) -> float:
         return self.seconds
+
+
+@contextmanager
+def clocked(store: Store, clock: Clock) -> Iterator[None]:
+    """Let a store that is open already go by another clock."""
+    having = [part for part in (store, *vars(store).values()) if hasattr(part, "clock")]
+    before = store.clock
+    for part in having:
+        part.clock = clock
+    yield
+    for part in having:
+        part.clock = before
 
 
 def prepare_nothing() -> None:

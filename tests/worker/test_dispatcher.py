@@ -39,10 +39,10 @@ def test_studies_are_run_to_their_ends(store: Store) -> None:
     records = [submit(store, cases, f"study {cases}") for cases in (1, 17, 8)]
     work(store, InlineExecutor(fakes.run))
     for record in records:
-        ended = store.get_study(record.id)
+        ended = store.studies.get(record.id)
         assert (ended.state, ended.done, ended.ok) == (StudyState.FINISHED, record.cases, record.cases)
         assert ended.started_at is not None
-        block = store.case_rows(record.id)
+        block = store.rows.block(record.id)
         assert block.cases.tolist() == list(range(record.cases))
         np.testing.assert_array_equal(block.values, fakes.values(0, record.cases))
 
@@ -52,7 +52,7 @@ def test_two_studies_take_turns(store: Store) -> None:
     seen: list[int] = []
 
     def run(task: ChunkTask) -> ChunkResult:
-        seen.append(store.get_study(first.id).done - store.get_study(second.id).done)
+        seen.append(store.studies.get(first.id).done - store.studies.get(second.id).done)
         return fakes.run(task)
 
     class Wide(InlineExecutor):
@@ -67,7 +67,7 @@ def test_a_crash_and_a_hang_are_found_among_their_neighbours(store: Store) -> No
     work(store, fakes.pool(2, run=fakes.faulty(crash=frozenset({6}), hang=frozenset({17})), chunk_timeout=2.0))
     found = endings(store, record)
     assert found == {case: {6: "crashed", 17: "timed_out"}.get(case, "ok") for case in range(24)}
-    ended = store.get_study(record.id)
+    ended = store.studies.get(record.id)
     assert (ended.state, ended.done, ended.ok) == (StudyState.FINISHED, 24, 22)
 
 
@@ -84,14 +84,14 @@ def test_the_log_tells_when_a_study_is_taken_up_and_how_it_ends(store: Store, ca
 def test_an_engine_fault_holds_the_study_until_it_is_resumed(store: Store, caplog: pytest.LogCaptureFixture) -> None:
     record = submit(store)
     work(store, InlineExecutor(fakes.raising))
-    held = store.get_study(record.id)
+    held = store.studies.get(record.id)
     assert (held.state, held.done) == (StudyState.PAUSED, 0)
     assert "engine fault" in (held.reason or "")
     assert "ZeroDivisionError: no such thing" in (held.reason or "")
     assert caplog.messages == [f"The study {record.id} is held: {held.reason}"]
-    store.resume_study(record.id)
+    store.studies.resume(record.id)
     work(store, InlineExecutor(fakes.run))
-    assert store.get_study(record.id).state is StudyState.FINISHED
+    assert store.studies.get(record.id).state is StudyState.FINISHED
 
 
 def test_kernels_are_compiled_anew_once_before_a_study_is_held(store: Store, caplog: pytest.LogCaptureFixture) -> None:
@@ -105,20 +105,20 @@ def test_kernels_are_compiled_anew_once_before_a_study_is_held(store: Store, cap
 
         return renewed
 
-    Dispatcher(store, InlineExecutor(fakes.raising), SystemClock(), renew=renew(fakes.run)).run(
-        lambda: not store.active_studies()
+    Dispatcher(store.work, InlineExecutor(fakes.raising), SystemClock(), renew=renew(fakes.run)).run(
+        lambda: not store.work.active_studies()
     )
     assert renewals == ["once"]
     assert "Its kernels are compiled anew" in caplog.messages[0]
     for study, cases in ((record, 20), (other, 8)):
         assert endings(store, study) == dict.fromkeys(range(cases), "ok")
-        assert store.get_study(study.id).reason is None
+        assert store.studies.get(study.id).reason is None
     last = submit(store)
-    Dispatcher(store, InlineExecutor(fakes.raising), SystemClock(), renew=renew(fakes.raising)).run(
-        lambda: store.get_study(last.id).state is StudyState.PAUSED
+    Dispatcher(store.work, InlineExecutor(fakes.raising), SystemClock(), renew=renew(fakes.raising)).run(
+        lambda: store.studies.get(last.id).state is StudyState.PAUSED
     )
     assert renewals == ["once", "once"]
-    held = store.get_study(last.id)
+    held = store.studies.get(last.id)
     assert held.done == 0
     assert (held.reason or "").endswith(
         "(ZeroDivisionError: no such thing); the same happened with newly compiled kernels"
@@ -131,8 +131,8 @@ def test_the_highest_priority_goes_first_however_many_wait(store: Store) -> None
 
     def run(task: ChunkTask) -> ChunkResult:
         if not ended:
-            urgent = store.create_study({}, fakes.study(8), priority=3)
-            store.prioritize_study(low[-1].id, 2)
+            urgent = store.studies.create({}, fakes.study(8), priority=3)
+            store.studies.prioritize(low[-1].id, 2)
             ended.append(urgent.id)
         return fakes.run(task)
 
@@ -140,10 +140,10 @@ def test_the_highest_priority_goes_first_however_many_wait(store: Store) -> None
 
     def turn() -> bool:
         clock.seconds += POLL_SECONDS
-        return not store.active_studies()
+        return not store.work.active_studies()
 
-    Dispatcher(store, Prompt(run), clock).run(turn)
-    finished = {study.id: study.finished_at for study in store.list_studies().studies}
+    Dispatcher(store.work, Prompt(run), clock).run(turn)
+    finished = {study.id: study.finished_at for study in store.studies.page().studies}
     assert None not in finished.values()
     order = sorted(finished, key=lambda study: finished[study])  # type: ignore[arg-type,return-value]
     assert order[:2] == [ended[0], low[-1].id]
@@ -152,11 +152,11 @@ def test_the_highest_priority_goes_first_however_many_wait(store: Store) -> None
 def test_a_user_with_many_studies_holds_up_nobody(store: Store) -> None:
     """The only study of the last to come is taken up, however many long ones of others are active and wait."""
     for name in ("dora", "emil"):
-        store.add_user(name, Role.DESIGNER)
+        store.people.add_user(name, Role.DESIGNER)
 
     def of(name: str, cases: int) -> StudyRecord:
         with act_as(Actor(Door.API, name, "", name, everything=False)):
-            return store.create_study({}, fakes.study(cases), priority=100 if name == "dora" else 0)
+            return store.studies.create({}, fakes.study(cases), priority=100 if name == "dora" else 0)
 
     many = [of("dora", 400) for _ in range(OPEN_STUDIES + 2)]
     few = of("emil", 12)
@@ -164,16 +164,16 @@ def test_a_user_with_many_studies_holds_up_nobody(store: Store) -> None:
 
     def turn() -> bool:
         clock.seconds += POLL_SECONDS
-        return store.get_study(few.id).state.terminal
+        return store.studies.get(few.id).state.terminal
 
-    Dispatcher(store, Prompt(fakes.run), clock).run(turn)
-    assert not any(store.get_study(record.id).state.terminal for record in many)
+    Dispatcher(store.work, Prompt(fakes.run), clock).run(turn)
+    assert not any(store.studies.get(record.id).state.terminal for record in many)
 
 
 def test_cancelling_keeps_what_is_done(store: Store) -> None:
     record = submit(store)
-    work(store, InlineExecutor(after(store, 8, lambda: store.cancel_study(record.id))))
-    ended = store.get_study(record.id)
+    work(store, InlineExecutor(after(store, 8, lambda: store.studies.cancel(record.id))))
+    ended = store.studies.get(record.id)
     assert ended.state is StudyState.CANCELLED
     assert endings(store, record) == dict.fromkeys(range(ended.done), "ok")
     assert 12 <= ended.done < 20
@@ -184,31 +184,31 @@ def test_cancelling_stops_what_would_never_end(store: Store) -> None:
     pool = fakes.pool(1, run=fakes.faulty(hang=frozenset({0})))
 
     def ended() -> bool:
-        state = store.get_study(record.id).state
+        state = store.studies.get(record.id).state
         if state is StudyState.RUNNING:
-            store.cancel_study(record.id)
+            store.studies.cancel(record.id)
         return state.terminal
 
-    Dispatcher(store, pool, SystemClock()).run(ended)
-    assert store.get_study(record.id).state is StudyState.CANCELLED
+    Dispatcher(store.work, pool, SystemClock()).run(ended)
+    assert store.studies.get(record.id).state is StudyState.CANCELLED
 
 
 def test_a_study_is_cancelled_before_it_was_begun(store: Store) -> None:
     record = submit(store)
-    store.cancel_study(record.id)
+    store.studies.cancel(record.id)
     work(store, InlineExecutor(fakes.run))
-    assert store.get_study(record.id).state is StudyState.CANCELLED
+    assert store.studies.get(record.id).state is StudyState.CANCELLED
     assert endings(store, record) == {}
 
 
 def test_a_paused_study_goes_on_where_it_was(store: Store) -> None:
     record, other = submit(store), submit(store, 8)
-    work(store, InlineExecutor(after(store, 8, lambda: store.pause_study(record.id))))
-    held = store.get_study(record.id)
+    work(store, InlineExecutor(after(store, 8, lambda: store.studies.pause(record.id))))
+    held = store.studies.get(record.id)
     assert held.state is StudyState.PAUSED
     assert 0 < held.done < 20
-    assert store.get_study(other.id).state is StudyState.FINISHED
-    store.resume_study(record.id)
+    assert store.studies.get(other.id).state is StudyState.FINISHED
+    store.studies.resume(record.id)
     work(store, InlineExecutor(fakes.run))
     assert endings(store, record) == dict.fromkeys(range(20), "ok")
 
@@ -216,13 +216,13 @@ def test_a_paused_study_goes_on_where_it_was(store: Store) -> None:
 def test_only_one_study_is_run_when_asked(store: Store) -> None:
     other, wanted = submit(store), submit(store)
     work(store, InlineExecutor(fakes.run), only=wanted.number)
-    assert store.get_study(wanted.id).state is StudyState.FINISHED
-    assert store.get_study(other.id).state is StudyState.QUEUED
+    assert store.studies.get(wanted.id).state is StudyState.FINISHED
+    assert store.studies.get(other.id).state is StudyState.QUEUED
 
 
 def test_a_dispatcher_gives_up_when_another_has_taken_over(store: Store) -> None:
     record = submit(store)
-    executor = InlineExecutor(after(store, 8, lambda: store.take_over("another")))
+    executor = InlineExecutor(after(store, 8, lambda: store.work.take_over("another")))
     with pytest.raises(EpochLostError):
         work(store, executor)
     assert endings(store, record) == dict.fromkeys(range(8), "ok")
@@ -251,19 +251,19 @@ def test_stopping_hands_the_claims_back_before_the_processes_end(store: Store) -
         seen.append(claimed())
         return next(asked)
 
-    Dispatcher(store, Closed(fakes.run), SystemClock()).run(stopping)
+    Dispatcher(store.work, Closed(fakes.run), SystemClock()).run(stopping)
     assert seen == [0, 1, 1, 0]
-    assert store.get_study(record.id).done == 8
+    assert store.studies.get(record.id).done == 8
 
 
 def test_a_study_whose_last_commit_was_not_settled_is_settled_later(store: Store) -> None:
     record = submit(store, 4)
-    epoch = store.take_over("died between commit and settle")
-    chunks = store.open_chunks(record.number)
-    store.claim(epoch, chunks)
-    store.commit(epoch, chunks[0], fakes.result(0, 4))
+    epoch = store.work.take_over("died between commit and settle")
+    chunks = store.work.open_chunks(record.number)
+    store.work.claim(epoch, chunks)
+    store.work.commit(epoch, chunks[0], fakes.result(0, 4))
     work(store, InlineExecutor(fakes.run))
-    assert store.get_study(record.id).state is StudyState.FINISHED
+    assert store.studies.get(record.id).state is StudyState.FINISHED
 
 
 def test_it_shows_that_it_is_alive_and_polls_when_it_is_time(store: Store) -> None:
@@ -272,18 +272,18 @@ def test_it_shows_that_it_is_alive_and_polls_when_it_is_time(store: Store) -> No
             return []
 
     clock = fakes.HandClock()
-    store.clock = clock
     beats: list[float] = []
     turns = iter(range(100))
 
     def turn() -> bool:
-        dispatcher = store.dispatcher()
+        dispatcher = store.dispatchers.latest()
         assert dispatcher is not None
         beats.append(dispatcher.heartbeat_at.timestamp() - fakes.HandClock().now().timestamp())
         clock.seconds += POLL_SECONDS
         return next(turns) == 60
 
-    Dispatcher(store, Quiet(), clock, owner="test").run(turn)
+    with fakes.clocked(store, clock):
+        Dispatcher(store.work, Quiet(), clock, owner="test").run(turn)
     assert max(np.diff(sorted(set(beats)))) <= HEARTBEAT_SECONDS + 1.01 * POLL_SECONDS
     assert len(set(beats)) >= 3
 
@@ -294,7 +294,7 @@ def test_rows_do_not_depend_on_chunks_and_processes(tmp_path: Path, size: int, p
     with Store.open(f"sqlite:///{tmp_path / 'a.sqlite3'}", chunking=Chunking(cases=size)) as store:
         record = submit(store, 40)
         work(store, fakes.pool(processes))
-        np.testing.assert_array_equal(store.case_rows(record.id).values, fakes.values(0, 40))
+        np.testing.assert_array_equal(store.rows.block(record.id).values, fakes.values(0, 40))
 
 
 def test_a_study_goes_to_a_dispatcher_with_workers_from_one_that_has_none(store: Store) -> None:
@@ -307,28 +307,28 @@ def test_a_study_goes_to_a_dispatcher_with_workers_from_one_that_has_none(store:
         def report(self) -> ExecutorReport:
             return ExecutorReport("dask", (), {}, self.shortage)
 
-    store.presence = Everybody()
+    store.dispatchers.presence = Everybody()
     record = submit(store, 20)
     clock = fakes.HandClock()
-    poor = Dispatcher(store, WithoutWorkers(), clock, owner="poor:1")
-    rich = Dispatcher(store, InlineExecutor(fakes.run), clock, owner="rich:1")
+    poor = Dispatcher(store.work, WithoutWorkers(), clock, owner="poor:1")
+    rich = Dispatcher(store.work, InlineExecutor(fakes.run), clock, owner="rich:1")
     turns = iter(range(100))
 
     def ended() -> bool:
         clock.seconds += QUIET_POLL_SECONDS
         poor.step()
-        return store.get_study(record.id).state.terminal or next(turns) == 50
+        return store.studies.get(record.id).state.terminal or next(turns) == 50
 
     def joined() -> bool:
         """The other one comes once the study belongs to the first."""
         clock.seconds += QUIET_POLL_SECONDS
-        if not {found.owner: found.studies for found in store.dispatchers()}["poor:1"]:
+        if not {found.owner: found.studies for found in store.dispatchers.all()}["poor:1"]:
             return next(turns) == 50
         rich.run(ended)
         return True
 
     poor.run(joined)
-    assert store.get_study(record.id).state is StudyState.FINISHED
+    assert store.studies.get(record.id).state is StudyState.FINISHED
 
 
 class Everybody:
@@ -365,14 +365,14 @@ def test_with_news_the_store_is_looked_at_when_it_has_changed_and_seldom_otherwi
     store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     looks = 0
-    active = store.active_studies
+    active = store.work.active_studies
 
     def looked() -> list[ActiveStudy]:
         nonlocal looks
         looks += 1
         return active()
 
-    monkeypatch.setattr(store, "active_studies", looked)
+    monkeypatch.setattr(store.work, "active_studies", looked)
     news, clock = HandNews(), fakes.HandClock()
     asked: list[float] = []
 
@@ -381,14 +381,14 @@ def test_with_news_the_store_is_looked_at_when_it_has_changed_and_seldom_otherwi
             asked.append(timeout)
             return super().wait(timeout)
 
-    dispatcher = Dispatcher(store, Asked(fakes.run), clock, news=news)
+    dispatcher = Dispatcher(store.work, Asked(fakes.run), clock, news=news)
     turns = iter(range(200))
     seen: list[tuple[int, StudyState | None]] = []
     records: list[StudyRecord] = []
 
     def stopping() -> bool:
         turn = next(turns)
-        seen.append((looks, store.get_study(records[0].id).state if records else None))
+        seen.append((looks, store.studies.get(records[0].id).state if records else None))
         if turn == 50:
             records.append(submit(store))
             news.told = True
@@ -408,7 +408,7 @@ def test_with_news_the_store_is_looked_at_when_it_has_changed_and_seldom_otherwi
 
 def test_the_log_names_a_study_by_its_id_whether_it_ran_or_not(store: Store, caplog: pytest.LogCaptureFixture) -> None:
     ran, cancelled = submit(store, 8), submit(store, 8)
-    store.cancel_study(cancelled.id)
+    store.studies.cancel(cancelled.id)
     with caplog.at_level("INFO", "sprag.worker.dispatcher"):
         work(store, InlineExecutor(fakes.run))
     assert f"The study {cancelled.id} is cancelled." in caplog.text

@@ -37,14 +37,14 @@ class Several(InlineExecutor):
 def exchanged(store: Store, monkeypatch: pytest.MonkeyPatch) -> list[tuple[list[int], list[int]]]:
     """First cases of the chunks that each transaction stored and claimed."""
     seen: list[tuple[list[int], list[int]]] = []
-    exchange = store.exchange
+    exchange = store.work.exchange
 
     def noted(epoch: int, finished: Sequence[Finished], wanted: Sequence[Chunk] = ()) -> Any:
         done = exchange(epoch, finished, wanted)
         seen.append(([chunk.first for chunk in done[0]], [chunk.first for chunk in done[1]]))
         return done
 
-    monkeypatch.setattr(store, "exchange", noted)
+    monkeypatch.setattr(store.work, "exchange", noted)
     return seen
 
 
@@ -80,4 +80,4 @@ def test_a_crash_beside_chunks_that_ended_well_costs_them_nothing(
     work(store, Several(run))
     assert exchanged == [([], [0, 4, 8]), ([0], []), ([8], [4]), ([4], [])]
     assert endings(store, record) == dict.fromkeys(range(12), "ok")
-    assert store.get_study(record.id).state is StudyState.FINISHED
+    assert store.studies.get(record.id).state is StudyState.FINISHED

@@ -8,6 +8,7 @@ from functools import partialmethod
 import pytest
 
 from sprag.service.storage.store import Store
+from sprag.service.storage.work import Work
 from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import (
     POLL_SECONDS,
@@ -29,9 +30,9 @@ def store(sqlite_url: str) -> Iterator[Store]:
 
 
 class Tank:
-    """A store's disk that a test fills and empties: stands before `Store`."""
+    """A store's disk that a test fills and empties: stands before `Work`."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Work) -> None:
         self.store = store
         self.full = False
         self.short: str | None = None
@@ -47,7 +48,7 @@ class Tank:
         return getattr(self.store, name)(*given, **named)
 
     def shortage(self) -> str | None:
-        """See `Store`."""
+        """See `Work`."""
         return self.short
 
     exchange = partialmethod(_write, "exchange")
@@ -57,12 +58,12 @@ class Tank:
 
 
 def test_studies_are_held_before_the_disk_is_full_and_go_on_by_themselves(store: Store) -> None:
-    tank, clock, record = Tank(store), fakes.HandClock(), submit(store)
+    tank, clock, record = Tank(store.work), fakes.HandClock(), submit(store)
     seen: list[tuple[StudyState, str | None, int]] = []
 
     def turn() -> bool:
         clock.seconds += POLL_SECONDS
-        now = store.get_study(record.id)
+        now = store.studies.get(record.id)
         seen.append((now.state, now.reason, now.done))
         if now.done >= 8:
             tank.short = "no room" if len(seen) < 30 else None
@@ -78,13 +79,13 @@ def test_studies_are_held_before_the_disk_is_full_and_go_on_by_themselves(store:
 
 
 def test_a_store_that_takes_nothing_is_tried_again_and_nothing_is_lost(store: Store) -> None:
-    tank, clock, record, paused = Tank(store), fakes.HandClock(), submit(store), submit(store)
-    store.pause_study(paused.id)
+    tank, clock, record, paused = Tank(store.work), fakes.HandClock(), submit(store), submit(store)
+    store.studies.pause(paused.id)
     seen: list[tuple[float, StudyState, str | None]] = []
 
     def turn() -> bool:
         clock.seconds += POLL_SECONDS
-        now = store.get_study(record.id)
+        now = store.studies.get(record.id)
         seen.append((clock.seconds, now.state, now.reason))
         if now.done >= 8 and len(seen) < 40:
             tank.full = not tank.full if len(seen) > 30 else len(seen) > 3
@@ -97,7 +98,7 @@ def test_a_store_that_takes_nothing_is_tried_again_and_nothing_is_lost(store: St
     reasons = {reason for _, state, reason in seen if state is StudyState.PAUSED}
     assert reasons == {"the disk is full; it is retried from time to time"}
     assert endings(store, record) == dict.fromkeys(range(20), "ok")
-    assert store.get_study(paused.id).state is StudyState.PAUSED
+    assert store.studies.get(paused.id).state is StudyState.PAUSED
 
 
 class Cold(InlineExecutor):
@@ -116,23 +117,23 @@ class Cold(InlineExecutor):
 def test_a_study_that_waits_for_its_kernel_says_so_and_holds_nobody_up(store: Store) -> None:
     clock = fakes.HandClock()
     executor = Cold(fakes.run)
-    slow = store.create_study({}, fakes.study(20, "slow", tolerance=1e-6))
+    slow = store.studies.create({}, fakes.study(20, "slow", tolerance=1e-6))
     fast = submit(store, 20)
     seen: list[tuple[StudyState, str | None]] = []
 
     def turn() -> bool:
-        record = store.get_study(slow.id)
+        record = store.studies.get(slow.id)
         seen.append((record.state, record.reason))
         executor.warm = record.reason == COMPILING or executor.warm
         if not executor.warm:
             assert record.done == 0
         clock.seconds += NOTE_SECONDS / 20
-        return not store.active_studies()
+        return not store.work.active_studies()
 
-    Dispatcher(store, executor, clock).run(turn)
+    Dispatcher(store.work, executor, clock).run(turn)
     assert seen[0] == (StudyState.QUEUED, None)
     assert (StudyState.QUEUED, COMPILING) in seen
-    ended, other = store.get_study(slow.id), store.get_study(fast.id)
+    ended, other = store.studies.get(slow.id), store.studies.get(fast.id)
     assert (ended.state, ended.reason, ended.ok) == (StudyState.FINISHED, None, 20)
     assert other.finished_at is not None
     assert ended.started_at is not None
@@ -140,20 +141,20 @@ def test_a_study_that_waits_for_its_kernel_says_so_and_holds_nobody_up(store: St
 
 
 def test_a_running_study_whose_kernel_must_be_compiled_anew_says_so_too(store: Store) -> None:
-    record = store.create_study({}, fakes.study(20, tolerance=1e-6))
-    epoch = store.take_over("before an upgrade")
-    store.claim(epoch, store.open_chunks(record.number)[:1])
+    record = store.studies.create({}, fakes.study(20, tolerance=1e-6))
+    epoch = store.work.take_over("before an upgrade")
+    store.work.claim(epoch, store.work.open_chunks(record.number)[:1])
     clock, executor = fakes.HandClock(), Cold(fakes.run)
     seen: list[tuple[StudyState, str | None]] = []
 
     def turn() -> bool:
-        now = store.get_study(record.id)
+        now = store.studies.get(record.id)
         seen.append((now.state, now.reason))
         executor.warm = now.reason == COMPILING or executor.warm
         clock.seconds += NOTE_SECONDS / 5
-        return not store.active_studies()
+        return not store.work.active_studies()
 
-    Dispatcher(store, executor, clock).run(turn)
+    Dispatcher(store.work, executor, clock).run(turn)
     assert (StudyState.RUNNING, COMPILING) in seen
     assert (StudyState.RUNNING, None) in seen[seen.index((StudyState.RUNNING, COMPILING)) :]
     assert seen[-1] == (StudyState.FINISHED, None)
@@ -166,22 +167,22 @@ def test_studies_say_when_nobody_is_there_to_run_them(store: Store) -> None:
         def wait(self, timeout: float) -> list[Outcome]:
             return super().wait(0.0) if self.shortage is None else []
 
-    queued = store.create_study({}, fakes.study(20, "queued", tolerance=1e-6))
+    queued = store.studies.create({}, fakes.study(20, "queued", tolerance=1e-6))
     running = submit(store, 20)
     clock, executor = fakes.HandClock(), Lonely(fakes.run)
     seen: list[tuple[str | None, str | None, int]] = []
 
     def turn() -> bool:
-        records = store.get_study(queued.id), store.get_study(running.id)
+        records = store.studies.get(queued.id), store.studies.get(running.id)
         seen.append((records[0].reason, records[1].reason, records[1].done))
         told = ("nobody has joined", "nobody has joined", 8) in seen
         executor.shortage = "nobody has joined" if records[1].done >= 8 and not told else None
         executor.warm = COMPILING in {reason for reason, *_ in seen}
         clock.seconds += NOTE_SECONDS / 5
         assert len(seen) < 1000
-        return not store.active_studies()
+        return not store.work.active_studies()
 
-    Dispatcher(store, executor, clock).run(turn)
+    Dispatcher(store.work, executor, clock).run(turn)
     assert seen[-1] == (None, None, 20)
     assert {done for _, reason, done in seen if reason is not None} == {8}
 
@@ -193,10 +194,10 @@ def test_a_kernel_that_cannot_be_had_holds_the_study_and_is_logged(
     executor = Cold(fakes.run)
     executor.broken = True
     work(store, executor)
-    held = store.get_study(record.id)
+    held = store.studies.get(record.id)
     assert (held.state, held.reason, held.done) == (StudyState.PAUSED, "its kernel cannot be compiled", 0)
     assert caplog.messages == [f"The study {record.id} is held: its kernel cannot be compiled"]
-    store.resume_study(record.id)
+    store.studies.resume(record.id)
     executor.broken = False
     work(store, executor)
-    assert store.get_study(record.id).state is StudyState.FINISHED
+    assert store.studies.get(record.id).state is StudyState.FINISHED

@@ -153,7 +153,7 @@ class Dying(InlineExecutor):
 
 
 def _work(store: Store, executor: InlineExecutor) -> None:
-    Dispatcher(store, executor, SystemClock()).run(lambda: not store.active_studies())
+    Dispatcher(store.work, executor, SystemClock()).run(lambda: not store.work.active_studies())
 
 
 def test_a_killed_sweep_goes_on_with_the_same_bits(tmp_path: Path) -> None:
@@ -164,24 +164,24 @@ def test_a_killed_sweep_goes_on_with_the_same_bits(tmp_path: Path) -> None:
     assert whole.values[5, speed] == pytest.approx(0.5579460807, abs=1e-9)  # and down
     assert {case: flag for case, flag in enumerate(whole.flags[:8]) if flag} == {0: "jumped", 3: "jumped"}
     with Store.open(f"sqlite:///{tmp_path / 'store.sqlite3'}", chunking=Chunking(cases=4)) as store:
-        record = store.create_study({}, study)
+        record = store.studies.create({}, study)
         dying = Dying(2)
         with pytest.raises(KeyboardInterrupt):
             _work(store, dying)
-        left = store.open_chunks(record.number)
+        left = store.work.open_chunks(record.number)
         assert [(chunk.first, chunk.count, chunk.unit) for chunk in left] == [(8, 4, 4), (12, 4, 4)]
         _work(store, Dying(99))
-        rows = store.case_rows(record.id)
-        assert store.get_study(record.id).state is StudyState.FINISHED
+        rows = store.rows.block(record.id)
+        assert store.studies.get(record.id).state is StudyState.FINISHED
         assert rows.values.tobytes() == whole.values.tobytes()
         assert rows.flags == whole.flags
         # A further study runs only the lines that are new, and none of them in part.
-        more = store.create_study({}, swept(loads=(0.38, 0.3)))
+        more = store.studies.create({}, swept(loads=(0.38, 0.3)))
         executor = Dying(99)
         _work(store, executor)
         assert [task.count for task in executor.tasks] == [4, 4]
-        assert store.get_study(more.id).reused == 8
-        again = store.case_rows(more.id)
+        assert store.studies.get(more.id).reused == 8
+        again = store.rows.block(more.id)
         assert again.values[:8].tobytes() == whole.values[8:].tobytes()
         # One row of a line in another study is not enough.
         with store.session.write() as connection:
@@ -192,33 +192,33 @@ def test_a_killed_sweep_goes_on_with_the_same_bits(tmp_path: Path) -> None:
             connection.exec_driver_sql(
                 f"INSERT INTO endings (study, ending, cases) VALUES ({record.number}, 'crashed', 1)"
             )
-        assert store.reusable(swept(loads=(0.4,))) == 4
-        assert store.reusable(swept(loads=(0.4,), ways=(0,))) == 0
+        assert store.reuse.count(swept(loads=(0.4,))) == 4
+        assert store.reuse.count(swept(loads=(0.4,), ways=(0,))) == 0
 
 
 def test_failed_cases_of_a_sweep_are_run_again_with_their_lines(tmp_path: Path) -> None:
     study = swept()
     with Store.open(f"sqlite:///{tmp_path / 'store.sqlite3'}", chunking=Chunking(cases=8)) as store:
-        record = store.create_study({}, study)
-        order, epoch = order_of(study), store.take_over("test")
-        for chunk in store.open_chunks(record.number):
-            (claimed,) = store.claim(epoch, [chunk])
-            known = store.known(study, claimed)
+        record = store.studies.create({}, study)
+        order, epoch = order_of(study), store.work.take_over("test")
+        for chunk in store.work.open_chunks(record.number):
+            (claimed,) = store.work.claim(epoch, [chunk])
+            known = store.work.known(study, claimed)
             assert known is not None
             endings = ["diverged" if case == 4 else "ok" for case in known.missing.tolist()]
             values = np.ones((claimed.count, len(models.study_results(study))))
-            assert store.commit(epoch, claimed, ChunkResult(0, endings, [""] * claimed.count, values), known)
-        store.settle(epoch, record.number)
-        again = store.retry_study(record.id, ["diverged"])
+            assert store.work.commit(epoch, claimed, ChunkResult(0, endings, [""] * claimed.count, values), known)
+        store.work.settle(epoch, record.number)
+        again = store.studies.retry(record.id, ["diverged"])
         line = sorted(line_to(study, 6).tolist())
         assert 4 in line
         assert (again.done, again.ok) == (study.cases - 4, study.cases - 4)
-        left = store.open_chunks(record.number)
+        left = store.work.open_chunks(record.number)
         assert [(chunk.count, chunk.unit) for chunk in left] == [(4, 4)]
         assert sorted(order.cases(np.arange(left[0].first, left[0].last + 1)).tolist()) == line
-        assert sorted(set(range(study.cases)) - set(store.case_rows(record.id).cases.tolist())) == line
+        assert sorted(set(range(study.cases)) - set(store.rows.block(record.id).cases.tolist())) == line
         _work(store, InlineExecutor())
-        done = store.get_study(record.id)
+        done = store.studies.get(record.id)
         assert (done.state, done.ok) == (StudyState.FINISHED, study.cases)
 
 

@@ -50,7 +50,7 @@ async def list_cases(*, work: Attended, request: Request, study_id: StudyId, que
     query = replace(selection(question, question.page_size), at=pairs(question.at))
     context = work.context
     asked = (context.library, study_id, query, question.page_token)
-    study = await in_thread(context.store.study, study_id)
+    study = await in_thread(context.store.studies.study, study_id)
     large = study.cases > FEW and not by_number(query)
     page = await (work.check(case_page, *asked) if large else in_thread(case_page, *asked))
     rows = await in_thread(lambda: list(rows_json(study, page.block)))
@@ -68,7 +68,7 @@ router.get(
 def get_case(context: Ctx, study_id: StudyId, case: CaseNumber) -> Response:
     """One case; its ending is `pending` while it has not been run."""
     study = study_with(context, study_id, case)
-    row = context.store.case_row(study_id, case)
+    row = context.store.rows.case(study_id, case)
     parameters = case_values(study, case)
     if row is None:
         names = [info.name for info in models.study_results(study)]
@@ -97,5 +97,5 @@ def get_case(context: Ctx, study_id: StudyId, case: CaseNumber) -> Response:
 def _regimes(context: Context, study_id: str, study: Study, case: int) -> list[m.RegimeRow]:
     """The rows of a case that can have several."""
     numbered = models.numbered_by(study.model, models.variant_of(study))
-    rows = () if numbered is None else context.store.all_rows(study_id, case)
+    rows = () if numbered is None else context.store.rows.of_case(study_id, case)
     return [{"number": number, "flags": list(row.flags), "results": row.results} for number, row in enumerate(rows)]

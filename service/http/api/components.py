@@ -52,7 +52,7 @@ def list_components(
     form: Annotated[str | None, format_query(COMPONENT_FORMATS)] = None,
 ) -> Response:
     """The office's own springs, clutches and motors, by kind and name; also as CSV."""
-    found = context.store.components(kind)
+    found = context.store.components.all(kind)
     if choose_format(request, form, COMPONENT_FORMATS) == "csv":
         return Response(
             components_csv(record.component for record in found),
@@ -72,7 +72,7 @@ async def put_components(context: Ctx, work: Attended, received: Annotated[Body,
     """Add components, all or none; those of the same kind and name are replaced. CSV is sent as `{"csv": text}`."""
     with as_body_problems():
         given = await work.check(checks.components, received.content, received.format)
-    made = await in_thread(context.store.put_components, given)
+    made = await in_thread(context.store.components.put, given)
     return json_response({"components": list(map(entry, made))})
 
 
@@ -90,5 +90,5 @@ def delete_component(
     if_match: IfMatch = None,
 ) -> Response:
     """Remove a component; studies that took it keep its values."""
-    context.store.remove_component(component_id, editions(if_match))
+    context.store.components.remove(component_id, editions(if_match))
     return Response(status_code=204)

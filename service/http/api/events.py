@@ -33,12 +33,12 @@ LastEventId = Annotated[
 )
 async def get_events(context: Ctx, study_id: StudyId, last_event_id: LastEventId = None) -> Response:
     """The live progress of a study. Each event has the complete state, so a missed one does not matter."""
-    record = await in_thread(context.store.get_study, study_id, threads=Threads.STREAMS)
+    record = await in_thread(context.store.studies.get, study_id, threads=Threads.STREAMS)
     if record.state.terminal and last_event_id == str(record.revision):
         return Response(status_code=204)
 
     def look() -> Seen:
-        found, progress = context.store.look(study_id)
+        found, progress = context.store.studies.look(study_id)
         data = {
             "id": found.id,
             "state": found.state.value,

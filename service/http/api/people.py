@@ -18,7 +18,7 @@ from sprag.service.http.routers import api_router
 from sprag.service.http.threads import in_thread, iterated
 from sprag.service.results.exports.audit import AUDIT_FORMATS, audit_pieces, entry_json
 from sprag.service.storage.audit import audit_filter
-from sprag.service.storage.users import Quota
+from sprag.service.storage.people import Quota
 from sprag.worker.limits import MAX_PAGE_SIZE
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def get_me(context: Ctx, request: Request) -> Response:
     grant = cast("Grant | None", request.scope.get("sprag.grant")) or OPEN
     store, quota = context.store, None
     if grant.user is not None:
-        own = next((user.quota for user in store.users() if user.name == grant.user), Quota())
+        own = next((user.quota for user in store.people.users() if user.name == grant.user), Quota())
         quota = quota_json(store, grant.user, own)
     return json_response(filled(m.Me, grant, quota=quota))
 
@@ -41,7 +41,7 @@ def get_me(context: Ctx, request: Request) -> Response:
 @router.get("/users", response_model=m.UserList, responses=problems("invalid-parameter", "not-allowed"))
 def list_users(context: Ctx) -> Response:
     """Every user with role and quotas, by name, for administrators. `sprag user` adds and changes them."""
-    return json_response({"users": [user_json(context.store, user) for user in context.store.users()]})
+    return json_response({"users": [user_json(context.store, user) for user in context.store.people.users()]})
 
 
 @router.get(
@@ -70,8 +70,8 @@ async def get_audit(
     wanted = audit_filter(since, until, actor, action, target)
     chosen = choose_format(request, form, AUDIT_FORMATS)
     if chosen != "json":
-        pieces = audit_pieces(context.store.audit_rows(wanted), chosen)
+        pieces = audit_pieces(context.store.audit.rows(wanted), chosen)
         return await streamed(iterated(pieces), AUDIT_FORMATS[chosen], f"audit.{chosen}")
-    page = await in_thread(context.store.audit_log, wanted, page_size, page_token)
+    page = await in_thread(context.store.audit.page, wanted, page_size, page_token)
     entries = list(map(entry_json, page.records))
     return page_response(request, {"entries": entries, "next_page_token": page.next_token})

@@ -97,7 +97,7 @@ async def get_results(
     heads: formats.Header = choice_of("header", "names" if header is None else header, formats.HEADERS)
 
     def look() -> tuple[StudyRecord, str]:
-        record = work.context.store.get_study(study_id)
+        record = work.context.store.studies.get(study_id)
         return record, tag_of(work.request, record.id, record.revision, chosen)
 
     record, tag = await in_thread(look)
@@ -145,7 +145,7 @@ async def get_report(
 
     def make(_record: StudyRecord) -> Drawing:
         policy = {"Content-Security-Policy": _REPORT_POLICY} if chosen == "html" else {}
-        study = work.context.store.study(study_id)
+        study = work.context.store.studies.study(study_id)
         curves = question.x, question.y, question.by, question.at, question.of
         query = completed_query(study, *curves) if any(curves) else None
         content = report_of(work.context.store, study_id, choice, query, question.point, saved=not question.y)

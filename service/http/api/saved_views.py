@@ -47,7 +47,7 @@ def list_views(
     study: Annotated[str | None, Query(description="only the views of this study", pattern=ID_PATTERN)] = None,
 ) -> Response:
     """Saved views: the figures of the report in order, then the others by name; all, or those of a study."""
-    return json_response({"views": list(map(entry, context.store.saved_views(study)))})
+    return json_response({"views": list(map(entry, context.store.views.all(study)))})
 
 
 @router.post(
@@ -81,7 +81,7 @@ async def change_view(
     if_match: IfMatch = None,
 ) -> Response:
     """Change the name or the choices of a view, and whether and where it is in the report of its study."""
-    page = (await in_thread(context.store.saved_view, view_id)).view.page
+    page = (await in_thread(context.store.views.get, view_id)).view.page
     with as_body_problems():
         wanted = await work.check(checks.saved_view_change, received.content, received.format, page)
         saved = await in_thread(change, context.store, view_id, wanted, editions(if_match))
@@ -96,5 +96,5 @@ async def change_view(
 )
 def delete_view(context: Ctx, view_id: ViewId, if_match: IfMatch = None) -> Response:
     """Delete a saved view."""
-    context.store.remove_view(view_id, editions(if_match))
+    context.store.views.remove(view_id, editions(if_match))
     return Response(status_code=204)

@@ -28,7 +28,7 @@ from sprag.service.schedules.times import ALIASES
 from sprag.service.spec.described import schemas
 from sprag.service.storage.editions import require_edition
 from sprag.service.storage.errors import ChangedMeanwhileError
-from sprag.service.storage.schedule_runs import ScheduleRecord
+from sprag.service.storage.runs import ScheduleRecord
 from sprag.worker.codes import FLAG_MASKS
 from sprag.worker.limits import MAX_NAME_LENGTH
 
@@ -154,14 +154,14 @@ async def create_schedule(
     store = context.store
 
     def keep(fields: ScheduleFields, key: str | None, body_hash: str) -> Response:
-        return _made(context, store.create_schedule(fields, idempotency_key=key, body_hash=body_hash))
+        return _made(context, store.schedules.create(fields, idempotency_key=key, body_hash=body_hash))
 
     if idempotency_key is None:
         return await in_thread(keep, await _fields(context, work, received, None), None, "")
     # Before the fields are read: a future time may have passed since the key was first sent.
     with as_body_problems():
         body_hash = await work.check(checks.body_hash, received.content, received.format)
-    known = await in_thread(store.schedule_of_key, idempotency_key, body_hash)
+    known = await in_thread(store.schedules.of_key, idempotency_key, body_hash)
     if known is not None:
         return await in_thread(_made, context, known)
     return await in_thread(keep, await _fields(context, work, received, None), idempotency_key, body_hash)
@@ -216,7 +216,7 @@ def get_night(
 )
 def get_schedule(context: Ctx, schedule_id: ScheduleId) -> Response:
     """A schedule with its spec and its latest runs."""
-    return _answer(context, context.store.get_schedule(schedule_id))
+    return _answer(context, context.store.schedules.get(schedule_id))
 
 
 @router.patch(
@@ -233,12 +233,12 @@ async def change_schedule(
     """Change some fields of a schedule; the others are kept. Due times missed before the change are dropped."""
     store, wanted = context.store, editions(if_match)
     for left in reversed(range(_ATTEMPTS)):
-        record = await in_thread(store.get_schedule, schedule_id)
+        record = await in_thread(store.schedules.get, schedule_id)
         require_edition("schedule", schedule_id, record.etag, wanted)
         fields = await _fields(context, work, received, record.fields)
         try:
             # The fields that are kept are those that were read.
-            changed = await in_thread(store.change_schedule, schedule_id, fields, (record.etag,))
+            changed = await in_thread(store.schedules.change, schedule_id, fields, (record.etag,))
         except ChangedMeanwhileError:
             if not left:
                 raise
@@ -255,5 +255,5 @@ async def change_schedule(
 )
 def delete_schedule(context: Ctx, schedule_id: ScheduleId, if_match: IfMatch = None) -> Response:
     """Delete a schedule. Its studies are kept."""
-    context.store.delete_schedule(schedule_id, editions(if_match))
+    context.store.schedules.delete(schedule_id, editions(if_match))
     return Response(status_code=204)

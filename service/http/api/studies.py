@@ -145,18 +145,18 @@ async def preview_study(context: Ctx, work: Attended, received: SpecBody, finish
 )
 def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
     """A study: its state, progress, time left and spec."""
-    record, progress = context.store.look(study_id)
+    record, progress = context.store.studies.look(study_id)
     tag = views.study_tag(record)
     if record.state.terminal and (unchanged := not_modified(request, tag)):
         return unchanged
-    study = context.store.study(study_id)
+    study = context.store.studies.study(study_id)
     data = views.detail(
         record,
         progress,
         study,
-        context.store.spec(study_id),
-        context.store.kinds(study_id),
-        context.store.origins(study_id),
+        context.store.studies.spec(study_id),
+        context.store.rows.kinds(study_id),
+        context.store.rows.origins(study_id),
     )
     unaffected = warned((*record.warnings, *context.library.unaffected.of(context.store, record)))
     return tagged(json_response({**data, **unaffected}), tag)
@@ -169,15 +169,15 @@ def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
 )
 def get_rounds(context: Ctx, study_id: StudyId) -> m.RoundList:
     """The rounds of a study that chooses its own cases, each with what was known before it; none for other studies."""
-    return {"study": study_id, "rounds": [round_json(found) for found in context.store.rounds(study_id)]}
+    return {"study": study_id, "rounds": [round_json(found) for found in context.store.studies.rounds(study_id)]}
 
 
 def _verb(name: str, sentence: str, *refused: str) -> None:
     def act(context: Ctx, study_id: StudyId) -> Response:
         wish = {
-            "cancel": context.store.cancel_study,
-            "pause": context.store.pause_study,
-            "resume": context.store.resume_study,
+            "cancel": context.store.studies.cancel,
+            "pause": context.store.studies.pause,
+            "resume": context.store.studies.resume,
         }[name]
         return json_response(views.summary(wish(study_id)), 202)
 
@@ -220,7 +220,7 @@ def retry_study(
     for name in ending or ():
         if name not in _FAILED:
             raise parameter_error("ending", "invalid-choice", "is not a failed case's ending", name, ", ".join(_FAILED))
-    return json_response(views.summary(context.store.retry_study(study_id, ending)), 202)
+    return json_response(views.summary(context.store.studies.retry(study_id, ending)), 202)
 
 
 @router.post(
@@ -301,7 +301,7 @@ async def run_longer(
 
 def _to_run_longer(context: Context, study_id: str, regime: str | None) -> str:
     """The regime or flag of the cases to run longer; FaultError where no case has it."""
-    study, kinds = context.store.study(study_id), context.store.kinds(study_id)
+    study, kinds = context.store.studies.study(study_id), context.store.rows.kinds(study_id)
     if is_settled(study.run):
         if (wanted := regime or UNSETTLED) in kinds.regimes:
             return wanted
@@ -368,4 +368,4 @@ async def narrow_study(
 )
 def prioritize_study(context: Ctx, study_id: StudyId, priority: Priority) -> Response:
     """Change the priority of a study that has not ended."""
-    return json_response(views.summary(context.store.prioritize_study(study_id, priority)), 202)
+    return json_response(views.summary(context.store.studies.prioritize(study_id, priority)), 202)

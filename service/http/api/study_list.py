@@ -34,7 +34,7 @@ def list_studies(
     sort: Sort = StudyOrder.NEWEST,
 ) -> Response:
     """Studies, newest first or in another order: all but archived and deleted ones, or those that are searched for."""
-    page = context.store.list_studies(page_size, page_token, wanted, sort)
+    page = context.store.studies.page(page_size, page_token, wanted, sort)
     studies = [views.summary(record) for record in page.studies]
     return page_response(request, {"studies": studies, "next_page_token": page.next_token})
 
@@ -74,7 +74,7 @@ async def change_study(
     """
     with as_body_problems():
         change = await work.check(checks.study_change, received.content, received.format)
-        record = await in_thread(context.store.change_study, study_id, change, editions(if_match))
+        record = await in_thread(context.store.studies.change, study_id, change, editions(if_match))
     return tagged(json_response(views.summary(record)), views.study_tag(record))
 
 
@@ -96,7 +96,7 @@ def delete_study(
 
     It can be restored for `SPRAG_RESTORE_DAYS`, unless `at_once` is true.
     """
-    context.store.delete_study(study_id, at_once=at_once, read=editions(if_match))
+    context.store.studies.delete(study_id, at_once=at_once, read=editions(if_match))
     return Response(status_code=204)
 
 
@@ -107,5 +107,5 @@ def delete_study(
 )
 def restore_study(context: Ctx, study_id: StudyId) -> Response:
     """Undo the deletion of a study, with all its results, until `purge_at`."""
-    context.store.restore_study(study_id)
-    return json_response(views.summary(context.store.get_study(study_id)))
+    context.store.studies.restore(study_id)
+    return json_response(views.summary(context.store.studies.get(study_id)))

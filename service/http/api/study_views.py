@@ -34,7 +34,7 @@ def _add(view: StudyView[Any, Any, Any]) -> None:
         work: Attended, study_id: StudyId, choice: FileChoice, chosen: DrawnFormat, question: Any
     ) -> Response:
         def make(record: StudyRecord) -> Response | Drawing:
-            study = work.context.store.study(study_id)
+            study = work.context.store.studies.study(study_id)
             asked = view.choose(study, question)
             shown = work.context.library, study_id, view, asked, choice, record.name or record.model
             if chosen in PICTURES:

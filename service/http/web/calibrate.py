@@ -48,8 +48,8 @@ def calibrate_page(context: Ctx, study: Annotated[str, Query(max_length=64)]) ->
 async def send_points(context: Ctx, work: Attended, values: Form) -> Response:
     """Submit the calibration, or show what is wrong with it."""
     study_id = values.get("study", "")
-    spec = await in_thread(context.store.spec, study_id)
-    study = await in_thread(context.store.study, study_id)
+    spec = await in_thread(context.store.studies.spec, study_id)
+    study = await in_thread(context.store.studies.study, study_id)
     content = json.dumps(calibration_spec(await in_thread(accepted, spec, study), values)).encode()
     try:
         made = await work.check(
@@ -85,7 +85,7 @@ def calibration_spec(spec: Mapping[str, Any], values: Mapping[str, str]) -> dict
 def _page(
     context: Context, study_id: str, values: Mapping[str, str], faults: tuple[Fault, ...], status: int = 200
 ) -> Response:
-    study, record = context.store.study(study_id), context.store.get_study(study_id)
+    study, record = context.store.studies.study(study_id), context.store.studies.get(study_id)
     paths = [path for path in study.base if path not in study.derive]
     infos = [info for info in models.study_results(study) if info.kind != "category"]
     first = models.presentation_of(study).along[:1]

@@ -36,7 +36,7 @@ async def calibration_page(work: Attended, study_id: StudyId) -> Response:
 
 def _page(context: Context, study_id: str, found: CalibrationReport) -> Response:
     results = list(dict.fromkeys(point["result"] for point in found["points"]))
-    study = context.store.study(study_id)
+    study = context.store.studies.study(study_id)
     units = {axis.paths[0]: unit_of(study, axis.paths[0]) for axis in study.axes}
     return page(
         "calibration.html",

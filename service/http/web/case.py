@@ -72,10 +72,10 @@ def _span(study: Study, case: int, begin: str, end: str) -> tuple[float, float]:
 def _rows(context: Context, study: Study, study_id: str, case: int) -> tuple[CaseRow, ...]:
     """The rows of a case: one, or one for each regime; none while it is not finished."""
     if models.numbered_by(study.model, models.variant_of(study)) is not None:
-        rows = context.store.all_rows(study_id, case)
+        rows = context.store.rows.of_case(study_id, case)
         if rows:
             return rows
-    row = context.store.case_row(study_id, case)
+    row = context.store.rows.case(study_id, case)
     return () if row is None else (row,)
 
 
@@ -194,7 +194,7 @@ async def motion(
 @router.get("/studies/{study_id:study}/cases/{case:case}/laboratory")
 async def in_laboratory(work: Attended, study_id: StudyId, case: CaseNumber, which: StartNumber = None) -> Response:
     """The machine of a case in the laboratory, in the motion that the case comes to."""
-    study, spec = await work.case_of(study_id, case, lambda _: work.context.store.spec(study_id), which)
+    study, spec = await work.case_of(study_id, case, lambda _: work.context.store.studies.spec(study_id), which)
     moving = models.has_strobes(study)
     state = await work.run_case(models.run_end_state, *motion_of(study, case, which)) if moving else None
     mark = f"{study_id}/{case}" if which is None else f"{study_id}/{case}/{which}"

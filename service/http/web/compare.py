@@ -111,12 +111,12 @@ def chosen_studies(context: Context, given: QueryParams) -> list[StudyRecord]:
         raise refused(
             "study", "required", "is missing", allowed=Sentence("1 to {high} ids of studies", high=MOST_COMPARED)
         )
-    return [context.store.get_study(study_id) for study_id in ids]
+    return [context.store.studies.get(study_id) for study_id in ids]
 
 
 def comparison(context: Context, given: QueryParams, records: list[StudyRecord]) -> Comparison:
     """The comparison of a URL, whose studies are ``records``; SelectionError where they have nothing in common."""
-    studies = [context.store.study(record.id) for record in records]
+    studies = [context.store.studies.study(record.id) for record in records]
     axes = common_axes([[(axis.paths, len(axis)) for axis in study.axes] for study in studies])
     known = [{info.name for info in models.study_results(study)} for study in studies]
     results = [info for info in models.study_results(studies[0]) if all(info.name in names for names in known)]
@@ -154,7 +154,7 @@ def drawn(context: Context, chosen: Comparison) -> list[tuple[str, Curves]]:
         except SelectionError as error:
             faults = [replace(item, message=f"{chosen.label(position)}: {item.message}") for item in error.faults]
             raise SelectionError(faults) from error
-        found.append((chosen.label(position), draw(selection, partial(context.store.rows_for_cases, record.id))))
+        found.append((chosen.label(position), draw(selection, partial(context.store.rows.for_cases, record.id))))
     if chosen.less:
         return differences(found, [record.id for record in chosen.records].index(chosen.less))
     return found
@@ -163,7 +163,7 @@ def drawn(context: Context, chosen: Comparison) -> list[tuple[str, Curves]]:
 def _differing_inputs(context: Context, records: list[StudyRecord], choice: Choice) -> list[DifferingInput]:
     if len(records) < 2:
         return []
-    pairs = [(context.store.study(record.id), context.store.spec(record.id)) for record in records]
+    pairs = [(context.store.studies.study(record.id), context.store.studies.spec(record.id)) for record in records]
     return differing_inputs([ReadStudy(study, spec, reading_for(study, spec, choice)) for study, spec in pairs])
 
 
@@ -206,7 +206,7 @@ def compare_page(context: Ctx, request: Request) -> Response:
         fixed=[] if chosen is None or reading is None else _fixed(chosen, reading),
         figure=f"/compare/figure?{query}",
         query=query,
-        here_saved=saved_here(context.store.general_views(), "compare", None, query, ", ".join(labels(records))),
+        here_saved=saved_here(context.store.views.general(), "compare", None, query, ", ".join(labels(records))),
     )
 
 
@@ -216,7 +216,7 @@ def _offered(context: Context, given: QueryParams, *, choosing: bool) -> dict[st
     if not choosing:
         return {"choosing": False, "ids_of": ids}
     search = given.get("search", "").strip()[:MAX_SEARCH_LENGTH]
-    found = context.store.list_studies(_LISTED, wanted=StudyFilter(search))
+    found = context.store.studies.page(_LISTED, wanted=StudyFilter(search))
     chosen = list(filter(None, (_known(context, study_id) for study_id in ids[:_LISTED])))
     ids = [record.id for record in chosen]
     listed = [*chosen, *(record for record in found.studies if record.id not in ids)]
@@ -231,7 +231,7 @@ def _offered(context: Context, given: QueryParams, *, choosing: bool) -> dict[st
 
 def _known(context: Context, study_id: str) -> StudyRecord | None:
     try:
-        return context.store.get_study(study_id)
+        return context.store.studies.get(study_id)
     except StudyNotFoundError:
         return None
 

@@ -81,7 +81,7 @@ def components_page(
 
 def _values(context: Context, component_id: str) -> Values:
     """The form filled with a component; raises ComponentNotFoundError."""
-    component = next((one.component for one in context.store.components() if one.id == component_id), None)
+    component = next((one.component for one in context.store.components.all() if one.id == component_id), None)
     if component is None:
         raise ComponentNotFoundError(component_id)
     fields = {f"fields/{name}": text for name, text in component.fields.items()}
@@ -97,7 +97,7 @@ async def put_component(context: Ctx, work: Attended, values: Form) -> Response:
             given = await work.check(checks.components, to_bytes({"csv": values.get("csv", "")}), "json")
         else:
             given = [_component(values)]
-        await in_thread(context.store.put_components, given)
+        await in_thread(context.store.components.put, given)
     except FaultError as error:
         faults, status = _faults(error, csv=csv), api_error(error).type.status
         return await in_thread(_page, context, values, faults, status)
@@ -123,12 +123,12 @@ def _faults(error: FaultError, *, csv: bool) -> Faults:
 @router.post("/components/{component_id}/delete")
 def delete_component(context: Ctx, component_id: str) -> Response:
     """Remove a component."""
-    context.store.remove_component(component_id)
+    context.store.components.remove(component_id)
     return RedirectResponse("/components", status_code=303)
 
 
 def _page(context: Context, values: Values, faults: Faults, status: int, read: int = 0) -> Response:
-    records = context.store.components()
+    records = context.store.components.all()
     return page(
         "components.html",
         status=status,

@@ -49,7 +49,7 @@ _PROBABILITY: Final = re.compile(r"([\d.eE+-]+)\s*(%?)")
 @router.get("/studies/{study_id:study}/drives")
 async def drives_page(context: Ctx, work: Attended, request: Request, study_id: StudyId) -> Response:
     """Ribbons and yield of one line of places; the user chooses results, places, quantiles and conditions."""
-    study = await in_thread(context.store.study, study_id)
+    study = await in_thread(context.store.studies.study, study_id)
     if study.spread is None or study.plan is not None:
         return RedirectResponse(f"/studies/{study_id}", status_code=303)
     reading = await in_thread(reading_of, context.store, study_id, CHOICE.get())
@@ -71,7 +71,7 @@ def _page(
     found: tuple[RibbonReport, YieldReport] | None,
     faults: tuple[Any, ...],
 ) -> Response:
-    study = context.store.study(study_id)
+    study = context.store.studies.study(study_id)
     shown = given if found else type(given)()
     ribbon, wanted = _queries(study, shown)
     own = f"/studies/{study_id}"

@@ -45,7 +45,7 @@ METHODS: Final = {
 @router.get("/studies/{study_id:study}/sensitivity")
 async def sensitivity_page(context: Ctx, work: Attended, request: Request, study_id: StudyId) -> Response:
     """The indices of every axis for the chosen results, as a picture and as tables."""
-    study = await in_thread(context.store.study, study_id)
+    study = await in_thread(context.store.studies.study, study_id)
     if not varying_axes(study) or study.plan is not None:
         return RedirectResponse(f"/studies/{study_id}", status_code=303)
     infos = models.study_results(study)
@@ -63,7 +63,7 @@ async def sensitivity_page(context: Ctx, work: Attended, request: Request, study
 def _page(
     context: Context, study_id: str, names: tuple[str, ...], found: list[ResultSensitivity], faults: tuple[Any, ...]
 ) -> Response:
-    infos = models.study_results(context.store.study(study_id))
+    infos = models.study_results(context.store.studies.study(study_id))
     chosen = urlencode([("y", name) for name in names])
     return page(
         "effects.html",

@@ -133,7 +133,9 @@ def _with_unit_of_end(ends: dict[str, str]) -> dict[str, str]:
 def explore_view(library: Library, study_id: str, given: Sequence[tuple[str, str]], choice: Choice) -> ExploreView:
     """The page of a study; where its address asks for what there is not, the rest of it, with what is wrong."""
     params = QueryParams(list(given))
-    query, faults = read_choice(params, library.store.study(study_id), reading_of(library.store, study_id, choice))
+    query, faults = read_choice(
+        params, library.store.studies.study(study_id), reading_of(library.store, study_id, choice)
+    )
     found = explored(library, study_id, query)
     try:
         axes = chosen_pair(found, params.get("x", ""), params.get("y", ""))
@@ -166,11 +168,11 @@ async def explore_page(work: Attended, study_id: StudyId) -> Response:
 
 def _many(context: Context, study_id: str) -> bool:
     """Whether reading all rows takes so long that another process does it."""
-    return context.store.study(study_id).cases > FEW
+    return context.store.studies.study(study_id).cases > FEW
 
 
 def _page(context: Context, study_id: str, view: ExploreView, given: Sequence[tuple[str, str]]) -> Response:
-    study = context.store.study(study_id)
+    study = context.store.studies.study(study_id)
     infos, query = models.study_results(study), view.query
     kept = [(key, value) for key, value in given if value.strip() and key != "sort"]
     unpaired = [(key, value) for key, value in given if value.strip() and key not in {"x", "y"}]
@@ -225,7 +227,7 @@ async def new_study_of_selection(work: Attended, study_id: StudyId) -> Response:
     context, given, choice = work.context, work.request.query_params, CHOICE.get()
 
     def asked() -> ExploreQuery:
-        study = context.store.study(study_id)
+        study = context.store.studies.study(study_id)
         query = _whole(read_choice(given, study, reading_of(context.store, study_id, choice)))
         return replace(query, limit=MOST_POINTS)
 

@@ -48,7 +48,7 @@ async def front_page(work: Attended, study_id: StudyId, x: X = "", y: X = "", ex
 
 def _many(context: Context, study_id: str) -> bool:
     """Whether ranking the designs takes so long that another process does it."""
-    return not FrontView().small(context.store.study(study_id), FrontQuestion())
+    return not FrontView().small(context.store.studies.study(study_id), FrontQuestion())
 
 
 def _front_page(context: Context, study_id: str, view: FrontPage, *, exact: bool) -> Response:

@@ -40,7 +40,7 @@ def change_priority(context: Ctx, study_id: StudyId, values: Form) -> Response:
     if number is None or not abs(number) <= MAX_PRIORITY or number != int(number):
         allowed = Sentence("a whole number from {low} to {high}", low=-MAX_PRIORITY, high=MAX_PRIORITY)
         raise parameter_error("priority", "out-of-range", "is not a priority", text, allowed)
-    context.store.prioritize_study(study_id, int(number))
+    context.store.studies.prioritize(study_id, int(number))
     return RedirectResponse(f"/studies/{study_id}", status_code=303)
 
 

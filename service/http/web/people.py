@@ -36,7 +36,7 @@ def audit(
     faults: dict[str, str] = {}
     found = AuditPage((), None)
     try:
-        found = context.store.audit_log(audit_filter(**asked), _LISTED, after)
+        found = context.store.audit.page(audit_filter(**asked), _LISTED, after)
     except FaultError as error:
         faults = {str(fault.where): message(fault) for fault in error.faults}
     return page(
@@ -53,7 +53,7 @@ def audit(
 @router.get("/users")
 def users(context: Ctx) -> Response:
     """Every user with role, quotas and tokens."""
-    now, listed = context.store.clock.now(), context.store.users()
+    now, listed = context.store.clock.now(), context.store.people.users()
     records = {user.name: user for user in listed}
-    tokens = [(token, token.state_at(now, records.get(token.owner or ""))) for token in context.store.tokens()]
+    tokens = [(token, token.state_at(now, records.get(token.owner or ""))) for token in context.store.people.tokens()]
     return page("users.html", users=[user_json(context.store, user) for user in listed], tokens=tokens)

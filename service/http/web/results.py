@@ -56,7 +56,7 @@ KINDS: Final = {"heatmap": N_("Colours"), "contour": N_("Lines of equal value")}
 @router.get("/studies/{study_id:study}/curves")
 def curves_page(context: Ctx, request: Request, study_id: StudyId) -> Response:
     """Results against an axis; the user chooses the family and the held values."""
-    study = context.store.study(study_id)
+    study = context.store.studies.study(study_id)
     infos = models.study_results(study)
     frame = study_frame(context, study_id)
     reading = frame["reading"]
@@ -108,7 +108,7 @@ def map_page(
     context: Ctx, request: Request, study_id: StudyId, kind: Annotated[str, Query(max_length=20)] = "heatmap"
 ) -> Response:
     """One result over two axes."""
-    study = context.store.study(study_id)
+    study = context.store.studies.study(study_id)
     infos = models.study_results(study)
     frame = study_frame(context, study_id)
     reading = frame["reading"]

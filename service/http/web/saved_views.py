@@ -124,7 +124,7 @@ def save(context: Ctx, values: Form) -> Response:
 def act(context: Ctx, view_id: str, values: Form) -> Response:
     """A button beside a view."""
     done: str = choice_of("do", values.get("do", ""), ACTIONS)
-    saved = context.store.saved_view(view_id)
+    saved = context.store.views.get(view_id)
     _act(context, saved, done, values.get("name", ""))
     return RedirectResponse(f"{views_address(saved.view.study)}#saved-views", status_code=303)
 
@@ -139,7 +139,7 @@ def _act(context: Context, saved: SavedView, done: str, name: str) -> None:
     place = saved.place or 0
     match done:
         case "delete":
-            context.store.remove_view(saved.id)
+            context.store.views.remove(saved.id)
             return
         case "rename":
             change: dict[str, Any] = {"name": name}

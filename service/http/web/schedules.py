@@ -92,7 +92,7 @@ def new_schedule(context: Ctx, study: Annotated[str | None, Query(max_length=80)
     """The form, empty, or for a study."""
     values = {**_EMPTY, **_ticks(_usual())}
     if study is not None:
-        context.store.get_study(study)
+        context.store.studies.get(study)
         values["source"] = f"study {study}"
     return _form(context, values, {})
 
@@ -106,7 +106,7 @@ async def keep_schedule(context: Ctx, work: Attended, values: Form) -> Response:
 @router.get("/schedules/{schedule_id:schedule}")
 def edit_schedule(context: Ctx, schedule_id: str) -> Response:
     """The form with the fields of a schedule."""
-    record = context.store.get_schedule(schedule_id)
+    record = context.store.schedules.get(schedule_id)
     return _form(context, {**_values_of(record.fields), "etag": record.etag}, {}, schedule_id)
 
 
@@ -120,7 +120,7 @@ async def change_schedule(context: Ctx, work: Attended, schedule_id: str, values
 def act(context: Ctx, schedule_id: str, verb: str) -> Response:
     """A button of the list."""
     if verb == "delete":
-        context.store.delete_schedule(schedule_id)
+        context.store.schedules.delete(schedule_id)
     elif verb in _CHANGES:
         _change(context, schedule_id, _CHANGES[verb])
     else:
@@ -132,10 +132,10 @@ def _change(context: Context, schedule_id: str, changes: Mapping[str, object]) -
     """Change some fields; the others stay as they are by then."""
     store, saved = context.store, False
     while not saved:
-        record = store.get_schedule(schedule_id)
+        record = store.schedules.get(schedule_id)
         fields = change_fields(record.fields, changes, store.clock.now())
         with suppress(ChangedMeanwhileError):
-            store.change_schedule(schedule_id, fields, (record.etag,))
+            store.schedules.change(schedule_id, fields, (record.etag,))
             saved = True
 
 
@@ -148,10 +148,10 @@ async def _save(context: Context, work: Work, values: Values, schedule_id: str |
         if old is None or fields.report_to != old.report_to:
             require_deliverable(fields.report_to, context.settings.reports)
         if schedule_id is None:
-            await in_thread(context.store.create_schedule, fields)
+            await in_thread(context.store.schedules.create, fields)
         else:
             read = (values["etag"],) if "etag" in values else None
-            await in_thread(context.store.change_schedule, schedule_id, fields, read)
+            await in_thread(context.store.schedules.change, schedule_id, fields, read)
     except SpecError as error:
         for fault in error.faults:
             first = fault.where.split("/")[1] if fault.where else ""
@@ -160,7 +160,7 @@ async def _save(context: Context, work: Work, values: Values, schedule_id: str |
         faults["source"] = [str(error)]
     except ChangedMeanwhileError:
         # What was typed stays in the form; saved once more, it replaces what somebody else saved.
-        values = {**values, "etag": (await in_thread(context.store.get_schedule, schedule_id or "")).etag}
+        values = {**values, "etag": (await in_thread(context.store.schedules.get, schedule_id or "")).etag}
         faults[""] = [changed_meanwhile()]
         return await in_thread(_form, context, values, faults, schedule_id, status=412)
     if faults:
@@ -180,7 +180,7 @@ def _asked(context: Context, values: Values, schedule_id: str | None) -> tuple[d
     data = _data_of(context, values)
     if schedule_id is None:
         return data, None
-    old = context.store.get_schedule(schedule_id).fields
+    old = context.store.schedules.get(schedule_id).fields
     if data.get("at") == _values_of(old)["at"] and data.get("zone") == old.timing.zone:
         del data["at"]  # unchanged; the time may have passed
     if data["paused_until"] == (_values_of(old)["paused_until"] or None) and data.get("zone") == old.timing.zone:
@@ -211,7 +211,7 @@ def _data_of(context: Context, values: Mapping[str, str]) -> dict[str, Any]:
     data[when] = values.get(when, "").strip() or None
     kind, _, name = values.get("source", "").partition(" ")
     if kind == "study":
-        data["spec"] = accepted(context.store.spec(name), context.store.study(name))
+        data["spec"] = accepted(context.store.studies.spec(name), context.store.studies.study(name))
     elif kind == "preset" and name in preset_names():
         data["spec"] = preset_of(name)["spec"]
     return data
@@ -269,7 +269,7 @@ def _form(
     schedule_id: str | None = None,
     status: int = 200,
 ) -> Response:
-    studies = list(context.store.list_studies(page_size=_OFFERED).studies)
+    studies = list(context.store.studies.page(page_size=_OFFERED).studies)
     kind, _, chosen = values.get("source", "").partition(" ")
     if kind == "study" and chosen not in [study.id for study in studies]:
         studies += _known(context, chosen)
@@ -289,6 +289,6 @@ def _form(
 
 def _known(context: Context, study_id: str) -> list[Any]:
     try:
-        return [context.store.get_study(study_id)]
+        return [context.store.studies.get(study_id)]
     except StudyNotFoundError:
         return []

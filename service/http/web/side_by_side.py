@@ -84,7 +84,7 @@ def _line(name: str, unit: str, values: Sequence[Value | None]) -> Line:
 @router.get("/studies/{study_id:study}/explore/compare")
 def compare_cases(context: Ctx, request: Request, study_id: StudyId) -> Response:
     """The cases of the address side by side."""
-    study = context.store.study(study_id)
+    study = context.store.studies.study(study_id)
     faults: tuple[Fault, ...] = ()
     rows: list[CaseRow] = []
     missing: list[int] = []
@@ -107,5 +107,5 @@ def compare_cases(context: Ctx, request: Request, study_id: StudyId) -> Response
 
 def _rows(context: Context, study_id: str, cases: Sequence[int]) -> tuple[list[CaseRow], list[int]]:
     """Rows of the finished cases, and numbers of the others."""
-    found = {case: context.store.case_row(study_id, case) for case in cases}
+    found = {case: context.store.rows.case(study_id, case) for case in cases}
     return [row for row in found.values() if row is not None], [case for case, row in found.items() if row is None]

@@ -79,9 +79,9 @@ _EVENTS: Final = {
 
 def study_frame(context: Context, study_id: str) -> dict[str, Any]:
     """The common part of all pages about a study: the study as in the API, its actions, the related pages."""
-    (record, progress), study = context.store.look(study_id), context.store.study(study_id)
+    (record, progress), study = context.store.studies.look(study_id), context.store.studies.study(study_id)
     # Counting kinds takes time in proportion to the rows, so only the page that shows them does it.
-    spec, choice = context.store.spec(study_id), CHOICE.get()
+    spec, choice = context.store.studies.spec(study_id), CHOICE.get()
     shown = views.detail(record, progress, study, spec, Kinds({}, {}), ())
     varying = len(varying_axes(study))
     grid = study.combine == "grid" and varying > 1
@@ -105,7 +105,7 @@ def study_frame(context: Context, study_id: str) -> dict[str, Any]:
         "now": timestamp(datetime.now(UTC)),
         "choice": choice,
         "reading": reading_for(study, spec, choice),
-        "saved": (saved := context.store.saved_views(study_id)),
+        "saved": (saved := context.store.views.all(study_id)),
         "views_of": lambda part: saved_here(saved, part, study_id),
     }
 
@@ -135,9 +135,9 @@ async def shown_study(
     ``labels`` is what its form for name, notes and tags has, where somebody else changed them after it was shown, or
     with what is ``untaken`` of it.
     """
-    spec = await in_thread(context.store.spec, study_id)
+    spec = await in_thread(context.store.studies.spec, study_id)
     fits = (
-        await work.check(fits_of, spec, await in_thread(context.store.study, study_id))
+        await work.check(fits_of, spec, await in_thread(context.store.studies.study, study_id))
         if has_measured_clutch(spec)
         else {}
     )
@@ -152,7 +152,7 @@ async def shown_study(
 
 def _usual_curves(context: Context, study_id: str) -> tuple[CurveQuery | None, bool]:
     """The curves that are shown first, and whether reading the answers of the study takes long."""
-    study = context.store.study(study_id)
+    study = context.store.studies.study(study_id)
     usual = characteristic(study, models.study_results(study))
     return _with_rows(context, study, study_id, usual), study.cases > FEW // 2
 
@@ -165,17 +165,17 @@ def _study_page(
     usual: CurveQuery | None,
     extension: Mapping[str, Any],
 ) -> Response:
-    study = context.store.study(study_id)
+    study = context.store.studies.study(study_id)
     frame = study_frame(context, study_id)
     query = view.query or usual
-    first = context.store.case_row(study_id, 0) if query is None and study.cases == 1 else None
-    kinds = context.store.kinds(study_id)
+    first = context.store.rows.case(study_id, 0) if query is None and study.cases == 1 else None
+    kinds = context.store.rows.kinds(study_id)
     return page(
         "study.html",
         status=_status(view, extension),
         **frame,
         **extension,
-        origins=context.store.origins(study_id),
+        origins=context.store.rows.origins(study_id),
         tab="",
         shown=models.presentation_of(study),
         answers=view,
@@ -213,10 +213,10 @@ def _status(view: AnswersView, extension: Mapping[str, Any]) -> int:
 
 def _narrowed(context: Context, study: Study, study_id: str) -> int:
     """Cases of the sweep with smaller steps where the motion jumps; 0 where it cannot be run, or not yet."""
-    record = context.store.get_study(study_id)
+    record = context.store.studies.get(study_id)
     if record.done < record.cases:
         return 0
-    count = narrowed_cases(study, context.store.cases_of_kind(study_id, flag=models.JUMPED))
+    count = narrowed_cases(study, context.store.rows.cases_of_kind(study_id, flag=models.JUMPED))
     return count if count <= MAX_CASES else 0
 
 
@@ -300,14 +300,14 @@ def _main_figure(
 
 def _with_rows(context: Context, study: Study, study_id: str, query: CurveQuery | None) -> CurveQuery | None:
     """The same curves; where they have no finished case, the undrawn axes are held where there are finished cases."""
-    if query is None or not query.at or StudyState(context.store.get_study(study_id).state) is StudyState.FINISHED:
+    if query is None or not query.at or StudyState(context.store.studies.get(study_id).state) is StudyState.FINISHED:
         return query
     try:
         cases = [line.cases for line in select(study, models.study_results(study), query).lines]
     except SelectionError:
         return query
-    found = context.store.rows_for_cases(study_id, np.concatenate(cases), ())
-    done = context.store.case_rows(study_id, limit=1).cases
+    found = context.store.rows.for_cases(study_id, np.concatenate(cases), ())
+    done = context.store.rows.block(study_id, limit=1).cases
     if not {None, models.WorkerEnding.CANCELLED}.issuperset(found.endings) or not len(done):
         return query
     # Of a parameter with a tolerance, the axis has the nominal value.
@@ -319,14 +319,14 @@ def _with_rows(context: Context, study: Study, study_id: str, query: CurveQuery 
 @router.get("/studies/{study_id:study}/delete")
 def delete_page(context: Ctx, study_id: StudyId) -> Response:
     """The confirmation page for deleting a study, with everything that is deleted."""
-    record = context.store.get_study(study_id)
+    record = context.store.studies.get(study_id)
     return page("delete.html", study=views.summary(record), ended=record.over, days=context.settings.restore_days)
 
 
 @router.post("/studies/{study_id:study}/delete")
 def delete(context: Ctx, study_id: StudyId, at_once: bool = False) -> Response:
     """Delete the study and show the list of the remaining ones."""
-    context.store.delete_study(study_id, at_once=at_once)
+    context.store.studies.delete(study_id, at_once=at_once)
     return RedirectResponse("/" if at_once else f"/?done=delete&changed={study_id}", status_code=303)
 
 
@@ -340,7 +340,7 @@ async def run_longer(context: Ctx, work: Attended, study_id: StudyId, kind: str)
     """The button beside the count of a regime or a flag: submit a study of its cases with more time to settle."""
 
     def find() -> Mapping[str, int]:
-        study, kinds = context.store.study(study_id), context.store.kinds(study_id)
+        study, kinds = context.store.studies.study(study_id), context.store.rows.kinds(study_id)
         return kinds.regimes if models.is_settled(study.run) else _not_settled(kinds.flags)
 
     counts = await in_thread(find)
@@ -357,7 +357,7 @@ async def run_longer(context: Ctx, work: Attended, study_id: StudyId, kind: str)
 @router.post("/studies/{study_id:study}/narrow")
 async def narrow(context: Ctx, work: Attended, study_id: StudyId) -> Response:
     """The button beside the count of jumps: submit the sweep once more, with smaller steps there."""
-    now, revision = context.store.clock.now(), (await in_thread(context.store.get_study, study_id)).revision
+    now, revision = context.store.clock.now(), (await in_thread(context.store.studies.get, study_id)).revision
     made = await work.check(checks.narrowed_study, context.library, study_id, NARROW_STEPS, (), now, {})
     # Pressed twice, it submits one study.
     record = await in_thread(take_in, context.store, made, f"narrow-{study_id}-{revision}")
@@ -368,10 +368,10 @@ async def narrow(context: Ctx, work: Attended, study_id: StudyId) -> Response:
 def act(context: Ctx, study_id: StudyId, verb: str) -> Response:
     """A button of the page: perform the action and show the page again."""
     wishes = {
-        "pause": context.store.pause_study,
-        "resume": context.store.resume_study,
-        "cancel": context.store.cancel_study,
-        "retry": context.store.retry_study,
+        "pause": context.store.studies.pause,
+        "resume": context.store.studies.resume,
+        "cancel": context.store.studies.cancel,
+        "retry": context.store.studies.retry,
     }
     if verb not in wishes:
         raise ApiError("not-found", Sentence("Unknown action."))

@@ -118,7 +118,7 @@ def answers_view(
     library: Library, study_id: str, given: Sequence[tuple[str, str]], usual: CurveQuery | None, choice: Choice
 ) -> AnswersView:
     """The answers of a study as the page shows them; those of the ``usual`` curves where others cannot be shown."""
-    study, params = library.store.study(study_id), QueryParams(list(given))
+    study, params = library.store.studies.study(study_id), QueryParams(list(given))
     faults: tuple[Fault, ...] = ()
     reading = reading_of(library.store, study_id, choice)
     params = with_held(params, study, reading)

@@ -67,7 +67,7 @@ def _list(context: Context, given: QueryParams, refused: Sequence[tuple[str, str
     wanted, order = _asked(given)
     found = listed(context, given)
     own = {name: value for name in _OWN if (value := given.get(name))}
-    done, general = given.get("done", ""), context.store.general_views()
+    done, general = given.get("done", ""), context.store.views.general()
     return page(
         "index.html",
         status,
@@ -80,8 +80,8 @@ def _list(context: Context, given: QueryParams, refused: Sequence[tuple[str, str
         more=found.next_token,
         after=_after(given),
         states=list(StudyState),
-        tags=context.store.tags(),
-        owners=context.store.owners(),
+        tags=context.store.studies.tags(),
+        owners=context.store.studies.owners(),
         models=models.model_names(),
         actions=_actions(wanted, context.settings.restore_days),
         done=ACTIONS[done][1] if done in ACTIONS else "",
@@ -98,7 +98,7 @@ def _list(context: Context, given: QueryParams, refused: Sequence[tuple[str, str
 
 def listed(context: Context, given: QueryParams) -> StudyPage:
     """The studies that the page of an address lists. FaultError."""
-    return context.store.list_studies(_LISTED, _after(given), *_asked(given))
+    return context.store.studies.page(_LISTED, _after(given), *_asked(given))
 
 
 def _after(given: QueryParams) -> str | None:
@@ -159,14 +159,14 @@ def _action(context: Context, done: str, tags: str) -> Callable[[str], Any]:
     store = context.store
     match done:
         case "delete":
-            return store.delete_study
+            return store.studies.delete
         case "restore":
-            return store.restore_study
+            return store.studies.restore
         case "archive" | "unarchive":
             change = StudyChange(archived=done == "archive")
         case _:
             change = read_change({"add_tags" if done == "tag" else "remove_tags": tags_of(tags)})
-    return lambda study_id: store.change_study(study_id, change)
+    return lambda study_id: store.studies.change(study_id, change)
 
 
 def _changed(chosen: Iterable[str], act: Callable[[str], Any]) -> list[tuple[str, str]]:
@@ -189,7 +189,7 @@ async def change_labels(context: Ctx, work: Attended, study_id: StudyId, values:
     data["archived"] = "archived" in values
     read = (values["etag"],) if "etag" in values else None
     try:
-        await in_thread(context.store.change_study, study_id, read_change(data), read)
+        await in_thread(context.store.studies.change, study_id, read_change(data), read)
     except ChangedMeanwhileError:
         return await shown_study(context, work, study_id, labels=values)
     except SpecError as error:

@@ -49,7 +49,7 @@ async def cases_page(
 ) -> Response:
     """Cases with the selected results, sorted and filtered."""
     context = work.context
-    study = await in_thread(context.store.study, study_id)
+    study = await in_thread(context.store.studies.study, study_id)
     reading = await in_thread(reading_of, context.store, study_id, CHOICE.get())
     given = with_held(work.request.query_params, study, reading)
     at = tuple(
@@ -78,7 +78,7 @@ def _table(
     found: CasePage | None,
     faults: tuple[Any, ...],
 ) -> Response:
-    study, frame = context.store.study(study_id), study_frame(context, study_id)
+    study, frame = context.store.studies.study(study_id), study_frame(context, study_id)
     infos = models.study_results(study)
     names = [name for name in given.getlist("col") if result_of(infos, name)]
     usual = models.presentation_of(study).columns

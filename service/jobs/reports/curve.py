@@ -25,7 +25,7 @@ def small_curve(store: Store, study_id: str) -> bytes | None:
 
     Raises StudyNotFoundError, and SelectionError for curves that cannot be drawn.
     """
-    study = store.study(study_id)
+    study = store.studies.study(study_id)
     infos = models.study_results(study)
     chosen = next((figure for figure in chosen_figures(store, study_id, _AS_TYPED) if figure.shown is not None), None)
     if chosen is not None:
@@ -33,6 +33,6 @@ def small_curve(store: Store, study_id: str) -> bytes | None:
     query = main_query(study, infos)
     if query is None:
         return None
-    fetch = partial(store.rows_for_cases, study_id)
+    fetch = partial(store.rows.for_cases, study_id)
     drawn = draw(select(study, infos, replace(query, y=query.y[:1])), fetch)
-    return draw_curves(drawn, "", "png", reading_for(study, store.spec(study_id), _AS_TYPED))
+    return draw_curves(drawn, "", "png", reading_for(study, store.studies.spec(study_id), _AS_TYPED))

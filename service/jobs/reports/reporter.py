@@ -44,10 +44,10 @@ class Reporter(PollingThread):
 
     def look(self) -> None:
         """Send every report that is due to be sent, unless the database is a copy of the deployment."""
-        if self._store.is_copy():
+        if self._store.deployment.is_copy():
             return
         with act_as(Actor(Door.SERVICE, "reports", socket.gethostname())):
-            while not self._ending.is_set() and (report := self._store.claim_report()) is not None:
+            while not self._ending.is_set() and (report := self._store.reports.claim()) is not None:
                 self._send(report)
 
     def _send(self, report: Claimed) -> None:
@@ -65,7 +65,7 @@ class Reporter(PollingThread):
             _LOG.exception("The report %s cannot be made", report.id)
             self._failed(report, DeliveryError("The report cannot be made; the log says why."))
             return
-        self._store.report_sent(report)
+        self._store.reports.sent(report)
         _LOG.info("The report %s of the schedule %s was sent by %s.", report.id, report.schedule, report.channel)
 
     def _failed(self, report: Claimed, error: DeliveryError) -> None:
@@ -73,7 +73,7 @@ class Reporter(PollingThread):
         # Two to the power of twenty minutes is longer than any report is kept.
         pause = min(FIRST_PAUSE * 2 ** min(report.attempts - 1, 20), LONGEST_PAUSE)
         again = None if error.permanent or now + pause - report.created_at > GIVEN_UP_AFTER else now + pause
-        self._store.report_failed(report, str(error), again)
+        self._store.reports.failed(report, str(error), again)
         if again is None:
             _LOG.error("The report %s of the schedule %s is given up: %s", report.id, report.schedule, error)
         elif report.attempts == 1:

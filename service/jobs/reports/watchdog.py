@@ -17,7 +17,7 @@ from sprag.service.schedules.times import local_time, wall_clock
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from sprag.service.storage.late_runs import ExpectedRun
+    from sprag.service.storage.runs import ExpectedRun
     from sprag.service.storage.store import Store
 
 _LOG = logging.getLogger("sprag.watchdog")
@@ -40,13 +40,13 @@ class LateRun:
 def late_runs(store: Store) -> list[LateRun]:
     """Due times at which nothing has run although it should; raises StoreError."""
     now = store.clock.now()
-    expected = store.expected_runs(now - LATE)
+    expected = store.runs.expected(now - LATE)
     if not expected:
         return []
-    silence = store.silence()
+    silence = store.dispatchers.silence()
     silent = silence is None or silence > LATE.total_seconds()
-    stalled = not silent and not store.chunk_finished_since(now - STALLED)
-    off, found = store.is_copy(), []
+    stalled = not silent and not store.runs.chunk_finished_since(now - STALLED)
+    off, found = store.deployment.is_copy(), []
     for run in expected:
         why = Sentence(recorded.OFF) if off and run.study is None else _why(run, now, silent, stalled)
         if why is not None:
@@ -90,12 +90,12 @@ class Watchdog:
 
     def look(self) -> None:
         """One look, of which a copy of the deployment says nothing to anybody; raises StoreError."""
-        if self._store.is_copy():
+        if self._store.deployment.is_copy():
             return
         found = late_runs(self._store)
         known = {(late.run.id, late.run.due) for late in found}
         for late in found:
             if (late.run.id, late.run.due) not in self._known:
                 _LOG.error("The schedule %s is late. %s", late.run.id, late.sentence)
-                self._store.add_alarm(late.run, late.sentence)
+                self._store.runs.add_alarm(late.run, late.sentence)
         self._known = known

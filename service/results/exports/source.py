@@ -86,11 +86,11 @@ class StoredRows:
     study_id: str
 
     def __iter__(self) -> Iterator[RowBlock]:
-        before, cases = self.store.get_study(self.study_id), 0
-        for block in self.store.iter_rows(self.study_id):
+        before, cases = self.store.studies.get(self.study_id), 0
+        for block in self.store.rows.blocks(self.study_id):
             cases += int(np.count_nonzero(np.diff(block.cases, prepend=-1)))
             yield block
-        after = self.store.get_study(self.study_id)
+        after = self.store.studies.get(self.study_id)
         least = min(before.done, after.done)
         if cases < least or (before.revision == after.revision and cases != least):
             raise MissingRowsError(
@@ -101,8 +101,8 @@ class StoredRows:
 
 def stored(store: Store, record: StudyRecord, study: Study, units: str = SI, header: Header = "names") -> Source:
     """The rows of a study of the database; raises SelectionError for ``units`` that cannot be shown."""
-    store.require_undamaged(record.id, anew=True)
-    origins = store.origins(record.id)
+    store.digests.require_undamaged(record.id, anew=True)
+    origins = store.rows.origins(record.id)
     about: dict[str, Any] = {
         "study": record.id,
         "name": record.name,
@@ -110,9 +110,11 @@ def stored(store: Store, record: StudyRecord, study: Study, units: str = SI, hea
         "engine_version": record.engine_version,
         "computed_by": [asdict(origin) for origin in origins],
     }
-    if len({origin.fingerprint for origin in origins} - {None}) > 1 and (by := store.cases_by_fingerprint(record.id)):
+    if len({origin.fingerprint for origin in origins} - {None}) > 1 and (
+        by := store.rows.cases_by_fingerprint(record.id)
+    ):
         about["cases_by_fingerprint"] = [asdict(item) for item in by]
-    spec = store.spec(record.id)
+    spec = store.studies.spec(record.id)
     return Source(
         study,
         models.study_results(study),

@@ -139,34 +139,34 @@ def report_of(
     Raises StudyNotFoundError, SelectionError for curves, points and units that the study does not have, and
     DatabaseError where its rows are not those that were stored.
     """
-    store.require_undamaged(study_id, anew=True)
-    record, progress = store.look(study_id)
-    spec, study = store.spec(study_id), store.study(study_id)
+    store.digests.require_undamaged(study_id, anew=True)
+    record, progress = store.studies.look(study_id)
+    spec, study = store.studies.spec(study_id), store.studies.study(study_id)
     report = make_report(
         record,
         study,
         progress.endings,
         StoredRows(store, study_id),
-        partial(store.rows_for_cases, study_id),
+        partial(store.rows.for_cases, study_id),
         spec,
-        store.kinds(study_id),
+        store.rows.kinds(study_id),
         reading_for(study, spec, choice),
         chosen,
         chosen_figures(store, study_id, choice) if saved else (),
         point,
     )
-    origins = "; ".join(origin.sentence for origin in store.origins(study_id))
+    origins = "; ".join(origin.sentence for origin in store.rows.origins(study_id))
     report = replace(report, facts=(*report.facts, (_("computed by"), origins or _("no host yet"))))
     if progress.rounds is None:
         return report
-    rows = partial(store.rows_for_cases, study_id)
+    rows = partial(store.rows.for_cases, study_id)
     return replace(
         report,
         facts=(
             *report.facts,
             (_("rounds"), report.reading.say(sentence(progress.rounds, record.state, goal_units(study)))),
         ),
-        calibration=calibration_part(study, store.rounds(study_id), rows),
+        calibration=calibration_part(study, store.studies.rounds(study_id), rows),
     )
 
 

@@ -73,12 +73,12 @@ def known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Sto
         from sprag.service.actor import Role
 
         for name in ("dora", "ada"):
-            store.add_user(name, Role.DESIGNER)
+            store.people.add_user(name, Role.DESIGNER)
         record = create(store)
         finish(store, record)
         with store.session.write() as connection:
             connection.exec_driver_sql("UPDATE studies SET finished_at = finished_at - 172800000000")
-        token = store.create_token("old", TokenScope.READ)[1].id
+        token = store.people.create_token("old", TokenScope.READ)[1].id
         words = {"SPEC": str(tmp_path / "spec.json"), "BENCH": str(tmp_path / "bench.json"), "TOKEN": token}
         yield store, {**words, "DB": str(tmp_path / "known.sqlite3")}
 
@@ -103,11 +103,11 @@ def test_every_command_on_a_database_is_in_one_of_the_lists() -> None:
 @pytest.mark.parametrize("command", CHANGING)
 def test_every_change_by_a_command_is_in_the_log(known: tuple[Store, dict[str, str]], command: str) -> None:
     store, words = known
-    before = [row.number for row in store.audit_rows(AuditFilter())]
+    before = [row.number for row in store.audit.rows(AuditFilter())]
     actions, arguments = CHANGING[command]
     given = [words.get(word, word) for word in arguments.split()]
     assert execute([*command.split(), *given, "--db", words["DB"]]) in (0, 130)
-    rows = [row for row in store.audit_rows(AuditFilter()) if row.number not in before]
+    rows = [row for row in store.audit.rows(AuditFilter()) if row.number not in before]
     assert [row.action for row in rows] == actions
     assert {(row.door, row.actor, row.address) for row in rows} == {
         ("command", getpass.getuser(), socket.gethostname())
@@ -116,7 +116,7 @@ def test_every_change_by_a_command_is_in_the_log(known: tuple[Store, dict[str, s
 
 def test_commands_that_read_leave_no_row(known: tuple[Store, dict[str, str]], tmp_path: Path) -> None:
     store, words = known
-    before = list(store.audit_rows(AuditFilter()))
+    before = list(store.audit.rows(AuditFilter()))
     backup = str(tmp_path / "copy.sqlite3")
     for command in (
         "token list",
@@ -127,7 +127,7 @@ def test_commands_that_read_leave_no_row(known: tuple[Store, dict[str, str]], tm
         "db prune --older-than 9",
     ):
         assert execute([*command.split(), "--db", words["DB"]]) == 0, command
-    assert list(store.audit_rows(AuditFilter())) == before
+    assert list(store.audit.rows(AuditFilter())) == before
 
 
 def test_an_upgrade_is_in_the_log_of_the_new_revision(tmp_path: Path) -> None:
@@ -137,12 +137,12 @@ def test_an_upgrade_is_in_the_log_of_the_new_revision(tmp_path: Path) -> None:
     connection.close()
     assert execute(["db", "upgrade", "--db", str(database)]) == 0
     with Store.open(f"sqlite:///{database}") as store:
-        (row,) = store.audit_rows(AuditFilter())
+        (row,) = store.audit.rows(AuditFilter())
         assert (row.action, row.door, row.detail["before"]) == ("database.upgrade", "command", "0020")
-        assert {study.owner for study in store.list_studies().studies} == {None}
+        assert {study.owner for study in store.studies.page().studies} == {None}
     assert execute(["db", "upgrade", "--db", str(database)]) == 0
     with Store.open(f"sqlite:///{database}") as store:
-        assert len(list(store.audit_rows(AuditFilter()))) == 1
+        assert len(list(store.audit.rows(AuditFilter()))) == 1
 
 
 def test_users_are_listed_and_wrong_ones_refused(

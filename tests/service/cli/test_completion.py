@@ -82,9 +82,9 @@ def test_schedules_tokens_and_users_are_completed(
         return context
 
     kept = service.http.post("/api/v1/schedules", json={"spec": spec, "cron": "@daily", "name": "nightly"}).json()
-    _, token = service.store.create_token("laptop", TokenScope.READ)
-    service.store.revoke_token(service.store.create_token("old", TokenScope.READ)[1].id)
-    service.store.add_user("dora", Role.VIEWER)
+    _, token = service.store.people.create_token("laptop", TokenScope.READ)
+    service.store.people.revoke_token(service.store.people.create_token("old", TokenScope.READ)[1].id)
+    service.store.people.add_user("dora", Role.VIEWER)
     own = given(db=settings.database)
     assert completion.tokens(own, "") == [(token.id, "laptop, read")]
     assert ("laptop", token.id) in completion.tokens(own, "la")
@@ -92,7 +92,7 @@ def test_schedules_tokens_and_users_are_completed(
     none = tmp_path / "none.sqlite3"
     assert completion.users(given(db=str(none))) == []
     assert not none.exists()
-    secret, _ = service.store.create_token("", TokenScope.READ)
+    secret, _ = service.store.people.create_token("", TokenScope.READ)
     with served(service.app) as address:
         context = given(server=address, token=secret)
         assert completion.schedules(context, "") == [(kept["id"], "nightly, @daily")]

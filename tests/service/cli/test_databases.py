@@ -189,7 +189,7 @@ def test_copies_of_a_database_name_rows_that_changed_on_the_disk(
     database, target = tmp_path / "here.sqlite3", tmp_path / "there.sqlite3"
     with Store.open(f"sqlite:///{database}") as store:
         record = create(store, 25)
-        last = max(chunk.count for chunk in store.open_chunks(record.number)) - 1
+        last = max(chunk.count for chunk in store.work.open_chunks(record.number)) - 1
         finish(store, record)
     connection = sqlite3.connect(database)
     name = results_table("vibration-drive", "1").name
@@ -200,5 +200,5 @@ def test_copies_of_a_database_name_rows_that_changed_on_the_disk(
     told = capsys.readouterr()
     assert f"the rows of the study {record.id}, cases 0 to {last}, are not those that were stored" in told.err
     with Store.open(f"sqlite:///{target}") as store:
-        assert store.case_rows(record.id).cases.size == 25
-        assert [item.study for item in store.all_damaged_rows()] == [record.id]
+        assert store.rows.block(record.id).cases.size == 25
+        assert [item.study for item in store.digests.all_damaged_rows()] == [record.id]

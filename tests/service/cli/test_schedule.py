@@ -78,9 +78,9 @@ def test_what_is_wrong_is_told_by_field(run: Run, spec_file: str) -> None:
 def test_the_last_night_is_a_table_and_an_exit_code(run: Run, service: Service, spec_file: str) -> None:
     assert run("night")[0] == 0
     name = run("add", spec_file, "--cron", "* * * * *", "--misfire-grace", "1 s", "--name", "odd")[1].strip()
-    record = service.store.get_schedule(name)
+    record = service.store.schedules.get(name)
     now = service.store.clock.now()
-    assert service.store.take_due(record, [DueTime(now - timedelta(hours=1), too_late=True)], None, now)
+    assert service.store.runs.take_due(record, [DueTime(now - timedelta(hours=1), too_late=True)], None, now)
     code, out, _ = run("night", "--hours", "2")
     assert code == 1
     assert "Missed: No worker was running" in out.replace("\n", " ")
@@ -131,7 +131,7 @@ def test_the_list_of_a_copied_database_says_that_its_schedules_are_off(
     assert run("add", spec_file, "--cron", "@daily")[0] == 0
     assert "is a copy" not in run("list")[2]
     assert (run("night")[0], "is a copy" in run("night")[2]) == (0, False)
-    monkeypatch.setattr(service.store, "is_copy", lambda: True)
+    monkeypatch.setattr(service.store.deployment, "is_copy", lambda: True)
     assert "This database is a copy, or was moved: its schedules are off" in run("list")[2]
     assert "This database is a copy" in json.loads(run("list", "--json")[1])["off"]
     assert run("night")[0] == 1

@@ -12,9 +12,9 @@ import pytest
 from sprag.service import languages
 from sprag.service.actor import Role
 from sprag.service.cli.app import execute
+from sprag.service.storage.people import digest_of
 from sprag.service.storage.scopes import TokenScope
 from sprag.service.storage.store import Store
-from sprag.service.storage.tokens import digest_of
 
 if TYPE_CHECKING:
     from sprag.service.settings import Settings
@@ -32,7 +32,7 @@ def test_tokens_are_created_listed_and_revoked(settings: Settings, capsys: pytes
     secret = out.strip()
     assert "the office, read" in err
     with Store.open(settings.database_url) as store:
-        (record,) = store.tokens()
+        (record,) = store.people.tokens()
     assert record.digest == digest_of(secret.encode())
     found: dict[str, Any] = json.loads(run("list", "--json", *db)[1])
     assert [(t["id"], t["name"], t["scope"], t["revoked_at"]) for t in found["tokens"]] == [
@@ -55,16 +55,16 @@ def test_tokens_are_created_listed_and_revoked(settings: Settings, capsys: pytes
 def test_the_list_marks_every_token_that_lets_nobody_in(settings: Settings, sprag: Callable[..., Any]) -> None:
     with Store.open(settings.database_url) as store:
         for name in ("dora", "emil"):
-            store.add_user(name, Role.DESIGNER)
+            store.people.add_user(name, Role.DESIGNER)
         now = store.clock.now()
         made = {
-            "valid": store.create_token("a", TokenScope.WRITE, owner="dora", expires_at=now + timedelta(days=1)),
-            "expired": store.create_token("b", TokenScope.READ, expires_at=now - timedelta(seconds=1)),
-            "user-removed": store.create_token("c", TokenScope.WRITE, owner="emil"),
-            "revoked": store.create_token("d", TokenScope.WRITE, owner="emil", expires_at=now),
+            "valid": store.people.create_token("a", TokenScope.WRITE, owner="dora", expires_at=now + timedelta(days=1)),
+            "expired": store.people.create_token("b", TokenScope.READ, expires_at=now - timedelta(seconds=1)),
+            "user-removed": store.people.create_token("c", TokenScope.WRITE, owner="emil"),
+            "revoked": store.people.create_token("d", TokenScope.WRITE, owner="emil", expires_at=now),
         }
-        store.revoke_token(made["revoked"][1].id)
-        store.change_user("emil", removed=True)
+        store.people.revoke_token(made["revoked"][1].id)
+        store.people.change_user("emil", removed=True)
     db = ("--db", settings.database)
     listed = sprag("token", "list", "--json", *db).data["tokens"]
     assert {token["id"]: token["state"] for token in listed} == {

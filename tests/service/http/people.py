@@ -33,7 +33,7 @@ class Office:
         self.ids: dict[str, str] = {}
         with act_as(of_machine(Door.COMMAND)):
             for role, name in NAMES.items():
-                self.store.add_user(name, role)
+                self.store.people.add_user(name, role)
                 self.add_token(name)
         self.app: FastAPI = create_app(
             settings.model_copy(update=more), store=service.store, computer=service.computer, checker=service.checker
@@ -42,7 +42,7 @@ class Office:
 
     def add_token(self, name: str) -> None:
         """Give a user a token."""
-        self.tokens[name], record = self.store.create_token(f"of {name}", TokenScope.WRITE, owner=name)
+        self.tokens[name], record = self.store.people.create_token(f"of {name}", TokenScope.WRITE, owner=name)
         self.ids[name] = record.id
 
     def program(self, name: str | None) -> httpx.Client:

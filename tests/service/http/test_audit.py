@@ -229,7 +229,7 @@ def test_every_change_is_in_the_log(office: Office, service: Service, route: str
     action, change = CHANGES[route]
     answer = change(walk)
     assert answer.status_code < 400, answer.text
-    (entry, *_) = office.store.audit_log(AuditFilter()).records
+    (entry, *_) = office.store.audit.page(AuditFilter()).records
     door = Door.API if API in route else Door.PAGE
     assert (entry.action, entry.door, entry.actor) == (action, door, "dora")
     assert (entry.address, entry.token) == ("127.0.0.1", office.ids["dora"])
@@ -243,14 +243,14 @@ def test_what_is_refused_or_changes_nothing_is_not_in_it(office: Office, service
     walk = Walk(office, service)
     held, sent = walk.held(), {"Idempotency-Key": "once"}
     first = walk.post(f"{API}/studies", json=SPEC, headers=sent)
-    before = office.store.audit_log(AuditFilter()).records
+    before = office.store.audit.page(AuditFilter()).records
     assert walk.post(f"{API}/studies/{held}:pause").status_code == 202
     assert walk.http.delete(f"{API}/studies/{held}").status_code == 409
     assert walk.post(f"{API}/studies", json=SPEC, headers=sent).json()["id"] == first.json()["id"]
     assert walk.post(f"{API}/studies:preview", json=SPEC).status_code == 200
     assert walk.post(f"{API}/studies", json={}).status_code == 422
     assert office.program("vera").post(f"{API}/studies/{held}:resume").status_code == 403
-    assert office.store.audit_log(AuditFilter()).records == before
+    assert office.store.audit.page(AuditFilter()).records == before
 
 
 def test_where_nobody_logs_in_the_log_has_the_address(service: Service) -> None:

@@ -10,10 +10,10 @@ from tests.service.conftest import Service
 
 def test_a_machine_without_a_motion_has_no_link_but_a_sentence(service: Service) -> None:
     study_id = service.submit(load_spec(preset_text("press")[1], "toml"))
-    study, record = service.store.study(study_id), service.store.get_study(study_id)
-    epoch = service.store.take_over("test")
-    for chunk in service.store.claim(epoch, service.store.open_chunks(record.number)):
-        assert service.store.commit(epoch, chunk, models.run_chunk(study, chunk.first, chunk.count))
+    study, record = service.store.studies.study(study_id), service.store.studies.get(study_id)
+    epoch = service.store.work.take_over("test")
+    for chunk in service.store.work.claim(epoch, service.store.work.open_chunks(record.number)):
+        assert service.store.work.commit(epoch, chunk, models.run_chunk(study, chunk.first, chunk.count))
     found = service.get(f"/studies/{study_id}/cases", page_size=100)["cases"]
     endings = {row["ending"]: row["case"] for row in found}
     assert set(endings) == {"ok", "inertia_insufficient"}

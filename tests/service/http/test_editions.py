@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import pytest
 
     from sprag.service.schedules.fields import ScheduleFields
-    from sprag.service.storage.schedule_runs import ScheduleRecord
+    from sprag.service.storage.runs import ScheduleRecord
 
 
 def _ended(service: Service) -> str:
@@ -91,7 +91,7 @@ def test_views_schedules_and_components_are_edited_alike(service: Service) -> No
 def test_two_changes_of_a_schedule_at_once_both_count(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fields that a change leaves out are those of the other change, not those that were read before it."""
     night = service.http.post(f"{API}/schedules", json={"spec": SPEC, "cron": "@daily"}).json()
-    address, change = f"{API}/schedules/{night['id']}", service.store.change_schedule
+    address, change = f"{API}/schedules/{night['id']}", service.store.schedules.change
     others = iter([{"priority": 7}])
 
     def after_another(schedule_id: str, fields: ScheduleFields, *read: Any) -> ScheduleRecord:
@@ -99,7 +99,7 @@ def test_two_changes_of_a_schedule_at_once_both_count(service: Service, monkeypa
             assert service.http.patch(address, json=other).status_code == 200
         return change(schedule_id, fields, *read)
 
-    monkeypatch.setattr(service.store, "change_schedule", after_another)
+    monkeypatch.setattr(service.store.schedules, "change", after_another)
     assert service.http.patch(address, json={"name": "nightly"}).status_code == 200
     now = service.http.get(address).json()
     assert (now["name"], now["priority"]) == ("nightly", 7)

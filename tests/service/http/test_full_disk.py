@@ -17,7 +17,7 @@ import pytest
 from sprag.service.formats import FORMATS
 from sprag.service.http.api import curves
 from sprag.service.results.exports import netcdf
-from sprag.service.storage.store import Store
+from sprag.service.storage.cases import Rows
 from tests.service.conftest import API, Service
 from tests.serving import served
 
@@ -36,8 +36,8 @@ def ended(service: Service, spec: dict[str, Any]) -> str:
 
 @pytest.fixture(autouse=True)
 def _small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    rows = Store.iter_rows
-    monkeypatch.setattr(Store, "iter_rows", lambda self, study_id, block=2: rows(self, study_id, block))
+    blocks = Rows.blocks
+    monkeypatch.setattr(Rows, "blocks", lambda self, study_id, size=2: blocks(self, study_id, size))
 
 
 @contextmanager
@@ -59,7 +59,7 @@ def ask(service: Service, study_id: str, form: str) -> httpx.Response:
 @pytest.mark.parametrize("form", FORMATS)
 def test_all_rows_or_a_refusal_wherever_the_disk_ends(service: Service, ended: str, form: str) -> None:
     random = Random(form)
-    other = service.submit({**service.store.spec(ended), "name": "whole"})
+    other = service.submit({**service.store.studies.spec(ended), "name": "whole"})
     service.fill(other)
     size = len(ask(service, other, form).content)
     whole = None
@@ -119,11 +119,11 @@ def test_a_grid_is_smaller_than_the_room_it_asks_for(
 def test_rows_that_are_not_read_are_missed(
     service: Service, ended: str, form: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    read = Store.case_rows
+    read = Rows.block
     with monkeypatch.context() as patch:
         # Rows that the database lost: the third block is the last one.
         patch.setattr(
-            Store, "case_rows", lambda self, study, after, limit: read(self, study, after if after < 5 else 99, limit)
+            Rows, "block", lambda self, study, after, limit: read(self, study, after if after < 5 else 99, limit)
         )
         assert ask(service, ended, form).status_code == 503
         patch.setattr(curves, "_AT_ONCE", 0)  # as a large study, which is sent while it is read

@@ -46,7 +46,7 @@ def test_queue_endings_and_cases_are_counted(service: Service) -> None:
     assert value(found, "sprag_reused_cases") == 0
     assert value(found, "sprag_cases_per_second") > 0
     assert value(found, "sprag_worker_heartbeat_age_seconds") >= 0
-    service.store.delete_study(first)
+    service.store.studies.delete(first)
     assert value(samples(service), "sprag_cases_done_total") == 9
 
 
@@ -55,7 +55,7 @@ def test_the_time_of_cases_falls_into_its_buckets(service: Service, monkeypatch:
 
     now = service.store.clock.now()
     work = [FinishedWork(now, 1.0, 10), FinishedWork(now, 4.0, 2)]  # 0.1 s and 2 s each
-    monkeypatch.setattr(service.store, "finished_since", lambda _: work)
+    monkeypatch.setattr(service.store.figures.current, "finished_since", lambda _: work)
     found = samples(service)
     buckets = {s.labels["le"]: s.value for s in found if s.name == "sprag_case_seconds_bucket"}
     assert (buckets["0.03"], buckets["0.1"], buckets["1.0"], buckets["3.0"], buckets["+Inf"]) == (0, 10, 10, 12, 12)

@@ -38,7 +38,7 @@ STREAMS = 50
 def tokens(service: Service) -> dict[str, str]:
     """Secrets of three readers and a writer; the service's client is the writer."""
     scopes = {**dict.fromkeys(("one", "other", "third"), TokenScope.READ), "writer": TokenScope.WRITE}
-    secrets = {name: service.store.create_token(name, scope)[0] for name, scope in scopes.items()}
+    secrets = {name: service.store.people.create_token(name, scope)[0] for name, scope in scopes.items()}
     service.http.headers["Authorization"] = f"Bearer {secrets['writer']}"
     return secrets
 
@@ -393,7 +393,7 @@ def test_whether_the_process_answers_is_asked_of_nobody(
     def refuse(*_: object) -> None:
         raise AssertionError("/livez asks the database")
 
-    monkeypatch.setattr(service.store, "tokens", refuse)
+    monkeypatch.setattr(service.store.people, "tokens", refuse)
     monkeypatch.setattr(service.app.state.access, "_read_at", None)
     assert service.http.get("/livez").status_code == 200
     assert portal.call(threads_taken) == 0
@@ -402,14 +402,14 @@ def test_whether_the_process_answers_is_asked_of_nobody(
 def test_tokens_are_read_once_for_all_who_wait(
     service: Service, ended: str, tokens: dict[str, str], portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    read, go_on, reads = service.store.tokens, threading.Event(), list[int]()
+    read, go_on, reads = service.store.people.tokens, threading.Event(), list[int]()
 
     def slowly() -> Any:
         reads.append(1)
         assert go_on.wait(600)
         return read()
 
-    monkeypatch.setattr(service.store, "tokens", slowly)
+    monkeypatch.setattr(service.store.people, "tokens", slowly)
     monkeypatch.setattr(service.app.state.access, "_read_at", None)
 
     async def many() -> None:
@@ -427,8 +427,8 @@ def test_one_look_serves_all_streams_of_a_study(
     service: Service, tokens: dict[str, str], portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study_id, seen = service.submit(), list[str]()
-    look = service.store.look
-    monkeypatch.setattr(service.store, "look", lambda *args: seen.append(study_id) or look(*args))
+    look = service.store.studies.look
+    monkeypatch.setattr(service.store.studies, "look", lambda *args: seen.append(study_id) or look(*args))
 
     async def follow() -> None:
         go_on = anyio.Event()
@@ -466,8 +466,8 @@ def test_opening_streams_takes_no_thread_of_readers(
 
         return call
 
-    for name in ("get_study", "list_schedules"):
-        monkeypatch.setattr(service.store, name, slowly(getattr(service.store, name)))
+    for part, name in ((service.store.studies, "get"), (service.store.schedules, "all")):
+        monkeypatch.setattr(part, name, slowly(getattr(part, name)))
 
     async def open_many() -> None:
         paths = (f"{API}/studies/{study_id}/events", "/live/schedules")

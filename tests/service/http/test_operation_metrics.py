@@ -109,8 +109,8 @@ def test_a_service_without_backups_says_nothing_of_them(service: Service) -> Non
 def test_every_executor_reports_its_workers(service: Service) -> None:
     assert not [s for s in samples(service) if "executor" in s.labels]
     team = [WorkerReport("tls://a:1", "a", usable=True, threads=2), WorkerReport("tls://b:1", "b", usable=False)]
-    epoch = service.store.take_over("head:7")
-    service.store.heartbeat(epoch, fakes.report(*team, shortage="No worker."))
+    epoch = service.store.work.take_over("head:7")
+    service.store.work.heartbeat(epoch, fakes.report(*team, shortage="No worker."))
     found = samples(service)
     assert value(found, "sprag_workers", executor="dask", host="a", state="usable") == 1
     assert value(found, "sprag_workers", executor="dask", host="b", state="usable") == 0
@@ -118,7 +118,7 @@ def test_every_executor_reports_its_workers(service: Service) -> None:
     assert value(found, "sprag_idle_threads", executor="dask", host="a") == 2
     assert value(found, "sprag_executor_chunks_in_flight", executor="dask") == 0
     assert value(found, "sprag_executor_shortage", executor="dask") == 1
-    service.store.heartbeat(epoch, fakes.report(*team))
+    service.store.work.heartbeat(epoch, fakes.report(*team))
     assert value(samples(service), "sprag_executor_shortage", executor="dask") == 0
 
 
@@ -175,7 +175,9 @@ def test_every_metric_of_the_dashboard_and_of_the_rules_exists_and_every_metric_
 ) -> None:
     service = backed_up
     (tmp_path / "backups" / "sprag-20260101T023000Z.sqlite3").write_bytes(b"x")
-    service.store.heartbeat(service.store.take_over("head:7"), fakes.report(WorkerReport("a", "a", usable=True)))
+    service.store.work.heartbeat(
+        service.store.work.take_over("head:7"), fakes.report(WorkerReport("a", "a", usable=True))
+    )
     text = service.http.get("/metrics").text
     families = set(re.findall(r"^# TYPE (\w+) ", text, re.MULTILINE))
     names = {s.name for s in samples(service)} | families

@@ -98,7 +98,7 @@ def test_every_address_of_every_page_has_the_prefix(below: tuple[Service, OnlyBe
         file, text = preset_text(name)
         spec = load_spec(text, "toml" if file.endswith("toml") else "json")
         study = service.submit(spec)
-        if service.store.get_study(study).cases <= 400:
+        if service.store.studies.get(study).cases <= 400:
             service.fill(study)
     schedule = {"spec": json.loads(preset_text("one_pendulum")[1]), "cron": "0 22 * * *"}
     assert service.http.post("/api/v1/schedules", json=schedule).status_code == 201

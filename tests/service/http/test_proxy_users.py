@@ -57,7 +57,7 @@ def test_a_page_of_another_site_cannot_use_the_proxys_login(make: Callable[..., 
     for headers in ({}, {"Sec-Fetch-Site": "cross-site"}, {"Origin": "http://evil.example"}):
         answer = office.behind_proxy(**{HEADER: "dora", **headers}).post(STUDIES, json=SPEC)
         assert (answer.status_code, answer.json()["type"]) == (403, "/problems/cross-site"), headers
-    assert office.store.list_studies().studies == ()
+    assert office.store.studies.page().studies == ()
 
 
 def test_users_whom_nobody_listed(make: Callable[..., Office]) -> None:
@@ -83,5 +83,5 @@ def test_they_get_the_role_of_the_setting(
     stranger.headers = httpx.Headers([*stranger.headers.raw, (HEADER.encode(), "Jürgen".encode())])
     assert stranger.get("/api/v1/me").json()["role"] == "designer"
     assert stranger.post(STUDIES, json=SPEC).json()["owner"] == "Jürgen"
-    office.store.change_user("dora", removed=True)
+    office.store.people.change_user("dora", removed=True)
     assert office.behind_proxy(**{HEADER: "dora"}).get("/api/v1/me").status_code == 403

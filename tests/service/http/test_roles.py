@@ -97,7 +97,7 @@ def test_a_route_without_a_declared_role_is_for_administrators(connect: Callable
 
 def test_what_belongs_to_somebody_is_theirs_and_the_administrators(office: Office, service: Service) -> None:
     dora, ada = office.program("dora"), office.program("ada")
-    office.store.add_user("emil", Role.DESIGNER)
+    office.store.people.add_user("emil", Role.DESIGNER)
     office.add_token("emil")
     emil = office.program("emil")
     made = dora.post(STUDIES, json=SPEC).json()
@@ -111,7 +111,7 @@ def test_what_belongs_to_somebody_is_theirs_and_the_administrators(office: Offic
     assert emil.get(address).json()["owner"] == "dora"
     assert dora.post(f"{address}:pause").status_code == 202
     assert ada.post(f"{address}:cancel").status_code == 202
-    service.store.settle(service.store.take_over("test"), 1)
+    service.store.work.settle(service.store.work.take_over("test"), 1)
     assert emil.post(f"{address}:retry").status_code == 403
     assert emil.delete(address).status_code == 403
     night = dora.post("/api/v1/schedules", json={"spec": SPEC, "cron": "0 22 * * *"}).json()
@@ -122,13 +122,13 @@ def test_what_belongs_to_somebody_is_theirs_and_the_administrators(office: Offic
     assert emil.post(f"/schedules/{night['id']}/delete", headers=OWN).status_code == 403
     assert ada.patch(schedule, json={"enabled": False}).json()["owner"] == "dora"
     assert dora.delete(schedule).status_code == 204
-    assert office.store.hand_over("dora", "emil") == (1, 0)
+    assert office.store.people.hand_over("dora", "emil") == (1, 0)
     assert emil.delete(address).status_code == 204
 
 
 def test_tokens_of_nobody_change_what_is_nobodys_as_before(office: Office) -> None:
     """A database of before users: its write tokens go on as they did, and govern nobody."""
-    secret, _ = office.store.create_token("old", TokenScope.WRITE)
+    secret, _ = office.store.people.create_token("old", TokenScope.WRITE)
     office.tokens["old"] = secret
     old = office.program("old")
     made = old.post(STUDIES, json=SPEC).json()
@@ -154,27 +154,27 @@ def test_role_removal_and_expiry_take_effect_at_once(office: Office, monkeypatch
         "quota": {"cases": 0, "most_cases": None, "bytes": 0, "most_bytes": None, "most_checks": None},
     }
     for name in ("dora", ""):
-        text, record = office.store.create_token(name, TokenScope.WRITE, owner="dora")
+        text, record = office.store.people.create_token(name, TokenScope.WRITE, owner="dora")
         me = browser.get("/api/v1/me", headers={"Authorization": f"Bearer {text}"}).json()
         assert me["token"] == (name or record.id)
-    office.store.change_user("dora", Role.VIEWER)
+    office.store.people.change_user("dora", Role.VIEWER)
     refused = dora.post(STUDIES, json=SPEC).json()
     assert refused["type"] == "/problems/read-only"
     assert "role viewer" in refused["detail"]
     assert "token" not in refused["title"] + refused["detail"]
-    office.store.change_user("dora", removed=True)
+    office.store.people.change_user("dora", removed=True)
     assert dora.get("/api/v1/me").status_code == 401
     assert browser.get("/schedules").status_code == 401
-    office.store.change_user("dora", removed=False)
+    office.store.people.change_user("dora", removed=False)
     assert dora.get("/api/v1/me").json()["role"] == "viewer"
     assert [user["name"] for user in ada.get("/api/v1/users").json()["users"]] == ["ada", "dora", "vera"]
-    secret, _ = office.store.create_token("short", TokenScope.WRITE, expires_at=office.store.clock.now())
+    secret, _ = office.store.people.create_token("short", TokenScope.WRITE, expires_at=office.store.clock.now())
     office.tokens["short"] = secret
     assert office.program("short").get("/api/v1/me").status_code == 401
 
 
 def test_a_reading_token_of_an_administrator_only_reads(office: Office) -> None:
-    office.tokens["screen"], _ = office.store.create_token("screen", TokenScope.READ, owner="ada")
+    office.tokens["screen"], _ = office.store.people.create_token("screen", TokenScope.READ, owner="ada")
     screen = office.program("screen")
     me = screen.get("/api/v1/me").json()
     assert (me["user"], me["scope"], me["role"]) == ("ada", "read", "viewer")

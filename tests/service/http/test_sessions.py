@@ -34,8 +34,8 @@ class Office:
 
     def __init__(self, settings: Settings, service: Service, connect: Callable[..., httpx.Client]) -> None:
         self.store = service.store
-        self.write, self.writer = self.store.create_token("designer", TokenScope.WRITE)
-        self.read, self.reader = self.store.create_token("manager", TokenScope.READ)
+        self.write, self.writer = self.store.people.create_token("designer", TokenScope.WRITE)
+        self.read, self.reader = self.store.people.create_token("manager", TokenScope.READ)
         self.app = create_app(
             settings.model_copy(update={"host": "0.0.0.0"}),
             store=service.store,
@@ -88,26 +88,26 @@ def test_a_revoked_token_is_worthless_and_the_service_stays_shut(
     assert browser.post("/login", data={"token": office.write}).status_code == 303
     assert browser.get("/").status_code == 200
     for record in (office.writer, office.reader):
-        assert office.store.revoke_token(record.id).revoked_at is not None
+        assert office.store.people.revoke_token(record.id).revoked_at is not None
     monkeypatch.setattr(access, "BELIEVED_SECONDS", 0.0)
     assert client.get("/api/v1/studies").status_code == 401
     assert browser.get("/").status_code == 303
     with pytest.raises(TokenNotFoundError):
-        office.store.revoke_token("tk_0")
+        office.store.people.revoke_token("tk_0")
 
 
 def test_whoever_has_a_token_is_told_why_it_lets_nobody_in(office: Office, monkeypatch: pytest.MonkeyPatch) -> None:
     """By programs, at the login, and by a browser whose session ends with its token; others are told nothing."""
     monkeypatch.setattr(access, "BELIEVED_SECONDS", 0.0)
     store, browser = office.store, office.browser(**OWN)
-    store.add_user("dora", Role.DESIGNER)
+    store.people.add_user("dora", Role.DESIGNER)
     soon = store.clock.now() + timedelta(days=1)
-    of_dora, dora = store.create_token("laptop", TokenScope.WRITE, owner="dora", expires_at=soon)
-    old, expired = store.create_token("old", TokenScope.READ, expires_at=store.clock.now())
+    of_dora, dora = store.people.create_token("laptop", TokenScope.WRITE, owner="dora", expires_at=soon)
+    old, expired = store.people.create_token("old", TokenScope.READ, expires_at=store.clock.now())
     assert browser.post("/login", data={"token": of_dora}).status_code == 303
     assert browser.get("/").status_code == 200
-    store.revoke_token(office.reader.id)
-    store.change_user("dora", removed=True)
+    store.people.revoke_token(office.reader.id)
+    store.people.change_user("dora", removed=True)
     assert expired.expires_at is not None
     time_of = expired.expires_at.strftime("%Y-%m-%dT%H:%M:%SZ")
     sentences = {
@@ -137,10 +137,10 @@ def test_a_service_of_this_machine_needs_a_token_as_soon_as_there_was_one(
     client = connect(create_app(settings, store=service.store, computer=service.computer, checker=service.checker))
     assert client.get("/api/v1/studies").status_code == 200
     assert "needs no token" in client.get("/login").text
-    secret, record = service.store.create_token("me", TokenScope.WRITE)
+    secret, record = service.store.people.create_token("me", TokenScope.WRITE)
     assert client.get("/api/v1/studies").status_code == 401
     assert client.get("/api/v1/studies", headers={"Authorization": f"Bearer {secret}"}).status_code == 200
-    service.store.revoke_token(record.id)
+    service.store.people.revoke_token(record.id)
     assert client.get("/api/v1/studies").status_code == 401
 
 
@@ -288,7 +288,7 @@ def test_a_form_without_fields_is_kept_too(office: Office) -> None:
     back = browser.post("/login", data={**fields_of(refused.text), "token": office.write})
     assert f'action="/studies/{study_id}/cancel"' in back.text
     assert browser.post(f"/studies/{study_id}/cancel", headers=empty).status_code == 303
-    assert office.store.get_study(study_id).state is StudyState.CANCELLING
+    assert office.store.studies.get(study_id).state is StudyState.CANCELLING
 
 
 def test_what_is_no_form_is_refused_and_not_kept(office: Office) -> None:
@@ -349,7 +349,7 @@ def test_a_session_of_the_setting_ends_when_the_setting_changes(
 
 def test_ended_sessions_are_forgotten_when_their_time_is_over(service: Service) -> None:
     now = int(time.time())
-    service.store.end_session("old", now - 10)
-    service.store.end_session("new", now + 1000)
-    service.store.end_session("new", now + 1000)
-    assert service.store.session_secrets().ended == {"new": now + 1000}
+    service.store.people.end_session("old", now - 10)
+    service.store.people.end_session("new", now + 1000)
+    service.store.people.end_session("new", now + 1000)
+    assert service.store.people.session_secrets().ended == {"new": now + 1000}

@@ -80,7 +80,7 @@ def test_a_deletion_is_undone(service: Service, three: dict[str, str]) -> None:
     assert service.http.delete(address).status_code == 204
     assert service.http.get(address).status_code == 404
     assert names(service, deleted=True) == ["feeder"]
-    service.store.purge()
+    service.store.purging.purge()
     restored = service.http.post(f"{address}:restore")
     assert (restored.status_code, restored.json()["purge_at"]) == (200, None)
     assert service.http.get(f"{address}/results?format=csv").content == before

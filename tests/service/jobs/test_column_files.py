@@ -111,19 +111,19 @@ def test_an_ended_study_is_read_once_until_it_has_run_again(
     monkeypatch.setattr(module, "LARGE", 5)
     study_id = service.submit(spec)
     service.fill(study_id)
-    reads, read = list[list[str]](), service.store.row_columns
+    reads, read = list[list[str]](), service.store.rows.columns
 
     def counting(study: str, names: list[str]) -> RowColumns:
         reads.append(list(names))
         return read(study, names)
 
-    monkeypatch.setattr(service.store, "row_columns", counting)
+    monkeypatch.setattr(service.store.rows, "columns", counting)
     first = Columns(service.store, ColumnFiles(tmp_path / "columns")).of(study_id, ["efficiency"])
     again = Columns(service.store, ColumnFiles(tmp_path / "columns")).of(study_id, ["efficiency", "torque.mean"])
     assert same(again, first)
     assert same(again, read(study_id, ["efficiency", "torque.mean"]))
     assert reads == [["efficiency"], ["torque.mean"]]
-    record = service.store.get_study(study_id)
+    record = service.store.studies.get(study_id)
     assert record.state is StudyState.FINISHED
     assert [path.name.split("-")[0] for path in (tmp_path / "columns").iterdir()] == [study_id]
 
@@ -142,7 +142,7 @@ def test_columns_are_read_ahead_once_a_study_has_ended(
     assert columns.waiting() == [study_id]
     portal.call(read_ahead, context, set[str]())
     assert columns.waiting() == []
-    monkeypatch.setattr(service.store, "row_columns", None)  # nothing reads the database any more
+    monkeypatch.setattr(service.store.rows, "columns", None)  # nothing reads the database any more
     explore.explored(context.library, study_id, explore.ExploreQuery())
 
 

@@ -27,13 +27,13 @@ def store(sqlite_url: str) -> Iterator[Store]:
 
 
 def finished(store: Store, cases: int = 9) -> StudyRecord:
-    record = store.create_study({}, fakes.study(cases))
-    epoch = store.take_over("test")
-    chunks = store.open_chunks(record.number)
-    store.claim(epoch, chunks)
+    record = store.studies.create({}, fakes.study(cases))
+    epoch = store.work.take_over("test")
+    chunks = store.work.open_chunks(record.number)
+    store.work.claim(epoch, chunks)
     for chunk in chunks:
-        store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
-    store.settle(epoch, record.number)
+        store.work.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+    store.work.settle(epoch, record.number)
     return record
 
 
@@ -45,31 +45,31 @@ def count(store: Store, table: str) -> int:
 def test_deleting_removes_no_row_itself_and_each_step_few(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(purging, "PURGED_ROWS", 4)
     record, other = finished(store), finished(store)
-    store.delete_study(record.id)
+    store.studies.delete(record.id)
     with pytest.raises(StudyNotFoundError):
-        store.get_study(record.id)
+        store.studies.get(record.id)
     assert count(store, "vibration_drive_1") == 18
-    assert list(store.purge_steps()) == [4, 4, 1, 4, 1, 4, 4, 1, 1]  # rows, chunks, keys, the study itself
+    assert list(store.purging.steps()) == [4, 4, 1, 4, 1, 4, 4, 1, 1]  # rows, chunks, keys, the study itself
     assert (count(store, "vibration_drive_1"), count(store, "chunks"), count(store, "studies")) == (9, 5, 1)
-    assert list(store.purge_steps()) == []
-    assert len(store.case_rows(other.id)) == 9
+    assert list(store.purging.steps()) == []
+    assert len(store.rows.block(other.id)) == 9
 
 
 def test_what_is_deleted_is_removed_in_the_background(store: Store) -> None:
     first, second = finished(store), finished(store)
-    store.delete_study(first.id)
+    store.studies.delete(first.id)
     keeping = Housekeeping(store)
     gone = threading.Event()
-    steps = store.purge_steps
+    steps = store.purging.steps
 
     def noting() -> Iterator[int]:
         yield from steps()
         if not count(store, "studies"):
             gone.set()
 
-    store.purge_steps = noting  # type: ignore[method-assign]
+    store.purging.steps = noting  # type: ignore[method-assign]
     keeping.start()
-    store.delete_study(second.id)
+    store.studies.delete(second.id)
     assert gone.wait(SECONDS)
     keeping.stop()
     assert not keeping.is_alive()
@@ -81,7 +81,7 @@ def test_a_task_that_fails_stops_neither_the_others_nor_the_thread(
     done = threading.Event()
     keeping = Housekeeping(store, lambda: 1 // 0, done.set)  # type: ignore[arg-type,return-value]
     keeping.start()
-    store.deleted.set()
+    store.studies.deleted.set()
     assert done.wait(SECONDS)
     assert keeping.is_alive()
     keeping.stop()
@@ -91,14 +91,14 @@ def test_a_task_that_fails_stops_neither_the_others_nor_the_thread(
 def test_a_purge_that_fails_is_tried_again(
     store: Store, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    store.delete_study(finished(store).id)
+    store.studies.delete(finished(store).id)
     keeping = Housekeeping(store)
 
     def busy() -> Iterator[int]:
         raise DatabaseBusyError("busy")
 
     with monkeypatch.context() as patch:
-        patch.setattr(store, "purge_steps", busy)
+        patch.setattr(store.purging, "steps", busy)
         keeping.purge()
     assert "removed later: busy" in caplog.text
     monkeypatch.setattr("sprag.service.jobs.housekeeping.LOOK_SECONDS", 0.0)
@@ -117,7 +117,7 @@ def test_a_file_copied_by_itself_is_whole_after_a_checkpoint(store: Store, tmp_p
     Housekeeping(store).checkpoint()
     shutil.copyfile(path, copy)
     with Store.open(f"sqlite:///{copy}") as read:
-        assert read.get_study(record.id).done == 9
+        assert read.studies.get(record.id).done == 9
 
 
 def test_the_log_is_in_the_file_at_the_end(tmp_path: Path) -> None:

@@ -55,7 +55,7 @@ def test_a_study_is_run_in_a_passing_database() -> None:
     with run_here({"sprag": 1}, study, processes=0, chunk_cases=3, on_progress=seen.append) as run:
         path = run.store.session.path
         assert run.record.state is StudyState.FINISHED
-        rows = run.store.case_rows(run.record.id)
+        rows = run.store.rows.block(run.record.id)
     assert not path.exists()
     assert (seen[-1].done, seen[-1].total) == (20, 20)
     np.testing.assert_array_equal(rows.values, models.run_chunk(study, 0, 20).values)
@@ -65,8 +65,8 @@ def test_a_study_stays_in_the_database_that_was_given(url: str) -> None:
     with run_here({"sprag": 1}, fakes.study(5), processes=2, database_url=url, executor=fakes.pool(2)) as run:
         record = run.record
     with Store.open(url) as store:
-        assert store.get_study(record.id) == record
-        assert len(store.case_rows(record.id)) == 5
+        assert store.studies.get(record.id) == record
+        assert len(store.rows.block(record.id)) == 5
 
 
 def test_a_held_study_is_no_result() -> None:
@@ -128,7 +128,7 @@ def test_where_another_dispatcher_is_at_work_that_one_runs_the_study(url: str) -
     try:
         eventually(lambda: DispatcherLock(Path(url.removeprefix("sqlite:///"))).holder() != "")
         with run_here({}, fakes.study(9), processes=1, database_url=url) as run:
-            np.testing.assert_array_equal(run.store.case_rows(run.record.id).values, fakes.values(0, 9))
+            np.testing.assert_array_equal(run.store.rows.block(run.record.id).values, fakes.values(0, 9))
     finally:
         stop.set()
         other.join(DEADLINE)
@@ -164,14 +164,14 @@ def test_a_standby_tells_of_a_silent_worker_and_one_that_takes_over_does_not_wai
     with Store.open(url) as store:
         lock, settings = DispatcherLock(store.session.path), WorkerSettings(url, 1, DEADLINE)
         assert lock.take()
-        epoch = store.take_over("the silent one")
+        epoch = store.work.take_over("the silent one")
         turns = iter([False, False, False, True])
         run_dispatcher(settings, lambda: next(turns), say=said.append, executor=inline)
         assert [line for line in said if "--take-over" in line] == [said[1]]
         assert f"process {os.getpid()} has not responded" in said[1]
         run_dispatcher(settings, lambda: True, say=said.append, executor=inline, take_over=True)
         with pytest.raises(EpochLostError):
-            store.heartbeat(epoch, fakes.report())
+            store.work.heartbeat(epoch, fakes.report())
         lock.release()
 
 
@@ -180,20 +180,20 @@ def test_a_standby_ends_when_it_is_asked_to(url: str) -> None:
         lock = DispatcherLock(store.session.path)
         assert lock.take()
         run_dispatcher(WorkerSettings(url, 1, DEADLINE), lambda: True, say=lambda _: None, executor=inline)
-        assert store.dispatcher() is None
+        assert store.dispatchers.latest() is None
         lock.release()
 
 
 def test_a_new_dispatcher_clears_away_half_deleted_studies(url: str) -> None:
     with Store.open(url, chunking=Chunking(cases=4)) as store:
-        record = store.create_study({}, fakes.study(9))
+        record = store.studies.create({}, fakes.study(9))
         run_dispatcher(
             WorkerSettings(url, 1, DEADLINE),
-            lambda: store.get_study(record.id).state.terminal,
+            lambda: store.studies.get(record.id).state.terminal,
             say=lambda _: None,
             executor=inline,
         )
-        store.delete_study(record.id)
+        store.studies.delete(record.id)
         with store.session.read() as connection:
             assert connection.exec_driver_sql("SELECT count(*) FROM vibration_drive_1").scalar_one() == 9
 
@@ -209,12 +209,12 @@ def test_a_new_dispatcher_clears_away_half_deleted_studies(url: str) -> None:
 
 def test_a_dispatcher_process_runs_studies_and_ends_in_order(url: str) -> None:
     with Store.open(url, chunking=Chunking(cases=4)) as store:
-        record = store.create_study({}, fakes.study(20))
+        record = store.studies.create({}, fakes.study(20))
         process = start_dispatcher_process(WorkerSettings(url, 2, DEADLINE))
         try:
-            eventually(lambda: store.get_study(record.id).state is StudyState.FINISHED)
+            eventually(lambda: store.studies.get(record.id).state is StudyState.FINISHED)
             np.testing.assert_array_equal(
-                store.case_rows(record.id).values, models.run_chunk(fakes.study(20), 0, 20).values
+                store.rows.block(record.id).values, models.run_chunk(fakes.study(20), 0, 20).values
             )
         finally:
             process.terminate()
@@ -262,8 +262,8 @@ def test_a_run_that_is_interrupted_leaves_nothing_to_later_workers_and_its_rows_
     assert (record.state, record.cases) == (StudyState.CANCELLED, 20)
     assert record.done == 12
     with Store.open(url) as store:
-        assert store.active_studies() == []
-        assert store.list_studies().studies[0].state is StudyState.CANCELLED
+        assert store.work.active_studies() == []
+        assert store.studies.page().studies[0].state is StudyState.CANCELLED
     with run_here({}, study, processes=0, database_url=url, chunk_cases=4) as run:
         assert (run.record.state, run.record.reused) == (StudyState.FINISHED, record.done)
 
@@ -307,10 +307,10 @@ def test_a_run_that_is_killed_leaves_its_study_held(url: str) -> None:
     ):
         pass
     with Store.open(url) as store:
-        (left,) = store.list_studies().studies
+        (left,) = store.studies.page().studies
         assert left.state is StudyState.RUNNING
-        store.take_over("a worker")
-        assert store.get_study(left.id).state is StudyState.PAUSED
+        store.work.take_over("a worker")
+        assert store.studies.get(left.id).state is StudyState.PAUSED
 
 
 def test_a_run_that_another_dispatcher_works_on_is_cancelled_too(url: str) -> None:

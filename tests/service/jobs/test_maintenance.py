@@ -58,7 +58,7 @@ def test_a_backup_is_written_every_night_and_some_are_kept(store: Store, clock: 
     assert (folder / "of somebody else.sqlite3").exists()
     _, latest = backups(folder)[-1]
     with Store.open(f"sqlite:///{latest}") as copy:
-        assert copy.get_study(study.id).cases == 9
+        assert copy.studies.get(study.id).cases == 9
         assert copy.check().problems == ()
 
 
@@ -108,8 +108,8 @@ def test_a_fault_of_one_task_leaves_the_others_and_the_nights_to_come(
     store: Store, clock: HandClock, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study = accept(store, parse_spec(SPEC))
-    store.cancel_study(study.id)
-    store.settle(store.take_over("test"), study.number)
+    store.studies.cancel(study.id)
+    store.work.settle(store.work.take_over("test"), study.number)
     maintenance = Maintenance(store, MaintenancePlan(tmp_path, study_days=30))
     maintenance.look()
     clock.seconds = 31 * DAY
@@ -117,7 +117,7 @@ def test_a_fault_of_one_task_leaves_the_others_and_the_nights_to_come(
         patch.setattr(store, "backup", lambda _: 1 / 0)
         maintenance.look()
     with pytest.raises(StudyNotFoundError):
-        store.get_study(study.id)
+        store.studies.get(study.id)
     clock.seconds += 601.0
     maintenance.look()
     assert made(tmp_path) == ["01 00:00", "01 00:10"]
@@ -134,30 +134,30 @@ def test_parts_of_killed_backups_are_removed(store: Store, tmp_path: Path) -> No
 
 def test_studies_that_ended_long_ago_are_deleted_and_no_others(store: Store, clock: HandClock) -> None:
     old, running, young = (accept(store, parse_spec(SPEC)) for _ in range(3))
-    epoch = store.take_over("test")
-    store.cancel_study(old.id)
-    store.settle(epoch, old.number)
+    epoch = store.work.take_over("test")
+    store.studies.cancel(old.id)
+    store.work.settle(epoch, old.number)
     maintenance = Maintenance(store, MaintenancePlan(study_days=30))
     maintenance.look()
     clock.seconds = 20 * DAY
-    store.cancel_study(young.id)
-    store.settle(epoch, young.number)
+    store.studies.cancel(young.id)
+    store.work.settle(epoch, young.number)
     clock.seconds = 29 * DAY
     maintenance.look()
-    assert store.get_study(old.id)
+    assert store.studies.get(old.id)
     clock.seconds = 31 * DAY
     maintenance.look()
     with pytest.raises(StudyNotFoundError):
-        store.get_study(old.id)
-    assert {store.get_study(running.id).id, store.get_study(young.id).id} == {running.id, young.id}
+        store.studies.get(old.id)
+    assert {store.studies.get(running.id).id, store.studies.get(young.id).id} == {running.id, young.id}
 
 
 def test_old_studies_are_deleted_by_command_too(
     store: Store, settings: Settings, capsys: pytest.CaptureFixture[str]
 ) -> None:
     study = accept(store, parse_spec(SPEC))
-    store.cancel_study(study.id)
-    store.settle(store.take_over("test"), study.number)  # by the clock of the test it ended in January 2026
+    store.studies.cancel(study.id)
+    store.work.settle(store.work.take_over("test"), study.number)  # by the clock of the test it ended in January 2026
     arguments = ["db", "prune", "--older-than", "1", "--db", settings.database]
     for options, code in ((["--dry-run", "--json"], 0), ([], 0), (["--json"], 0)):
         assert execute([*arguments, *options]) == code

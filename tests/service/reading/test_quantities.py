@@ -117,11 +117,11 @@ def test_both_painters_and_the_table_show_one_number_in_one_unit() -> None:
 def test_files_of_all_rows_have_the_chosen_units(service: Service, form: str) -> None:
     study_id = service.submit()
     rows = service.fill(study_id)
-    names = [info.name for info in models.study_results(service.store.study(study_id))]
+    names = [info.name for info in models.study_results(service.store.studies.study(study_id))]
     wanted = rows.values[:, names.index(SPEED)] * 30.0 / math.pi
     path = f"/api/v1/studies/{study_id}/results"
     answer = service.http.get(path, params={"format": form, "units": "rpm,torque=N*mm"})
-    loads = service.store.study(study_id).columns(range(9))["shaft.load"]
+    loads = service.store.studies.study(study_id).columns(range(9))["shaft.load"]
     if form == "csv":
         table = pd.read_csv(io.BytesIO(answer.content))
         speed, load = f"{SPEED} [rpm]", "shaft.load [N*mm]"

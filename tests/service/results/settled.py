@@ -35,24 +35,24 @@ def rows_of(study: Study) -> ChunkResult:
 
 def stored(service: Service, study_id: str, rows: ChunkResult) -> str:
     """Store the rows of all cases of a study; its id."""
-    number, epoch = service.store.get_study(study_id).number, service.store.take_over("test")
-    for chunk in service.store.claim(epoch, service.store.open_chunks(number)):
+    number, epoch = service.store.studies.get(study_id).number, service.store.work.take_over("test")
+    for chunk in service.store.work.claim(epoch, service.store.work.open_chunks(number)):
         part = slice(chunk.first, chunk.first + chunk.count)
         result = ChunkResult(chunk.first, rows.endings[part], rows.flags[part], rows.values[part])
-        assert service.store.commit(epoch, chunk, result)
-    service.store.settle(epoch, number)
+        assert service.store.work.commit(epoch, chunk, result)
+    service.store.work.settle(epoch, number)
     return study_id
 
 
 def settled(service: Service) -> str:
     """A settled study whose rows are there."""
     study_id = service.submit(SPEC)
-    return stored(service, study_id, rows_of(service.store.study(study_id)))
+    return stored(service, study_id, rows_of(service.store.studies.study(study_id)))
 
 
 def flagged(service: Service, run: dict[str, Any]) -> str:
     """A study of three runs of a given time, the second and third of which have not settled."""
     study_id = service.submit(changed({"/run": run, "/axes": [{"path": "shaft.load", "values": [0.1, 0.2, 0.7]}]}))
-    rows = made_up(service.store.study(study_id))
+    rows = made_up(service.store.studies.study(study_id))
     flags = ["", "not_settled", "windup_out_of_data,not_settled"]
     return stored(service, study_id, ChunkResult(0, rows.endings, flags, rows.values))

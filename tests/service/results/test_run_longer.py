@@ -17,7 +17,7 @@ def test_unsettled_cases_are_run_longer(service: Service, study_id: str) -> None
     made = service.http.post(f"{API}/studies/{study_id}:longer")
     assert made.status_code == 202, made.text
     assert made.json()["cases"] == 1
-    old, new = service.store.study(study_id), service.store.study(made.json()["id"])
+    old, new = service.store.studies.study(study_id), service.store.studies.study(made.json()["id"])
     assert new.columns([0]) == old.columns([3])
     assert new.run == old.run | {"at_most": 4000}
     assert new.base == old.base
@@ -29,9 +29,9 @@ def test_other_regimes_and_times_are_asked_for(service: Service, study_id: str) 
     key = {"Idempotency-Key": "once"}
     made = [service.http.post(f"{API}/studies/{study_id}:longer", params=query, headers=key).json() for _ in range(2)]
     assert made[0]["id"] == made[1]["id"]
-    new = service.store.study(made[0]["id"])
+    new = service.store.studies.study(made[0]["id"])
     assert (new.cases, new.run["at_most"]) == (1, 20_000)
-    assert new.case_parameters(0) == service.store.study(study_id).case_parameters(1)
+    assert new.case_parameters(0) == service.store.studies.study(study_id).case_parameters(1)
 
 
 def test_what_cannot_be_run_longer_is_refused(service: Service, study_id: str) -> None:
@@ -67,7 +67,7 @@ def test_runs_of_a_given_time_that_had_not_settled_are_run_longer(
 ) -> None:
     timed = flagged(service, run)
     with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
-        new = service.store.study(client.study(timed).run_longer(**query).id)
+        new = service.store.studies.study(client.study(timed).run_longer(**query).id)
     assert new.columns([0, 1])["shaft.load"].tolist() == [0.2, 0.7]
     assert new.run == {"tolerance": 1e-9, "reset": "contact"} | longer
     refused = service.http.post(f"{API}/studies/{timed}:longer", params={"regime": "unsettled"})
@@ -82,7 +82,7 @@ def test_the_command_runs_longer_what_the_button_does(
     for study, at_most in ((study_id, 2000), (timed, 500)):
         done = sprag("longer", study, "--at-most", at_most, "--json")
         assert done.code == 0, done.err
-        new = service.store.study(done.data["id"])
+        new = service.store.studies.study(done.data["id"])
         assert new.run.get("at_most", new.run.get("duration")) in (2000, [500.0, "periods"])
         assert new.cases == {study_id: 1, timed: 2}[study]
     shown = [service.http.post(f"/studies/{timed}/longer/not_settled").headers["location"] for _ in range(2)]
@@ -98,5 +98,5 @@ def test_the_page_of_a_study_has_a_button_that_runs_cases_longer(service: Servic
     assert f'action="/studies/{study_id}/longer/periodic"' not in page
     shown = [service.http.post(address).headers["location"] for _ in range(2)]
     assert shown[0] == shown[1]
-    assert service.store.study(shown[0].rpartition("/")[2]).run["at_most"] == 4000
+    assert service.store.studies.study(shown[0].rpartition("/")[2]).run["at_most"] == 4000
     assert service.http.post(f"/studies/{study_id}/longer/held").status_code == 404

@@ -210,14 +210,14 @@ def test_what_cannot_be_told_is_not_told() -> None:
 def fill(service: Service, study_id: str, function: Function) -> None:
     """Rows whose every result is that function of the parameters."""
     store = service.store
-    record, study = store.get_study(study_id), store.study(study_id)
-    epoch = store.take_over("test")
-    for chunk in store.claim(epoch, store.open_chunks(record.number)):
+    record, study = store.studies.get(study_id), store.studies.study(study_id)
+    epoch = store.work.take_over("test")
+    for chunk in store.work.claim(epoch, store.work.open_chunks(record.number)):
         columns = {**study.base, **study.columns(range(chunk.first, chunk.last + 1))}
         y = np.broadcast_to(function(columns), chunk.count)
         values = np.repeat(y[:, None], len(models.study_results(study)), axis=1)
-        store.commit(epoch, chunk, ChunkResult(chunk.first, ["ok"] * chunk.count, [""] * chunk.count, values))
-    store.settle(epoch, record.number)
+        store.work.commit(epoch, chunk, ChunkResult(chunk.first, ["ok"] * chunk.count, [""] * chunk.count, values))
+    store.work.settle(epoch, record.number)
 
 
 def test_the_interface_tells_effects_and_axes_without_any(service: Service, spec: dict[str, Any]) -> None:

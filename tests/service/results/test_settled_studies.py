@@ -123,13 +123,13 @@ def test_maps_have_the_order_of_every_point(service: Service) -> None:
 
 def test_transient_studies_have_no_regime(service: Service) -> None:
     timed = service.submit(changed({"/run": {"duration": "60 periods"}}))
-    study = service.store.study(timed)
+    study = service.store.studies.study(timed)
     assert regime_info(models.study_results(study)) is None
     assert study.run == {"duration": [60.0, "periods"], "window": None, "tolerance": 1e-9, "reset": "contact"}
 
 
 def test_the_motion_of_a_settled_case_lasts_as_long_as_its_search_may(service: Service, study_id: str) -> None:
-    study = service.store.study(study_id)
+    study = service.store.studies.study(study_id)
     assert models.extent(study, 1).end == pytest.approx(1000.0 / 25.0)
 
 
@@ -145,21 +145,21 @@ def test_a_study_tells_how_many_cases_have_which_regime(service: Service, study_
 
 
 def test_kinds_are_counted_once_for_each_revision(service: Service, study_id: str) -> None:
-    counted = service.store.kinds(study_id)
-    assert service.store.kinds(study_id) is counted
-    record, epoch = service.store.get_study(study_id), service.store.take_over("again")
-    service.store.retry_study(study_id)
-    assert service.store.get_study(study_id).revision > record.revision
-    chunks = service.store.claim(epoch, service.store.open_chunks(record.number))
+    counted = service.store.rows.kinds(study_id)
+    assert service.store.rows.kinds(study_id) is counted
+    record, epoch = service.store.studies.get(study_id), service.store.work.take_over("again")
+    service.store.studies.retry(study_id)
+    assert service.store.studies.get(study_id).revision > record.revision
+    chunks = service.store.work.claim(epoch, service.store.work.open_chunks(record.number))
     assert chunks
-    whole = rows_of(service.store.study(study_id))
-    column = [info.name for info in models.study_results(service.store.study(study_id))].index("regime")
+    whole = rows_of(service.store.studies.study(study_id))
+    column = [info.name for info in models.study_results(service.store.studies.study(study_id))].index("regime")
     whole.values[2, column] = Regime.HELD
     for chunk in chunks:
         part = slice(chunk.first, chunk.first + chunk.count)
         result = ChunkResult(chunk.first, ["ok"] * chunk.count, whole.flags[part], whole.values[part])
-        assert service.store.commit(epoch, chunk, result)
-    assert service.store.kinds(study_id).regimes.get("held") == 1
+        assert service.store.work.commit(epoch, chunk, result)
+    assert service.store.rows.kinds(study_id).regimes.get("held") == 1
 
 
 def test_cases_are_filtered_by_regime(service: Service, study_id: str) -> None:

@@ -92,7 +92,7 @@ def test_answers_and_files_have_directions_in_words(service: Service, study_id: 
 
 
 def test_a_figure_tells_directions_by_dashes_and_loads_by_colours(service: Service, study_id: str) -> None:
-    study = service.store.study(study_id)
+    study = service.store.studies.study(study_id)
     query = main_query(study, models.study_results(study))
     assert query is not None
     assert (query.x, query.by) == ("excitation.frequency", ("shaft.load", "sweep"))
@@ -148,7 +148,7 @@ def test_the_example_of_the_guide_says_what_the_guide_says() -> None:
         with run_here(spec, study, processes=0) as run:
             query = main_query(study, models.study_results(study))
             assert query is not None
-            cases = run.store.cases_of_kind(run.record.id, flag="jumped")
+            cases = run.store.rows.cases_of_kind(run.record.id, flag="jumped")
             return study, cases, hysteresis(stored_curves(run.store, run.record.id, query))
 
     text = (Path(__file__).resolve().parents[3] / "docs" / "sweeps.md").read_text(encoding="utf-8")
@@ -163,7 +163,7 @@ def test_jumps_are_narrowed_over_http_by_clients_a_command_and_a_button(
 ) -> None:
     made = service.http.post(f"{API}/studies/{study_id}:narrow", params={"steps": 4})
     assert made.status_code == 202, made.text
-    new = service.store.study(made.json()["id"])
+    new = service.store.studies.study(made.json()["id"])
     assert (new.sweep, new.shape) == ("excitation.frequency", (11, 2, 2))
     assert new.axes[0].values == (16.0, 16.25, 16.5, 16.75, 17.0, 18.0, 18.25, 18.5, 18.75, 19.0, 20.0)
     assert new.name.endswith(", narrowed")
@@ -180,14 +180,14 @@ def test_jumps_are_narrowed_over_http_by_clients_a_command_and_a_button(
     )
     done = sprag("narrow", study_id, "--steps", 4, "--at", "shaft.load=0.1", "--at", "sweep=up", "--json")
     assert done.code == 0, done.err
-    for one in map(service.store.study, [*ids, done.data["id"]]):
+    for one in map(service.store.studies.study, [*ids, done.data["id"]]):
         assert [axis.values for axis in one.axes] == [
             (16.0, 17.0, 18.0, 18.25, 18.5, 18.75, 19.0, 20.0), (0.1,), (0.0,),
         ]  # fmt: skip
     assert "Narrow these jumps</button> 140 cases" in service.http.get(f"/studies/{study_id}").text
     shown = [service.http.post(f"/studies/{study_id}/narrow").headers["location"] for _ in range(2)]
     assert shown[0] == shown[1]
-    assert service.store.study(shown[0].rpartition("/")[2]).cases == 140
+    assert service.store.studies.study(shown[0].rpartition("/")[2]).cases == 140
 
 
 def test_what_has_no_jumps_to_narrow_is_refused(service: Service, study_id: str) -> None:
@@ -214,7 +214,7 @@ def test_the_form_keeps_a_sweep() -> None:
 def test_a_case_of_a_sweep_is_gone_on_from_in_its_sweep(
     service: Service, study_id: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    study = service.store.study(study_id)
+    study = service.store.studies.study(study_id)
     assert motion_of(study, 3, 0) == (study, 3)
     asked: list[tuple[Study, int]] = []
 

@@ -127,19 +127,19 @@ def test_a_design_with_an_unsettled_case_is_not_feasible() -> None:
 
 def test_planners_are_told_what_counts(service: Service) -> None:
     study_id = settled(service)
-    study, number = service.store.study(study_id), service.store.get_study(study_id).number
-    rows = service.store.round_rows(number, study, range(4), [SPEED])
+    study, number = service.store.studies.study(study_id), service.store.studies.get(study_id).number
+    rows = service.store.work.round_rows(number, study, range(4), [SPEED])
     assert rows.ok.tolist() == [True, True, False, False]
-    width = service.store.rows_for_cases(study_id, range(4), [f"{SPEED}.half_width"]).values[f"{SPEED}.half_width"]
+    width = service.store.rows.for_cases(study_id, range(4), [f"{SPEED}.half_width"]).values[f"{SPEED}.half_width"]
     np.testing.assert_array_equal(rows.values[f"{SPEED}.half_width"], width)
 
 
 def test_curves_join_and_compare_what_counts(service: Service) -> None:
     study_id = flagged(service, {"duration": "60 periods"})
-    study = service.store.study(study_id)
+    study = service.store.studies.study(study_id)
     infos = models.study_results(study)
     drawn = draw(
-        select(study, infos, CurveQuery("shaft.load", (SPEED,))), partial(service.store.rows_for_cases, study_id)
+        select(study, infos, CurveQuery("shaft.load", (SPEED,))), partial(service.store.rows.for_cases, study_id)
     )
     (curve,) = drawn.curves
     joined = joined_points(curve, SPEED)
@@ -184,9 +184,9 @@ def test_maps_leave_blank_and_mark_what_does_not_count(run: dict[str, str], flag
 
 def test_sensitivities_and_explore_leave_out_what_does_not_count(service: Service) -> None:
     study_id = flagged(service, {"duration": "60 periods"})
-    study = service.store.study(study_id)
-    fetch = partial(service.store.rows_for_cases, study_id)
-    (found,) = sensitivity(study, service.store.spec(study_id), [SPEED], fetch)
+    study = service.store.studies.study(study_id)
+    fetch = partial(service.store.rows.for_cases, study_id)
+    (found,) = sensitivity(study, service.store.studies.spec(study_id), [SPEED], fetch)
     assert (found.cases, found.missing) == (1, 2)
     rows = service.get(f"/studies/{study_id}/explore", show=SPEED)["cases"]
     assert [row["results"][SPEED] is None for row in sorted(rows, key=lambda row: row["case"])] == [False, True, True]

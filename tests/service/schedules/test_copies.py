@@ -64,24 +64,24 @@ def opening(clock: Clock) -> Iterator[Opening]:
 
 def nightly(store: Store, **given: object) -> None:
     fields = {"spec": SPEC, "cron": "0 1 * * *", "name": "nightly", **given}
-    store.create_schedule(read_fields(fields, NEW_YEAR))
+    store.schedules.create(read_fields(fields, NEW_YEAR))
 
 
 def fire(store: Store) -> int:
     """What a dispatcher does at every look; the number of studies afterwards."""
     Scheduler(store).look()
-    return len(store.list_studies().studies)
+    return len(store.studies.page().studies)
 
 
 def end_studies(store: Store) -> None:
     """Bring every study to its end, with which its reports are ready to be sent."""
-    epoch = store.take_over("test")
-    for study in store.list_studies().studies:
+    epoch = store.work.take_over("test")
+    for study in store.studies.page().studies:
         if study.state.terminal:
             continue
-        for chunk in store.claim(epoch, store.open_chunks(study.number)):
-            store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
-        store.settle(epoch, study.number)
+        for chunk in store.work.claim(epoch, store.work.open_chunks(study.number)):
+            store.work.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+        store.work.settle(epoch, study.number)
 
 
 def by_cp(store: Store, target: Path) -> None:
@@ -126,7 +126,7 @@ def test_a_copy_fires_nothing_until_it_is_adopted_and_the_original_goes_on(
     scheduler = Scheduler(copy)
     scheduler.look()
     scheduler.look()
-    assert len(copy.list_studies().studies) == nights
+    assert len(copy.studies.page().studies) == nights
     Watchdog(copy).look()
     Reporter(copy, delivery).look()
     assert hook.requests == []
@@ -142,7 +142,7 @@ def test_a_copy_fires_nothing_until_it_is_adopted_and_the_original_goes_on(
     assert OFF in http.get("/api/v1/night").json()["off"]
     assert OFF in http.get("/night").text
     assert "копія" in http.get("/night", headers={"Accept-Language": "uk"}).text
-    copy.take_over("here:1")
+    copy.work.take_over("here:1")
     ready = http.get("/readyz")
     assert ready.status_code == 200
     assert ready.json()["warnings"][0].startswith(OFF)
@@ -157,10 +157,10 @@ def test_a_copy_fires_nothing_until_it_is_adopted_and_the_original_goes_on(
     assert len(hook.requests) == nights + 1
 
     assert execute(["db", "adopt", "--db", str(target)]) == 0
-    (noted,) = copy.audit_rows(AuditFilter(action="database.adopt"))
+    (noted,) = copy.audit.rows(AuditFilter(action="database.adopt"))
     assert noted.door == "command"
     scheduler.look()
-    assert len(copy.list_studies().studies) == nights + 1
+    assert len(copy.studies.page().studies) == nights + 1
     assert caplog.text.count("This database was adopted: its schedules are on.") == 1
     end_studies(copy)
     fire(copy)
@@ -213,9 +213,9 @@ def test_a_dump_restored_into_another_database_is_a_copy(
     clock.set("2026-01-02T01:00")
     assert fire(copy) == 1
     assert fire(original) == 2
-    assert copy.adopt_database()
+    assert copy.deployment.adopt()
     assert fire(copy) == 2
-    assert not copy.adopt_database()
+    assert not copy.deployment.adopt()
     with original.session.read() as connection:
         kept = deployment.place_of(original.session, connection)
         control = connection.exec_driver_sql("SELECT system_identifier FROM pg_control_system()").scalar_one()
@@ -291,7 +291,7 @@ def test_a_cloned_machine_is_another_one(
     monkeypatch.setattr(deployment, "_machine", lambda: "b")
     clock.set("2026-01-01T01:00")
     assert fire(store) == 0
-    assert store.adopt_database()
+    assert store.deployment.adopt()
     assert fire(store) == 1
 
 
@@ -340,8 +340,8 @@ def test_a_database_without_schedules_is_copied_freely(settings: Settings, openi
     original.backup(tmp_path / "copy.sqlite3")
     copy = opening(f"sqlite:///{tmp_path / 'copy.sqlite3'}")
     nightly(copy)
-    assert not copy.is_copy()
-    assert copy.is_deployment()
+    assert not copy.deployment.is_copy()
+    assert copy.deployment.is_deployment()
 
 
 def test_a_database_of_before_is_the_deployment_after_its_upgrade_without_a_word(

@@ -58,11 +58,11 @@ class Ticking(fakes.HandClock):
 
 @pytest.fixture
 def clock(service: Service) -> Iterator[fakes.HandClock]:
-    before = service.store.clock, service.store.base_chunking
-    service.store.clock = clock = Ticking()
-    service.store.base_chunking = Chunking(cases=2)
-    yield clock
-    service.store.clock, service.store.base_chunking = before
+    clock, before = Ticking(), service.store.dispatchers.base_chunking
+    service.store.dispatchers.base_chunking = Chunking(cases=2)
+    with fakes.clocked(service.store, clock):
+        yield clock
+    service.store.dispatchers.base_chunking = before
 
 
 def nine_loads() -> dict[str, Any]:
@@ -83,9 +83,9 @@ def dispatch(service: Service, clock: fakes.HandClock, chunks: int) -> None:
         return fakes.run(task)
 
     def idle() -> bool:
-        return not [study for study in service.store.active_studies() if study.state is not StudyState.PAUSED]
+        return not [study for study in service.store.work.active_studies() if study.state is not StudyState.PAUSED]
 
-    Dispatcher(service.store, InlineExecutor(run), clock).run(idle)
+    Dispatcher(service.store.work, InlineExecutor(run), clock).run(idle)
 
 
 # What is taken for a deadline
@@ -210,7 +210,7 @@ def test_preview_and_study_say_when_the_time_will_hardly_do(service: Service, cl
         {"path": "shaft.load", "linspace": [0, 1, 2000]},
         {"path": "excitation.frequency", "linspace": ["16 Hz", "35 Hz", 1000]},
     ]
-    service.store.base_chunking = Chunking()
+    service.store.dispatchers.base_chunking = Chunking()
     seconds = service.http.post(f"{STUDIES}:preview", json=spec).json()["estimated_seconds"]
     assert seconds > 20.0
     found = service.http.post(f"{STUDIES}:preview", json=spec, params={"finish_by": f"{seconds / 4:.3f} s"}).json()
@@ -276,7 +276,7 @@ def test_the_form_takes_a_deadline_and_says_what_is_wrong_with_it(service: Servi
     assert "finish_by=8+h" in service.http.post("/new/check", data={**fields, "finish_by": "8 h"}).json()["panel"]
     made = service.http.post("/new", data={**fields, "finish_by": "8 h", "do": "submit"}, follow_redirects=False)
     assert made.status_code == 303
-    (study,) = service.store.list_studies().studies
+    (study,) = service.store.studies.page().studies
     assert study.finish_by == clock.now() + timedelta(hours=8)
     assert 'name="finish_by"' in service.http.get("/new").text
 
@@ -333,11 +333,11 @@ def test_each_run_of_a_schedule_gets_its_deadline(service: Service, clock: fakes
     given = {"spec": nine_loads(), "cron": "0 22 * * *", "zone": "Europe/Berlin", "finish_by": "6:00"}
     kept = service.http.post("/api/v1/schedules", json=given)
     assert (kept.status_code, kept.json()["finish_by"]) == (201, "06:00")
-    due = service.store.get_schedule(kept.json()["id"]).next_due
+    due = service.store.schedules.get(kept.json()["id"]).next_due
     assert due is not None
     clock.seconds += (due - clock.now()).total_seconds()
     Scheduler(service.store).look()
-    (study,) = service.store.list_studies().studies
+    (study,) = service.store.studies.page().studies
     assert study.coarse
     assert study.finish_by == due + timedelta(hours=8)
     assert "finished by 06:00" in service.http.get("/schedules").text

@@ -29,14 +29,14 @@ if TYPE_CHECKING:
 def due_at_one(service: Service, clock: Clock, **given: Any) -> tuple[str, str]:
     """Ids of a schedule that was due at 01:00, and of its study."""
     fields = {"spec": SPEC, "cron": "0 1 * * *", "name": "nightly", **given}
-    kept = service.store.create_schedule(read_fields(fields, NEW_YEAR))
+    kept = service.store.schedules.create(read_fields(fields, NEW_YEAR))
     clock.set("2026-01-01T01:00")
     Scheduler(service.store).look()
-    return kept.id, service.store.list_studies().studies[0].id
+    return kept.id, service.store.studies.page().studies[0].id
 
 
 def last(store: Store, schedule: str) -> Outcome:
-    return store.schedule_runs(schedule)[0].outcome
+    return store.schedules.runs(schedule)[0].outcome
 
 
 def test_a_finished_study_has_its_failures_and_flags(service: Service, clock: Clock) -> None:
@@ -72,7 +72,7 @@ def test_cases_that_ended_ok_and_are_unsettled_need_attention(
         )
 
     monkeypatch.setattr("tests.service.conftest.made_up", unsettled)
-    cases = service.store.get_study(study).cases
+    cases = service.store.studies.get(study).cases
     service.fill(study)
     Scheduler(service.store).look()
     outcome = last(service.store, schedule)
@@ -101,7 +101,7 @@ def test_flags_are_unknown_until_they_are_counted(service: Service, clock: Clock
     assert run["outcome"]["flags"] == counted, "the night counts them at once"
     Scheduler(service.store).look()
     assert last(service.store, schedule).flags == counted
-    service.store.retry_study(study)
+    service.store.studies.retry(study)
     service.fill(study)
     assert service.get("/night")["runs"][0]["outcome"]["flags"] is not None
 
@@ -111,17 +111,17 @@ def test_the_outcome_is_kept_when_the_study_is_deleted(service: Service, clock: 
     service.fill(study)
     Scheduler(service.store).look()
     before = last(service.store, schedule)
-    service.store.delete_study(study)
+    service.store.studies.delete(study)
     Scheduler(service.store).look()
     assert last(service.store, schedule) == before
-    assert service.store.schedule_runs(schedule)[0].study is None
+    assert service.store.schedules.runs(schedule)[0].study is None
 
 
 def test_a_study_that_was_deleted_before_its_end_says_so(service: Service, clock: Clock) -> None:
     schedule, study = due_at_one(service, clock)
-    service.store.cancel_study(study)
-    service.store.settle(service.store.take_over("test"), service.store.get_study(study).number)
-    service.store.delete_study(study)
+    service.store.studies.cancel(study)
+    service.store.work.settle(service.store.work.take_over("test"), service.store.studies.get(study).number)
+    service.store.studies.delete(study)
     Scheduler(service.store).look()
     assert (last(service.store, schedule).result, last(service.store, schedule).trouble) == (Result.DELETED, True)
 
@@ -129,17 +129,17 @@ def test_a_study_that_was_deleted_before_its_end_says_so(service: Service, clock
 def test_a_study_that_is_held_by_its_deadline_has_its_coverage(service: Service, clock: Clock) -> None:
     store = service.store
     schedule, study = due_at_one(service, clock, finish_by="06:00")
-    record = store.get_study(study)
+    record = store.studies.get(study)
     service.fill(study, range(record.cases // 2))
     clock.set("2026-01-01T06:00")
-    store.time_is_over(store.take_over("test"), record.number)
+    store.work.time_is_over(store.work.take_over("test"), record.number)
     Scheduler(store).look()
     outcome = last(store, schedule)
     assert outcome.result is Result.DEADLINE
     assert 0 < outcome.done < outcome.cases
     assert "complete" in str(outcome.coverage)
     assert outcome.coverage in outcome.sentence
-    store.resume_study(study)
+    store.studies.resume(study)
     assert last(store, schedule).result is Result.QUEUED, "somebody resumed it: the run is not over"
     service.fill(study)
     assert last(store, schedule).result is Result.FINISHED
@@ -148,10 +148,10 @@ def test_a_study_that_is_held_by_its_deadline_has_its_coverage(service: Service,
 def test_cancelled_paused_and_refused_runs(service: Service, clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
     store = service.store
     schedule, study = due_at_one(service, clock)
-    store.pause_study(study)
+    store.studies.pause(study)
     assert last(store, schedule).result is Result.HELD
-    store.cancel_study(study)
-    store.settle(store.take_over("test"), store.get_study(study).number)
+    store.studies.cancel(study)
+    store.work.settle(store.work.take_over("test"), store.studies.get(study).number)
     assert last(store, schedule).result is Result.CANCELLED
     monkeypatch.setattr("sprag.service.jobs.submission.MAX_WAITING_STUDIES", 0)
     clock.set("2026-01-04T01:00")
@@ -160,7 +160,7 @@ def test_cancelled_paused_and_refused_runs(service: Service, clock: Clock, monke
     assert (waiting.result, waiting.missed) == (Result.WAITING, 2)
     clock.set("2026-01-05T01:00")
     Scheduler(store).look()
-    refused = store.schedule_runs(schedule)[1].outcome
+    refused = store.schedules.runs(schedule)[1].outcome
     assert refused.result is Result.REFUSED
     assert refused.sentence.startswith("No study was submitted: 0 studies have not ended yet.")
     assert refused.sentence.endswith("2 due times before it were not run.")
@@ -170,19 +170,19 @@ def test_an_outcome_is_concluded_once(service: Service, clock: Clock) -> None:
     store = service.store
     schedule, study = due_at_one(service, clock)
     service.fill(study)
-    (ended,) = store.ended_runs()
-    assert store.conclude_run(ended, ended.outcome)
-    assert not store.conclude_run(ended, ended.outcome)
-    assert store.ended_runs() == []
+    (ended,) = store.runs.ended()
+    assert store.runs.conclude(ended, ended.outcome)
+    assert not store.runs.conclude(ended, ended.outcome)
+    assert store.runs.ended() == []
     assert last(store, schedule).ended_at is not None
 
 
 def test_the_last_night_has_trouble_first(service: Service, clock: Clock) -> None:
     store = service.store
     due_at_one(service, clock, name="<b>odd</b>", zone="Europe/Berlin", cron="0 2 * * *")
-    study = store.list_studies().studies[0].id
+    study = store.studies.page().studies[0].id
     service.fill(study)
-    store.create_schedule(read_fields({"spec": SPEC, "at": "2026-01-01T03:00", "name": "late"}, NEW_YEAR))
+    store.schedules.create(read_fields({"spec": SPEC, "at": "2026-01-01T03:00", "name": "late"}, NEW_YEAR))
     clock.set("2026-01-01T06:00")
     Scheduler(store).look()
     found = service.get("/night")
@@ -206,7 +206,7 @@ def test_the_last_night_has_trouble_first(service: Service, clock: Clock) -> Non
 
 def test_the_night_of_a_deleted_schedule_is_shown(service: Service, clock: Clock) -> None:
     schedule, _ = due_at_one(service, clock)
-    service.store.delete_schedule(schedule)
+    service.store.schedules.delete(schedule)
     assert [run["schedule"] for run in service.get("/night")["runs"]] == [schedule]
     assert service.http.get("/night").status_code == 200
 

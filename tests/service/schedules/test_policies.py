@@ -12,7 +12,7 @@ from sprag.service.schedules.deadline import FinishError
 from sprag.service.schedules.fields import ScheduleFields, change_fields, read_fields
 from sprag.service.schedules.policies import CatchUp, DueTime, Policies, check_grace, due_times
 from sprag.service.schedules.times import ALIASES, Timing, wall_clock
-from sprag.service.storage.schedule_runs import RunState
+from sprag.service.storage.runs import RunState
 from sprag.worker.states import StudyState
 from tests.service.schedules.conftest import NEW_YEAR
 from tests.service.timed_spec import SPEC
@@ -33,7 +33,7 @@ def at(text: str) -> datetime:
 
 def states(store: Store, schedule: str) -> list[tuple[str, RunState, int]]:
     """Time, state and number of missed ones of the latest due times, earliest first."""
-    return [(f"{run.due:%d %H:%M}", run.state, run.missed) for run in reversed(store.schedule_runs(schedule))]
+    return [(f"{run.due:%d %H:%M}", run.state, run.missed) for run in reversed(store.schedules.runs(schedule))]
 
 
 @pytest.mark.parametrize(
@@ -69,12 +69,12 @@ def test_catching_up_on_a_year_of_minutes_is_bounded() -> None:
 
 
 def test_all_missed_due_times_are_submitted_in_order(service: Service, clock: Clock) -> None:
-    kept = service.store.create_schedule(fields(cron="@daily", zone="Europe/Berlin", catch_up="all", name="daily"))
+    kept = service.store.schedules.create(fields(cron="@daily", zone="Europe/Berlin", catch_up="all", name="daily"))
     clock.set("2026-01-04T12:00")
     Scheduler(service.store).look()
     assert states(service.store, kept.id) == [(f"0{day} 23:00", RunState.SUBMITTED, 0) for day in (1, 2, 3)]
-    found = service.store.schedule_runs(kept.id)
-    studies = {study.id: study.number for study in service.store.list_studies().studies}
+    found = service.store.schedules.runs(kept.id)
+    studies = {study.id: study.number for study in service.store.studies.page().studies}
     numbers = [studies[str(run.study)] for run in reversed(found)]
     assert numbers == sorted(numbers)
     assert len(numbers) == 3
@@ -84,15 +84,15 @@ def test_what_is_too_late_is_recorded_as_missed_and_in_the_log(
     service: Service, clock: Clock, caplog: pytest.LogCaptureFixture
 ) -> None:
     store = service.store
-    kept = store.create_schedule(fields(cron="@hourly", misfire_grace="10 min"))
+    kept = store.schedules.create(fields(cron="@hourly", misfire_grace="10 min"))
     clock.set("2026-01-01T03:30")
     Scheduler(store).look()
     Scheduler(store).look()
     assert states(store, kept.id) == [("01 03:00", RunState.MISSED, 2)]
-    (run,) = store.schedule_runs(kept.id)
+    (run,) = store.schedules.runs(kept.id)
     assert "0:30:00 (h:min:s) later; its misfire grace is 10 min" in str(run.problem)
     assert "was missed 3 times" in caplog.text
-    assert store.list_studies().studies == ()
+    assert store.studies.page().studies == ()
     clock.set("2026-01-01T04:09")
     Scheduler(store).look()
     assert states(store, kept.id)[-1] == ("01 04:00", RunState.SUBMITTED, 0)
@@ -100,14 +100,14 @@ def test_what_is_too_late_is_recorded_as_missed_and_in_the_log(
 
 def test_a_run_whose_scheduler_died_is_not_submitted_after_its_grace(service: Service, clock: Clock) -> None:
     store = service.store
-    kept = store.create_schedule(fields(at="2026-01-01T02:00", misfire_grace="10 min"))
+    kept = store.schedules.create(fields(at="2026-01-01T02:00", misfire_grace="10 min"))
     clock.set("2026-01-01T02:00")
-    (due,) = store.due_schedules(clock.now())
-    assert store.take_due(due, [DueTime(clock.now())], None, clock.now())
+    (due,) = store.schedules.due(clock.now())
+    assert store.runs.take_due(due, [DueTime(clock.now())], None, clock.now())
     clock.set("2026-01-01T02:11")
     Scheduler(store).look()
     assert states(store, kept.id) == [("01 02:00", RunState.REFUSED, 0)]
-    assert store.list_studies().studies == ()
+    assert store.studies.page().studies == ()
 
 
 @pytest.mark.parametrize("finished", [False, True])
@@ -115,27 +115,27 @@ def test_a_due_time_is_skipped_while_the_earlier_study_has_not_ended(
     service: Service, clock: Clock, finished: bool
 ) -> None:
     store, look = service.store, Scheduler(service.store).look
-    kept = store.create_schedule(fields(cron="@hourly", overlap="skip"))
+    kept = store.schedules.create(fields(cron="@hourly", overlap="skip"))
     clock.set("2026-01-01T01:00")
     look()
-    (first,) = store.list_studies().studies
+    (first,) = store.studies.page().studies
     if finished:
         service.fill(first.id)
     clock.set("2026-01-01T02:00")
     look()
     outcome = RunState.SUBMITTED if finished else RunState.SKIPPED
     assert states(store, kept.id) == [("01 01:00", RunState.SUBMITTED, 0), ("01 02:00", outcome, 0)]
-    assert len(store.list_studies().studies) == 1 + finished
+    assert len(store.studies.page().studies) == 1 + finished
     if not finished:
-        assert first.id in str(store.schedule_runs(kept.id)[0].problem)
+        assert first.id in str(store.schedules.runs(kept.id)[0].problem)
 
 
 def test_a_study_that_somebody_paused_does_not_make_skip_the_next(service: Service, clock: Clock) -> None:
     store, look = service.store, Scheduler(service.store).look
-    kept = store.create_schedule(fields(cron="@hourly", overlap="skip"))
+    kept = store.schedules.create(fields(cron="@hourly", overlap="skip"))
     clock.set("2026-01-01T01:00")
     look()
-    store.pause_study(store.list_studies().studies[0].id)
+    store.studies.pause(store.studies.page().studies[0].id)
     clock.set("2026-01-01T02:00")
     look()
     assert states(store, kept.id)[-1] == ("01 02:00", RunState.SUBMITTED, 0)
@@ -143,46 +143,46 @@ def test_a_study_that_somebody_paused_does_not_make_skip_the_next(service: Servi
 
 def test_the_earlier_study_is_replaced_also_outside_its_window(service: Service, clock: Clock) -> None:
     store, look = service.store, Scheduler(service.store).look
-    store.create_schedule(fields(cron="0 12 * * *", overlap="replace", window=["22:00", "06:00"]))
+    store.schedules.create(fields(cron="0 12 * * *", overlap="replace", window=["22:00", "06:00"]))
     other = service.submit()
     clock.set("2026-01-01T12:00")
     look()
-    first = store.list_studies().studies[0]
+    first = store.studies.page().studies[0]
     assert first.state is StudyState.PAUSED
     clock.set("2026-01-02T12:00")
     look()
     look()
-    newest = store.list_studies().studies[0]
+    newest = store.studies.page().studies[0]
     assert newest.id != first.id
-    store.settle(store.take_over("test"), first.number)
-    assert store.get_study(first.id).state is StudyState.CANCELLED
-    assert store.get_study(other).state is StudyState.QUEUED, "studies of others go on"
+    store.work.settle(store.work.take_over("test"), first.number)
+    assert store.studies.get(first.id).state is StudyState.CANCELLED
+    assert store.studies.get(other).state is StudyState.QUEUED, "studies of others go on"
 
 
 def test_studies_wait_their_turn_by_default(service: Service, clock: Clock) -> None:
     store, look = service.store, Scheduler(service.store).look
-    kept = store.create_schedule(fields(cron="@hourly"))
+    kept = store.schedules.create(fields(cron="@hourly"))
     for hour in (1, 2):
         clock.set(f"2026-01-01T0{hour}:00")
         look()
     assert [state for _, state, _ in states(store, kept.id)] == [RunState.SUBMITTED] * 2
-    assert {study.state for study in store.list_studies().studies} == {StudyState.QUEUED}
+    assert {study.state for study in store.studies.page().studies} == {StudyState.QUEUED}
 
 
 def test_a_paused_schedule_is_due_again_at_the_end_of_its_pause(service: Service, clock: Clock) -> None:
     store, look = service.store, Scheduler(service.store).look
-    kept = store.create_schedule(fields(cron="0 22 * * *"))
+    kept = store.schedules.create(fields(cron="0 22 * * *"))
     paused = change_fields(kept.fields, {"paused_until": "2026-01-03T22:00"}, clock.now())
-    assert store.change_schedule(kept.id, paused).next_due == at("2026-01-03T22:00")
+    assert store.schedules.change(kept.id, paused).next_due == at("2026-01-03T22:00")
     clock.set("2026-01-03T21:59")
     look()
-    assert store.list_studies().studies == ()
-    assert store.get_schedule(kept.id).fields.policies.paused_until == at("2026-01-03T22:00")
+    assert store.studies.page().studies == ()
+    assert store.schedules.get(kept.id).fields.policies.paused_until == at("2026-01-03T22:00")
     clock.set("2026-01-03T22:00")
     look()
     assert states(store, kept.id) == [("03 22:00", RunState.SUBMITTED, 0)]
-    assert store.get_schedule(kept.id).fields.policies.paused_until is None
-    assert store.get_schedule(kept.id).next_due == at("2026-01-04T22:00")
+    assert store.schedules.get(kept.id).fields.policies.paused_until is None
+    assert store.schedules.get(kept.id).next_due == at("2026-01-04T22:00")
 
 
 def test_another_field_is_changed_after_the_end_of_a_pause(clock: Clock) -> None:

@@ -120,7 +120,7 @@ def test_the_form_has_recipients(office: Service) -> None:
         "report_when": "trouble",
     }
     assert office.http.post("/schedules/new", data=form).status_code == 303
-    (kept,) = office.store.list_schedules()
+    (kept,) = office.store.schedules.all()
     assert kept.fields.report_to.email == ("dora@example.com", "otto@example.org")
     shown = office.http.get(f"/schedules/{kept.id}").text
     assert 'value="dora@example.com, otto@example.org"' in shown
@@ -148,14 +148,14 @@ def test_reports_are_deleted_after_ninety_days(office: Service, clock: Clock) ->
     office.http.post(API, json=asked(report_webhook=HOOK, catch_up="none"))
     clock.set("2026-01-01T06:00")
     Scheduler(store).look()
-    report = store.claim_report()
+    report = store.reports.claim()
     assert report is not None
-    store.report_sent(report)
+    store.reports.sent(report)
     for time, left in (("2026-03-31T05:00", 1), ("2026-04-02T05:00", 0)):
         clock.set(time)
-        store.note_clock(clock.now())
+        store.dispatchers.note_clock(clock.now())
         Maintenance(store, MaintenancePlan()).look()
-        assert len(store.reports_between(report.created_at.replace(year=2025), clock.now())) == left
+        assert len(store.reports.between(report.created_at.replace(year=2025), clock.now())) == left
 
 
 @pytest.mark.parametrize(

@@ -63,17 +63,17 @@ def delivery_to(hook: Hook, **more: Any) -> Delivery:
 def run_over(service: Service, clock: Clock, time: str = "2026-01-01T01:00", **given: Any) -> str:
     """A schedule that was due at ``time`` and whose study has ended; the id of the study."""
     fields = {"spec": SPEC, "at": time, "name": "Nächtlich", "zone": "Europe/Berlin", **given}
-    service.store.create_schedule(read_fields({**fields, "at": f"{time}Z"}, NEW_YEAR))
+    service.store.schedules.create(read_fields({**fields, "at": f"{time}Z"}, NEW_YEAR))
     clock.set(time)
     Scheduler(service.store).look()
-    study = service.store.list_studies().studies[0].id
+    study = service.store.studies.page().studies[0].id
     service.fill(study)
     Scheduler(service.store).look()
     return study
 
 
 def records(store: Store) -> list[ReportRecord]:
-    found = store.reports_between(NEW_YEAR.replace(year=2025), NEW_YEAR.replace(year=2027))
+    found = store.reports.between(NEW_YEAR.replace(year=2025), NEW_YEAR.replace(year=2027))
     return [record for reports in found.values() for record in reports]
 
 
@@ -173,7 +173,7 @@ def test_a_report_is_given_up_after_three_days_or_when_its_receiver_is_gone(
     hook.status = 410
     reporter.look()
     assert [report.state for report in records(store)] == [ReportState.FAILED] * 2
-    log = list(store.audit_rows(AuditFilter(action="report.fail")))
+    log = list(store.audit.rows(AuditFilter(action="report.fail")))
     assert [(row.actor, row.detail["problem"]) for row in log] == [
         ("reports", "The webhook answered 500."),
         ("reports", "The webhook answered 410."),
@@ -184,7 +184,7 @@ def test_a_report_is_given_up_after_three_days_or_when_its_receiver_is_gone(
 def test_a_process_that_dies_before_sending_loses_nothing(service: Service, clock: Clock, hook: Hook) -> None:
     store = service.store
     run_over(service, clock, report_webhook=hook.address)
-    killed = store.claim_report()
+    killed = store.reports.claim()
     assert killed is not None
     reporter = Reporter(store, delivery_to(hook))
     reporter.look()
@@ -193,7 +193,7 @@ def test_a_process_that_dies_before_sending_loses_nothing(service: Service, cloc
     reporter.look()
     reporter.look()
     assert hook.ids == [killed.id]
-    store.report_failed(killed, "late", None)  # the other process was not dead, only slow
+    store.reports.failed(killed, "late", None)  # the other process was not dead, only slow
     assert [(report.state, report.attempts) for report in records(store)] == [(ReportState.SENT, 2)]
 
 
@@ -210,7 +210,7 @@ def test_a_process_that_dies_after_sending_sends_it_again_under_the_same_id(
         raise KilledError
 
     with monkeypatch.context() as patch:
-        patch.setattr(store, "report_sent", die)
+        patch.setattr(store.reports, "sent", die)
         with pytest.raises(KilledError):
             Reporter(store, delivery_to(hook)).look()
     clock.seconds += CLAIM.total_seconds()
@@ -250,7 +250,7 @@ def test_two_reporters_at_once_send_each_report_once(
 def test_a_claim_of_a_clock_that_was_put_back_does_not_last(service: Service, clock: Clock, hook: Hook) -> None:
     run_over(service, clock, report_webhook=hook.address)
     clock.set("2026-03-01T00:00")
-    assert service.store.claim_report() is not None
+    assert service.store.reports.claim() is not None
     clock.set("2026-01-01T01:05")
     Reporter(service.store, delivery_to(hook)).look()
     assert len(hook.requests) == 1
@@ -309,7 +309,7 @@ def test_only_trouble_is_reported_where_that_is_asked_for(
     )
     run_over(service, clock, report_webhook=hook.address, report_when="trouble")
     assert records(service.store) == []
-    service.store.create_schedule(
+    service.store.schedules.create(
         read_fields(
             {
                 "spec": SPEC,
@@ -329,7 +329,7 @@ def test_only_trouble_is_reported_where_that_is_asked_for(
 
 def test_a_study_that_is_gone_is_reported_without_its_curve(service: Service, clock: Clock) -> None:
     study = run_over(service, clock, report_email=[DORA])
-    service.store.delete_study(study)
+    service.store.studies.delete(study)
     with mail_server() as box:
         Reporter(service.store, Delivery(mail_server=box.server("none"), sender="sprag@example.com")).look()
     (mail,) = box.mails
@@ -338,10 +338,10 @@ def test_a_study_that_is_gone_is_reported_without_its_curve(service: Service, cl
 
 def test_old_reports_are_deleted(service: Service, clock: Clock, hook: Hook) -> None:
     run_over(service, clock, report_webhook=hook.address)
-    assert service.store.prune_reports(NEW_YEAR.replace(year=2027)) == 0, "it waits"
+    assert service.store.reports.prune(NEW_YEAR.replace(year=2027)) == 0, "it waits"
     Reporter(service.store, delivery_to(hook)).look()
-    assert service.store.prune_reports(NEW_YEAR) == 0
-    assert service.store.prune_reports(NEW_YEAR.replace(year=2027)) == 1
+    assert service.store.reports.prune(NEW_YEAR) == 0
+    assert service.store.reports.prune(NEW_YEAR.replace(year=2027)) == 1
 
 
 def test_an_answer_that_drips_does_not_keep_other_reports_waiting(monkeypatch: pytest.MonkeyPatch) -> None:

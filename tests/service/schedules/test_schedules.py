@@ -17,7 +17,7 @@ from sprag.service.jobs.scheduler import Scheduler
 from sprag.service.schedules.fields import ScheduleFields, read_fields
 from sprag.service.schedules.policies import DueTime
 from sprag.service.storage.errors import DatabaseBusyError, ScheduleNotFoundError
-from sprag.service.storage.schedule_runs import RunState
+from sprag.service.storage.runs import RunState
 from sprag.service.storage.store import Store
 from sprag.worker.states import StudyState
 from tests.service.conftest import Service
@@ -33,12 +33,12 @@ def fields(**given: Any) -> ScheduleFields:
 
 
 def names(store: Store) -> list[str]:
-    return [study.name for study in store.list_studies().studies]
+    return [study.name for study in store.studies.page().studies]
 
 
 def test_a_cron_schedule_submits_a_study_whenever_it_is_due(service: Service, clock: Clock) -> None:
     store, look = service.store, Scheduler(service.store).look
-    kept = store.create_schedule(
+    kept = store.schedules.create(
         fields(cron="0 22 * * *", zone="Europe/Berlin", name="nightly", priority=3, fresh=True)
     )
     assert kept.next_due == datetime(2026, 1, 1, 21, tzinfo=UTC)
@@ -49,14 +49,14 @@ def test_a_cron_schedule_submits_a_study_whenever_it_is_due(service: Service, cl
         look()
         look()
         assert names(store) == ["nightly"] * day
-    study = store.list_studies().studies[0]
+    study = store.studies.page().studies[0]
     assert study.priority == 3
-    assert store.spec(study.id) == SPEC
-    found = store.get_schedule(kept.id)
+    assert store.studies.spec(study.id) == SPEC
+    found = store.schedules.get(kept.id)
     assert found.next_due == datetime(2026, 1, 3, 21, tzinfo=UTC)
     assert found.last is not None
     assert (found.last.state, found.last.study, found.last.missed) == (RunState.SUBMITTED, study.id, 0)
-    assert [run.due.day for run in store.schedule_runs(kept.id)] == [2, 1]
+    assert [run.due.day for run in store.schedules.runs(kept.id)] == [2, 1]
 
 
 def test_a_look_asks_one_question_where_there_are_no_schedules(service: Service, clock: Clock) -> None:
@@ -73,7 +73,7 @@ def test_a_look_asks_one_question_where_there_are_no_schedules(service: Service,
         assert len(statements) == 1, statements
     finally:
         sa.event.remove(sa.Engine, "before_cursor_execute", note)
-    service.store.create_schedule(fields(cron="0 22 * * *", zone="Europe/Berlin", name="nightly"))
+    service.store.schedules.create(fields(cron="0 22 * * *", zone="Europe/Berlin", name="nightly"))
     clock.set("2026-01-01T21:00")
     look()
     assert names(service.store) == ["nightly"]
@@ -88,35 +88,35 @@ def test_a_schedule_from_before_goes_on_as_before(
         for rows in ("20.000;100,5\n25.000;100,5\n", "20;100.5\n25;100.5\n")
     )
     store, look = service.store, Scheduler(service.store).look
-    store.create_schedule(read_fields({"spec": old, "cron": "0 22 * * *"}, NEW_YEAR))
+    store.schedules.create(read_fields({"spec": old, "cron": "0 22 * * *"}, NEW_YEAR))
     with monkeypatch.context() as patch:
         patch.setattr("sprag.service.spec.stored.accepted", lambda *_: then)
         clock.set("2026-01-01T22:00")
         look()
     clock.set("2026-01-02T22:00")
     look()
-    made = [store.study(study.id) for study in store.list_studies().studies]
+    made = [store.studies.study(study.id) for study in store.studies.page().studies]
     assert [study.columns(range(2))["gravity"].tolist() for study in made] == [pytest.approx([0.020, 0.025])] * 2
 
 
 def test_missed_times_become_one_run(service: Service, clock: Clock) -> None:
-    kept = service.store.create_schedule(fields(cron="0 * * * *"))
+    kept = service.store.schedules.create(fields(cron="0 * * * *"))
     clock.set("2026-01-01T05:20")
     Scheduler(service.store).look()
-    (run,) = service.store.schedule_runs(kept.id)
+    (run,) = service.store.schedules.runs(kept.id)
     assert (run.due, run.missed) == (datetime(2026, 1, 1, 5, tzinfo=UTC), 4)
     assert len(names(service.store)) == 1
-    assert service.store.get_schedule(kept.id).next_due == datetime(2026, 1, 1, 6, tzinfo=UTC)
+    assert service.store.schedules.get(kept.id).next_due == datetime(2026, 1, 1, 6, tzinfo=UTC)
 
 
 def test_once_is_made_up_for_when_it_was_missed_and_never_again(service: Service, clock: Clock) -> None:
-    kept = service.store.create_schedule(fields(at="2026-01-01T02:00"))
+    kept = service.store.schedules.create(fields(at="2026-01-01T02:00"))
     clock.set("2026-01-09T00:00")
     look = Scheduler(service.store).look
     look()
     look()
     assert len(names(service.store)) == 1
-    assert service.store.get_schedule(kept.id).next_due is None
+    assert service.store.schedules.get(kept.id).next_due is None
 
 
 def test_two_schedulers_at_once_submit_one_study(settings: Settings, clock: Clock) -> None:
@@ -125,7 +125,7 @@ def test_two_schedulers_at_once_submit_one_study(settings: Settings, clock: Cloc
         Store.open(settings.database_url, clock=clock) as other,
     ):
         for number in range(4):
-            one.create_schedule(fields(cron="*/5 * * * *", name=str(number)))
+            one.schedules.create(fields(cron="*/5 * * * *", name=str(number)))
         for turn in range(1, 6):
             clock.set(f"2026-01-01T00:{5 * turn:02}")
             gate = threading.Barrier(2)
@@ -154,65 +154,63 @@ def test_one_key_from_many_threads_keeps_one_schedule(settings: Settings, clock:
             made = {
                 record.id
                 for record in threads.map(
-                    lambda _: store.create_schedule(kept, idempotency_key="k", body_hash="a"), range(16)
+                    lambda _: store.schedules.create(kept, idempotency_key="k", body_hash="a"), range(16)
                 )
             }
-        assert made == {record.id for record in store.list_schedules()}
+        assert made == {record.id for record in store.schedules.all()}
         assert len(made) == 1
 
 
 def test_who_saw_it_due_before_another_took_it_takes_nothing(service: Service, clock: Clock) -> None:
     store = service.store
-    store.create_schedule(fields(cron="0 * * * *"))
+    store.schedules.create(fields(cron="0 * * * *"))
     clock.set("2026-01-01T01:00")
-    (seen,) = store.due_schedules(clock.now())
+    (seen,) = store.schedules.due(clock.now())
     due, following = clock.now(), clock.now() + timedelta(hours=1)
-    assert store.take_due(seen, [DueTime(due)], following, due)
-    assert not store.take_due(seen, [DueTime(due)], following, due)
-    assert len(store.open_runs()) == 1
+    assert store.runs.take_due(seen, [DueTime(due)], following, due)
+    assert not store.runs.take_due(seen, [DueTime(due)], following, due)
+    assert len(store.runs.open()) == 1
 
 
 def test_a_clock_that_is_put_back_comes_to_no_due_time_twice(service: Service, clock: Clock) -> None:
     look = Scheduler(service.store).look
-    kept = service.store.create_schedule(fields(cron="0 * * * *"))
+    kept = service.store.schedules.create(fields(cron="0 * * * *"))
     clock.set("2026-01-01T01:00")
     look()
     clock.set("2026-01-01T00:30")
-    service.store.change_schedule(kept.id, fields(cron="0 * * * *", name="changed"))
+    service.store.schedules.change(kept.id, fields(cron="0 * * * *", name="changed"))
     clock.set("2026-01-01T01:00")
     look()
     look()
     assert len(names(service.store)) == 1
-    assert service.store.get_schedule(kept.id).next_due == datetime(2026, 1, 1, 2, tzinfo=UTC)
+    assert service.store.schedules.get(kept.id).next_due == datetime(2026, 1, 1, 2, tzinfo=UTC)
 
 
 def test_a_scheduler_that_dies_as_it_submits_is_made_up_for_once(
     service: Service, clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    kept = service.store.create_schedule(fields(at="2026-01-01T02:00"))
+    kept = service.store.schedules.create(fields(at="2026-01-01T02:00"))
     clock.set("2026-01-01T02:00")
     with monkeypatch.context() as patch:
-        patch.setattr(
-            "sprag.service.storage.schedule_runs.inherit_figures", Mock(side_effect=DatabaseBusyError("busy"))
-        )
+        patch.setattr("sprag.service.storage.runs.inherit_figures", Mock(side_effect=DatabaseBusyError("busy")))
         with pytest.raises(DatabaseBusyError):
             Scheduler(service.store).look()
     assert names(service.store) == [], "neither the study nor its outcome is there"
-    assert service.store.schedule_runs(kept.id)[0].state is RunState.TAKEN
+    assert service.store.schedules.runs(kept.id)[0].state is RunState.TAKEN
     for _ in range(2):
         Scheduler(service.store).look()
     assert len(names(service.store)) == 1
-    assert service.store.schedule_runs(kept.id)[0].state is RunState.SUBMITTED
+    assert service.store.schedules.runs(kept.id)[0].state is RunState.SUBMITTED
 
 
 def test_a_spec_that_this_program_does_not_read_is_told(service: Service, clock: Clock) -> None:
     good = fields(at="2026-01-01T02:00")
-    kept = service.store.create_schedule(
+    kept = service.store.schedules.create(
         ScheduleFields("old", {"sprag": 0}, good.timing, None, 0, fresh=False, enabled=True)
     )
     clock.set("2026-01-01T02:00")
     Scheduler(service.store).look()
-    (run,) = service.store.schedule_runs(kept.id)
+    (run,) = service.store.schedules.runs(kept.id)
     assert run.state is RunState.REFUSED
     assert run.problem is not None
     assert "/sprag" in run.problem
@@ -221,85 +219,85 @@ def test_a_spec_that_this_program_does_not_read_is_told(service: Service, clock:
 
 def test_a_study_is_held_outside_its_window_and_goes_on_inside(service: Service, clock: Clock) -> None:
     store, look = service.store, Scheduler(service.store).look
-    store.create_schedule(fields(at="2026-01-01T12:00", window=["22:00", "06:00"], zone="UTC"))
+    store.schedules.create(fields(at="2026-01-01T12:00", window=["22:00", "06:00"], zone="UTC"))
     clock.set("2026-01-01T12:00")
     look()
-    (study,) = store.list_studies().studies
+    (study,) = store.studies.page().studies
     assert (study.state, study.reason) == (
         StudyState.PAUSED,
         "outside its window, 22:00 to 06:00 (UTC); it continues by itself",
     )
     clock.set("2026-01-01T22:00")
     look()
-    assert store.get_study(study.id).state is StudyState.QUEUED
+    assert store.studies.get(study.id).state is StudyState.QUEUED
     clock.set("2026-01-02T06:00")
     look()
-    assert store.get_study(study.id).state is StudyState.PAUSED
+    assert store.studies.get(study.id).state is StudyState.PAUSED
 
 
 def test_the_window_stays_when_the_schedule_is_deleted(service: Service, clock: Clock) -> None:
     store, look = service.store, Scheduler(service.store).look
-    kept = store.create_schedule(fields(at="2026-01-01T12:00", window=["22:00", "06:00"]))
+    kept = store.schedules.create(fields(at="2026-01-01T12:00", window=["22:00", "06:00"]))
     clock.set("2026-01-01T12:00")
     look()
-    store.delete_schedule(kept.id)
+    store.schedules.delete(kept.id)
     with pytest.raises(ScheduleNotFoundError):
-        store.get_schedule(kept.id)
+        store.schedules.get(kept.id)
     clock.set("2026-01-01T23:00")
     look()
-    assert store.list_studies().studies[0].state is StudyState.QUEUED
+    assert store.studies.page().studies[0].state is StudyState.QUEUED
 
 
 def test_who_resumes_a_held_study_lifts_its_window(service: Service, clock: Clock) -> None:
     store, look = service.store, Scheduler(service.store).look
-    store.create_schedule(fields(at="2026-01-01T12:00", window=["22:00", "06:00"]))
+    store.schedules.create(fields(at="2026-01-01T12:00", window=["22:00", "06:00"]))
     clock.set("2026-01-01T12:00")
     look()
-    (study,) = store.list_studies().studies
-    store.resume_study(study.id)
+    (study,) = store.studies.page().studies
+    store.studies.resume(study.id)
     look()
-    assert store.get_study(study.id).state is StudyState.QUEUED
+    assert store.studies.get(study.id).state is StudyState.QUEUED
 
 
 def test_who_resumes_a_study_outside_its_window_lifts_it_whatever_held_the_study(
     service: Service, clock: Clock
 ) -> None:
     store, look = service.store, Scheduler(service.store).look
-    store.create_schedule(fields(at="2026-01-01T23:00", window=["22:00", "06:00"], finish_by="05:00"))
+    store.schedules.create(fields(at="2026-01-01T23:00", window=["22:00", "06:00"], finish_by="05:00"))
     clock.set("2026-01-01T23:00")
     look()
-    (study,) = store.list_studies().studies
-    store.pause_study(study.id)
-    store.resume_study(study.id)  # in its window, which stays
+    (study,) = store.studies.page().studies
+    store.studies.pause(study.id)
+    store.studies.resume(study.id)  # in its window, which stays
     clock.set("2026-01-02T12:00")
     look()
-    assert store.get_study(study.id).state is StudyState.PAUSED
-    store.time_is_over(store.take_over("tests"), study.number)
-    assert store.get_study(study.id).time_over
-    store.resume_study(study.id)
+    assert store.studies.get(study.id).state is StudyState.PAUSED
+    store.work.time_is_over(store.work.take_over("tests"), study.number)
+    assert store.studies.get(study.id).time_over
+    store.studies.resume(study.id)
     look()
-    assert store.get_study(study.id).state is StudyState.QUEUED
+    assert store.studies.get(study.id).state is StudyState.QUEUED
 
 
 def test_who_pauses_a_study_keeps_it_paused_in_its_window(service: Service, clock: Clock) -> None:
     store, look = service.store, Scheduler(service.store).look
-    store.create_schedule(fields(at="2026-01-01T12:00", window=["22:00", "06:00"]))
+    store.schedules.create(fields(at="2026-01-01T12:00", window=["22:00", "06:00"]))
     clock.set("2026-01-01T12:00")
     look()
-    (study,) = store.list_studies().studies
-    store.pause_study(study.id)
+    (study,) = store.studies.page().studies
+    store.studies.pause(study.id)
     clock.set("2026-01-01T23:00")
     look()
-    assert store.get_study(study.id).state is StudyState.PAUSED
+    assert store.studies.get(study.id).state is StudyState.PAUSED
 
 
 def test_a_disabled_schedule_is_not_due_and_forgets_what_it_missed(service: Service, clock: Clock) -> None:
     store, look = service.store, Scheduler(service.store).look
-    kept = store.create_schedule(fields(cron="0 * * * *", enabled=False))
+    kept = store.schedules.create(fields(cron="0 * * * *", enabled=False))
     assert kept.next_due is None
     clock.set("2026-01-01T03:10")
     look()
-    again = store.change_schedule(kept.id, fields(cron="0 * * * *"))
+    again = store.schedules.change(kept.id, fields(cron="0 * * * *"))
     assert again.next_due == datetime(2026, 1, 1, 4, tzinfo=UTC)
     look()
     assert names(store) == []
@@ -307,14 +305,14 @@ def test_a_disabled_schedule_is_not_due_and_forgets_what_it_missed(service: Serv
 
 def test_a_study_of_a_schedule_can_be_deleted(service: Service, clock: Clock) -> None:
     store = service.store
-    kept = store.create_schedule(fields(at="2026-01-01T12:00"))
+    kept = store.schedules.create(fields(at="2026-01-01T12:00"))
     clock.set("2026-01-01T12:00")
     Scheduler(store).look()
-    (study,) = store.list_studies().studies
+    (study,) = store.studies.page().studies
     service.fill(study.id)
-    store.delete_study(study.id)
+    store.studies.delete(study.id)
     Scheduler(store).look()
-    (run,) = store.schedule_runs(kept.id)
+    (run,) = store.schedules.runs(kept.id)
     assert (run.state, run.study) == (RunState.SUBMITTED, None)
     assert names(store) == []
 
@@ -342,12 +340,12 @@ def test_the_thread_looks_again_after_trouble(
 def test_a_time_that_passes_between_its_check_and_its_storage_is_run(service: Service, clock: Clock) -> None:
     checked, other = fields(at="2026-01-01T02:00"), fields(at="2026-01-01T02:30")
     clock.set("2026-01-01T03:00")
-    kept = service.store.create_schedule(checked)
+    kept = service.store.schedules.create(checked)
     look = Scheduler(service.store).look
     look()
-    service.store.change_schedule(kept.id, other)
+    service.store.schedules.change(kept.id, other)
     look()
-    service.store.change_schedule(kept.id, replace(other, priority=3))
+    service.store.schedules.change(kept.id, replace(other, priority=3))
     look()
-    assert [run.due.minute for run in service.store.schedule_runs(kept.id)] == [30, 0]
+    assert [run.due.minute for run in service.store.schedules.runs(kept.id)] == [30, 0]
     assert len(names(service.store)) == 2

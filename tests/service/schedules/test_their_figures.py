@@ -18,22 +18,22 @@ if TYPE_CHECKING:
 
 
 def test_the_next_study_of_a_schedule_has_the_figures_of_the_one_before(service: Service, clock: Clock) -> None:
-    service.store.create_schedule(read_fields({"spec": SPEC, "cron": "0 1 * * *"}, NEW_YEAR))
+    service.store.schedules.create(read_fields({"spec": SPEC, "cron": "0 1 * * *"}, NEW_YEAR))
     studies = []
     for day in (1, 2, 3):
         clock.set(f"2026-01-0{day}T01:00")
         Scheduler(service.store).look()
-        studies.append(service.store.list_studies().studies[0].id)
+        studies.append(service.store.studies.page().studies[0].id)
         service.fill(studies[-1])
         if day == 1:
-            service.store.save_view(View("curves", "Efficiency", "y=efficiency", studies[0], in_report=True))
-            service.store.save_view(View("curves", "Torque", "y=torque.mean", studies[0]))
+            service.store.views.save(View("curves", "Efficiency", "y=efficiency", studies[0], in_report=True))
+            service.store.views.save(View("curves", "Torque", "y=torque.mean", studies[0]))
     assert len(set(studies)) == 3
     for study in studies[1:]:
-        assert [(one.view.name, one.place) for one in service.store.saved_views(study)] == [("Efficiency", 1)]
+        assert [(one.view.name, one.place) for one in service.store.views.all(study)] == [("Efficiency", 1)]
         (figure,) = report_of(service.store, study).figures
         assert small_curve(service.store, study) == figure.draw("png", "Efficiency")
-    (first, *_) = service.store.saved_views(studies[1])
-    service.store.remove_view(first.id)
+    (first, *_) = service.store.views.all(studies[1])
+    service.store.views.remove(first.id)
     Scheduler(service.store).look()  # what was taken out stays out
-    assert service.store.saved_views(studies[1]) == ()
+    assert service.store.views.all(studies[1]) == ()

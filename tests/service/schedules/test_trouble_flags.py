@@ -65,7 +65,7 @@ def one_night(service: Service, clock: Clock) -> dict[str, Any]:
     """The outcome of the only run of the night, which is finished."""
     clock.set("2026-01-01T01:00")
     Scheduler(service.store).look()
-    (study,) = service.store.list_studies().studies
+    (study,) = service.store.studies.page().studies
     service.fill(study.id)
     before = service.get("/night")["runs"][0]["outcome"]
     Scheduler(service.store).look()
@@ -138,7 +138,7 @@ def test_a_change_holds_for_runs_that_end_after_it(
     assert service.get("/night")["runs"][0]["outcome"] == first, "what was told stays"
     clock.set("2026-01-02T01:00")
     Scheduler(service.store).look()
-    service.fill(service.store.list_studies().studies[0].id)
+    service.fill(service.store.studies.page().studies[0].id)
     Scheduler(service.store).look()
     latest, earlier = service.http.get(made).json()["runs"]
     assert (latest["outcome"]["trouble"], earlier["outcome"]["trouble"]) == (False, True)
@@ -149,17 +149,17 @@ def test_a_change_holds_for_runs_that_end_after_it(
 def test_reports_say_which_flag_it_is(service: Service, clock: Clock, all_have: Callable[[str], None]) -> None:
     """Only on trouble, and in the language of mails."""
     to = {"report_email": ["dora@example.com"], "report_when": "trouble"}
-    service.store.create_schedule(read_fields({**NIGHTLY, **to, "trouble_flags": ["jumped"]}, NEW_YEAR))
-    service.store.create_schedule(read_fields({**NIGHTLY, **to, "trouble_flags": []}, NEW_YEAR))
+    service.store.schedules.create(read_fields({**NIGHTLY, **to, "trouble_flags": ["jumped"]}, NEW_YEAR))
+    service.store.schedules.create(read_fields({**NIGHTLY, **to, "trouble_flags": []}, NEW_YEAR))
     all_have("jumped,unsettled")
     clock.set("2026-01-01T01:00")
     Scheduler(service.store).look()
-    for study in service.store.list_studies().studies:
+    for study in service.store.studies.page().studies:
         service.fill(study.id)
     Scheduler(service.store).look()
-    report = service.store.claim_report()
+    report = service.store.reports.claim()
     assert report is not None
-    assert service.store.claim_report() is None
+    assert service.store.reports.claim() is None
     assert sentence(report.content).endswith("ended ok. Flag jumped: 9 cases.")
     with languages.language("uk"):
         assert sentence(report.content).endswith("Позначка «стрибок»: 9 випадків.")
@@ -251,17 +251,17 @@ def test_the_form_has_a_box_for_each_flag(service: Service) -> None:
         ({"trouble_flags/unsettled": "on"}, ("unsettled",), {"unsettled"}),
     ):
         assert service.http.post("/schedules/new", data={**FORM, **boxes}).status_code == 303
-        record = service.store.list_schedules()[0]
+        record = service.store.schedules.all()[0]
         assert record.fields.trouble_flags == kept
         page = f"/schedules/{record.id}"
         assert ticked(service.http.get(page).text) == shown
         # Saved again as it is shown, with "the current one" for the study.
         again = {**FORM, "source": "", **{f"trouble_flags/{name}": "on" for name in shown}}
         assert service.http.post(page, data=again).status_code == 303
-        assert service.store.get_schedule(record.id).fields.trouble_flags == kept
+        assert service.store.schedules.get(record.id).fields.trouble_flags == kept
     without = {name: text for name, text in FORM.items() if name != "trouble_flags"}
     assert service.http.post(page, data={**without, "source": ""}).status_code == 303
-    assert service.store.get_schedule(record.id).fields.trouble_flags == ("unsettled",), "a form of before keeps it"
+    assert service.store.schedules.get(record.id).fields.trouble_flags == ("unsettled",), "a form of before keeps it"
 
 
 def test_the_form_says_what_is_wrong_in_the_language_of_the_page(service: Service) -> None:
@@ -324,7 +324,7 @@ def test_a_night_of_unsettled_cases_ends_the_command_as_its_schedule_says(
     service.http.post(API, json={**NIGHTLY, "cron": "0 2 * * *", "trouble_flags": ["unsettled"]})
     clock.set("2026-01-01T02:00")
     Scheduler(service.store).look()
-    service.fill(service.store.list_studies().studies[0].id)
+    service.fill(service.store.studies.page().studies[0].id)
     Scheduler(service.store).look()
     code, out, _ = run("night")
     assert code == 1

@@ -34,7 +34,7 @@ def hook(monkeypatch: pytest.MonkeyPatch) -> Iterator[Hook]:
 
 def nightly(store: Store, **given: Any) -> str:
     fields = {"spec": SPEC, "cron": "0 1 * * *", "name": "nightly", **given}
-    return store.create_schedule(read_fields(fields, NEW_YEAR)).id
+    return store.schedules.create(read_fields(fields, NEW_YEAR)).id
 
 
 def sentences(store: Store) -> list[str]:
@@ -105,7 +105,7 @@ def test_a_study_waits_without_a_worker(service: Service, clock: Clock) -> None:
     assert sentences(store) == []
     clock.set("2026-01-01T01:15")
     assert sentences(store) == ["its study waits, and no worker has responded for a quarter of an hour."]
-    service.fill(store.list_studies().studies[0].id)
+    service.fill(store.studies.page().studies[0].id)
     assert sentences(store) == []
 
 
@@ -119,16 +119,16 @@ def beat(store: Store, epoch: int) -> None:
         "hosts": [],
         "refused": [],
     }
-    store.heartbeat(epoch, report)
+    store.work.heartbeat(epoch, report)
 
 
 def test_a_worker_that_finishes_nothing_for_two_hours(service: Service, clock: Clock) -> None:
     store = service.store
     nightly(store, window=["22:00", "06:00"])
-    epoch = store.take_over("test")
+    epoch = store.work.take_over("test")
     clock.set("2026-01-01T01:00")
     Scheduler(store).look()
-    study = store.list_studies().studies[0]
+    study = store.studies.page().studies[0]
     for time, expected in (
         ("2026-01-01T03:00", []),
         ("2026-01-01T03:01", ["its study waits, and no chunk of any study has been finished for two hours."]),
@@ -136,9 +136,9 @@ def test_a_worker_that_finishes_nothing_for_two_hours(service: Service, clock: C
         clock.set(time)
         beat(store, epoch)
         assert sentences(store) == expected
-    epoch = store.take_over("test")
-    chunk = store.open_chunks(study.number)[0]
-    assert store.claim(epoch, [chunk])
+    epoch = store.work.take_over("test")
+    chunk = store.work.open_chunks(study.number)[0]
+    assert store.work.claim(epoch, [chunk])
     clock.set("2026-01-01T06:30")
     Scheduler(store).look()
     clock.set("2026-01-01T22:00")
@@ -158,8 +158,8 @@ def test_a_study_that_is_not_submitted_says_why(
     clock.set("2026-01-01T02:00")
     (said,) = sentences(store)
     assert said.startswith("its study is not submitted yet; 0 studies have not ended yet.")
-    paused = change_fields(store.get_schedule(kept).fields, {"enabled": False}, clock.now())
-    store.change_schedule(kept, paused)
+    paused = change_fields(store.schedules.get(kept).fields, {"enabled": False}, clock.now())
+    store.schedules.change(kept, paused)
     assert sentences(store) == []
 
 
@@ -167,6 +167,6 @@ def test_what_is_paused_or_over_is_not_late(service: Service, clock: Clock) -> N
     store = service.store
     nightly(store, paused_until="2026-02-01T00:00")
     nightly(store, enabled=False)
-    store.delete_schedule(nightly(store))
+    store.schedules.delete(nightly(store))
     clock.set("2026-01-05T00:00")
     assert late_runs(store) == []

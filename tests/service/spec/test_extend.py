@@ -119,7 +119,9 @@ def test_over_http_only_new_cases_are_run(service: Service, spec: dict[str, Any]
 
     def run(study_id: str) -> dict[str, Any]:
         store = service.store
-        Dispatcher(store, InlineExecutor(engine), SystemClock()).run(lambda: store.get_study(study_id).state.terminal)
+        Dispatcher(store.work, InlineExecutor(engine), SystemClock()).run(
+            lambda: store.studies.get(study_id).state.terminal
+        )
         study: dict[str, Any] = service.get(f"/studies/{study_id}")
         return study
 

@@ -77,13 +77,13 @@ def test_a_study_that_chooses_its_own_cases() -> None:
 @pytest.fixture
 def stored(service: Service) -> str:
     """A study that an earlier version accepted, with its spec as it was sent."""
-    made = service.store.create_study(OLD, parse_spec(THEN).study)
+    made = service.store.studies.create(OLD, parse_spec(THEN).study)
     service.fill(made.id)
     return made.id
 
 
 def values_of(service: Service, study_id: str) -> list[float]:
-    study = service.store.study(study_id)
+    study = service.store.studies.study(study_id)
     return sorted(float(value) for value in study.columns(range(study.cases))["gravity"])
 
 
@@ -96,7 +96,7 @@ def test_it_is_extended_cloned_selected_and_scheduled_as_it_was(service: Service
     assert "20.000;" not in page
     form = {"when": "cron", "cron": "0 22 * * *", "priority": "0", "zone": "UTC", "source": f"study {stored}"}
     assert service.http.post("/schedules/new", data=form).status_code == 303
-    (schedule,) = service.store.list_schedules()
+    (schedule,) = service.store.schedules.all()
     assert gravity(schedule.fields.spec) == pytest.approx([0.020, 0.025])
 
 

@@ -48,14 +48,14 @@ def clock() -> Wrong:
 @pytest.fixture
 def store(settings: Settings, clock: Wrong) -> Iterator[Store]:
     with Store.open(settings.database_url, clock=clock) as opened:
-        opened.take_over("here:1")
+        opened.work.take_over("here:1")
         yield opened
 
 
 def ended(store: Store) -> str:
     study = accept(store, parse_spec(SPEC))
-    store.cancel_study(study.id)
-    store.settle(store.take_over("here:1"), study.number)
+    store.studies.cancel(study.id)
+    store.work.settle(store.work.take_over("here:1"), study.number)
     return study.id
 
 
@@ -75,20 +75,20 @@ def test_a_jump_deletes_nothing_and_is_told_and_survives_a_restart(
         looker.look()
         clock.seconds += DAY
         looker.look()
-        assert store.get_study(study).id == study
+        assert store.studies.get(study).id == study
     assert backups(plan.folder or tmp_path)[0][0] == NEW_YEAR + timedelta(hours=12), "kept, although keep is 1"
     assert caplog.text.count("The clock jumped ahead, from 2026-01-01T12:00:20+00:00 to 2035-12-30T12:00:20") == 1
-    store.take_over("here:1")
+    store.work.take_over("here:1")
     answer = http.get("/readyz").json()
     assert "nothing is deleted by age until it is corrected" in answer["warnings"][0]
     clock.ahead = timedelta()
     looker.look()
     assert "The clock is trusted again: it is 2026-01-0" in caplog.text
-    assert store.get_study(study).id == study
+    assert store.studies.get(study).id == study
     clock.seconds = 31.5 * DAY
     looker.look()
     with pytest.raises(StudyNotFoundError):
-        store.get_study(study)
+        store.studies.get(study)
 
 
 def test_the_user_can_say_that_the_clock_is_right(store: Store, clock: Wrong) -> None:
@@ -96,7 +96,7 @@ def test_the_user_can_say_that_the_clock_is_right(store: Store, clock: Wrong) ->
     assert watch.believable()
     clock.ahead = timedelta(days=100)
     assert not watch.believable()
-    store.note_clock(clock.now())
+    store.dispatchers.note_clock(clock.now())
     assert watch.believable()
     assert ClockWatch(store).believable()
 
@@ -128,15 +128,15 @@ def test_the_command_deletes_nothing_on_the_word_of_a_clock_that_jumped(
     settings: Settings, store: Store, clock: Wrong, capsys: pytest.CaptureFixture[str]
 ) -> None:
     study = ended(store)
-    store.note_clock(clock.now())  # in January 2026: the clock of the command is months ahead
+    store.dispatchers.note_clock(clock.now())  # in January 2026: the clock of the command is months ahead
     command = ["db", "prune", "--older-than", "1", "--db", settings.database]
     assert execute(command) == ExitCode.TROUBLE
     assert "nothing is deleted by age until it is corrected" in capsys.readouterr().err
-    assert store.get_study(study).id == study
+    assert store.studies.get(study).id == study
     assert execute(["db", "clock", "--db", settings.database]) == 0
     assert execute(command) == 0
     with pytest.raises(StudyNotFoundError):
-        store.get_study(study)
+        store.studies.get(study)
 
 
 def test_what_was_missed_is_deleted_at_the_start_and_while_backups_fail(
@@ -147,20 +147,20 @@ def test_what_was_missed_is_deleted_at_the_start_and_while_backups_fail(
     clock.seconds = 31.4 * DAY  # the machine is off at 02:30, always
     Maintenance(store, MaintenancePlan(folder, study_days=30)).look()
     with pytest.raises(StudyNotFoundError):
-        store.get_study(study)
+        store.studies.get(study)
 
 
 def test_schedules_are_due_again_when_a_clock_that_was_ahead_is_put_back(store: Store, clock: Wrong) -> None:
-    kept = store.create_schedule(read_fields({"spec": SPEC, "cron": "0 22 * * *"}, NEW_YEAR))
+    kept = store.schedules.create(read_fields({"spec": SPEC, "cron": "0 22 * * *"}, NEW_YEAR))
     look = Scheduler(store).look
     look()
     clock.ahead = timedelta(days=3650)
     clock.seconds = 60.0
     look()
-    due = store.get_schedule(kept.id).next_due
+    due = store.schedules.get(kept.id).next_due
     assert due is not None
     assert due.year == 2035
     clock.ahead = timedelta()
     clock.seconds = 120.0
     look()
-    assert store.get_schedule(kept.id).next_due == datetime(2026, 1, 1, 22, tzinfo=UTC)
+    assert store.schedules.get(kept.id).next_due == datetime(2026, 1, 1, 22, tzinfo=UTC)

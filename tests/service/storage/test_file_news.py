@@ -30,12 +30,12 @@ def news(store: Store, monkeypatch: pytest.MonkeyPatch) -> Iterator[FileNews]:
 def test_every_commit_of_another_connection_is_reported_once(store: Store, news: FileNews) -> None:
     assert news.wait(0.0)  # whatever was there before
     assert not news.wait(0.0)
-    store.take_over("test")
+    store.work.take_over("test")
     assert news.wait(0.0)
     assert not news.wait(0.0)
-    assert store.active_studies() == []  # reading changes nothing
+    assert store.work.active_studies() == []  # reading changes nothing
     assert not news.wait(0.0)
-    store.create_study({}, fakes.study(4), fresh=True)
+    store.studies.create({}, fakes.study(4), fresh=True)
     assert news.wait(0.0)
 
 
@@ -45,7 +45,7 @@ def test_a_change_while_it_waits_is_reported(store: Store, news: FileNews, monke
 
     def rest(seconds: float) -> None:
         waited.append(seconds)
-        store.take_over("test")
+        store.work.take_over("test")
 
     monkeypatch.setattr("sprag.service.storage.file_news.time.sleep", rest)
     assert news.wait(0.5)
@@ -59,7 +59,7 @@ def test_changes_are_reported_so_often_and_none_is_lost(
     monkeypatch.setattr("sprag.service.storage.file_news.time.monotonic", lambda: now)
     monkeypatch.setattr(file_news, "LEAST_SECONDS", 1.0)
     assert news.wait(0.0)
-    store.take_over("test")
+    store.work.take_over("test")
     assert not news.wait(0.0)
     now = 1.0
     assert news.wait(0.0)

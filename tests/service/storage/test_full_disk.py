@@ -41,66 +41,66 @@ def fill_up():
 
 MAKING_ROOM = """
 with Store.open(f"sqlite:///{place / 'a.sqlite3'}", chunking=Chunking(cases=500)) as store:
-    record = store.create_study({}, fakes.study(20_000))
-    waiting = store.create_study({}, fakes.study(500))
-    epoch = store.take_over("test")
-    for chunk in store.open_chunks(record.number):
-        store.claim(epoch, [chunk])
-        store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
-    store.settle(epoch, record.number)
-    assert store.shortage() is None, "makes the reserve"
+    record = store.studies.create({}, fakes.study(20_000))
+    waiting = store.studies.create({}, fakes.study(500))
+    epoch = store.work.take_over("test")
+    for chunk in store.work.open_chunks(record.number):
+        store.work.claim(epoch, [chunk])
+        store.work.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+    store.work.settle(epoch, record.number)
+    assert store.work.shortage() is None, "makes the reserve"
     assert Readiness(store).problems() == ()
     with store.session.plain() as connection:
         connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
     fill_up()
     try:
-        store.create_study({}, fakes.study(500))
+        store.studies.create({}, fakes.study(500))
     except DatabaseFullError:
         print("full", flush=True)
-    store.hold(epoch, store.shortage(), returned=False)
+    store.work.hold(epoch, store.work.shortage(), returned=False)
     print(Readiness(store).problems()[0], flush=True)
     fill_up()
-    store.cancel_study(waiting.id)
-    store.settle(epoch, waiting.number)
-    store.delete_study(record.id, at_once=True)
-    store.purge()
-    listed = {study.id: study.state.value for study in store.list_studies(page_size=1000).studies}
+    store.studies.cancel(waiting.id)
+    store.work.settle(epoch, waiting.number)
+    store.studies.delete(record.id, at_once=True)
+    store.purging.purge()
+    listed = {study.id: study.state.value for study in store.studies.page(page_size=1000).studies}
     assert record.id not in listed
     assert listed[waiting.id] == "cancelled"
-    print("room", store.room() > 5e6, flush=True)
-    store.let_go(epoch)
+    print("room", store.room.left() > 5e6, flush=True)
+    store.work.let_go(epoch)
     print(Readiness(store).problems(), flush=True)
-    again = store.create_study({}, fakes.study(500))
-    (chunk,) = store.open_chunks(again.number)
-    store.claim(epoch, [chunk])
-    assert store.commit(epoch, chunk, fakes.result(0, 500))
+    again = store.studies.create({}, fakes.study(500))
+    (chunk,) = store.work.open_chunks(again.number)
+    store.work.claim(epoch, [chunk])
+    assert store.work.commit(epoch, chunk, fakes.result(0, 500))
     print(store.check().problems, flush=True)
 """
 
 OPENED_ON_FULL = """
 url = f"sqlite:///{place / 'a.sqlite3'}"
 with Store.open(url, chunking=Chunking(cases=500)) as store:
-    record = store.create_study({}, fakes.study(20_000))
-    epoch = store.take_over("test")
-    for chunk in store.open_chunks(record.number):
-        store.claim(epoch, [chunk])
-        store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
-    store.settle(epoch, record.number)
-    assert store.shortage() is None, "makes the reserve"
-    store.let_go(epoch)
+    record = store.studies.create({}, fakes.study(20_000))
+    epoch = store.work.take_over("test")
+    for chunk in store.work.open_chunks(record.number):
+        store.work.claim(epoch, [chunk])
+        store.work.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+    store.work.settle(epoch, record.number)
+    assert store.work.shortage() is None, "makes the reserve"
+    store.work.let_go(epoch)
 fill_up()
 for _ in range(3):
     with Store.open(url) as store:
-        print([study.id == record.id for study in store.list_studies(page_size=10).studies], flush=True)
+        print([study.id == record.id for study in store.studies.page(page_size=10).studies], flush=True)
     fill_up()
 lock = DispatcherLock(place / "a.sqlite3")
 print(lock.take(), DispatcherLock(place / "a.sqlite3").take(), flush=True)
 lock.release()
 print(DispatcherLock(place / "a.sqlite3").take(), flush=True)
 with Store.open(url) as store:
-    store.delete_study(record.id, at_once=True)
-    store.purge()
-    print(len(store.list_studies(page_size=10).studies), store.room() > 5e6, store.check().problems, flush=True)
+    store.studies.delete(record.id, at_once=True)
+    store.purging.purge()
+    print(len(store.studies.page(page_size=10).studies), store.room.left() > 5e6, store.check().problems, flush=True)
 """
 
 

@@ -114,20 +114,20 @@ def test_studies_go_on_where_they_were(opened: tuple[Session, Session], urls: tu
     with Store.open(urls[0]) as store:
         done, deleted = create(store, 25), create(store, 5, "deleted")
         finish(store, done)
-        store.cancel_study(deleted.id)
-        store.settle(store.take_over("test"), deleted.number)
-        store.delete_study(deleted.id)
-        store.purge()
+        store.studies.cancel(deleted.id)
+        store.work.settle(store.work.take_over("test"), deleted.number)
+        store.studies.delete(deleted.id)
+        store.purging.purge()
         waiting = create(store, 12, "waiting", idempotency_key="once")
-        _, token = store.create_token("a token", TokenScope.READ)
+        _, token = store.people.create_token("a token", TokenScope.READ)
     _move(*opened)
     with Store.open(urls[1]) as store:
-        assert store.reusable(fakes.study(25)) == 25
+        assert store.reuse.count(fakes.study(25)) == 25
         assert create(store, 12, "waiting", idempotency_key="once").id == waiting.id
-        assert [kept.id for kept in store.tokens()] == [token.id]
+        assert [kept.id for kept in store.people.tokens()] == [token.id]
         assert create(store, 3, "new").number > waiting.number
         assert finish(store, waiting)
-        assert store.get_study(waiting.id).done == 12
+        assert store.studies.get(waiting.id).done == 12
 
 
 class _PowerError(Exception):

@@ -84,7 +84,7 @@ def test_symbolic_links_of_file_and_folder_are_followed(file: Path, tmp_path: Pa
         with held(file) as said, Store.open(f"sqlite:///{name}") as store:
             assert said == "open"
             assert store.session.path == file
-            store.create_study({}, fakes.study(1))
+            store.studies.create({}, fakes.study(1))
     assert {path.name.split(".")[0] for path in file.parent.iterdir()} == {"a"}
     (tmp_path / "dangling").symlink_to(tmp_path / "real.sqlite3")
     Store.open(f"sqlite:///{tmp_path / 'dangling'}").close()
@@ -99,7 +99,7 @@ def test_a_link_that_is_turned_to_another_file_is_noticed(file: Path, tmp_path: 
         link.unlink()
         link.symlink_to(other)
         with refused(DatabaseError, "database-replaced"):
-            store.create_study({}, fakes.study(1))
+            store.studies.create({}, fakes.study(1))
 
 
 def test_a_file_that_was_moved_while_a_process_uses_it_is_refused_under_the_new_name(
@@ -132,7 +132,7 @@ def test_a_session_that_ends_leaves_the_locks_of_another_one_of_its_process_alon
         with held(moved) as said:
             assert said == "database-in-use"
         moved.rename(file)
-        store.create_study({}, fakes.study(1))
+        store.studies.create({}, fakes.study(1))
         opened = file.stat().st_dev, file.stat().st_ino
         assert opened in one_name._OPENED
     assert opened not in one_name._OPENED
@@ -143,18 +143,18 @@ def test_workers_that_take_a_database_from_each_other_are_told(file: Path) -> No
     with Store.open(f"sqlite:///{file}", clock=clock) as store:
         for turn in range(4):
             clock.seconds = turn
-            store.take_over(f"host:{turn % 2}")
+            store.work.take_over(f"host:{turn % 2}")
             clock.seconds += 0.5
             taken = Readiness(store).problems()
             assert bool(taken) == (turn == 3), turn
         assert "3 times within 10 minutes" in taken[0]
-        store.release(4)
+        store.work.release(4)
         clock.seconds = 700.0
         for turn in range(4):
             clock.seconds += 1.0
-            store.release(store.take_over(f"host:{turn}"))
+            store.work.release(store.work.take_over(f"host:{turn}"))
             clock.seconds += 1.0
-        store.take_over("host:5")
+        store.work.take_over("host:5")
         assert Readiness(store).problems() == (), "restarts that ended the worker before are none"
 
 
@@ -163,5 +163,5 @@ def test_a_process_that_begins_anew_takes_nothing_from_another(file: Path) -> No
     with Store.open(f"sqlite:///{file}", clock=clock) as store:
         for turn in range(5):
             clock.seconds = turn
-            store.take_over("host:1")
+            store.work.take_over("host:1")
         assert Readiness(store).problems() == ()

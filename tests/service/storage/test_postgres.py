@@ -144,7 +144,7 @@ def test_what_the_program_did_wrong_is_not_explained_away() -> None:
 def test_an_empty_database_gets_the_tables_of_the_code(postgres_server: postgres.Server) -> None:
     url = postgres_server.url(postgres_server.new_database())
     with Store.open(url) as store:
-        assert store.list_studies().studies == ()
+        assert store.studies.page().studies == ()
         with store.session.read() as connection:
             context = MigrationContext.configure(connection, opts={"compare_type": True})
             assert compare_metadata(context, all_tables()) == []
@@ -167,13 +167,13 @@ def test_one_writer_at_a_time_and_readers_of_one_moment(postgres_url: str, monke
     monkeypatch.setattr(session_module, "BUSY_SECONDS", 0.05)
     with Store.open(postgres_url) as store, Store.open(postgres_url) as other:
         with store.session.write():
-            assert other.list_studies().studies == ()
+            assert other.studies.page().studies == ()
             with refused(DatabaseBusyError, "database-busy"), other.session.write():
                 pass
         with store.session.read() as connection:
             count = sa.select(sa.func.count()).select_from(STUDIES)
             assert connection.execute(count).scalar_one() == 0
-            other.create_study({}, fakes.study(3))
+            other.studies.create({}, fakes.study(3))
             assert connection.execute(count).scalar_one() == 0
 
 
@@ -212,8 +212,8 @@ def test_news_come_with_every_wish_and_not_without(postgres_url: str) -> None:
         assert news is not None
         assert news.wait(0.0)  # whatever happened before it began to listen
         assert not news.wait(0.0)
-        record = store.create_study({}, fakes.study(3))
-        for wish in (store.pause_study, store.resume_study, lambda of: store.prioritize_study(of, 3)):
+        record = store.studies.create({}, fakes.study(3))
+        for wish in (store.studies.pause, store.studies.resume, lambda of: store.studies.prioritize(of, 3)):
             assert news.wait(DEADLINE)
             assert not news.wait(0.0)
             wish(record.id)
@@ -225,7 +225,7 @@ def test_news_come_with_every_wish_and_not_without(postgres_url: str) -> None:
             )
         eventually(lambda: news.wait(0.0))  # lost, which may mean anything
         eventually(lambda: not news.wait(0.0))
-        store.cancel_study(record.id)
+        store.studies.cancel(record.id)
         assert news.wait(DEADLINE)
         news.close()
 
@@ -292,17 +292,17 @@ def test_workers_share_studies_and_take_over_those_of_one_that_is_killed_or_lose
     with Store.open(postgres_url, chunking=Chunking(cases=4)) as store:
         workers = [worker(postgres_url), worker(postgres_url)]
         try:
-            eventually(lambda: len([record for record in store.dispatchers() if record.usable]) == 2)
-            studies = [store.create_study({}, fakes.study(400, f"{number}"), fresh=True) for number in range(4)]
-            eventually(lambda: {record.studies for record in store.dispatchers()} == {2})
-            eventually(lambda: all(store.get_study(record.id).done for record in studies))
+            eventually(lambda: len([record for record in store.dispatchers.all() if record.usable]) == 2)
+            studies = [store.studies.create({}, fakes.study(400, f"{number}"), fresh=True) for number in range(4)]
+            eventually(lambda: {record.studies for record in store.dispatchers.all()} == {2})
+            eventually(lambda: all(store.studies.get(record.id).done for record in studies))
             workers[0].send_signal(signal.SIGKILL)
             eventually(
-                lambda: [record.owner.rpartition(":")[2] for record in store.dispatchers()] == [f"{workers[1].pid}"]
+                lambda: [record.owner.rpartition(":")[2] for record in store.dispatchers.all()] == [f"{workers[1].pid}"]
             )
             workers.append(worker(postgres_url))
-            eventually(lambda: len(store.dispatchers()) == 2)
-            (lost, _) = store.dispatchers()
+            eventually(lambda: len(store.dispatchers.all()) == 2)
+            (lost, _) = store.dispatchers.all()
 
             # Its connection is cut and it does not know; it ends when it asks who is there, or is refused.
             with store.session.plain() as connection:
@@ -312,10 +312,10 @@ def test_workers_share_studies_and_take_over_those_of_one_that_is_killed_or_lose
                     "AND database = (SELECT oid FROM pg_database WHERE datname = current_database())"
                 )
             assert workers[1].wait(DEADLINE) == 3
-            eventually(lambda: all(store.get_study(record.id).state is StudyState.FINISHED for record in studies))
+            eventually(lambda: all(store.studies.get(record.id).state is StudyState.FINISHED for record in studies))
             expected = models.run_chunk(fakes.study(400), 0, 400).values
             for record in studies:
-                np.testing.assert_array_equal(store.case_rows(record.id, limit=400).values, expected)
+                np.testing.assert_array_equal(store.rows.block(record.id, limit=400).values, expected)
         finally:
             for process in workers:
                 process.terminate()
@@ -368,9 +368,9 @@ def test_a_server_that_crashes_ends_the_worker_with_a_sentence_and_loses_nothing
         url = server.url(server.new_database())
         with Store.open(url, chunking=Chunking(cases=4)) as store:
             study = fakes.study(400)  # enough that the first worker is not through before the server crashes
-            record = store.create_study({}, study)
+            record = store.studies.create({}, study)
             with worker(url) as process:
-                eventually(lambda: store.get_study(record.id).done > 0)
+                eventually(lambda: store.studies.get(record.id).done > 0)
                 server.stop()
                 assert process.wait(DEADLINE) == 3
                 assert process.stderr is not None
@@ -378,12 +378,12 @@ def test_a_server_that_crashes_ends_the_worker_with_a_sentence_and_loses_nothing
             assert "cannot be reached" in said
             assert "Traceback" not in said
             with refused(DatabaseError, "database-unreachable"):
-                store.get_study(record.id)
+                store.studies.get(record.id)
             server.start()
             with worker(url) as process:
-                eventually(lambda: store.get_study(record.id).state is StudyState.FINISHED)
+                eventually(lambda: store.studies.get(record.id).state is StudyState.FINISHED)
                 process.terminate()
             assert process.returncode == 0
-            block = store.case_rows(record.id, limit=400)
+            block = store.rows.block(record.id, limit=400)
             assert block.cases.tolist() == list(range(400))
             np.testing.assert_array_equal(block.values, models.run_chunk(study, 0, 400).values)

@@ -76,12 +76,12 @@ def test_a_silent_worker_is_told_by_readyz_and_by_studies(
     settings: Settings, store: Store, clock: fakes.HandClock, connect: Callable[..., httpx.Client]
 ) -> None:
     http = connect(create_app(settings, store=store, checker=InThread()))
-    study = store.create_study({}, fakes.study(4))
+    study = store.studies.create({}, fakes.study(4))
     assert http.get("/readyz").status_code == 200, "no worker has begun yet"
-    epoch = store.take_over("here:1")
+    epoch = store.work.take_over("here:1")
     clock.seconds = 60.0
     assert http.get("/readyz").status_code == 200
-    assert store.get_study(study.id).reason is None
+    assert store.studies.get(study.id).reason is None
     clock.seconds = 158.0
     answer = http.get("/readyz")
     assert (answer.status_code, answer.json()["detail"]) == (
@@ -91,15 +91,15 @@ def test_a_silent_worker_is_told_by_readyz_and_by_studies(
         "the worker (process here:1) has not responded since 2026-01-01T00:00:00+00:00; the study continues when "
         "a worker is at work"
     )
-    assert {record.reason for record in (*store.list_studies().studies, store.look(study.id)[0])} == {reason}
-    late = store.create_study({}, fakes.study(4))
-    assert {late.reason, store.prioritize_study(late.id, 1).reason} == {reason}, "in the answers to a change too"
-    assert store.pause_study(late.id).reason is None
-    assert store.resume_study(late.id).reason == reason
-    store.heartbeat(epoch, fakes.report())
+    assert {record.reason for record in (*store.studies.page().studies, store.studies.look(study.id)[0])} == {reason}
+    late = store.studies.create({}, fakes.study(4))
+    assert {late.reason, store.studies.prioritize(late.id, 1).reason} == {reason}, "in the answers to a change too"
+    assert store.studies.pause(late.id).reason is None
+    assert store.studies.resume(late.id).reason == reason
+    store.work.heartbeat(epoch, fakes.report())
     clock.seconds += 10.0
     assert http.get("/readyz").status_code == 200
-    assert store.get_study(study.id).reason is None
+    assert store.studies.get(study.id).reason is None
 
 
 def test_a_worker_beside_the_service_makes_no_database_in_the_place_of_one_that_is_gone(tmp_path: Path) -> None:
@@ -135,7 +135,7 @@ def test_what_would_be_lost_with_a_file_is_not_taken(
     (problem,) = Readiness(store).problems()
     assert reason in problem
     with pytest.raises(DatabaseError, match=reason):
-        store.create_study({}, fakes.study(4))
+        store.studies.create({}, fakes.study(4))
 
 
 def _replace(path: Path) -> None:
@@ -170,7 +170,7 @@ def test_submissions_tell_that_the_file_is_gone(
     assert f"POST /api/v1/studies: {answer.json()['detail']}" in caplog.text
     assert path.exists() == there, "no empty file takes its place"
     with refused(DatabaseError, "database-replaced"):
-        store.room()
+        store.room.left()
 
 
 def test_errors_of_the_disk_are_those_of_a_file_that_is_gone(store: Store) -> None:
@@ -186,7 +186,7 @@ def test_errors_of_the_disk_are_those_of_a_file_that_is_gone(store: Store) -> No
 def test_damage_is_found_and_told(store: Store, clock: fakes.HandClock) -> None:
     readiness = Readiness(store)
     for _ in range(20):
-        store.create_study({"text": "x" * 10_000}, fakes.study(50))
+        store.studies.create({"text": "x" * 10_000}, fakes.study(50))
     with store.session.plain() as connection:
         connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
     data = bytearray(store.session.path.read_bytes())
@@ -203,7 +203,7 @@ def test_a_worker_that_was_stopped_in_its_transaction_is_ended_by_take_over(
 ) -> None:
     monkeypatch.setattr(dispatching, "LOCKED_SECONDS", 0.01)
     assert Readiness(store, locked_seconds=0.01).problems()
-    study = store.get_study  # reads go on
+    study = store.studies.get  # reads go on
     said: list[str] = []
     run_dispatcher(
         WorkerSettings(settings.database_url, 1, 60.0), lambda: True, say=said.append,
@@ -211,7 +211,7 @@ def test_a_worker_that_was_stopped_in_its_transaction_is_ended_by_take_over(
     )  # fmt: skip
     assert stopped.wait(600) == -signal.SIGKILL
     assert said[0] == f"process {stopped.pid} hung and was ended"
-    record = store.create_study({}, fakes.study(4))
+    record = store.studies.create({}, fakes.study(4))
     assert study(record.id).cases == 4
 
 

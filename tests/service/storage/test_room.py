@@ -39,32 +39,32 @@ def world(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 
 def fill(store: Store) -> str:
     """A finished study of some 8 MB of rows; its id."""
-    record = store.create_study({}, fakes.study(20_000))
-    epoch = store.take_over("test")
-    for chunk in store.open_chunks(record.number):
-        store.claim(epoch, [chunk])
-        store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
-    store.settle(epoch, record.number)
+    record = store.studies.create({}, fakes.study(20_000))
+    epoch = store.work.take_over("test")
+    for chunk in store.work.open_chunks(record.number):
+        store.work.claim(epoch, [chunk])
+        store.work.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+    store.work.settle(epoch, record.number)
     return record.id
 
 
 def test_the_disk_is_asked(store: Store, world: Callable[..., None]) -> None:
     world(free=PLENTY)
-    assert (store.room(), store.shortage()) == (PLENTY, None)
+    assert (store.room.left(), store.work.shortage()) == (PLENTY, None)
     world(free=RESERVE_BYTES)
-    assert store.shortage() is None
+    assert store.work.shortage() is None
     world(free=0)
-    shortage = store.shortage() or ""
+    shortage = store.work.shortage() or ""
     assert shortage.startswith(f"no room: the disk that holds {store.session.path} has 0 MB left; the study continues")
 
 
 def test_the_largest_file_allowed_counts_too(store: Store, world: Callable[..., None]) -> None:
     size = store.session.path.stat().st_size
     world(limit=size + 3 * RESERVE_BYTES)
-    assert store.shortage() is None
-    assert 2 * RESERVE_BYTES < store.room() <= 3 * RESERVE_BYTES
+    assert store.work.shortage() is None
+    assert 2 * RESERVE_BYTES < store.room.left() <= 3 * RESERVE_BYTES
     world(limit=size + RESERVE_BYTES // 2)
-    assert "ulimit -f" in (store.shortage() or "")
+    assert "ulimit -f" in (store.work.shortage() or "")
 
 
 def test_what_deleted_studies_left_free_is_room(store: Store, world: Callable[..., None]) -> None:
@@ -72,13 +72,13 @@ def test_what_deleted_studies_left_free_is_room(store: Store, world: Callable[..
     world(free=0)
     with store.session.plain() as connection:
         connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
-    assert store.shortage() is not None
+    assert store.work.shortage() is not None
     world(free=PLENTY)
-    store.delete_study(study)
-    store.purge()
+    store.studies.delete(study)
+    store.purging.purge()
     world(free=0)
-    assert store.room() > 5e6
-    assert store.shortage() is None
+    assert store.room.left() > 5e6
+    assert store.work.shortage() is None
 
 
 def test_a_log_whose_pages_are_in_their_place_is_room(store: Store, world: Callable[..., None]) -> None:
@@ -86,17 +86,17 @@ def test_a_log_whose_pages_are_in_their_place_is_room(store: Store, world: Calla
     log = store.session.path.with_name(f"{store.session.path.name}-wal").stat().st_size
     world(free=0)
     assert log > RESERVE_BYTES
-    assert store.room() == pytest.approx(log, rel=0.05)
+    assert store.room.left() == pytest.approx(log, rel=0.05)
 
 
 def test_a_database_that_takes_nothing_more_says_so_and_stays_whole(store: Store) -> None:
     """SQLite itself refuses pages beyond a limit just as it does on a full disk."""
-    record = store.create_study({}, fakes.study(20_000))
-    epoch = store.take_over("test")
+    record = store.studies.create({}, fakes.study(20_000))
+    epoch = store.work.take_over("test")
     with store.session.read() as connection:
         pages = connection.exec_driver_sql("PRAGMA page_count").scalar_one()
-    chunks = store.open_chunks(record.number)
-    store.claim(epoch, chunks)
+    chunks = store.work.open_chunks(record.number)
+    store.work.claim(epoch, chunks)
     limit = [pages + 100]
 
     def limited(connection: object, _record: object, _proxy: object) -> None:
@@ -107,15 +107,15 @@ def test_a_database_that_takes_nothing_more_says_so_and_stays_whole(store: Store
 
     def commit_all() -> None:
         for chunk in chunks[len(stored) :]:
-            assert store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+            assert store.work.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
             stored.append(chunk)
 
     with refused(DatabaseFullError, "storage-full") as caught:
         commit_all()
     assert isinstance(caught.value, StoreFullError)
     assert 0 < len(stored) < len(chunks)
-    assert store.get_study(record.id).done == 500 * len(stored) == len(store.case_rows(record.id, limit=20_000))
+    assert store.studies.get(record.id).done == 500 * len(stored) == len(store.rows.block(record.id, limit=20_000))
     limit[0] = pages + 10_000
     commit_all()
-    assert len(store.case_rows(record.id, limit=20_000)) == 20_000
+    assert len(store.rows.block(record.id, limit=20_000)) == 20_000
     assert not [problem for problem in store.check().problems if "SQLite" not in problem]

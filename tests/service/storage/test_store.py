@@ -33,10 +33,10 @@ def test_the_studies_kept_in_memory_are_few_values(url: str, monkeypatch: pytest
     monkeypatch.setattr("sprag.service.storage.studies.KEPT_VALUES", 5)
     with Store.open(url) as store:
         made = [fakes.study(3, name=f"study {index}") for index in range(3)]
-        ids = [store.create_study({}, study).id for study in made]
-        assert [store.study(study_id) for study_id in ids] == made
-        assert list(store._studies) == ids[-1:]
-        assert store.study(ids[0]) == made[0]
+        ids = [store.studies.create({}, study).id for study in made]
+        assert [store.studies.study(study_id) for study_id in ids] == made
+        assert list(store.studies._studies) == ids[-1:]
+        assert store.studies.study(ids[0]) == made[0]
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,7 @@ def test_threads_queue_for_the_one_that_writes_and_give_up_in_the_end(
 ) -> None:
     monkeypatch.setattr(session_module, "BUSY_SECONDS", 0.05)
     with Store.open(url) as store, store.session.write(), ThreadPoolExecutor(1) as threads:
-        waiting = threads.submit(store.create_study, {}, fakes.study(1))
+        waiting = threads.submit(store.studies.create, {}, fakes.study(1))
         assert isinstance(waiting.exception(), DatabaseBusyError)
 
 
@@ -141,14 +141,14 @@ def test_connections_are_safe(url: str) -> None:
 def test_writers_take_the_lock_at_once_and_readers_go_on(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(session_module, "BUSY_SECONDS", 0.05)
     with Store.open(url) as store, Store.open(url) as other, store.session.write():
-        assert other.list_studies().studies == ()
+        assert other.studies.page().studies == ()
         with refused(DatabaseBusyError, "database-busy"), other.session.write():
             pass
 
 
 def test_a_transaction_is_whole_or_nothing(url: str) -> None:
     with Store.open(url) as store:
-        record = store.create_study({}, fakes.study(3))
+        record = store.studies.create({}, fakes.study(3))
 
         def half() -> None:
             with store.session.write() as connection:
@@ -157,21 +157,21 @@ def test_a_transaction_is_whole_or_nothing(url: str) -> None:
 
         with pytest.raises(ZeroDivisionError):
             half()
-        assert store.get_study(record.id).name == "a study"
+        assert store.studies.get(record.id).name == "a study"
 
 
 def test_a_reader_sees_one_moment(url: str) -> None:
     with Store.open(url) as store, store.session.read() as connection:
         count = sa.select(sa.func.count()).select_from(STUDIES)
         assert connection.execute(count).scalar_one() == 0
-        store.create_study({}, fakes.study(3))
+        store.studies.create({}, fakes.study(3))
         assert connection.execute(count).scalar_one() == 0
 
 
 def test_a_backup_is_a_whole_database_and_replaces_nothing(url: str, tmp_path: Path) -> None:
     copy = tmp_path / "copy.sqlite3"
     with Store.open(url) as store:
-        record = store.create_study({"sprag": 1}, fakes.study(3))
+        record = store.studies.create({"sprag": 1}, fakes.study(3))
         with store.session.write() as connection:  # others may be at work
             connection.execute(sa.update(STUDIES).values(name="changed"))
             store.backup(copy)
@@ -180,7 +180,7 @@ def test_a_backup_is_a_whole_database_and_replaces_nothing(url: str, tmp_path: P
         with refused(DatabaseError, "write-failed"):
             store.backup(tmp_path / "nowhere" / "copy.sqlite3")
     with Store.open(f"sqlite:///{copy}") as restored:
-        assert restored.get_study(record.id) == record
+        assert restored.studies.get(record.id) == record
         assert not [problem for problem in restored.check().problems if "SQLite" not in problem]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "copy.sqlite3"]
 
@@ -274,8 +274,8 @@ def test_database_log_lock_reserve_and_backup_are_private_whatever_the_umask(url
     with Store.open(url) as store:
         lock = DispatcherLock(store.session.path)
         assert lock.take()
-        assert store.shortage() is None
-        store.create_study({}, fakes.study(1))
+        assert store.work.shortage() is None
+        store.studies.create({}, fakes.study(1))
         store.backup(tmp_path / "a" / "copy.sqlite3")
         folder = store.session.path.parent
         modes = {path.name: path.stat().st_mode & 0o777 for path in folder.iterdir()}

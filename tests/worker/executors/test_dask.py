@@ -310,7 +310,7 @@ def test_workers_that_would_give_other_values_run_nothing_and_the_study_says_so(
         other_settings: "numba settings: NUMBA_OPT=0 instead of ",
     }
     with clusters() as made, Store.open(f"sqlite:///{tmp_path / 'a.sqlite3'}", chunking=Chunking(cases=4)) as store:
-        record = store.create_study({}, fakes.study(20))
+        record = store.studies.create({}, fakes.study(20))
         made.start_scheduler()
         for other in others:
             folder = tmp_path / other.__name__
@@ -319,7 +319,7 @@ def test_workers_that_would_give_other_values_run_nothing_and_the_study_says_so(
         executor = DaskExecutor(made.url, 0, chunk_timeout=DEADLINE, run=fakes.run, load=fakes.load)
 
         def told() -> bool:
-            reason = store.get_study(record.id).reason or ""
+            reason = store.studies.get(record.id).reason or ""
             reported = sum(len(item["refused"]) for item in worker_list(store)["dispatchers"]) == len(others)
             return (
                 reported
@@ -328,9 +328,9 @@ def test_workers_that_would_give_other_values_run_nothing_and_the_study_says_so(
             )
 
         begin = time.monotonic()
-        Dispatcher(store, executor, SystemClock()).run(lambda: told() or time.monotonic() - begin > DEADLINE)
+        Dispatcher(store.work, executor, SystemClock()).run(lambda: told() or time.monotonic() - begin > DEADLINE)
         assert told()
-        assert store.get_study(record.id).done == 0
+        assert store.studies.get(record.id).done == 0
         assert [each for each in others.values() if each not in caplog.text] == []
         (found,) = worker_list(store)["dispatchers"]
         assert (found["usable"], [host["refused"] for host in found["hosts"]]) == (0, [len(others)])
@@ -364,13 +364,13 @@ def test_damaged_kernels_are_compiled_anew(tmp_path: Path, caplog: pytest.LogCap
         damaged.touch()
         given = {"chunk_timeout": DEADLINE, "run": fakes.run_or_die, "load": fakes.load_damaged}
         first = DaskExecutor(made.url, 0, **given)  # type: ignore[arg-type]
-        record = store.create_study({}, study)
+        record = store.studies.create({}, study)
         dispatcher = Dispatcher(
-            store, first, SystemClock(),
+            store.work, first, SystemClock(),
             renew=lambda: DaskExecutor(made.url, 0, renew=True, **given),  # type: ignore[arg-type]
         )  # fmt: skip
-        dispatcher.run(lambda: not store.active_studies())
-        ended = store.get_study(record.id)
+        dispatcher.run(lambda: not store.work.active_studies())
+        ended = store.studies.get(record.id)
         assert (ended.state, ended.ok) == (StudyState.FINISHED, 80)
         assert caplog.text.count("Its kernels are compiled anew and its cases run again.") == 1
         assert not damaged.exists()

@@ -156,21 +156,21 @@ def test_a_job_that_is_killed_is_submitted_again(tmp_path: Path) -> None:
         url = queue.stdout.readline().strip().removeprefix("SPRAG_EXECUTOR=")
         assert url == f"dask://127.0.0.1:{port}"
         with Store.open(f"sqlite:///{tmp_path / 'a.sqlite3'}", chunking=Chunking(cases=20)) as store:
-            record = store.create_study({}, fakes.study(cases))
+            record = store.studies.create({}, fakes.study(cases))
             executor = DaskExecutor(url, 0, chunk_timeout=DEADLINE, run=fakes.run, load=fakes.load)
 
             def stopping() -> bool:
                 nonlocal kills
-                now = store.get_study(record.id)
+                now = store.studies.get(record.id)
                 if not kills and now.done >= cases // 4:
                     os.killpg(int(numbers.read_text().split()[0]), signal.SIGKILL)
                     kills += 1
                 return now.state.terminal
 
-            Dispatcher(store, executor, SystemClock()).run(stopping)
-            ended = store.get_study(record.id)
+            Dispatcher(store.work, executor, SystemClock()).run(stopping)
+            ended = store.studies.get(record.id)
             assert (ended.state, ended.done, ended.ok) == (StudyState.FINISHED, cases, cases)
-            blocks = list(store.iter_rows(record.id))
+            blocks = list(store.rows.blocks(record.id))
             np.testing.assert_array_equal(np.concatenate([block.values for block in blocks]), fakes.values(0, cases))
         assert (kills, len(numbers.read_text().split())) == (1, 2)
         queue.send_signal(signal.SIGTERM)

@@ -50,12 +50,12 @@ def test_a_study_survives_what_happens_to_a_cluster(tmp_path: Path, capfd: pytes
     with clusters() as made, toy.known(), Store.open(store_url, chunking=Chunking(cases=20)) as store:
         made.start_scheduler()
         made.start_worker()
-        record = store.create_study({}, toy.study(5, size))
+        record = store.studies.create({}, toy.study(5, size))
         executor = DaskExecutor(made.url, 0, chunk_timeout=DEADLINE, run=fakes.run, load=fakes.load)
         marks = sorted(chosen.sample(range(cases // 20, cases - cases // 10), 2 + cases // 1500))
 
         def stopping() -> bool:
-            now = store.get_study(record.id)
+            now = store.studies.get(record.id)
             if len(kills) < len(marks) and now.done >= marks[len(kills)]:
                 if len(kills) % 3 == 1 and made.scheduler is not None:
                     made.scheduler.kill()
@@ -73,13 +73,13 @@ def test_a_study_survives_what_happens_to_a_cluster(tmp_path: Path, capfd: pytes
                     kills.append("worker")
             return now.state.terminal
 
-        Dispatcher(store, executor, SystemClock()).run(stopping)
-        ended = store.get_study(record.id)
+        Dispatcher(store.work, executor, SystemClock()).run(stopping)
+        ended = store.studies.get(record.id)
         assert (ended.state, ended.done, ended.ok) == (StudyState.FINISHED, cases, cases)
         assert set(kills) == {"worker", "scheduler"}
-        blocks = list(store.iter_rows(record.id))
+        blocks = list(store.rows.blocks(record.id))
         assert np.concatenate([block.cases for block in blocks]).tolist() == list(range(cases))
         np.testing.assert_array_equal(np.concatenate([block.values for block in blocks]), fakes.values(0, cases))
-        assert store.study(record.id) == undisturbed
-        assert len(store.rounds(record.id)) == 6  # the last is the end
+        assert store.studies.study(record.id) == undisturbed
+        assert len(store.studies.rounds(record.id)) == 6  # the last is the end
     assert "Traceback" not in capfd.readouterr().err

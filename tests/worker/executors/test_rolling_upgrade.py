@@ -78,14 +78,14 @@ class Upgrade:
         return sum(found["usable"] for found in alive), reasons
 
     def done(self) -> int:
-        return self.store.get_study(self.study).done
+        return self.store.studies.get(self.study).done
 
     def goes_on(self) -> None:
         """Let the study run until cases have been added. It is paused otherwise, so that no machine is too fast."""
         before = self.done()
-        self.store.resume_study(self.study)
+        self.store.studies.resume(self.study)
         until(lambda: self.done() >= before + A_FEW, f"more cases than {before} were done")
-        self.store.pause_study(self.study)
+        self.store.studies.pause(self.study)
 
 
 @contextmanager
@@ -94,8 +94,8 @@ def upgraded(folder: Path) -> Iterator[Upgrade]:
     with ExitStack() as stack:
         cluster = stack.enter_context(clusters())
         store = stack.enter_context(Store.open(f"sqlite:///{folder / 'a.sqlite3'}", chunking=Chunking(cases=10)))
-        record = store.create_study({}, study_of(spec(CASES, periods=20)))
-        store.pause_study(record.id)
+        record = store.studies.create({}, study_of(spec(CASES, periods=20)))
+        store.studies.pause(record.id)
         found = Upgrade(store, cluster, folder, record.id)
         try:
             cluster.start_scheduler()
@@ -144,15 +144,17 @@ def test_hosts_are_upgraded_in_turn_and_the_scheduler_is_replaced_while_a_study_
         assert office.dispatcher is replaced
         assert replaced is not None
         assert replaced.poll() is None  # it has found the new scheduler by itself
-        office.store.resume_study(office.study)
-        until(lambda: office.store.get_study(office.study).state.terminal, "the study has ended")
-        ended = office.store.get_study(office.study)
+        office.store.studies.resume(office.study)
+        until(lambda: office.store.studies.get(office.study).state.terminal, "the study has ended")
+        ended = office.store.studies.get(office.study)
         assert (ended.state, ended.done) == (StudyState.FINISHED, CASES)
-        blocks = list(office.store.iter_rows(office.study))
+        blocks = list(office.store.rows.blocks(office.study))
         assert np.concatenate([block.cases for block in blocks]).tolist() == list(range(CASES))
         values = np.concatenate([block.values for block in blocks])
-        np.testing.assert_array_equal(values, models.run_chunk(office.store.study(office.study), 0, CASES).values)
-        digests = {origin.fingerprint for origin in office.store.origins(office.study)}
+        np.testing.assert_array_equal(
+            values, models.run_chunk(office.store.studies.study(office.study), 0, CASES).values
+        )
+        digests = {origin.fingerprint for origin in office.store.rows.origins(office.study)}
         assert len(digests) == 2
         assert fingerprint.digest() in digests
         assert "mixed-origins" in {warning.code for warning in ended.warnings}

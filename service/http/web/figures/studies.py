@@ -52,7 +52,7 @@ async def figure_of(
     view = STUDY_VIEWS[name]
 
     def make(_record: StudyRecord) -> Response | Drawing:
-        study = work.context.store.study(study_id)
+        study = work.context.store.studies.study(study_id)
         chosen = choose(study)
         if chosen is None:
             return json_response(NOTHING)

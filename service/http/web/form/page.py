@@ -125,10 +125,10 @@ def _start(
     if clone is not None and case is not None:
         study = study_with(context, clone, case)
         known = along is None or (along in study.base and along not in study.derive)
-        return design_spec(accepted(context.store.spec(clone), study), study, case, along if known else None)
+        return design_spec(accepted(context.store.studies.spec(clone), study), study, case, along if known else None)
     if clone is not None:
-        name = context.store.get_study(clone).name
-        spec = accepted(context.store.spec(clone), context.store.study(clone))
+        name = context.store.studies.get(clone).name
+        spec = accepted(context.store.studies.spec(clone), context.store.studies.study(clone))
         # A study that was given another name is cloned under that.
         return spec if spec.get("name", UNNAMED) == name else {**spec, "name": name}
     if preset is None:
@@ -156,7 +156,7 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
         return await in_thread(_submit, context, request, values, checked, made)
     reshape(values, wanted)
     if wanted == "take-component":
-        take_component(values, await in_thread(context.store.components))
+        take_component(values, await in_thread(context.store.components.all))
     taken = wanted == "take-columns"
     faults = await in_thread(take_columns, values, _choices(values)) if taken else {}
     remember(values, before)
@@ -248,7 +248,7 @@ def form_page(
         search=is_search(values),
         kept=_kept(values),
         choices=[] if text_mode else _choices(values),
-        components=[] if text_mode else component_groups(values, request.app.state.context.store.components()),
+        components=[] if text_mode else component_groups(values, request.app.state.context.store.components.all()),
         component_rows=rows_with_components(values),
         undoable=bool(history_of(values)),
         presets=[preset_of(name) for name in (preset_names() if text_mode else _presets(model))],

@@ -20,13 +20,13 @@ def form(library: Library, values: Mapping[str, str], now: datetime, choice: Cho
     """Check a filled form; ``choice`` has the units and names of the sentence about it."""
     store = library.store
     # The study itself is not returned: it can be large, and no page shows it.
-    return replace(look_over(values, store.chunking, store.reusable, now, choice), parsed=None)
+    return replace(look_over(values, store.dispatchers.chunking, store.reuse.count, now, choice), parsed=None)
 
 
 def form_study(library: Library, values: Mapping[str, str], now: datetime) -> tuple[Checked, Submission | None]:
     """Check a filled form; also its study, None where the form has faults."""
     store = library.store
-    checked = look_over(values, store.chunking, store.reusable, now)
+    checked = look_over(values, store.dispatchers.chunking, store.reuse.count, now)
     made = None
     if checked.parsed is not None:
         made = submission(checked.parsed, store, now, finish_by=checked.finish)

@@ -58,8 +58,8 @@ def test_an_ended_calibration(service: Service) -> None:
 def test_an_ended_calibration_keeps_its_answer(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
     """A later version of the planner may read other values from the same rows."""
     study_id = calibration(service)
-    rows, study = service.store.rounds(study_id), service.store.study(study_id)
-    fetch = partial(service.store.rows_for_cases, study_id)
+    rows, study = service.store.studies.rounds(study_id), service.store.studies.study(study_id)
+    fetch = partial(service.store.rows.for_cases, study_id)
     assert not len(rows[-1].cases)
     replayed = calibration_of(study, rows[:-1], fetch)
     assert calibration_json("", replayed) == calibration_json("", calibration_of(study, rows, fetch))
@@ -116,7 +116,7 @@ def test_the_report_has_the_calibration(service: Service) -> None:
 
 
 def test_a_calibration_that_was_killed_ends_as_an_undisturbed_one(service: Service) -> None:
-    whole, killed = (service.store.study(calibration(service, kills=kills)) for kills in (False, True))
+    whole, killed = (service.store.studies.study(calibration(service, kills=kills)) for kills in (False, True))
     assert whole.cases == killed.cases
     assert whole.points(range(whole.cases)).tobytes() == killed.points(range(killed.cases)).tobytes()
 

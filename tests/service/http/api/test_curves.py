@@ -61,7 +61,7 @@ def expected(study: Study, rows: ChunkResult, name: str, **fixed: float) -> list
 def test_curves_are_the_rows_bit_for_bit(service: Service, grid: dict[str, Any]) -> None:
     study_id = service.submit(grid)
     rows = service.fill(study_id)
-    study = service.store.study(study_id)
+    study = service.store.studies.study(study_id)
     response = ask(
         service,
         study_id,
@@ -193,7 +193,7 @@ def test_zipped_axes_give_a_curve_for_each_machine(service: Service, spec: dict[
 def test_a_map_has_rows_of_y(service: Service, grid: dict[str, Any]) -> None:
     study_id = service.submit(grid)
     rows = service.fill(study_id)
-    study = service.store.study(study_id)
+    study = service.store.studies.study(study_id)
     body = ask(
         service, study_id, "x=shaft.load&y=excitation.frequency&z=torque.max&at=excitation.amplitude_x=1%20mm", "map"
     ).json()
@@ -243,7 +243,7 @@ def test_many_numbers_are_written_by_a_process_that_checks(
 
 
 def test_what_a_process_refuses_comes_back_whole(service: Service, grid: dict[str, Any]) -> None:
-    study = service.store.study(service.submit(grid))
+    study = service.store.studies.study(service.submit(grid))
     with pytest.raises(SelectionError) as refused:
         select(study, models.study_results(study), CurveQuery("nonsense", ("torque.max",)))
     again = pickle.loads(pickle.dumps(refused.value))

@@ -34,9 +34,11 @@ def test_both_tables_as_json(service: Service, one_case: str) -> None:
     assert (body["case"], body["regime"], body["ending"]) == (4, None, "ok")
     assert body["parameters"] == {"excitation.frequency": 25.5, "shaft.load": 0.1}
     assert (body["start"], body["end"]) == pytest.approx((6 / 25.5, 12 / 25.5))
-    result = models.run_chunk(service.store.study(one_case), 4, 1)
+    result = models.run_chunk(service.store.studies.study(one_case), 4, 1)
     row = dict(
-        zip([i.name for i in models.study_results(service.store.study(one_case))], result.values[0], strict=True)
+        zip(
+            [i.name for i in models.study_results(service.store.studies.study(one_case))], result.values[0], strict=True
+        )
     )
     assert max(each["torque_max"] for each in body["engagements"]) == pytest.approx(row["torque.max"], rel=1e-12)
     work = sum(each["work_shaft"] for each in body["engagements"])

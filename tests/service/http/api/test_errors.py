@@ -216,8 +216,8 @@ def test_trouble_with_the_database_is_told(
     def fail(*_: Any, **__: Any) -> Any:
         raise error
 
-    for name in ("insert_study", "ping", "list_studies"):
-        monkeypatch.setattr(service.store, name, fail)
+    for part, name in ((service.store.studies, "insert"), (service.store, "ping"), (service.store.studies, "page")):
+        monkeypatch.setattr(part, name, fail)
     assert_problem(service.http.post(f"{API}/studies", json=SPEC), status)
     assert_problem(service.http.get("/readyz"), 503)  # not ready, whatever the trouble
     assert service.http.get("/livez").status_code == 200
@@ -229,7 +229,7 @@ def test_a_fault_of_the_program_tells_no_secrets(
     def fail(*_: Any, **__: Any) -> Any:
         raise RuntimeError("the secret")
 
-    monkeypatch.setattr(service.store, "list_studies", fail)
+    monkeypatch.setattr(service.store.studies, "page", fail)
     response = service.http.get(f"{API}/studies")
     assert_problem(response, 500)
     assert "secret" not in response.text

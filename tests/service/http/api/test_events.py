@@ -46,13 +46,13 @@ def test_an_ended_study_is_told_once(service: Service) -> None:
 def test_a_study_is_followed_to_its_end(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
     study_id = service.submit()
     looked = threading.Event()
-    look = service.store.look
+    look = service.store.studies.look
 
     def noticed(*arguments: Any) -> Any:
         looked.set()
         return look(*arguments)
 
-    monkeypatch.setattr(service.store, "look", noticed)
+    monkeypatch.setattr(service.store.studies, "look", noticed)
     monkeypatch.setattr(streams, "LOOK_SECONDS", 0.01)
     heard: list[str] = []
     listener = threading.Thread(target=lambda: heard.append(service.http.get(f"{STUDIES}/{study_id}/events").text))
@@ -73,12 +73,12 @@ def test_a_study_is_followed_to_its_end(service: Service, monkeypatch: pytest.Mo
 def test_a_deleted_study_ends_the_stream(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
     study_id = service.submit()
     service.fill(study_id)
-    look = service.store.look
+    look = service.store.studies.look
 
     def deleted(*arguments: Any) -> Any:
-        service.store.delete_study(study_id)
+        service.store.studies.delete(study_id)
         return look(*arguments)
 
-    monkeypatch.setattr(service.store, "look", deleted)
+    monkeypatch.setattr(service.store.studies, "look", deleted)
     assert parse(service.http.get(f"{STUDIES}/{study_id}/events").text) == []
     assert service.http.get(f"{STUDIES}/{study_id}/events").status_code == 404

@@ -19,7 +19,7 @@ def test_designs_of_an_ended_search(service: Service) -> None:
     assert service.get(f"/studies/{study_id}")["state"] == "finished"
     found = service.get(f"/studies/{study_id}/front")
     fits(FrontReport, found)
-    study, designs = service.store.study(study_id), found["designs"]
+    study, designs = service.store.studies.study(study_id), found["designs"]
     assert found["variables"][1]["paths"] == ["excitation.amplitude_x", "excitation.amplitude_y"]
     assert found["variables"][2]["values"] == [0.001, 0.002]
     assert [(goal["result"], goal["unit"], goal["max"]) for goal in found["best"]] == [
@@ -31,7 +31,7 @@ def test_designs_of_an_ended_search(service: Service) -> None:
 
     counts = found["counts"]
     # The first round of the polish serves its derivatives only.
-    probes = next(one.cases for one in service.store.rounds(study_id) if one.summary.get("phase") == "polish")
+    probes = next(one.cases for one in service.store.studies.rounds(study_id) if one.summary.get("phase") == "polish")
     listed = set(range(study.cases // 2)) - set(range(probes.start // 2, probes.stop // 2))
     assert counts["known"] == len(listed) == len(designs)
     assert counts["pending"] == 0

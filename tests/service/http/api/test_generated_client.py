@@ -49,7 +49,7 @@ def test_a_generated_client_submits_reads_and_understands_problems(
     spec = models.Spec.from_dict(SPEC)
     made = generated("api.studies.create_study").sync(client=client, body=spec, idempotency_key="generated")
     assert isinstance(made, models.StudySummary)
-    assert service.store.spec(made.id) == SPEC
+    assert service.store.studies.spec(made.id) == SPEC
     rows = service.fill(made.id)
 
     study = generated("api.studies.get_study").sync(made.id, client=client)

@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 def end(service: Service, study_id: str) -> None:
     """Bring a study to its end as a dispatcher does: known rows are taken, every other row is the same."""
     store = service.store
-    record, study = store.get_study(study_id), store.study(study_id)
-    epoch = store.take_over("test")
-    for chunk in store.claim(epoch, store.open_chunks(record.number)):
-        known = store.known(study, chunk)
+    record, study = store.studies.get(study_id), store.studies.study(study_id)
+    epoch = store.work.take_over("test")
+    for chunk in store.work.claim(epoch, store.work.open_chunks(record.number)):
+        known = store.work.known(study, chunk)
         values = np.ones((chunk.count, len(study_results(study))))
         same = ChunkResult(chunk.first, ["ok"] * chunk.count, [""] * chunk.count, values)
-        assert store.commit(epoch, chunk, same if known is None else no_cases(study), known)
-    store.settle(epoch, record.number)
+        assert store.work.commit(epoch, chunk, same if known is None else no_cases(study), known)
+    store.work.settle(epoch, record.number)
 
 
 class Ending:

@@ -38,9 +38,9 @@ def results_of(rows: ChunkResult, case: int) -> dict[str, float | None]:
 def test_cases_that_a_cancelled_study_never_ran_are_told_as_cancelled(service: Service) -> None:
     study_id = service.submit()
     service.fill(study_id, range(6))
-    service.store.cancel_study(study_id)
-    record = service.store.get_study(study_id)
-    service.store.settle(service.store.take_over("test"), record.number)
+    service.store.studies.cancel(study_id)
+    record = service.store.studies.get(study_id)
+    service.store.work.settle(service.store.work.take_over("test"), record.number)
     page = service.get(f"/studies/{study_id}/cases", ending="cancelled")
     fits(results.CasePage, page)
     assert [case["case"] for case in page["cases"]] == list(range(6, record.cases))
@@ -139,7 +139,7 @@ def test_results_as_csv_read_back_exactly(service: Service) -> None:
     table = list(csv.reader(io.StringIO(response.text)))
     names = [info.name for info in models.result_infos("vibration-drive", "1")]
     assert table[0] == ["case", "excitation.frequency", "shaft.load", "ending", "flags", *names]
-    study = service.store.study(study_id)
+    study = service.store.studies.study(study_id)
     for case, row in enumerate(table[1:]):
         assert row[0] == str(case)
         assert [float(cell) for cell in row[1:3]] == list(study.case_parameters(case).values())
@@ -203,7 +203,7 @@ def test_a_format_that_there_is_not_is_told_instead_of_another_being_sent(servic
 
 def test_rows_are_written_as_they_come(service: Service) -> None:
     study_id = service.submit()
-    study = service.store.study(study_id)
+    study = service.store.studies.study(study_id)
     infos = models.study_results(study)
     given: list[int] = []
 

@@ -35,7 +35,7 @@ def started(service: Service) -> str:
     spec["axes"] = [{"path": "shaft.load", "values": ["0.1 N*m", "0.2 N*m"]}]
     spec.pop("combine", None)
     study_id = service.submit({**spec, "starts": {"count": 8, "ranges": {SPEED: [1, 30]}}})
-    record, study = service.store.get_study(study_id), service.store.study(study_id)
+    record, study = service.store.studies.get(study_id), service.store.studies.study(study_id)
     names = [info.name for info in models.study_results(study)]
     values = np.zeros((3, len(names)))
     for name, column in {
@@ -45,11 +45,11 @@ def started(service: Service) -> str:
     }.items():  # fmt: skip
         values[:, names.index(name)] = column
     further = FurtherRows(np.array([1]), [""], values[2:])
-    (chunk,) = service.store.open_chunks(record.number)
-    epoch = service.store.take_over("test")
-    service.store.claim(epoch, [chunk])
-    assert service.store.commit(epoch, chunk, ChunkResult(0, ["ok"] * 2, [""] * 2, values[:2], further))
-    service.store.settle(epoch, record.number)
+    (chunk,) = service.store.work.open_chunks(record.number)
+    epoch = service.store.work.take_over("test")
+    service.store.work.claim(epoch, [chunk])
+    assert service.store.work.commit(epoch, chunk, ChunkResult(0, ["ok"] * 2, [""] * 2, values[:2], further))
+    service.store.work.settle(epoch, record.number)
     return study_id
 
 
@@ -119,7 +119,7 @@ def test_other_studies_have_one_regime_a_case(service: Service) -> None:
 
 def test_a_motion_begins_at_the_start_that_is_asked_for(service: Service, started: str) -> None:
     service.computer.answer = lambda *_: b"{}"
-    values = service.store.study(started).run["starts"]["values"][SPEED]
+    values = service.store.studies.study(started).run["starts"]["values"][SPEED]
     for part in ("strobes", "trajectory", "engagements"):
         answer = service.http.get(f"{API}/studies/{started}/cases/1/{part}", params={"start": 5})
         assert answer.status_code == 200, answer.text
@@ -170,7 +170,7 @@ def test_pages_of_a_regime_follow_its_motion(service: Service, started: str, fig
     service.http.get(drawn)
     _, study, number, _view, _chosen, start, *_ = service.computer.calls[-1]
     study, number = motion_of(study, number, start)
-    values = service.store.study(started).run["starts"]["values"][SPEED]
+    values = service.store.studies.study(started).run["starts"]["values"][SPEED]
     assert (number, study.base[SPEED], study.base["shaft.load"]) == (0, values[4], 0.2)
 
 
@@ -191,7 +191,7 @@ def test_a_study_begins_at_the_end_of_a_case(service: Service, started: str, mon
             del place[name]
     study_id = service.submit(spec)
     assert asked == [(0.2, 0)]
-    study, stored = service.store.study(study_id), service.store.spec(study_id)
+    study, stored = service.store.studies.study(study_id), service.store.studies.spec(study_id)
     assert {path: study.base[path] for path in end} == end
     # The study needs the other one no longer.
     assert "start" not in stored["base"]
@@ -229,7 +229,7 @@ def test_the_client_has_the_motions_of_a_case(
         curves = study.curves("shaft.load", "shaft.speed.mean", number=1)
         assert curves.data["curves"][0]["y"]["shaft.speed.mean"] == [None, 3.5]
         service.computer.answer = lambda *_: b"{}"
-        values = service.store.study(started).run["starts"]["values"][SPEED]
+        values = service.store.studies.study(started).run["starts"]["values"][SPEED]
         for call in (study.strobes, study.engagements, study.section):
             call(1, start=5)
             assert 5 in service.computer.calls[-1] or service.computer.calls[-1][1].base[SPEED] == values[4]
@@ -283,7 +283,7 @@ def test_the_page_of_a_basin_keeps_its_form(service: Service, started: str) -> N
 
 
 def test_a_basin_has_possible_starts_only(service: Service, started: str) -> None:
-    study = service.store.study(started)
+    study = service.store.studies.study(started)
     state, windup = "pendulums.0.initial_clutch", "pendulums.0.initial_windup"
     base = {**study.base, state: 1.0, windup: 0.0}
     ends: basins.Ends = {"x": (None, None), "y": ("-0.005", "0")}

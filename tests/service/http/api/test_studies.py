@@ -11,8 +11,7 @@ import pytest
 
 from sprag.service.answers import studies
 from sprag.service.http.api.examples import SPEC_TOML
-from sprag.service.storage.room import RESERVE_BYTES
-from sprag.service.storage.store import Store
+from sprag.service.storage.room import RESERVE_BYTES, Room
 from tests.service.shapes import fits
 from tests.service.timed_spec import SPEC
 
@@ -160,7 +159,7 @@ def test_a_preview_submits_nothing(service: Service, spec: dict[str, Any]) -> No
 
 
 def test_preview_and_submission_warn_of_cases_that_take_too_long(service: Service, spec: dict[str, Any]) -> None:
-    service.store.base_chunking = replace(service.store.base_chunking, timeout=1e-9)
+    service.store.dispatchers.base_chunking = replace(service.store.dispatchers.base_chunking, timeout=1e-9)
     for path, status in ((f"{STUDIES}:preview", 200), (STUDIES, 202)):
         response = service.http.post(path, json=spec)
         assert response.status_code == status
@@ -190,12 +189,12 @@ def test_a_study_that_does_not_fit_on_the_disk_is_refused(
     service: Service, spec: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     accepted = service.submit(None, **{"Idempotency-Key": "before"})
-    monkeypatch.setattr(Store, "room", lambda _: RESERVE_BYTES + 10_000)
+    monkeypatch.setattr(Room, "left", lambda _: RESERVE_BYTES + 10_000)
     response = service.http.post(STUDIES, json={**spec, "axes": [{"path": "shaft.load", "linspace": [0, 1, 1000]}]})
     assert (response.status_code, response.json()["type"]) == (507, "/problems/storage-full")
     assert "0.01 MB" in response.json()["detail"]
     assert service.submit()
-    monkeypatch.setattr(Store, "room", lambda _: 0)
+    monkeypatch.setattr(Room, "left", lambda _: 0)
     assert service.http.post(STUDIES, json=SPEC).status_code == 507
     assert service.submit(None, **{"Idempotency-Key": "before"}) == accepted, "it was accepted before"
 

@@ -38,7 +38,7 @@ def test_a_transient_is_the_same_everywhere(service: Service, portal: Any) -> No
     body = response.json()
     TypeAdapter(Transient).validate_python(body)
     assert (body["kind"], body["load"], body["within"], body["torque"]) == ("load-step", 1.5, 0.01, None)
-    study = service.store.study(slotter)
+    study = service.store.studies.study(slotter)
     course = Course("load-step", 1.5, body["angle"])
     own = transient(spec_of(study.structure), case_machine(study, 9), course, 11)
     assert (body["outcome"], body["cause"]) == (own.outcome, own.cause)

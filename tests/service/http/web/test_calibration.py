@@ -57,8 +57,8 @@ def test_pasted_points_become_a_study(service: Service) -> None:
     sent = service.http.post("/calibrate", data=fields, follow_redirects=False)
     assert sent.status_code == 303, sent.text
     made = sent.headers["location"].rpartition("/")[2]
-    plan = service.store.study(made).plan
-    expected = service.store.study(service.submit(spec_of(loss="huber", refits=200))).plan
+    plan = service.store.studies.study(made).plan
+    expected = service.store.studies.study(service.submit(spec_of(loss="huber", refits=200))).plan
     assert plan == expected
 
 

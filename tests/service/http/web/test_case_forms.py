@@ -137,7 +137,7 @@ def test_the_page_submits_what_commands_submit(service: Service) -> None:
     assert 'name="/exclude/1/and/value" value="1 mm; 2 mm"' in page
     answer = service.http.post("/new", data={**values, "do": "submit"}, follow_redirects=False)
     assert answer.status_code == 303
-    by_form = service.store.study(answer.headers["location"].rpartition("/")[2])
-    by_program = service.store.study(service.submit(drawn()))
+    by_form = service.store.studies.study(answer.headers["location"].rpartition("/")[2])
+    by_program = service.store.studies.study(service.submit(drawn()))
     assert by_form.physics_hash("1") == by_program.physics_hash("1")
     assert by_form.cases == by_program.cases < 8 * 2  # some are left out

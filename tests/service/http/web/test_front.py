@@ -62,11 +62,11 @@ def test_the_scatter_has_every_design_that_has_not_failed(service: Service) -> N
 
 def test_designs_that_serve_the_derivatives_of_the_polish_are_not_listed(service: Service) -> None:
     study_id = search(service)
-    first = next(one for one in service.store.rounds(study_id) if one.summary.get("phase") == "polish")
+    first = next(one for one in service.store.studies.rounds(study_id) if one.summary.get("phase") == "polish")
     answer = service.get(f"/studies/{study_id}/front")
     cases = {case for item in answer["designs"] for case in item["cases"]}
     assert len(first.cases) > 0
-    assert cases | set(first.cases) == set(range(service.store.get_study(study_id).cases))
+    assert cases | set(first.cases) == set(range(service.store.studies.get(study_id).cases))
     assert not cases & set(first.cases)
     assert answer["counts"]["known"] == len(answer["designs"])
 
@@ -95,8 +95,8 @@ def test_a_search_without_any_result_has_a_page_and_other_studies_have_none(serv
     assert (
         "Waiting for round 1 of at most 13. 0 designs: 0 within the limits, 0 on the front, 8 still to be run." in text
     )
-    service.store.cancel_study(study_id)
-    service.store.settle(service.store.take_over("test"), service.store.get_study(study_id).number)
+    service.store.studies.cancel(study_id)
+    service.store.work.settle(service.store.work.take_over("test"), service.store.studies.get(study_id).number)
     assert "8 not run." in service.http.get(f"/studies/{study_id}/front").text
     none = search(service, subject_to=[{"result": "shaft.speed.mean", "at_least": 1e6}])
     assert "No design is within the limits;" in service.http.get(f"/studies/{none}/front").text
@@ -109,7 +109,7 @@ def test_a_search_without_any_result_has_a_page_and_other_studies_have_none(serv
 
 def test_a_design_becomes_a_study_of_its_own(service: Service) -> None:
     study_id = search(service, rounds=1)
-    study, spec = service.store.study(study_id), service.store.spec(study_id)
+    study, spec = service.store.studies.study(study_id), service.store.studies.spec(study_id)
     alone = parse_spec(design_spec(spec, study, 5)).study
     assert (alone.cases, alone.plan) == (1, None)
     assert {path: alone.base[path] for path in study.axis_paths} == study.case_parameters(5)
@@ -141,8 +141,8 @@ def test_designs_are_ranked_once_for_all_that_shows_them(service: Service, monke
     assert {service.http.get(page).status_code for page in pages} == {200}
     assert ranked == [False]
     before = service.http.get(pages[0]).text.count("data-design=")
-    record = service.store.get_study(study_id)
-    run_round(service.store, record.number, service.store.take_over("test"), rows_of)
+    record = service.store.studies.get(study_id)
+    run_round(service.store, record.number, service.store.work.take_over("test"), rows_of)
     assert service.http.get(pages[0]).text.count("data-design=") > before
     assert {service.http.get(f"{page}?exact=true").status_code for page in pages[:2]} == {200}
     assert ranked == [False, False, True]

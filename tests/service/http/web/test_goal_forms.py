@@ -141,7 +141,7 @@ def test_the_form_is_filled_in_without_javascript(service: Service) -> None:
     assert "out of range" in refused.text
     accepted = service.http.post("/new", data={**again, "do": "submit"}, follow_redirects=False)
     assert accepted.status_code == 303
-    study = service.store.study(accepted.headers["location"].rsplit("/", 1)[-1])
+    study = service.store.studies.study(accepted.headers["location"].rsplit("/", 1)[-1])
     assert study.plan == parse_spec(spec).study.plan
 
 

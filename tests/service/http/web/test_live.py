@@ -33,7 +33,7 @@ def test_a_stream_has_one_event_for_each_change(service: Service, monkeypatch: p
     service.submit({**SPEC, "name": "first"})
     changes = {
         "schedules": lambda: service.http.post("/api/v1/schedules", json=SCHEDULE),
-        "workers": lambda: service.store.take_over("somebody"),
+        "workers": lambda: service.store.work.take_over("somebody"),
     }
     change = changes.get(name, lambda: service.submit({**SPEC, "name": "first again"}))
     ending, looks = service.app.state.context.ending, itertools.count(1)

@@ -72,12 +72,12 @@ def finished_study(store: Store) -> str:
     from sprag.service.spec.document import parse_spec
 
     record = accept(store, parse_spec(SPEC))
-    rows, epoch = made_up(store.study(record.id)), store.take_over("test")
-    for chunk in store.claim(epoch, store.open_chunks(record.number)):
+    rows, epoch = made_up(store.studies.study(record.id)), store.work.take_over("test")
+    for chunk in store.work.claim(epoch, store.work.open_chunks(record.number)):
         part = slice(chunk.first, chunk.first + chunk.count)
         result = ChunkResult(chunk.first, rows.endings[part], rows.flags[part], rows.values[part])
-        assert store.commit(epoch, chunk, result)
-    store.settle(epoch, record.number)
+        assert store.work.commit(epoch, chunk, result)
+    store.work.settle(epoch, record.number)
     return record.id
 
 
@@ -103,7 +103,7 @@ def session_of(context: BrowserContext) -> list[dict[str, object]]:
 
 
 def test_a_browser_logs_in_looks_and_acts_and_logs_out(house: House, tab: Page) -> None:
-    secret, record = house.store.create_token("design office", TokenScope.WRITE)
+    secret, record = house.store.people.create_token("design office", TokenScope.WRITE)
     tab.goto(f"/studies/{house.study}")
     expect(tab).to_have_url(f"{house.address}/login?next=/studies/{house.study}")
     log_in(tab, "sprag_wrong-wrong-wrong-wrong")
@@ -130,7 +130,7 @@ def test_a_browser_logs_in_looks_and_acts_and_logs_out(house: House, tab: Page) 
 
 @pytest.mark.parametrize("tab", [{}], indirect=True)
 def test_what_was_typed_outlives_the_session(house: House, tab: Page) -> None:
-    secret, _ = house.store.create_token("design office", TokenScope.WRITE)
+    secret, _ = house.store.people.create_token("design office", TokenScope.WRITE)
     tab.goto("/new")
     log_in(tab, secret)
     load = tab.get_by_label("Load", exact=False).first
@@ -146,7 +146,7 @@ def test_what_was_typed_outlives_the_session(house: House, tab: Page) -> None:
 
 
 def test_a_token_to_look_sees_every_page_and_may_change_nothing(house: House, tab: Page) -> None:
-    secret, _ = house.store.create_token("wall display", TokenScope.READ)
+    secret, _ = house.store.people.create_token("wall display", TokenScope.READ)
     tab.goto("/login")
     log_in(tab, secret)
     expect(tab).to_have_url(f"{house.address}/")
@@ -164,7 +164,7 @@ def test_a_token_to_look_sees_every_page_and_may_change_nothing(house: House, ta
         assert answer.status == 200, page
     tab.goto("/schedules/new")
     expect(tab.get_by_role("button", name="Create the schedule")).to_be_disabled()
-    assert house.store.list_schedules() == ()
+    assert house.store.schedules.all() == ()
 
 
 def test_a_schedule_is_kept_changed_paused_and_deleted(house: House, tab: Page) -> None:
@@ -201,7 +201,7 @@ def test_a_schedule_is_kept_changed_paused_and_deleted(house: House, tab: Page) 
     expect(row).to_contain_text("2026-07-01 08:30 CEST")
     row.get_by_role("button", name="Delete").click()
     expect(tab.get_by_text("There is no schedule yet.")).to_be_visible()
-    assert house.store.list_schedules() == ()
+    assert house.store.schedules.all() == ()
 
 
 def test_a_study_is_run_once_at_a_time_of_a_zone(house: House, tab: Page) -> None:
@@ -227,4 +227,4 @@ def test_a_study_is_run_once_at_a_time_of_a_zone(house: House, tab: Page) -> Non
     tab.goto("/schedules")
     row.get_by_role("link", name="its study").click()
     expect(tab.get_by_role("heading", level=1)).to_be_visible()
-    assert len(house.store.list_studies().studies) == 2
+    assert len(house.store.studies.page().studies) == 2

@@ -80,7 +80,7 @@ def test_a_long_curve_is_thinned_and_keeps_its_highest_point(service: Service, s
 def test_panels_are_as_high_among_many_as_among_few(service: Service) -> None:
     study_id = service.submit()
     service.fill(study_id)
-    names = [info.name for info in models.study_results(service.store.study(study_id))]
+    names = [info.name for info in models.study_results(service.store.studies.study(study_id))]
     for count in (2, 12, 24):
         query = {"x": "shaft.load", "y": names[:count]}
         layout = service.http.get(f"/studies/{study_id}/figures/curves", params=query).json()["layout"]

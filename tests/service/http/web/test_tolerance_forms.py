@@ -114,7 +114,7 @@ def test_the_page_has_the_fields_when_they_are_asked_for(service: Service) -> No
     page = service.http.get(f"/new?clone={study_id}").text
     assert f'name="{BACKLASH}" value="60 %"' in page
     assert 'name="/drives" value="256"' in page
-    values = values_of(service.store.spec(study_id)) | {"batch": ""}
+    values = values_of(service.store.studies.spec(study_id)) | {"batch": ""}
     asked = {**values, "batch": "on", "correlations": "1", "/correlations/0/coefficient": "0,6"}
     page = service.http.post("/new", data={**asked, "do": "check"}).text
     assert 'name="/correlations/0/coefficient" value="0,6"' in page

@@ -85,7 +85,7 @@ def warned(service: Service, spec: dict[str, Any], texts: dict[WarningCode, str]
 def stored(service: Service, spec: dict[str, Any], warnings: list[str]) -> str:
     """A stored study with these warnings."""
     made = parse_spec(copy.deepcopy(spec))
-    return service.store.create_study(made.spec, made.study, warnings=warnings).id
+    return service.store.studies.create(made.spec, made.study, warnings=warnings).id
 
 
 def shown(service: Service, study_id: str, spoken: str, **params: str) -> list[str]:

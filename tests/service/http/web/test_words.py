@@ -23,7 +23,7 @@ _FIGURES = ("figures/curves?y=shaft.speed.mean&y=torque.mean&", "figures/answers
 
 def names_of(service: Service, study_id: str) -> set[str]:
     """Code names that nobody should have to read."""
-    study = service.store.study(study_id)
+    study = service.store.studies.study(study_id)
     every = {info.name for info in models.study_results(study)} | {*study.base, *study.axis_paths}
     return {name for name in every if "." in name}
 
@@ -74,7 +74,7 @@ def test_a_comparison_is_read_as_its_first_study(service: Service, study_id: str
     figure = service.http.get(f"/compare/figure?{query}").json()
     assert figure["layout"]["xaxis"]["title"]["text"] == "Load torque (N·mm)"
     assert max(figure["data"][0]["x"]) == pytest.approx(
-        1e3 * max(service.store.study(study_id).columns(range(9))["shaft.load"])
+        1e3 * max(service.store.studies.study(study_id).columns(range(9))["shaft.load"])
     )
     picture = service.http.get(f"/compare/picture.svg?{query}")
     assert (picture.status_code, picture.headers["content-type"]) == (200, "image/svg+xml")
@@ -90,7 +90,7 @@ def test_units_are_chosen_once_and_kept(service: Service, study_id: str) -> None
     form = {"rest": "si", "speed": "rpm", "torque": "N*mm", "names": "captions", "back": f"/studies/{study_id}/cases"}
     answer = service.http.post("/units", data=form, follow_redirects=False)
     assert (answer.status_code, answer.headers["location"]) == (303, f"/studies/{study_id}/cases")
-    row = service.store.case_row(study_id, 0)
+    row = service.store.rows.case(study_id, 0)
     assert row is not None
     speed = row.results["shaft.speed.mean"]
     assert isinstance(speed, float)

@@ -63,7 +63,7 @@ class Filled:
     @property
     def computed_by(self) -> list[dict[str, Any]]:
         """Where the rows come from: all of them from this process."""
-        chunks = len(range(0, self.study.cases, self.service.store.get_study(self.id).chunk_cases))
+        chunks = len(range(0, self.study.cases, self.service.store.studies.get(self.id).chunk_cases))
         digest, cases = fingerprint.digest(), self.study.cases
         return [{"host": None, "fingerprint": digest, "chunks": chunks, "cases": cases, "differs": None}]
 
@@ -96,7 +96,7 @@ def filled(service: Service, spec: dict[str, Any]) -> Filled:
     ]
     study_id = service.submit(spec)
     rows = service.fill(study_id)
-    return Filled(service, study_id, service.store.study(study_id), rows)
+    return Filled(service, study_id, service.store.studies.study(study_id), rows)
 
 
 def test_pandas_reads_every_table_back(filled: Filled) -> None:
@@ -198,7 +198,7 @@ def test_a_header_that_a_file_does_not_have_is_refused(filled: Filled, form: str
 
 
 def test_a_spreadsheet_goes_on_on_a_further_sheet(filled: Filled, tmp_path: Path) -> None:
-    blocks = filled.service.store.iter_rows(filled.id)
+    blocks = filled.service.store.rows.blocks(filled.id)
     source = Source(filled.study, models.study_results(filled.study), blocks, {})
     book = openpyxl.load_workbook(xlsx._write(source, tmp_path, sheet_rows=7))
     assert book.sheetnames == ["cases", "cases 2", "cases 3", "inputs"]
@@ -296,7 +296,7 @@ def test_a_grid_that_is_not_finished_has_holes_where_cases_are_missing(service: 
         speed = grid["shaft.speed.mean"].values.reshape(-1)
     expected = rows.values[:, 0].copy()
     expected[[0, 1, 4, 5, 6, 7, 8]] = np.nan
-    assert models.study_results(service.store.study(study_id))[0].name == "shaft.speed.mean"
+    assert models.study_results(service.store.studies.study(study_id))[0].name == "shaft.speed.mean"
     np.testing.assert_array_equal(speed, expected)
 
 

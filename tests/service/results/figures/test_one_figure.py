@@ -92,7 +92,7 @@ def test_the_answers_of_a_picture_are_those_of_the_page(service: Service, monkey
     _, described = painted(
         monkeypatch, study_file, library, study_id, AnswersView(), AnswersChoice(None, None), CHOICE, "", "svg"
     )
-    assert models.presentation_of(service.store.study(study_id)).main
+    assert models.presentation_of(service.store.studies.study(study_id)).main
     drawn = plotly_figure(described)
     assert [trace["name"] for trace in drawn["data"]] == [trace["name"] for trace in page["data"]]
     assert [trace["y"] for trace in drawn["data"]] == [trace["y"] for trace in page["data"]]

@@ -46,8 +46,8 @@ def pages(pdf: bytes) -> int:
 def test_ranges_are_those_of_the_rows(service: Service) -> None:
     study_id = service.submit()
     rows = service.fill(study_id)
-    infos = models.study_results(service.store.study(study_id))
-    found = ranges("vibration-drive", infos, service.store.iter_rows(study_id, block=2))
+    infos = models.study_results(service.store.studies.study(study_id))
+    found = ranges("vibration-drive", infos, service.store.rows.blocks(study_id, size=2))
     for index, row in enumerate(found):
         column = rows.values[:, index]
         assert row.known == int(np.isfinite(column).sum())
@@ -61,7 +61,7 @@ def test_rows_of_any_number_are_those_that_were_stored(service: Service, monkeyp
     study_id = service.submit()
     service.fill(study_id)
     monkeypatch.setattr(digests, "LOOKED_OVER", 2)
-    record = service.store.get_study(study_id)
+    record = service.store.studies.get(study_id)
     table = results_table(record.model, record.variant)
     speed = sa.update(table).where(table.c.case_number == 1).values(shaft_speed_mean=1e9)
     with service.store.session.write() as connection:
@@ -198,8 +198,8 @@ def test_a_mechanism_is_drawn() -> None:
 def test_doubtful_cases_are_in_no_range(service: Service) -> None:
     study_id = service.submit()
     rows = service.fill(study_id)
-    infos = models.study_results(service.store.study(study_id))
-    blocks = list(service.store.iter_rows(study_id, block=rows.values.shape[0]))
+    infos = models.study_results(service.store.studies.study(study_id))
+    blocks = list(service.store.rows.blocks(study_id, size=rows.values.shape[0]))
     marked = [replace(block, flags=["unsettled,jumped", *block.flags[1:]]) for block in blocks]
     every, sound = (ranges("vibration-drive", infos, own) for own in (blocks, marked))
     assert [row.known - kept.known for row, kept in zip(every, sound, strict=True)] == [

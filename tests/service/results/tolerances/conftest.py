@@ -100,5 +100,5 @@ def finish(service: Service, spec: dict[str, Any]) -> str:
     """Submit a study over HTTP and run it; its id."""
     study_id = service.submit(spec)
     store = service.store
-    Dispatcher(store, InlineExecutor(), SystemClock()).run(lambda: store.get_study(study_id).state.terminal)
+    Dispatcher(store.work, InlineExecutor(), SystemClock()).run(lambda: store.studies.get(study_id).state.terminal)
     return study_id

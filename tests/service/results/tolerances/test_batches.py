@@ -73,7 +73,7 @@ def test_yield_is_that_of_the_closed_form(service: Service) -> None:
     assert row["results"]["speed"] == worst[0]["results"]["speed"]
     assert row["parameters"]["drive"] == worst[0]["drive"]
     assert set(worst[0]["draws"]) == {"first", "second", "third"}
-    draws = service.store.study(study_id).spread
+    draws = service.store.studies.study(study_id).spread
     assert draws is not None
     assert list(worst[0]["draws"].values()) == draws.array[worst[0]["drive"] - 1].tolist()
 
@@ -82,7 +82,7 @@ def test_drives_that_fail_are_failed_drives(service: Service) -> None:
     # A third of the measured values lets the drive fail.
     tolerances = [{"path": "third", "values": [9, 11, 200]}, {"path": "first", "plus_minus": "3 m"}]
     study_id = finish(service, {**SPEC, "tolerances": tolerances, "drives": 256, "draws": "random"})
-    study = service.store.study(study_id)
+    study = service.store.studies.study(study_id)
     assert study.spread is not None
     failed = int((study.spread.array[:, study.spread.names.index("third")] > 100.0).sum())
     assert failed > 50

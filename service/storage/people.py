@@ -1,10 +1,15 @@
-"""Users: added, changed, removed; and the quotas of what belongs to them.
+"""People: users with the quotas of what belongs to them, tokens, and the sessions of browsers.
 
-A user has no password: users log in with a token of theirs, or a trusted proxy names them.
+A user has no password: users log in with a token of theirs, or a trusted proxy names them. A token is shown once and
+never stored; only its SHA-256 digest is. A digest without salt or key stretching is enough: a token consists of 256
+random bits, which nobody can guess. The cookie of a session contains its expiry and a signature, so a session needs no
+row of its own and a login no write: the database has the key that signs, and the sessions that were ended early.
 """
 
 from __future__ import annotations
 
+import hashlib
+import secrets
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -16,12 +21,13 @@ from sprag.service.faults import FaultError
 from sprag.service.languages import grouped, recorded
 from sprag.service.storage.audit import note
 from sprag.service.storage.component_tables import COMPONENTS
-from sprag.service.storage.errors import UserExistsError, UserNotFoundError
-from sprag.service.storage.part import Part, moment, optional_moment
+from sprag.service.storage.errors import TokenNotFoundError, UserExistsError, UserNotFoundError
+from sprag.service.storage.part import Part, micros_of, moment, optional_moment
 from sprag.service.storage.pools import pool_of
 from sprag.service.storage.schedule_tables import SCHEDULES
+from sprag.service.storage.scopes import TokenScope, TokenState
 from sprag.service.storage.tables import HELD_AT_DEADLINE, STUDIES
-from sprag.service.storage.user_tables import USERS
+from sprag.service.storage.user_tables import ENDED_SESSIONS, SESSION_KEY, TOKENS, USERS
 from sprag.service.storage.view_tables import SAVED_VIEWS
 from sprag.worker.states import TERMINAL
 
@@ -40,6 +46,12 @@ STUDY_BYTES: Final = 1024
 WAITING_STUDY = STUDIES.c.state.not_in([state.value for state in TERMINAL]) & STUDIES.c.waits_for.is_distinct_from(
     HELD_AT_DEADLINE
 )
+#: Prefix of a token, so that people and secret scanners recognise it.
+TOKEN_PREFIX: Final = "sprag_"  # noqa: S105 - the beginning of all tokens is no secret
+_TOKEN_BYTES: Final = 32
+_KEY_BYTES: Final = 32
+#: Primary key of the only row of the key's table.
+_ONLY: Final = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,8 +96,49 @@ class Usage:
     bytes: int
 
 
-class Users(Part):
-    """The users of a database."""
+@dataclass(frozen=True, slots=True)
+class TokenRecord:
+    """A token without its secret; ``digest`` is the SHA-256 of the secret in hexadecimal digits.
+
+    ``owner`` is the user whose token it is, None for nobody's; ``used_at`` the time of its last use, to the minute.
+    """
+
+    id: str
+    name: str
+    scope: TokenScope
+    digest: str
+    created_at: datetime
+    revoked_at: datetime | None
+    owner: str | None = None
+    expires_at: datetime | None = None
+    used_at: datetime | None = None
+
+    def state_at(self, now: datetime, user: UserRecord | None) -> TokenState:
+        """The state of the token; ``user`` is the record of its owner, None where there is none."""
+        if self.revoked_at is not None:
+            return TokenState.REVOKED
+        if self.owner is not None and (user is None or user.removed_at is not None):
+            return TokenState.USER_REMOVED
+        return TokenState.VALID if self.expires_at is None or now < self.expires_at else TokenState.EXPIRED
+
+
+def digest_of(token: bytes) -> str:
+    """The digest that is stored for a token."""
+    return hashlib.sha256(token).hexdigest()
+
+
+@dataclass(frozen=True, slots=True)
+class SessionSecrets:
+    """The data that validate sessions: the signing key, and the signatures of the sessions that were ended early."""
+
+    #: None before the very first login.
+    key: bytes | None
+    #: Signature and expiry (seconds since 1970-01-01 UTC).
+    ended: Mapping[str, int]
+
+
+class People(Part):
+    """The users of a database, their tokens, and the sessions of their browsers."""
 
     #: Quotas of users who have none of their own; set by the service.
     default_quota = Quota()
@@ -156,7 +209,7 @@ class Users(Part):
         with self.session.read() as connection:
             return _usage(connection, name)
 
-    def _require_quota(self, connection: sa.Connection, cases: int, size: int) -> None:
+    def require_quota(self, connection: sa.Connection, cases: int, size: int) -> None:
         """Raise FaultError where that many more cases or bytes exceed a quota of the present user."""
         user = acting().user
         if user is None:
@@ -175,6 +228,83 @@ class Users(Part):
                 f"That would take about {_mib(size)} MiB more, and {user} has used {_mib(used.bytes)} of "
                 f"{_mib(quota.bytes)} MiB: delete studies for good first; deleted ones that can be restored count too.",
             )
+
+    def create_token(
+        self, name: str, scope: TokenScope, *, owner: str | None = None, expires_at: datetime | None = None
+    ) -> tuple[str, TokenRecord]:
+        """Create a token; returns its secret, which cannot be shown again, and its record.
+
+        ``owner`` is the user whose token it is; raises UserNotFoundError.
+        """
+        secret = TOKEN_PREFIX + secrets.token_urlsafe(_TOKEN_BYTES)
+        values = {
+            "id": f"tk_{secrets.token_hex(6)}",
+            "name": name,
+            "scope": scope.value,
+            "digest": digest_of(secret.encode("ascii")),
+            "created_at": self._now(),
+            "owner": owner,
+            "expires_at": None if expires_at is None else micros_of(expires_at),
+        }
+        with self.session.write() as connection:
+            if owner is not None:
+                require_user(connection, owner)
+            said = {"name": name, "scope": scope.value, "owner": owner}
+            note(connection, self._now(), "token.create", str(values["id"]), **said)
+            row = connection.execute(sa.insert(TOKENS).values(values).returning(TOKENS)).one()
+        return secret, _token_record(row)
+
+    def tokens(self) -> tuple[TokenRecord, ...]:
+        """Every token ever created, newest first."""
+        with self.session.read() as connection:
+            rows = connection.execute(sa.select(TOKENS).order_by(TOKENS.c.number.desc())).all()
+        return tuple(map(_token_record, rows))
+
+    def revoke_token(self, token_id: str) -> TokenRecord:
+        """Revoke a token; raises TokenNotFoundError. Revoking it twice has no further effect."""
+        with self.session.write() as connection:
+            row = connection.execute(
+                sa.update(TOKENS)
+                .where(TOKENS.c.id == token_id)
+                .values(revoked_at=sa.func.coalesce(TOKENS.c.revoked_at, self._now()))
+                .returning(TOKENS)
+            ).one_or_none()
+            if row is None:
+                raise TokenNotFoundError(token_id)
+            note(connection, self._now(), "token.revoke", token_id, name=row.name, owner=row.owner)
+            return _token_record(row)
+
+    def note_uses(self, uses: Mapping[str, int]) -> None:
+        """Record when tokens were last used: µs since 1970 by id."""
+        with self.session.write() as connection:
+            for token_id, used in uses.items():
+                later = TOKENS.c.used_at.is_(None) | (TOKENS.c.used_at < used)
+                connection.execute(sa.update(TOKENS).where(TOKENS.c.id == token_id, later).values(used_at=used))
+
+    def session_secrets(self) -> SessionSecrets:
+        """The key, and the sessions that were ended early."""
+        with self.session.read() as connection:
+            key = connection.execute(sa.select(SESSION_KEY.c.key)).scalar_one_or_none()
+            ended = dict(connection.execute(sa.select(ENDED_SESSIONS.c.seal, ENDED_SESSIONS.c.ends_at)).all())
+        return SessionSecrets(None if key is None else bytes.fromhex(key), ended)
+
+    def create_session_key(self) -> bytes:
+        """The signing key; created where there is none."""
+        with self.session.write() as connection:
+            key: str | None = connection.execute(sa.select(SESSION_KEY.c.key)).scalar_one_or_none()
+            if key is None:
+                key = secrets.token_hex(_KEY_BYTES)
+                connection.execute(sa.insert(SESSION_KEY).values(id=_ONLY, key=key, created_at=self._now()))
+        return bytes.fromhex(key)
+
+    def end_session(self, seal: str, ends_at: int) -> None:
+        """Record that a session was ended before its expiry; forget the expired ones."""
+        c = ENDED_SESSIONS.c
+        with self.session.write() as connection:
+            connection.execute(sa.delete(ENDED_SESSIONS).where(c.ends_at < self._now() // 1_000_000))
+            known = connection.execute(sa.select(c.seal).where(c.seal == seal)).scalar_one_or_none()
+            if known is None:
+                connection.execute(sa.insert(ENDED_SESSIONS).values(seal=seal, ends_at=ends_at))
 
 
 def require_queue(connection: sa.Connection, most: int | None) -> None:
@@ -248,3 +378,17 @@ def _user_record(row: Any) -> UserRecord:
 
 def _mib(size: int) -> str:
     return f"{size / 2**20:,.{0 if size >= 100 * 2**20 else 1}f}"
+
+
+def _token_record(row: Any) -> TokenRecord:
+    return TokenRecord(
+        row.id,
+        row.name,
+        TokenScope(row.scope),
+        row.digest,
+        moment(row.created_at),
+        optional_moment(row.revoked_at),
+        row.owner,
+        optional_moment(row.expires_at),
+        optional_moment(row.used_at),
+    )
