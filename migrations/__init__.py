@@ -1,1 +1,168 @@
-"""Revisions of the database, run by `sprag db upgrade`."""
+"""The way up for databases of earlier revisions, which `sprag db upgrade` goes.
+
+A new database is made from the description of the tables (`sprag.service.storage.tables`). An earlier one gets whatever
+tables, columns and indexes that description has and the database lacks; so a revision that only adds needs nothing here
+but its number. A revision that moves, fills or removes something has a step as well. Steps run after the additions, in
+the order of their revisions, and name tables by text: a step does the same on the day it is run as on the day it was
+written.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import unicodedata
+from typing import TYPE_CHECKING, Final
+
+import sqlalchemy as sa
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+#: Every revision that a database can have, oldest first. The last one is that of this program.
+REVISIONS: Final = ("0001", *(f"{number:04}" for number in range(3, 41)))
+
+
+def bring_up(connection: sa.Connection, described: sa.MetaData, before: str) -> None:
+    """Turn a database of the revision ``before`` into one of the last revision, in the connection's transaction."""
+    if before < "0033":
+        _set_keys_aside(connection)
+    _add(connection, described)
+    for revision, step in _STEPS.items():
+        if before < revision:
+            step(connection)
+
+
+def _add(connection: sa.Connection, described: sa.MetaData) -> None:
+    """Add the tables, columns and indexes that the database lacks."""
+    there = sa.inspect(connection)
+    names = set(there.get_table_names())
+    for table in described.sorted_tables:
+        if table.name not in names:
+            table.create(connection)
+            continue
+        columns = {column["name"] for column in there.get_columns(table.name)}
+        for column in table.columns:
+            if column.name not in columns:
+                text = sa.schema.CreateColumn(column).compile(dialect=connection.dialect)
+                connection.exec_driver_sql(f"ALTER TABLE {table.name} ADD COLUMN {text}")
+        indexes = {index["name"] for index in there.get_indexes(table.name)}
+        for index in table.indexes:
+            if index.name not in indexes:
+                index.create(connection)
+
+
+def _hash_kin(connection: sa.Connection) -> None:
+    """0004: studies have the hash that those with a common case share."""
+    rows = connection.execute(sa.text("SELECT number, study, engine_version FROM studies")).all()
+    for number, text, engine in rows:
+        study = json.loads(text)
+        paths = sorted({*study["base"], *(path for axis in study["axes"] for path in axis["paths"])})
+        content = json.dumps(
+            {"engine": engine, "model": study["model"], "run": study["run"], "paths": paths},
+            sort_keys=True,
+            separators=(",", ":"),
+            allow_nan=False,
+        )
+        _set(connection, "studies", number, kin_hash=hashlib.sha256(content.encode("ascii")).hexdigest())
+
+
+def _leave_fingerprints_unknown(connection: sa.Connection) -> None:
+    """0010: nobody knows which code computed the rows that are there, so other studies do not reuse them."""
+    connection.execute(sa.text("UPDATE studies SET fingerprint = '' WHERE done > 0"))
+
+
+def _name_variants(connection: sa.Connection) -> None:
+    """0013: the number of pendulums, which only one model has, became the variant of the study's model."""
+    connection.execute(sa.text("UPDATE studies SET variant = CAST(pendulums AS VARCHAR(40)) WHERE pendulums > 0"))
+    connection.execute(sa.text("ALTER TABLE studies DROP COLUMN pendulums"))
+
+
+def _give_durations(connection: sa.Connection) -> None:
+    """0014: a run without duration and window lasted 60 periods; now it lasts until its motion is settled."""
+    for table in ("studies", "schedules"):
+        for number, text in connection.execute(sa.text(f"SELECT number, spec FROM {table}")).all():  # noqa: S608
+            spec = json.loads(text)
+            if not isinstance(spec, dict) or spec.get("model") != "vibration-drive":
+                continue
+            run = spec.get("run", {})
+            if isinstance(run, dict) and "duration" not in run and "window" not in run:
+                spec["run"] = {"duration": "60 periods", **run}
+                _set(connection, table, number, spec=json.dumps(spec))
+
+
+def _conclude_runs(connection: sa.Connection) -> None:
+    """0025: due times that are over have no outcome. Counting the flags of all studies would take long."""
+    connection.execute(
+        sa.text(
+            "UPDATE schedule_runs SET concluded_at = begun_at WHERE state <> 'taken' AND (study IS NULL OR study IN "
+            "(SELECT number FROM studies WHERE state IN ('finished', 'failed', 'cancelled') OR waits_for = 'deadline'))"
+        )
+    )
+
+
+def _fold_names(connection: sa.Connection) -> None:
+    """0026: studies are searched in their texts without case and accents. Earlier ones have no notes and tags."""
+    for number, name in connection.execute(sa.text("SELECT number, name FROM studies")).all():
+        plain = "".join(sign for sign in unicodedata.normalize("NFKD", name) if not unicodedata.combining(sign))
+        _set(connection, "studies", number, search=f"{' '.join(plain.casefold().split())}\n\n")
+
+
+def _move_dispatcher(connection: sa.Connection) -> None:
+    """0028: there are several dispatchers."""
+    there = {column["name"] for column in sa.inspect(connection).get_columns("dispatcher")}
+    kept = ", ".join(["epoch", "owner", "started_at", "heartbeat_at", *sorted({"clock_at", "report"} & there)])
+    connection.execute(
+        sa.text(f"INSERT INTO dispatchers ({kept}, fingerprint) SELECT {kept}, '' FROM dispatcher")  # noqa: S608
+    )
+    connection.execute(sa.text("DROP TABLE dispatcher"))
+
+
+def _set_keys_aside(connection: sa.Connection) -> None:
+    connection.execute(sa.text("CREATE TABLE idempotency_keys_before AS SELECT * FROM idempotency_keys"))
+    connection.execute(sa.text("DROP TABLE idempotency_keys"))
+
+
+def _give_keys_to_senders(connection: sa.Connection) -> None:
+    """0033: keys go to the owner of their study or schedule; without one they stay keys of nobody."""
+    connection.execute(
+        sa.text(
+            "INSERT INTO idempotency_keys (sender, key, body_hash, study, created_at) "
+            "SELECT CASE WHEN studies.owner IS NULL THEN '' ELSE 'user ' || studies.owner END, "
+            "old.key, old.body_hash, old.study, old.created_at "
+            "FROM idempotency_keys_before old JOIN studies ON studies.number = old.study"
+        )
+    )
+    connection.execute(sa.text("DROP TABLE idempotency_keys_before"))
+    connection.execute(sa.text("UPDATE schedules SET sender = 'user ' || owner WHERE owner IS NOT NULL"))
+    connection.execute(sa.text("DROP INDEX IF EXISTS ix_schedules_idempotency_key"))
+
+
+def _keep_ranks(connection: sa.Connection) -> None:
+    """0034: the whole priority of earlier studies counts against studies of other owners."""
+    connection.execute(sa.text("UPDATE studies SET rank = priority"))
+
+
+def _drop_index_of_kin(connection: sa.Connection) -> None:
+    """0035: another index begins with the same column."""
+    connection.execute(sa.text("DROP INDEX IF EXISTS ix_studies_kin_hash"))
+
+
+def _set(connection: sa.Connection, table: str, number: int, **values: str) -> None:
+    rows = sa.table(table, sa.column("number"), *map(sa.column, values))
+    connection.execute(sa.update(rows).where(rows.c.number == number).values(**values))
+
+
+#: What is to be done for databases from before a revision.
+_STEPS: Final[dict[str, Callable[[sa.Connection], None]]] = {
+    "0004": _hash_kin,
+    "0010": _leave_fingerprints_unknown,
+    "0013": _name_variants,
+    "0014": _give_durations,
+    "0025": _conclude_runs,
+    "0026": _fold_names,
+    "0028": _move_dispatcher,
+    "0033": _give_keys_to_senders,
+    "0034": _keep_ranks,
+    "0035": _drop_index_of_kin,
+}

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
+from sprag.migrations import REVISIONS
 from sprag.service.storage import deployment, maintenance
 from sprag.service.storage.errors import in_use
 from sprag.service.storage.session import Session
@@ -43,7 +44,7 @@ def upgrade(url: str, owner: str, *, copy: bool = True) -> Upgraded:
     with _alone(url, owner) as session:
         before = maintenance.revision(session)
         backup = None
-        if copy and before in maintenance.known_revisions() and before != HEAD_REVISION and not session.on_server:
+        if copy and before in REVISIONS and before != HEAD_REVISION and not session.on_server:
             backup = _beside(session.path, before)
             maintenance.backup(session, backup)
         before, after = maintenance.upgrade(session)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import glob
-import logging
 import os
 import secrets
 from contextlib import suppress
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import sqlalchemy as sa
 
+from sprag.migrations import REVISIONS, bring_up
 from sprag.service.stale_files import mark, sweep
 from sprag.service.storage import component_tables, schedule_tables, user_tables  # noqa: F401 - their tables are made, too
 from sprag.service.storage.audit import note
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 #: Largest database, in bytes, that is checked at every start; the check takes less than a second.
 CHECKED_BYTES = 256_000_000
-#: The table in which Alembic keeps the revision.
+#: The table with the revision; it has the name that Alembic gave it.
 _VERSION = sa.Table("alembic_version", sa.MetaData(), sa.Column("version_num", sa.String(32), primary_key=True))
 #: Begins the revision of the target of a move (`moving`) that is not complete yet.
 MOVING = "moving-"
@@ -67,18 +67,6 @@ def set_revision(session: Session, found: str) -> None:
         connection.execute(_VERSION.update().values(version_num=found))
 
 
-def create(session: Session, found: str = HEAD_REVISION) -> None:
-    """Make the tables of an empty SQLite database as the code has them.
-
-    They are those that the migrations make, which take ten times as long.
-    """
-    with session.write() as connection:
-        if not sa.inspect(connection).get_table_names():  # no other process was faster
-            all_tables().create_all(connection, checkfirst=False)
-            _VERSION.create(connection)
-            connection.execute(_VERSION.insert().values(version_num=found))
-
-
 def other_revision(session: Session, found: str | None) -> SchemaError:
     """The error of a database whose revision is not that of this program, with the command that helps."""
     where = f"the database {session.location}"
@@ -86,26 +74,12 @@ def other_revision(session: Session, found: str | None) -> SchemaError:
         return SchemaError(f"{where} is empty, and not a database of Sprag yet: {CREATED_BY}")
     if found.startswith(MOVING):
         return SchemaError(f"{where} is the target of a move that is not complete: run the same `sprag db move` again")
-    if found in known_revisions():
+    if found in REVISIONS:
         return SchemaError(f"{where} has revision {found}, this program needs {HEAD_REVISION}: run `sprag db upgrade`")
     return SchemaError(
         f"{where} has revision {found}, which is newer than this program's ({HEAD_REVISION}): install the newer Sprag "
         "and run its `sprag db upgrade`"
     )
-
-
-def known_revisions() -> list[str]:
-    """Revisions for which this program has a migration, oldest first."""
-    from alembic.script import ScriptDirectory
-
-    scripts = ScriptDirectory(str(_migrations()))
-    return [script.revision for script in scripts.walk_revisions()][::-1]
-
-
-def _migrations() -> Path:
-    from sprag import migrations
-
-    return Path(migrations.__path__[0])
 
 
 def upgrade(session: Session) -> tuple[str | None, str]:
@@ -114,41 +88,32 @@ def upgrade(session: Session) -> tuple[str | None, str]:
     Raises SchemaError when the database belongs to a newer program.
     """
     before = revision(session)
-    if before is not None and before not in known_revisions():
+    if before is not None and before not in REVISIONS:
         raise other_revision(session, before)
     if before is None:
         make(session)
-    else:
-        migrate(session)
+    elif before != HEAD_REVISION:
+        migrate(session, before)
     return before, HEAD_REVISION
 
 
 def make(session: Session, found: str = HEAD_REVISION) -> None:
     """Make the tables of an empty database, with ``found`` as its revision, in one transaction."""
-    if session.on_server:
-        migrate(session, found)
-    else:
-        create(session, found)
-
-
-def migrate(session: Session, after: str = HEAD_REVISION) -> None:
-    """Run the migrations that the database lacks, in one transaction, with ``after`` as its revision at the end."""
-    from alembic import command
-    from alembic.config import Config
-
-    # Alembic's messages about its progress are for authors of migrations, not for users.
-    logging.getLogger("alembic").setLevel(logging.WARNING)
-    config = Config()
-    config.set_main_option("script_location", str(_migrations()).replace("%", "%%"))
-    before = revision(session)
     with session.write() as connection:
-        config.attributes["connection"] = connection
-        command.upgrade(config, "head")
-        if before not in {None, HEAD_REVISION}:
-            now = micros_of(SystemClock().now())
-            note(connection, now, "database.upgrade", "", before=before, after=HEAD_REVISION)
-        if after != HEAD_REVISION:
-            connection.execute(_VERSION.update().values(version_num=after))
+        if not sa.inspect(connection).get_table_names():  # no other process was faster
+            all_tables().create_all(connection, checkfirst=False)
+            _VERSION.create(connection)
+            connection.execute(_VERSION.insert().values(version_num=found))
+
+
+def migrate(session: Session, before: str) -> None:
+    """Bring a database of the revision ``before`` to that of this program, in one transaction."""
+    with session.write() as connection:
+        if connection.execute(sa.select(_VERSION.c.version_num)).scalar_one() != before:
+            return  # another process was faster
+        bring_up(connection, all_tables(), before)
+        connection.execute(_VERSION.update().values(version_num=HEAD_REVISION))
+        note(connection, micros_of(SystemClock().now()), "database.upgrade", "", before=before, after=HEAD_REVISION)
 
 
 def require_sound(session: Session) -> None:

@@ -2,14 +2,16 @@
 
 import threading
 from functools import cache
+from typing import Final
 
 import sqlalchemy as sa
 
+from sprag.migrations import REVISIONS
 from sprag.worker import models
 from sprag.worker.states import ChunkState
 
-#: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0040"
+#: Revision of the schema below.
+HEAD_REVISION: Final = REVISIONS[-1]
 
 METADATA = sa.MetaData(
     naming_convention={

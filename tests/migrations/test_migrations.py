@@ -1,4 +1,4 @@
-"""Every revision's frozen database is upgraded and then used; the tables of the code are those of the migrations."""
+"""The frozen database of every revision is upgraded, is then like a new one, and is used."""
 
 from __future__ import annotations
 
@@ -10,13 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sqlalchemy as sa
-from alembic import command
-from alembic.autogenerate import compare_metadata
-from alembic.config import Config
-from alembic.migration import MigrationContext
 from numpy.typing import NDArray
 
-import sprag.migrations as migrations
+from sprag import migrations
+from sprag.migrations import REVISIONS
 from sprag.service.actor import Actor, Door, act_as
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage import maintenance
@@ -24,18 +21,18 @@ from sprag.service.storage.errors import DatabaseError, SchemaError
 from sprag.service.storage.session import Session
 from sprag.service.storage.sqlite_files import sqlite_driver
 from sprag.service.storage.store import Store
-from sprag.service.storage.tables import HEAD_REVISION, all_tables
+from sprag.service.storage.tables import HEAD_REVISION
 from sprag.worker import models
 from sprag.worker.states import StudyState
 from tests import postgres
 from tests.faults import refused
-from tests.migrations.freeze import FOLDER
+from tests.migrations import frozen
+from tests.migrations.frozen import thaw
 from tests.service.spec_sample import changed
 from tests.worker import fakes
 
-FROZEN = sorted(FOLDER.glob("*.sql"))
-#: Revisions that nobody's database ever had, because those after them were published with them.
-UNPUBLISHED = {f"{number:04}" for number in range(21, 31)} | {"0033"}
+#: Before the first step, and between each of them and the next one.
+_BEFORE_STEPS = [REVISIONS[REVISIONS.index(step) - 1] for step in migrations._STEPS]
 #: What made-up studies have since the databases were frozen.
 _LATER = {"clutch.coefficients.2", "clutch.coefficients.3"}
 
@@ -48,12 +45,6 @@ def file(tmp_path: Path) -> Path:
 @pytest.fixture
 def url(file: Path) -> str:
     return f"sqlite:///{file}"
-
-
-def thaw(frozen: Path, file: Path) -> None:
-    connection = sqlite_driver().connect(file)
-    connection.executescript(frozen.read_text(encoding="utf-8"))
-    connection.close()
 
 
 def frozen_values(file: Path, study: int, fresh: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -91,21 +82,62 @@ def upgrade(url: str) -> tuple[str | None, str]:
         session.close()
 
 
-def test_there_is_a_frozen_database_of_every_published_revision() -> None:
-    assert [path.stem for path in FROZEN] == [name for name in maintenance.known_revisions() if name not in UNPUBLISHED]
-    assert FROZEN[-1].stem == HEAD_REVISION
+def schema(session: Session) -> dict[str, object]:
+    """What the tables of a database are, in any order and without names of constraints."""
+    with session.read() as connection:
+        there = sa.inspect(connection)
+        unnamed = {
+            name: {
+                "columns": sorted(str(sorted(column.items(), key=str)) for column in there.get_columns(name)),
+                "key": there.get_pk_constraint(name)["constrained_columns"],
+                "foreign": sorted(str({**key, "name": ""}) for key in there.get_foreign_keys(name)),
+                "indexes": sorted(map(str, there.get_indexes(name))),
+                "unique": sorted(map(str, there.get_unique_constraints(name))),
+                "checks": sorted(map(str, there.get_check_constraints(name))),
+            }
+            for name in there.get_table_names()
+        }
+        rows = connection.exec_driver_sql("SELECT * FROM alembic_version").all()
+        kinds: set[tuple[object, ...]] = set()
+        if not session.on_server:
+            listed = connection.exec_driver_sql("SELECT name, wr, strict FROM pragma_table_list WHERE schema = 'main'")
+            kinds = {tuple(row) for row in listed}
+        return {"tables": unnamed, "kinds": kinds, "revision": [tuple(row) for row in rows]}
 
 
-@pytest.mark.parametrize("frozen", FROZEN, ids=lambda path: path.stem)
+def schema_of(url: str) -> dict[str, object]:
+    session = Session(url)
+    try:
+        return schema(session)
+    finally:
+        session.close()
+
+
+def test_there_are_frozen_databases_of_every_revision() -> None:
+    assert frozen.revisions() == list(REVISIONS)
+    assert set(frozen.texts()) == {f"{name}.{kind}.sql" for name in REVISIONS for kind in ("sqlite", "postgresql")}
+    assert REVISIONS[-1] == HEAD_REVISION
+
+
+@pytest.fixture(scope="module")
+def new(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
+    """The schema of a new file."""
+    url = f"sqlite:///{tmp_path_factory.mktemp('new') / 'sprag.sqlite3'}"
+    upgrade(url)
+    return schema_of(url)
+
+
+@pytest.mark.parametrize("revision", REVISIONS)
 def test_a_frozen_database_is_upgraded_and_then_used(
-    frozen: Path, file: Path, url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    revision: str, file: Path, url: str, new: dict[str, object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    thaw(frozen, file)
+    thaw(revision, file)
     before = frozen_values(file, 1, np.full((5, fakes.RESULTS), np.nan))
     then = frozen_values(file, 2, fakes.values(0, 5))
     assert not np.isnan(before[:4]).all()
-    assert upgrade(url) == (frozen.stem, HEAD_REVISION)
+    assert upgrade(url) == (revision, HEAD_REVISION)
+    assert schema_of(url) == new
     with Store.open(url) as store:
         assert not [problem for problem in store.check().problems if "SQLite" not in problem]
         queued, running, finished = store.studies.page().studies
@@ -133,7 +165,7 @@ def test_a_frozen_database_is_upgraded_and_then_used(
 
 
 def test_rows_of_before_a_result_stay_empty_in_it(file: Path, url: str) -> None:
-    thaw(FROZEN[-1], file)
+    thaw(HEAD_REVISION, file)
     connection = sqlite_driver().connect(file)
     connection.execute("ALTER TABLE vibration_drive_1 DROP COLUMN runup_time")
     before = frozen_values(file, 1, np.full((5, fakes.RESULTS), np.nan))
@@ -148,7 +180,7 @@ def test_rows_of_before_a_result_stay_empty_in_it(file: Path, url: str) -> None:
 
 
 def test_the_number_of_pendulums_became_the_variant(file: Path, url: str) -> None:
-    thaw(FOLDER / "0012.sql", file)
+    thaw("0012", file)
     connection = sqlite_driver().connect(file)
     connection.execute("UPDATE studies SET pendulums = 3 WHERE name = 'running'")
     connection.execute("UPDATE studies SET pendulums = 0, model = 'machine-shaft' WHERE name = 'queued'")
@@ -159,8 +191,55 @@ def test_the_number_of_pendulums_became_the_variant(file: Path, url: str) -> Non
         assert [study.variant for study in store.studies.page().studies] == ["", "3", "1"]
 
 
+def rows_of(file: Path, query: str) -> list[tuple[object, ...]]:
+    connection = sqlite_driver().connect(file)
+    try:
+        return [tuple(row) for row in connection.execute(query)]
+    finally:
+        connection.close()
+
+
+def test_studies_of_before_get_the_hash_that_the_next_revision_gave_them(file: Path, url: str, tmp_path: Path) -> None:
+    thaw("0003", file)
+    upgrade(url)
+    thaw("0004", tmp_path / "next.sqlite3")
+    kin = "SELECT number, kin_hash FROM studies ORDER BY number"
+    assert rows_of(file, kin) == rows_of(tmp_path / "next.sqlite3", kin)
+    assert len(rows_of(file, kin)) == 3
+
+
+def test_an_upgrade_fills_what_earlier_databases_lack(file: Path, url: str) -> None:
+    thaw("0009", file)
+    connection = sqlite_driver().connect(file)
+    connection.execute("UPDATE studies SET name = 'Ärger  Łódź', priority = 7 WHERE name = 'queued'")
+    connection.execute(
+        "INSERT INTO schedules (id, name, spec, zone, priority, fresh, enabled, created_at) "
+        "VALUES ('sc_1', 'n', '{}', 'UTC', 0, 0, 0, 0)"
+    )
+    for due, state, study in ((10, "submitted", 1), (20, "taken", None), (30, "missed", None), (40, "submitted", 2)):
+        connection.execute(
+            "INSERT INTO schedule_runs (schedule, due, state, missed, begun_at, study, unbound) "
+            "VALUES (1, ?, ?, 0, ?, ?, 0)",
+            (due, state, due + 1, study),
+        )
+    connection.execute("UPDATE dispatcher SET heartbeat_at = 77")
+    connection.commit()
+    connection.close()
+    upgrade(url)
+    studies = rows_of(file, "SELECT name, fingerprint, search, priority, rank FROM studies ORDER BY number")
+    assert studies == [
+        ("finished", "", "finished\n\n", 0, 0),
+        ("running", "", "running\n\n", 0, 0),
+        ("Ärger  Łódź", None, "arger łodz\n\n", 7, 7),
+    ]
+    concluded = rows_of(file, "SELECT due, concluded_at FROM schedule_runs ORDER BY due")
+    assert concluded == [(10, 11), (20, None), (30, 31), (40, None)]
+    dispatchers = rows_of(file, "SELECT epoch, owner, fingerprint, heartbeat_at, clock_at, report FROM dispatchers")
+    assert dispatchers == [(1, "frozen", "", 77, None, None)]
+
+
 def test_a_key_goes_to_the_owner_of_its_study_or_schedule(file: Path, url: str) -> None:
-    thaw(FOLDER / "0031.sql", file)
+    thaw("0031", file)
     connection = sqlite_driver().connect(file)
     connection.execute("UPDATE studies SET owner = 'dora' WHERE name = 'running'")
     connection.execute(
@@ -196,7 +275,7 @@ def test_a_key_goes_to_the_owner_of_its_study_or_schedule(file: Path, url: str) 
 def test_a_stored_spec_keeps_the_run_that_it_meant(
     file: Path, url: str, run: dict[str, object] | None, then: dict[str, object]
 ) -> None:
-    thaw(FOLDER / "0013.sql", file)
+    thaw("0013", file)
     drive = changed({"/run": ... if run is None else run})
     others = [changed({"/model": "machine-shaft", "/run": ...}), {"name": "no spec"}]
     connection = sqlite_driver().connect(file)
@@ -219,65 +298,23 @@ def test_a_stored_spec_keeps_the_run_that_it_meant(
         assert [store.studies.spec(studies[number]) for number in (2, 3)] == others
 
 
-def test_a_server_has_the_variants_too(postgres_server: postgres.Server) -> None:
-    url = postgres_server.url(postgres_server.new_database())
-    session = Session(url)
-    config = Config()
-    config.set_main_option("script_location", str(Path(migrations.__path__[0])))
-    with session.write() as connection:
-        config.attributes["connection"] = connection
-        command.upgrade(config, "0012")
-        for number, (model, pendulums) in enumerate([("vibration-drive", 3), ("machine-shaft", 0)]):
-            connection.execute(
-                sa.text(
-                    "INSERT INTO studies (id, name, model, pendulums, state, cases, done, ok, chunk_cases, "
-                    "engine_version, physics_hash, spec, study, warnings, revision, created_at) VALUES "
-                    f"('st_{number}', 'old', '{model}', {pendulums}, 'finished', 1, 1, 1, 1, '3', '', "
-                    "'{}', '{}', '[]', 1, 0)"
-                )
-            )
-    session.close()
-    assert upgrade(url) == ("0012", HEAD_REVISION)
-    with Store.open(url) as store:
-        assert [study.variant for study in store.studies.page().studies] == ["", "3"]
-
-
-def schema(session: Session) -> dict[str, object]:
-    """What the tables of a database are, in any order and without names of constraints."""
-    with session.read() as connection:
-        found = sa.inspect(connection)
-        unnamed = {
-            name: {
-                "columns": sorted(str(sorted(column.items(), key=str)) for column in found.get_columns(name)),
-                "key": found.get_pk_constraint(name)["constrained_columns"],
-                "foreign": sorted(str({**key, "name": ""}) for key in found.get_foreign_keys(name)),
-                "indexes": sorted(map(str, found.get_indexes(name))),
-                "unique": sorted(map(str, found.get_unique_constraints(name))),
-            }
-            for name in found.get_table_names()
-        }
-        kinds = connection.exec_driver_sql("SELECT name, wr, strict FROM pragma_table_list WHERE schema = 'main'")
-        rows = connection.exec_driver_sql("SELECT * FROM alembic_version").all()
-        return {"tables": unnamed, "kinds": {tuple(row) for row in kinds}, "revision": [tuple(row) for row in rows]}
-
-
-def test_a_new_database_is_what_the_migrations_make(tmp_path: Path) -> None:
-    made = []
-    for step in (maintenance.create, maintenance.migrate):
-        session = Session(f"sqlite:///{tmp_path / step.__name__}.sqlite3")
-        step(session)
-        made.append(schema(session))
-        session.close()
-    assert made[0] == made[1]
-
-
-def test_code_and_migrations_have_the_same_tables(url: str) -> None:
-    session = Session(url)
-    maintenance.migrate(session)
-    session.close()
-    with Store.open(url) as store, store.session.read() as connection:
-        context = MigrationContext.configure(connection, opts={"compare_type": True})
-        assert compare_metadata(context, all_tables()) == []
+def test_databases_on_a_server_are_upgraded_and_then_like_a_new_one(postgres_server: postgres.Server) -> None:
+    fresh = postgres_server.url(postgres_server.new_database())
+    upgrade(fresh)
+    new = schema_of(fresh)
+    for revision in _BEFORE_STEPS:
+        url = frozen.thaw_on(postgres_server, revision)
+        assert upgrade(url) == (revision, HEAD_REVISION)
+        assert schema_of(url) == new, revision
+        with Store.open(url) as store:
+            assert not store.check().problems
+            names = [study.name for study in store.studies.page().studies]
+            (number,) = (study.number for study in store.studies.page().studies if study.name == "running")
+            key = store.studies.of_key("key", "hash")
+            assert (names, key and key.name) == (["queued", "running", "finished"], "finished"), revision
+            assert [study.variant for study in store.studies.page().studies] == ["1", "1", "1"]
+            assert [chunk.first for chunk in store.work.open_chunks(number)] == [2, 4]
+            assert store.studies.create({}, fakes.study(3)).number == 4
 
 
 def test_an_empty_database_is_made_ready_by_opening_it(url: str, file: Path) -> None:
@@ -365,8 +402,8 @@ def test_a_migration_that_fails_changes_nothing(url: str, file: Path, monkeypatc
         raise sa.exc.OperationalError("CREATE TABLE", {}, Exception("database or disk is full"))
 
     with monkeypatch.context() as patch:
-        thaw(FOLDER / "0012.sql", file)
-        patch.setattr("alembic.operations.Operations.create_index", fail)
+        thaw("0012", file)
+        patch.setattr(sa.Index, "create", fail)
         with pytest.raises(DatabaseError, match="disk"):
             upgrade(url)
     assert upgrade(url) == ("0012", HEAD_REVISION)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import getpass
 import json
 import socket
-import sqlite3
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from sprag.service.storage.audit import AuditFilter
 from sprag.service.storage.scopes import TokenScope
 from sprag.service.storage.store import Store
 from tests.contract.filling import create, finish
-from tests.migrations.freeze import FOLDER
+from tests.migrations.frozen import thaw
 from tests.service.calibrating import spec_of
 from tests.service.timed_spec import SPEC
 
@@ -132,9 +131,7 @@ def test_commands_that_read_leave_no_row(known: tuple[Store, dict[str, str]], tm
 
 def test_an_upgrade_is_in_the_log_of_the_new_revision(tmp_path: Path) -> None:
     database = tmp_path / "old.sqlite3"
-    connection = sqlite3.connect(database)
-    connection.executescript((FOLDER / "0020.sql").read_text(encoding="utf-8"))
-    connection.close()
+    thaw("0020", database)
     assert execute(["db", "upgrade", "--db", str(database)]) == 0
     with Store.open(f"sqlite:///{database}") as store:
         (row,) = store.audit.rows(AuditFilter())

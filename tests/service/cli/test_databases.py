@@ -19,7 +19,7 @@ from sprag.service.storage.store import Store
 from sprag.service.storage.tables import HEAD_REVISION, results_table
 from tests.contract.filling import create, finish
 from tests.faults import refused
-from tests.migrations.freeze import FOLDER
+from tests.migrations.frozen import thaw
 from tests.service.calibrating import spec_of
 from tests.service.cli.test_changing_commands import CHANGING, OTHERS
 from tests.service.timed_spec import SPEC
@@ -35,9 +35,7 @@ ARGUMENTS = {"db backup": "copy.sqlite3", "db move": "target.sqlite3", "preview"
 def old(tmp_path: Path) -> Path:
     """A database of revision 0020."""
     database = tmp_path / "old.sqlite3"
-    connection = sqlite3.connect(database)
-    connection.executescript((FOLDER / "0020.sql").read_text(encoding="utf-8"))
-    connection.close()
+    thaw("0020", database)
     return database
 
 

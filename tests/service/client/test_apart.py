@@ -10,7 +10,6 @@ import pytest
 #: Modules that only POSIX has, and packages that only the server needs.
 POSIX = ("fcntl", "grp", "posix", "pwd", "resource", "termios", "tty")
 SERVER = (
-    "alembic",
     "sprag.engine",
     "fastapi",
     "jinja2",

@@ -1,1 +1,0 @@
-"""One self-contained file for each revision of the database."""
