@@ -12,10 +12,10 @@ from sprag.service.spec.draws.tolerances import DRAWS
 from sprag.service.spec.machine.shaft import MEAN_SPEED_IS
 from sprag.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, FLYWHEEL, MOTOR, STAGE
 from sprag.service.spec.machine.shaft_parts import (
-    FORMS,
     INDICATOR_OVER,
     INTERPOLATION,
     MECHANISM_CHOICES,
+    OPERATION,
     OPERATION_CHOICES,
     PHI_C,
 )
@@ -27,7 +27,7 @@ from sprag.worker.models.form import Block, Form, FormChoice, FormField
 
 def form_values() -> Iterator[str]:
     """Labels and help of the fields of the form for a new study."""
-    yield from (words(name) for name in (CHARACTERISTIC, *FORMS))
+    yield from (words(name) for name in (CHARACTERISTIC, *OPERATION.either))
     yield from map(words, CHARACTERISTICS)
     machine = (*MECHANISM_CHOICES.values(), OPERATION_CHOICES)
     drive = (MEAN_SPEED_IS, BALANCE, BALANCE_SIDE, FLYWHEEL, MOTOR, STAGE, INDICATOR_OVER, INTERPOLATION, PHI_C)

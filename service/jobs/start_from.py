@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from sprag.sentences import Sentence
 from sprag.service.reading.limits import span
-from sprag.service.spec.fields import read_object, read_whole
-from sprag.service.spec.machine.drive import START
+from sprag.service.spec.machine.drive import START, START_AT
 from sprag.service.spec.machine.shaft_check import NotCompiledError, compiles_here
+from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report
 from sprag.service.storage.errors import StudyNotFoundError
 from sprag.worker import models
@@ -32,7 +32,7 @@ def with_start(store: Store, data: Any) -> Any:
     if not isinstance(base, Mapping) or START not in base:
         return data
     report = Report(data)
-    source = _source(report, store, base[START], data)
+    source = _source(Node(report, _POINTER, base[START]), store, data)
     report.raise_if_any()
     assert source is not None
     study, case = source
@@ -51,35 +51,27 @@ def with_start(store: Store, data: Any) -> Any:
     return {**data, "base": new}
 
 
-def _source(report: Report, store: Store, data: object, spec: Mapping[str, Any]) -> tuple[Study, int] | None:
+def _source(node: Node, store: Store, spec: Mapping[str, Any]) -> tuple[Study, int] | None:
     """A study and the case in it that is gone on from; None, with faults recorded, where there is none."""
-    found = read_object(report, _POINTER, data, ("study", "case", "start"), given=True)
-    if found is None:
+    if not START_AT.read(node, null=False):
         return None
-    case = read_whole(report, f"{_POINTER}/case", found.get("case"), 0, MAX_CASES - 1)
-    start = read_whole(report, f"{_POINTER}/start", found.get("start", 0), 0, MAX_STARTS - 1)
-    study_id = found.get("study")
+    case, start = node["case"].whole(0, MAX_CASES - 1), node["start"].otherwise(0).whole(0, MAX_STARTS - 1)
+    named = node["study"]
     try:
-        if not isinstance(study_id, str):
-            raise StudyNotFoundError(str(study_id))
-        study = store.studies.study(study_id)
+        if not isinstance(named.value, str):
+            raise StudyNotFoundError(str(named.value))
+        study = store.studies.study(named.value)
     except StudyNotFoundError:
-        report.fault(f"{_POINTER}/study", "unknown-name", "is not a study of this service", study_id, allowed="its id")
+        named.refuse("unknown-name", "is not a study of this service", allowed="its id")
         return None
     if study.model != spec.get("model"):
-        report.fault(
-            f"{_POINTER}/study",
-            "conflict",
-            Sentence("is of the model {model}", model=study.model),
-            study_id,
-            allowed="one model",
-        )
+        named.refuse("conflict", Sentence("is of the model {model}", model=study.model), allowed="one model")
     if case is not None and case >= study.cases:
-        report.fault(f"{_POINTER}/case", "out-of-range", "is out of range", case, allowed=span(0, study.cases - 1))
+        node["case"].refuse("out-of-range", "is out of range", allowed=span(0, study.cases - 1))
     count = count_of(study.run)
     if start is not None and start >= count:
-        report.fault(f"{_POINTER}/start", "out-of-range", "is out of range", start, allowed=span(0, count - 1))
-    if report.found or case is None or start is None:
+        node["start"].refuse("out-of-range", "is out of range", start, allowed=span(0, count - 1))
+    if not node.sound or case is None or start is None:
         return None
     return motion_of(study, case, start)
 

@@ -7,18 +7,26 @@ from typing import TYPE_CHECKING, Final
 from sprag.service.answers import filled
 from sprag.service.answers.studies import ClutchFitReport, FitDegree
 from sprag.service.faults import warned
-from sprag.service.spec.described import FIT
-from sprag.service.spec.fields import read_number, read_object
-from sprag.service.spec.machine.clutch import read_clutch
+from sprag.service.spec.described import Record
+from sprag.service.spec.machine.clutch import MEASURED, read_measured
+from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report
+from sprag.service.spec.schema.quantity import QUANTITY
 from sprag.worker import models
 from sprag.worker.models.parameters import placed
 
 if TYPE_CHECKING:
     from sprag.worker.models import ClutchFit
 
-#: Fields of a request for a fit.
-REQUEST_FIELDS: Final = ("data", "accuracy", *FIT, "backlash")
+#: A request for a fit.
+REQUEST: Final = Record(
+    {
+        **MEASURED.fields,
+        "backlash": {**QUANTITY, "description": "backlash to be taken off the angles (rad)", "default": 0},
+    },
+    "Measured data of a clutch and how well it is to be fitted; numbers in SI or texts with a unit.",
+    required=MEASURED.required,
+)
 
 
 def fit_json(fit: ClutchFit) -> ClutchFitReport:
@@ -30,17 +38,15 @@ def fit_json(fit: ClutchFit) -> ClutchFitReport:
 def read_fit(data: object) -> ClutchFit:
     """Compute the fit that JSON data with rows, accuracy and options request; raises SpecError."""
     report = Report(data)
-    found = dict(read_object(report, "", data, REQUEST_FIELDS) or {})
-    backlash = read_number(report, "/backlash", found.pop("backlash", 0.0), _backlash())
-    if backlash and found.get("angles_include_backlash") is not True:
-        report.fault(
-            "/backlash", "not-used", "is subtracted from the angles only where they include it", backlash,
+    request = Node(report, "", data)
+    REQUEST.read(request)
+    backlash = request["backlash"].otherwise(0.0).number(_backlash())
+    if backlash and request["angles_include_backlash"].value is not True:
+        request["backlash"].refuse(
+            "not-used", "is subtracted from the angles only where they include it", backlash,
             allowed="with `angles_include_backlash` true; else 0 or left out", unit="rad",
         )  # fmt: skip
-    clutch = None
-    if not report.faults:
-        # Without rows this would be read as a law without coefficients.
-        clutch = read_clutch(report, "", {"data": None, **found}, "clutch.", [backlash or 0.0])
+    clutch = None if report.faults else read_measured(request, "clutch.", [backlash or 0.0])
     report.raise_if_any()
     assert clutch is not None
     assert clutch.fit is not None

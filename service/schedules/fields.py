@@ -25,7 +25,6 @@ from sprag.service.schedules.times import (
 from sprag.service.schedules.trouble import read_trouble_flags
 from sprag.service.spec.described import Described, choice, named
 from sprag.service.spec.document import parse_spec
-from sprag.service.spec.fields import read_object
 from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report, SpecError
 from sprag.service.zones import zones
@@ -147,9 +146,10 @@ def read_fields(data: object, now: datetime) -> ScheduleFields:
 def change_fields(fields: ScheduleFields, data: object, now: datetime) -> ScheduleFields:
     """Replace the fields given in ``data``; raises SpecError."""
     report = Report(data)
-    given = read_object(report, "", data, FIELDS)
+    node = Node(report, "", data)
+    node.has(FIELDS)
     report.raise_if_any()
-    assert given is not None
+    given = node.value
     whole = fields.to_json()
     if {"cron", "at"} & set(given):
         whole.pop("cron", None)
@@ -160,13 +160,12 @@ def change_fields(fields: ScheduleFields, data: object, now: datetime) -> Schedu
 
 def _read(data: object, now: datetime, old: ScheduleFields | None = None) -> ScheduleFields:
     report = Report(data)
-    found = read_object(report, "", data, FIELDS) or {}
+    node = Node(report, "", data)
+    found = node.value if node.has(FIELDS) else {}
     zone = _read_zone(report, found.get("zone", "UTC"))
     timing = _read_timing(report, found, zone, now, old)
     window = _read_window(report, found.get("window"), zone)
-    priority, fresh, enabled, overlap, catch_up, when = (
-        plain.read(Node(report, "", found)) for plain in PLAIN.values()
-    )
+    priority, fresh, enabled, overlap, catch_up, when = (plain.read(node) for plain in PLAIN.values())
     finish_by = _read_duration(report, "finish_by", found, check_run_finish, ALLOWED_OF_RUNS)
     grace = _read_duration(report, "misfire_grace", found, check_grace, GRACE_ALLOWED)
     paused_until = _read_pause(report, found.get("paused_until"), zone, now, old)

@@ -21,10 +21,10 @@ from sprag.service.reading.printed import could_be_several, could_be_values
 from sprag.service.reading.together import AMBIGUOUS_UNIT, questions
 from sprag.service.reading.units import QuantityError
 from sprag.service.spec.csv_text import in_cell, read_csv, refuse_mixed_column, unescape
-from sprag.service.spec.fields import read_object
+from sprag.service.spec.described import Record
 from sprag.service.spec.labels import LINES_ALLOWED, printable_lines
 from sprag.service.spec.node import Node, exact
-from sprag.service.spec.report import Report, SpecError, join
+from sprag.service.spec.report import Report, SpecError
 from sprag.service.spec.table_text import heading_of
 from sprag.worker import models
 from sprag.worker.limits import MAX_COMPONENTS, MAX_NAME_LENGTH, MAX_NOTES_LENGTH
@@ -66,34 +66,31 @@ _TEXTS: Final = ("name", "note")
 #: A list of numbers that only blanks separate.
 _BARE: Final = re.compile(r"(?:[-+0-9.eE\s]|,[0-9])+")
 
-SCHEMA: Final[dict[str, Any]] = {
-    "type": "object",
-    "description": "Components, or the text of a CSV file of them; those of the same kind and name are replaced.",
-    "additionalProperties": False,
-    "properties": {
+_COMPONENT: Final = Record(
+    {
+        "kind": {"enum": list(KINDS)},
+        "name": {"type": "string", "minLength": 1, "maxLength": MAX_NAME_LENGTH},
+        "note": {"type": "string", "maxLength": MAX_NOTES_LENGTH},
+        "fields": {
+            "type": "object",
+            "description": "quantities with their units, as in a field of the form",
+            "additionalProperties": {"type": "string", "maxLength": MAX_NOTES_LENGTH},
+        },
+    },
+    required=("kind", "name", "fields"),
+)
+REQUEST: Final = Record(
+    {
         "components": {
             "type": "array",
             "minItems": 1,
             "maxItems": MAX_COMPONENTS,
-            "items": {
-                "type": "object",
-                "required": ["kind", "name", "fields"],
-                "additionalProperties": False,
-                "properties": {
-                    "kind": {"enum": list(KINDS)},
-                    "name": {"type": "string", "minLength": 1, "maxLength": MAX_NAME_LENGTH},
-                    "note": {"type": "string", "maxLength": MAX_NOTES_LENGTH},
-                    "fields": {
-                        "type": "object",
-                        "description": "quantities with their units, as in a field of the form",
-                        "additionalProperties": {"type": "string", "maxLength": MAX_NOTES_LENGTH},
-                    },
-                },
-            },
+            "items": _COMPONENT.schema(),
         },
         "csv": {"type": "string", "description": "columns kind, name, note and the fields, with units in brackets"},
     },
-}
+    "Components, or the text of a CSV file of them; those of the same kind and name are replaced.",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,64 +125,49 @@ def list_text(text: str) -> list[str]:
 def read_components(data: object) -> list[Component]:
     """The components of a request; raises SpecError with every fault."""
     report = Report(data)
-    found = read_object(report, "", data, SCHEMA["properties"]) or {}
-    if len(found) != 1 and not report.found:
-        report.fault("", "exactly-one", "must have either `components` or `csv`", allowed="one of them")
-    made = _read_csv(report, found["csv"]) if "csv" in found else _read_list(report, found.get("components", []))
+    node = Node(report, "", data)
+    REQUEST.read(node)
+    if node.sound and len(node.value) != 1:
+        node.refuse("exactly-one", "must have either `components` or `csv`", None, allowed="one of them")
+    made = _read_csv(node["csv"]) if "csv" in node else _read_list(node["components"])
     places: dict[tuple[str, str], str] = {}
     for where, one in made:
         if places.setdefault((one.kind, one.name), where) != where:
-            message = Sentence(_TWICE[one.kind])
-            report.fault(where, "repeated", message, one.name, allowed="each once")
+            report.fault(where, "repeated", Sentence(_TWICE[one.kind]), one.name, allowed="each once")
     report.raise_if_any()
     return [one for _, one in made]
 
 
-def _read_list(report: Report, items: object) -> list[tuple[str, Component]]:
-    if not isinstance(items, list) or not 1 <= len(items) <= MAX_COMPONENTS:
-        report.fault(
-            "/components",
-            "wrong-type",
-            "must be a list",
-            allowed=Sentence("1 to {high} components", high=MAX_COMPONENTS),
-        )
+def _read_list(node: Node) -> list[tuple[str, Component]]:
+    if not isinstance(node.value, list) or not 1 <= len(node.value) <= MAX_COMPONENTS:
+        node.refuse("wrong-type", "must be a list", None,
+                    allowed=Sentence("1 to {high} components", high=MAX_COMPONENTS))  # fmt: skip
         return []
-    made = []
-    for index, item in enumerate(items):
-        where = join("/components", index)
-        found = read_object(report, where, item, (*COLUMNS, "fields"))
-        if found is not None:
-            one = _checked(report, where, found, found.get("fields"), join(where, "fields"))
-            made += [(where, one)] if one is not None else []
-    return made
+    read = [(item.pointer, _checked(item, item["fields"])) for item in node.parts() if _COMPONENT.read(item)]
+    return [(where, component) for where, component in read if component is not None]
 
 
-def _checked(report: Report, where: str, found: Mapping[str, Any], fields: object, at: str) -> Component | None:
+def _checked(node: Node, fields: Node) -> Component | None:
     """A component whose parts are given; None, and faults recorded, where it is invalid."""
-    before, kind, name, note = report.found, found.get("kind"), found.get("name"), found.get("note", "")
-    if kind not in KINDS:
-        report.fault(
-            join(where, "kind"), "invalid-choice", "is not a kind of component", kind, allowed=", ".join(KINDS)
-        )
-    if not isinstance(name, str) or not 0 < len(name.strip()) <= MAX_NAME_LENGTH or not name.isprintable():
-        report.fault(join(where, "name"), "invalid-text", "must be a printable text in one line", name,
-                     allowed=characters(1, MAX_NAME_LENGTH))  # fmt: skip
-    text = printable_lines(note)
+    kind, name, note = node["kind"], node["name"], node["note"].otherwise("")
+    if kind.value not in KINDS:
+        kind.refuse("invalid-choice", "is not a kind of component", allowed=", ".join(KINDS))
+    line = name.value if isinstance(name.value, str) else ""
+    if not 0 < len(line.strip()) <= MAX_NAME_LENGTH or not line.isprintable():
+        name.refuse("invalid-text", "must be a printable text in one line", allowed=characters(1, MAX_NAME_LENGTH))
+    text = printable_lines(note.value)
     if text is None:
-        report.fault(join(where, "note"), "invalid-text", "must be a printable text", note, allowed=LINES_ALLOWED)
-    texts: dict[str, str] = {}
-    if isinstance(fields, Mapping) and all(isinstance(text, str) for text in fields.values()):
-        texts = {key: text.strip() for key, text in fields.items()}
+        note.refuse("invalid-text", "must be a printable text", allowed=LINES_ALLOWED)
+    given: dict[str, str] = {}
+    if isinstance(fields.value, Mapping) and all(isinstance(text, str) for text in fields.value.values()):
+        given = {key: text.strip() for key, text in fields.value.items() if text.strip()}
     else:
-        report.fault(at, "wrong-type", "must be an object of texts", allowed="quantities with their units")
-    if report.found > before:
+        fields.refuse("wrong-type", "must be an object of texts", None, allowed="quantities with their units")
+    if not kind.sound:
         return None
-    given = {key: text for key, text in texts.items() if text}
-    for fault in faults_of(str(kind), given):
-        report.fault(
-            join(at, fault.where or ""), fault.code, fault.message, fault.value, allowed=fault.allowed, unit=fault.unit
-        )
-    return Component(str(kind), str(name).strip(), text or "", given) if report.found == before else None
+    for fault in faults_of(str(kind.value), given):
+        fields[fault.where or ""].refuse(fault.code, fault.message, fault.value, allowed=fault.allowed, unit=fault.unit)
+    return Component(str(kind.value), line.strip(), text or "", given) if name.sound else None
 
 
 def faults_of(kind: str, fields: Mapping[str, str]) -> list[Fault]:
@@ -237,9 +219,8 @@ def _faults_of_field(kind: str, name: str, text: str) -> list[Fault]:
     return found
 
 
-def _read_csv(report: Report, text: object) -> list[tuple[str, Component]]:
+def _read_csv(node: Node) -> list[tuple[str, Component]]:
     example = N_("columns kind, name, note and the fields")
-    node = Node(report, "/csv", text)
     rows = read_csv(node, (MAX_COMPONENTS, 40), example, texts=_TEXTS)
     if rows is None:
         return []
@@ -248,17 +229,16 @@ def _read_csv(report: Report, text: object) -> list[tuple[str, Component]]:
     known = {*COLUMNS, *(name for kind in KINDS for name in fields_of(kind))}
     for name, cell in zip(names, rows[0].cells, strict=True):
         if name not in known or names.count(name) > 1:
-            report.fault(
-                "/csv", "unknown-field",
-                "is a column twice" if name in known else "has a column that is no field",
-                cell, allowed=", ".join(sorted(known)),
+            node.refuse(
+                "unknown-field", "is a column twice" if name in known else "has a column that is no field", cell,
+                allowed=", ".join(sorted(known)),
             )  # fmt: skip
     parameters = {name: one for kind in KINDS for name, one in fields_of(kind).items() if name != COEFFICIENTS}
     for place, (name, unit) in enumerate(headings):
         parameter = parameters.get(name)
         if parameter is not None and not unit:
             refuse_mixed_column(node, rows[1:], (place, name), parameter.unit)
-    if report.found:
+    if node.report.found:
         return []
     made = []
     for row in rows[1:]:
@@ -269,10 +249,10 @@ def _read_csv(report: Report, text: object) -> list[tuple[str, Component]]:
         cells |= {name: unescape(cells[name]) for name in _TEXTS if name in cells}
         line = Report(None)
         fields = {name: cell for name, cell in cells.items() if name not in COLUMNS}
-        one = _checked(line, "", cells, fields, "")
+        one = _checked(Node(line, "", cells), Node(line, "", fields))
         for fault in line.faults:
             message = in_cell(row.line, fault.message, (fault.where or "").strip("/"))
-            report.fault("/csv", fault.code, message, fault.value, allowed=fault.allowed, unit=fault.unit)
+            node.refuse(fault.code, message, fault.value, allowed=fault.allowed, unit=fault.unit)
         made += [(f"/csv line {row.line}", one)] if one is not None else []
     return made
 
@@ -280,7 +260,8 @@ def _read_csv(report: Report, text: object) -> list[tuple[str, Component]]:
 def require_component(data: Mapping[str, Any]) -> Component:
     """One component as a form sends it; raises SpecError, whose pointers begin with ``/fields`` or a field's name."""
     report = Report(data)
-    one = _checked(report, "", data, data.get("fields"), "/fields")
+    node = Node(report, "", data)
+    one = _checked(node, node["fields"])
     if one is None:
         raise SpecError(report.faults)
     return one

@@ -21,6 +21,7 @@ from sprag.service.reading.catalogue import range_sentence
 from sprag.service.reading.texts import did_you_mean, quantity_text
 from sprag.service.spec.draws.unit import unit_sample
 from sprag.service.spec.formulas import Formula, FormulaError, UnknownNameError, read_formula
+from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report, join
 from sprag.worker.derived import blocks, involved
 from sprag.worker.limits import MAX_DERIVED
@@ -63,7 +64,7 @@ def read_machine(report: Report, part: SpecPart, found: Mapping[str, Any]) -> Ma
     base, before = found.get("base"), report.found
     given = _read_given(report, found.get("derive", {}), base)
     if not given:
-        machine = part.read_base(report, base)
+        machine = part.read_base(Node(report, "/base", base))
     else:
         machine = _read_derived(report, part, str(found["model"]), base, given)
     if report.found == before:
@@ -191,7 +192,7 @@ def _read_derived(
     numbers = {path: _any_number(entry) for path, entry in entries.items() if entry is not None}
     filled = with_values(base, numbers)
     first = Report({"base": filled})
-    machine = part.read_base(first, filled)
+    machine = part.read_base(Node(first, "/base", filled))
     report.adopt(first)
     unknown = [path for path in given if path not in machine.parameters and not machine.assumed(path)]
     for path in unknown:
@@ -214,7 +215,7 @@ def _read_derived(
     if report.found > before:
         return machine
     derive = machine.derive
-    machine = part.read_base(report, with_values(base, values))
+    machine = part.read_base(Node(report, "/base", with_values(base, values)))
     machine.derive = derive
     return machine
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Final, Literal, Union
 
 from sprag.sentences import Sentence
@@ -140,6 +140,12 @@ class Listed:
         )
         return None
 
+    def read_records(self, node: Node) -> list[Node]:
+        """The items, which are records; none, and the faults recorded, where one of them is not such an object."""
+        items = self.read(node) or []
+        well = [isinstance(self.item, Record | Variants) and self.item.read(item) for item in items]
+        return items if all(well) else []
+
     def read_rows(self, node: Node, *columns: Parameter) -> list[list[float]]:
         """Rows with a number for each of ``columns``; those that are wrong are noted and left out."""
         given = self.read(node) or []
@@ -222,9 +228,11 @@ class Record:
 
 @dataclass(frozen=True, slots=True)
 class Variants:
-    """A value that is described by any of ``ways``; an object of several kinds has the fields of all of them."""
+    """A value that any of ``ways`` describes, or ``only`` one; an object of several kinds has the fields of all."""
 
     ways: Sequence[Field]
+    help: str = ""
+    only: bool = False
 
     def read(self, node: Node) -> bool:
         """Whether ``node`` is an object, whose fields that no kind has are recorded."""
@@ -233,7 +241,8 @@ class Variants:
 
     def schema(self) -> Schema:
         """Its JSON Schema."""
-        return {"anyOf": [schema_of(way) for way in self.ways]}
+        described = {"description": self.help} if self.help else {}
+        return {**described, "oneOf" if self.only else "anyOf": [schema_of(way) for way in self.ways]}
 
 
 def _settled(rows: Sequence[Node]) -> list[list[Node]]:
@@ -305,7 +314,3 @@ FIT: Final = named(
     Described("through_origin", "", "no torque at zero windup (c_1 = 0)", "flag", default=True),
     Described("angles_include_backlash", "", _BACKLASH, "flag", default=False),
 )
-
-
-def listed_schema(listed: Listed, item: Schema, *, text: bool = False) -> Schema:
-    return replace(listed, item=item, text=text).schema()

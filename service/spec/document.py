@@ -113,8 +113,8 @@ def parse_spec(data: object) -> ParsedSpec:
             "cannot be combined with `refine` or `calibrate`",
             allowed="`goal`, or plain axes",
         )
-    run = part.read_run(report, found.get("run", {}), machine, axes, combine)
-    run |= read_starts(report, found, machine, axes, run)
+    run = part.read_run(spec["run"], axes, combine)
+    run |= read_starts(spec, axes, run)
     part.check(report, machine, axes or (), combine)
     report.raise_if_any()
     study = Study(model, name, _in_order(machine), run, structure=machine.structure, derive=machine.derive)

@@ -3,39 +3,36 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
 from sprag.sentences import Sentence
+from sprag.service.faults import Code
 from sprag.service.reading.limits import printable_line
-from sprag.service.spec.described import Listed
-from sprag.service.spec.fields import read_flag, read_object, values_of
+from sprag.service.spec.described import Described, Listed, Record
 from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report, join
+from sprag.service.spec.report import Report
 from sprag.worker.limits import MAX_NAME_LENGTH, MAX_NOTES_LENGTH, MAX_TAG_LENGTH, MAX_TAGS
 
-_LISTS: Final = {
-    "tags": Listed("tags", 0, MAX_TAGS, "all tags of the study from now on"),
-    "add_tags": Listed("tags", 0, MAX_TAGS, "tags that it gets besides those that it has"),
-    "remove_tags": Listed("tags", 0, MAX_TAGS, "tags that it loses"),
-}
 _TAG: Final[dict[str, Any]] = {"type": "string", "minLength": 1, "maxLength": MAX_TAG_LENGTH}
 _TAG_ALLOWED: Final = Sentence("{low} to {high} printable characters without a comma", low=1, high=MAX_TAG_LENGTH)
 LINES_ALLOWED: Final = Sentence("at most {high} printable characters in lines", high=MAX_NOTES_LENGTH)
-
-#: JSON Schema of a change.
-SCHEMA: Final[dict[str, Any]] = {
-    "type": "object",
-    "description": "The fields of a study to change; what is left out is kept.",
-    "additionalProperties": False,
-    "properties": {
-        "name": {"type": "string", "minLength": 1, "maxLength": MAX_NAME_LENGTH, "description": "its name, one line"},
+#: JSON Schema of a name.
+NAME: Final[dict[str, Any]] = {
+    "type": "string", "minLength": 1, "maxLength": MAX_NAME_LENGTH, "description": "its name, one line",
+}  # fmt: skip
+_ARCHIVED: Final = Described("archived", "", "whether it is kept out of the usual list", "flag")
+CHANGE: Final = Record(
+    {
+        "name": NAME,
         "notes": {"type": "string", "maxLength": MAX_NOTES_LENGTH, "description": "notes, plain text"},
-        **{name: found.schema() for name, found in _LISTS.items()},
-        "archived": {"type": "boolean", "description": "whether it is kept out of the usual list"},
+        "tags": Listed("tags", 0, MAX_TAGS, "all tags of the study from now on", item=_TAG),
+        "add_tags": Listed("tags", 0, MAX_TAGS, "tags that it gets besides those that it has", item=_TAG),
+        "remove_tags": Listed("tags", 0, MAX_TAGS, "tags that it loses", item=_TAG),
+        "archived": _ARCHIVED,
     },
-}
+    "The fields of a study to change; what is left out is kept.",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,34 +53,30 @@ class StudyChange:
 
 def read_change(data: object) -> StudyChange:
     """The change that a request asks for; raises SpecError with every fault."""
-    report = Report(data)
-    found = read_object(report, "", data, SCHEMA["properties"], given=True) or {}
-    name = _read_line(report, found, "name", MAX_NAME_LENGTH)
-    notes = _read_notes(report, found)
-    tags, more, less = (_read_tags(report, found, field) for field in _LISTS)
-    archived = read_flag(report, "/archived", found["archived"]) if "archived" in found else None
-    report.raise_if_any()
+    node = Node(Report(data), "", data)
+    CHANGE.read(node, null=False)
+    name, notes = read_line(node["name"]), _read_notes(node["notes"])
+    tags, more, less = (_read_tags(node, field) for field in CHANGE.listed)
+    archived = _ARCHIVED.read(node) if "archived" in node else None
+    node.report.raise_if_any()
     return StudyChange(name, notes, tags, more or (), less or (), archived)
 
 
-def _read_line(report: Report, found: Mapping[str, Any], field: str, longest: int) -> str | None:
-    if field not in found:
-        return None
-    value = found[field]
-    if isinstance(value, str) and value.isprintable() and 1 <= len(value.strip()) <= longest:
+def read_line(node: Node) -> str | None:
+    """A name; None where none is given, or, with a fault recorded, where it is none."""
+    value = node.value
+    if isinstance(value, str) and value.isprintable() and 1 <= len(value.strip()) <= MAX_NAME_LENGTH:
         return value.strip()
-    allowed = printable_line(longest)
-    report.fault(f"/{field}", _text_code(value), "must be a printable text in one line", value, allowed=allowed)
+    if node.given:
+        allowed = printable_line(MAX_NAME_LENGTH)
+        node.refuse(text_code(value), "must be a printable text in one line", allowed=allowed)
     return None
 
 
-def _read_notes(report: Report, found: Mapping[str, Any]) -> str | None:
-    if "notes" not in found:
-        return None
-    value = found["notes"]
-    text = printable_lines(value)
-    if text is None:
-        report.fault("/notes", _text_code(value), "must be a printable text", value, allowed=LINES_ALLOWED)
+def _read_notes(node: Node) -> str | None:
+    text = printable_lines(node.value)
+    if text is None and node.given:
+        node.refuse(text_code(node.value), "must be a printable text", allowed=LINES_ALLOWED)
     return text
 
 
@@ -96,20 +89,21 @@ def printable_lines(value: object) -> str | None:
     return text if printable and len(text) <= MAX_NOTES_LENGTH else None
 
 
-def _read_tags(report: Report, found: Mapping[str, Any], field: str) -> tuple[str, ...] | None:
-    if field not in found:
+def _read_tags(change: Node, field: str) -> tuple[str, ...] | None:
+    if field not in change:
         return None
     tags = []
-    for index, value in enumerate(values_of(_LISTS[field].read(Node(report, f"/{field}", found[field]))) or ()):
-        tag = " ".join(value.split()) if isinstance(value, str) else ""
+    for node in CHANGE.items(change, field):
+        tag = " ".join(node.value.split()) if isinstance(node.value, str) else ""
         if len(tag) <= MAX_TAG_LENGTH and tag.isprintable() and "," not in tag and folded(tag):
             tags.append(tag)
         else:
-            report.fault(join(f"/{field}", index), _text_code(value), "is not a tag", value, allowed=_TAG_ALLOWED)
+            node.refuse(text_code(node.value), "is not a tag", allowed=_TAG_ALLOWED)
     return tuple(tags)
 
 
-def _text_code(value: object) -> Any:
+def text_code(value: object) -> Code:
+    """The code of a fault of a value that is to be a text of some kind."""
     return "invalid-text" if isinstance(value, str) else "wrong-type"
 
 

@@ -64,12 +64,19 @@ class Node:
         if isinstance(self.value, Mapping):
             value, given = self.value.get(key), key in self.value
         else:
-            given = isinstance(self.value, list) and isinstance(key, int)
+            given = isinstance(self.value, list) and isinstance(key, int) and key < len(self.value)
             value = self.value[key] if given else None
         return Node(self.report, join(self.pointer, key), value, given=given)
 
     def __contains__(self, name: str) -> bool:
         return isinstance(self.value, Mapping) and name in self.value
+
+    def below(self, path: str) -> Node:
+        """The value at a path of fields and numbers of items with dots between them."""
+        node = self
+        for key in path.split("."):
+            node = node[int(key) if isinstance(node.value, list) and key.isdecimal() else key]
+        return node
 
     def parts(self) -> list[Node]:
         """The items of a list, the fields of an object; nothing of any other value."""
@@ -102,11 +109,16 @@ class Node:
         number = self.exact(parameter)
         return None if number is None else to_float(number)
 
-    def lacks(self, parameter: Parameter) -> None:
-        """Record that a required number is missing."""
+    def number_or_default(self, parameter: Parameter) -> float | None:
+        """As `number`; where nothing is given, the default of the parameter, or a fault where it has none."""
+        if self.given:
+            return self.number(parameter)
+        if parameter.default is not None:
+            return parameter.default
         needed = {"help": Sentence(parameter.help), "example": example(parameter.unit)}
         message = Sentence("is required ({help}, for example {example})", **needed)
         self.refuse("required", message, allowed=range_sentence(parameter), unit=parameter.unit)
+        return None
 
     def whole(self, low: int, high: int) -> int | None:
         """An integer from ``low`` to ``high``."""

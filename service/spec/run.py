@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.sentences import Amount, Sentence, plural
 from sprag.service.languages import N_
 from sprag.service.reading.units import PERIOD_NAMES, QuantityError, exact_number, parse_exact, split_quantity, to_float
-from sprag.service.spec.described import ANY_RUN, SETTLED_RUN
-from sprag.service.spec.fields import nodes, read_object
+from sprag.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN, Record
 from sprag.service.spec.lists import refuse_mixed
-from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report, join
 from sprag.worker.limits import MAX_RUN_PERIODS
 from sprag.worker.models import MEANS_FROM_PERIODS
 
@@ -20,10 +18,31 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from sprag.service.spec.node import Node
+
 #: Fields of settled runs only, and of timed runs only.
 SETTLED_FIELDS: Final = tuple(SETTLED_RUN)
 TIMED_FIELDS: Final = ("duration", "window")
-FIELDS: Final = (*SETTLED_FIELDS, *TIMED_FIELDS, *ANY_RUN)
+_RUN: Final = Record(
+    {
+        **SETTLED_RUN,
+        "duration": DURATION,
+        "window": {
+            "type": "array",
+            "minItems": 2,
+            "maxItems": 2,
+            "items": replace(DURATION, help="a time of the run").schema(),
+            "description": "part of the run that is evaluated, [start, end]; by default the last third",
+        },
+        **ANY_RUN,
+    },
+    "how long each case runs, what is evaluated, how accurately",
+)
+#: JSON Schema of `run`: it lasts until it is settled or for a given time.
+RUN: Final = {
+    **_RUN.schema(),
+    "not": {"allOf": [{"anyOf": [{"required": [name]} for name in names]} for names in (TIMED_FIELDS, SETTLED_FIELDS)]},
+}
 _ANY_DEFAULTS: Final[dict[str, Any]] = {name: field.default for name, field in ANY_RUN.items()}
 #: Defaults of missing fields. A run without a field of `TIMED_FIELDS` lasts until it is settled.
 SETTLED_DEFAULTS: Final[dict[str, Any]] = {name: field.default for name, field in SETTLED_RUN.items()} | _ANY_DEFAULTS
@@ -36,79 +55,66 @@ _ROUNDING: Final = 1e-9
 Time = list[Any]  # [number, "periods" | "s"], as stored in a study
 
 
-def read_run(report: Report, data: object, frequencies: NDArray[np.float64]) -> dict[str, Any]:
-    """Read the run as stored in a study (see `Study.run`); faults are recorded in ``report``.
+def read_run(node: Node, frequencies: NDArray[np.float64]) -> dict[str, Any]:
+    """Read the run as stored in a study (see `Study.run`); faults are recorded.
 
     Parameters
     ----------
     frequencies : every excitation frequency (Hz) of the study; empty when they could not be read
     """
-    found = read_object(report, "/run", data, FIELDS, given=True)
-    if found is None:
+    if node.given and not _RUN.read(node, null=False):
         return dict(SETTLED_DEFAULTS)
-    settled = not any(name in found for name in TIMED_FIELDS)
+    settled = not any(name in node for name in TIMED_FIELDS)
     run = dict(SETTLED_DEFAULTS if settled else TIMED_DEFAULTS)
-    before = report.found
-    for name, field in ((SETTLED_RUN | ANY_RUN) if settled else ANY_RUN).items():
-        run[name] = field.read(Node(report, "/run", found))
+    start = node["duration"]
+    run |= {name: field.read(node) for name, field in ((SETTLED_RUN | ANY_RUN) if settled else ANY_RUN).items()}
     if settled:
-        _warn_of_few_periods(report, run["at_most"])
+        _warn_of_few_periods(node["at_most"], run["at_most"])
         return run
-    _refuse_settled(report, found)
-    if "duration" in found:
-        run["duration"] = _read_time(report, "/run/duration", found["duration"], positive=True)
-    if "window" in found:
-        run["window"] = _read_window(report, found["window"])
-    if report.found == before and frequencies.size:
-        _check_times(report, run, found, frequencies)
+    _refuse_settled(node)
+    if start.given:
+        run["duration"] = _read_time(start, positive=True)
+    if "window" in node:
+        run["window"] = _read_window(node["window"])
+    if start.sound and frequencies.size:
+        _check_times(node, run, frequencies)
     return run
 
 
-def refuse_run(report: Report, data: object, why: str = N_("is not used: this model has no run")) -> dict[str, Any]:
+def refuse_run(node: Node, why: str = N_("is not used: this model has no run")) -> dict[str, Any]:
     """The empty run of a model without a run; every given field is recorded as a fault."""
-    if not isinstance(data, Mapping):
-        report.fault(
-            "/run",
-            "wrong-type",
-            "must be an object",
-            data,
-            allowed="nothing, or an empty object: this model has no run",
-        )
-        return {}
-    for name, value in data.items():
-        report.fault(join("/run", name), "not-used", why, value, allowed="no `run`")
+    if node.given and not isinstance(node.value, Mapping):
+        node.refuse("wrong-type", "must be an object", allowed="nothing, or an empty object: this model has no run")
+    else:
+        for field in node.parts():
+            field.refuse("not-used", why, allowed="no `run`")
     return {}
 
 
-def _warn_of_few_periods(report: Report, at_most: int | None) -> None:
+def _warn_of_few_periods(node: Node, at_most: int | None) -> None:
     if at_most is not None and at_most < MEANS_FROM_PERIODS:
-        report.warn(
-            "short-search",
-            "/run/at_most",
-            plural(
-                "{count} periods are too few for the means of irregular motion, which takes {needed}: cases without a "
-                "periodic motion will be unsettled",
-                "{count} periods are too few for the means of irregular motion, which takes {needed}: cases without a "
-                "periodic motion will be unsettled",
-                at_most,
-                needed=MEANS_FROM_PERIODS,
-            ),
+        text = plural(
+            "{count} periods are too few for the means of irregular motion, which takes {needed}: cases without a "
+            "periodic motion will be unsettled",
+            "{count} periods are too few for the means of irregular motion, which takes {needed}: cases without a "
+            "periodic motion will be unsettled",
+            at_most,
+            needed=MEANS_FROM_PERIODS,
         )
+        node.report.warn("short-search", node.pointer, text)
 
 
-def _refuse_settled(report: Report, found: Mapping[str, Any]) -> None:
+def _refuse_settled(run: Node) -> None:
     """Record the fields that contradict a duration or a window."""
-    given = [f"`{name}`" for name in TIMED_FIELDS if name in found]
+    given = [f"`{name}`" for name in TIMED_FIELDS if name in run]
     timed = Sentence("{low} and {high}", low=given[0], high=given[1]) if len(given) == 2 else given[0]
     for name in SETTLED_FIELDS:
-        if name in found:
-            report.fault(
-                f"/run/{name}",
-                "conflict",
-                Sentence("contradicts {fields}: a run lasts until it is settled or for a given time", fields=timed),
-                found[name],
+        if name in run:
+            run[name].refuse(
+                "conflict", Sentence("contradicts {fields}: a run lasts until it is settled or for a given time",
+                                     fields=timed),
                 allowed=Sentence("no `{field}`, or neither `duration` nor `window`", field=name),
-            )
+            )  # fmt: skip
 
 
 def in_periods(time: Time, frequency: float) -> float:
@@ -121,107 +127,88 @@ def time_text(time: Time) -> str:
     return f"{time[0]:g} {time[1]}"
 
 
-def _read_time(report: Report, pointer: str, value: object, *, positive: bool = False) -> Time | None:
+def _read_time(node: Node, *, positive: bool = False) -> Time | None:
     allowed = Sentence("{range}, in {units}", range="> 0" if positive else ">= 0", units=Sentence(_TIME))
     try:
         unit = "s"
-        if isinstance(value, str):
-            number, text = split_quantity(value)
+        if isinstance(node.value, str):
+            number, text = split_quantity(node.value)
             if text in PERIOD_NAMES:
                 unit = "periods"
             elif not text:
                 raise QuantityError("missing-unit", "a text needs its unit: periods or s")
             else:
-                number = parse_exact(value, "s")
+                number = parse_exact(node.value, "s")
         else:
-            number = exact_number(value, "s")
+            number = exact_number(node.value, "s")
         seconds = to_float(number)
     except QuantityError as error:
-        report.fault(pointer, error.code, error.message, value, allowed=allowed)
+        node.refuse(error.code, error.message, allowed=allowed)
         return None
     if seconds < 0.0 or (positive and seconds == 0.0) or seconds > _MAX_SECONDS:
-        report.fault(pointer, "out-of-range", "is out of range", value, allowed=allowed)
+        node.refuse("out-of-range", "is out of range", allowed=allowed)
         return None
     return [seconds + 0.0, unit]
 
 
-def _read_window(report: Report, data: object) -> list[Time] | None:
-    if not isinstance(data, list) or len(data) != 2:
-        report.fault(
-            "/run/window",
-            "wrong-type",
-            "must be a list of its start and its end",
-            data,
+def _read_window(node: Node) -> list[Time] | None:
+    if not isinstance(node.value, list) or len(node.value) != 2:
+        node.refuse(
+            "wrong-type", "must be a list of its start and its end",
             allowed='a list of two times in seconds or excitation periods, such as ["20 periods", "40 periods"]',
-        )
+        )  # fmt: skip
         return None
-    if refuse_mixed(nodes(report, [(join("/run/window", index), item) for index, item in enumerate(data)]), "s"):
+    if refuse_mixed(node.parts(), "s"):
         return None
-    times = [_read_time(report, join("/run/window", index), item) for index, item in enumerate(data)]
+    times = [_read_time(item) for item in node.parts()]
     return None if None in times else [time for time in times if time is not None]
 
 
-def _check_times(
-    report: Report, run: Mapping[str, Any], given: Mapping[str, Any], frequencies: NDArray[np.float64]
-) -> None:
+def _check_times(node: Node, run: Mapping[str, Any], frequencies: NDArray[np.float64]) -> None:
     """Compare duration and window at the lowest and the highest frequency; in between both are linear."""
     for frequency in dict.fromkeys((float(frequencies.min()), float(frequencies.max()))):
-        at = Sentence("") if _one_unit(run) else Sentence(" at {frequency}", frequency=Amount(frequency, "Hz", 6))
         duration = in_periods(run["duration"], frequency)
         if duration > MAX_RUN_PERIODS:
-            report.fault(
-                "/run/duration",
-                "out-of-range",
-                Sentence(
-                    "is {periods} excitation periods at {frequency}",
-                    periods=Amount(duration, digits=8),
-                    frequency=Amount(frequency, "Hz", 6),
-                ),
-                given.get("duration"),
+            periods = {"periods": Amount(duration, digits=8), "frequency": Amount(frequency, "Hz", 6)}
+            node["duration"].refuse(
+                "out-of-range", Sentence("is {periods} excitation periods at {frequency}", **periods),
                 allowed=Sentence("at most {periods} periods in any case", periods=int(MAX_RUN_PERIODS)),
-            )
+            )  # fmt: skip
             return
         if run["window"] is None:
             if duration / 3.0 < 1.0 - _ROUNDING:
-                report.warn(
-                    "short-window",
-                    "/run/duration",
-                    Sentence(
-                        "the window, its last third, is shorter than one excitation period at {frequency} ({count} "
-                        "periods), so means over it depend on its position",
-                        frequency=Amount(frequency, "Hz", 6),
-                        count=Amount(duration / 3.0, digits=3),
-                    ),
+                text = N_(
+                    "the window, its last third, is shorter than one excitation period at {frequency} ({count} "
+                    "periods), so means over it depend on its position"
                 )
-            continue
-        start, end = (in_periods(time, frequency) for time in run["window"])
-        if not start < end * (1.0 - _ROUNDING):
-            report.fault(
-                "/run/window",
-                "invalid-range",
-                Sentence("starts at or after its end{at}", at=at),
-                given["window"],
-                allowed="start < end",
-            )
+                _warn_of_short_window(node["duration"], text, frequency, duration / 3.0)
+        elif not _check_window(node["window"], run, frequency):
             return
-        if end > duration * (1.0 + _ROUNDING):
-            report.fault(
-                "/run/window/1", "out-of-range", Sentence("the window ends after the run{at}", at=at),
-                given["window"][1],
-                allowed=Sentence("at most the duration, {time}", time=time_text(run["duration"])),
-            )  # fmt: skip
-            return
-        if end - start < 1.0 - _ROUNDING:
-            report.warn(
-                "short-window",
-                "/run/window",
-                Sentence(
-                    "shorter than one excitation period at {frequency} ({count} periods), so means over it depend on "
-                    "its position",
-                    frequency=Amount(frequency, "Hz", 6),
-                    count=Amount(end - start, digits=3),
-                ),
-            )
+
+
+def _check_window(node: Node, run: Mapping[str, Any], frequency: float) -> bool:
+    """Whether the window fits into the run at a frequency; a fault recorded where it does not."""
+    at = Sentence("") if _one_unit(run) else Sentence(" at {frequency}", frequency=Amount(frequency, "Hz", 6))
+    start, end = (in_periods(time, frequency) for time in run["window"])
+    if not start < end * (1.0 - _ROUNDING):
+        node.refuse("invalid-range", Sentence("starts at or after its end{at}", at=at), allowed="start < end")
+        return False
+    if end > in_periods(run["duration"], frequency) * (1.0 + _ROUNDING):
+        node[1].refuse("out-of-range", Sentence("the window ends after the run{at}", at=at),
+                       allowed=Sentence("at most the duration, {time}", time=time_text(run["duration"])))  # fmt: skip
+        return False
+    if end - start < 1.0 - _ROUNDING:
+        text = N_(
+            "shorter than one excitation period at {frequency} ({count} periods), so means over it depend on its "
+            "position"
+        )
+        _warn_of_short_window(node, text, frequency, end - start)
+    return True
+
+
+def _warn_of_short_window(node: Node, text: str, frequency: float, count: float) -> None:
+    values = {"frequency": Amount(frequency, "Hz", 6), "count": Amount(count, digits=3)}
+    node.report.warn("short-window", node.pointer, Sentence(text, **values))
 
 
 def _one_unit(run: Mapping[str, Any]) -> bool:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 from urllib.parse import parse_qsl, urlencode
 
 from sprag.sentences import Sentence
-from sprag.service.reading.limits import characters, printable_line, span
-from sprag.service.spec.fields import read_flag, read_object
+from sprag.service.reading.limits import characters, span
+from sprag.service.spec.described import Described, Record
+from sprag.service.spec.labels import NAME, read_line, text_code
+from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report
 from sprag.worker.limits import MAX_NAME_LENGTH, MAX_REPORT_FIGURES, MAX_VIEW_QUERY
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 #: Pages whose views can be figures of the report.
 FIGURES: Final = ("curves", "map")
@@ -25,38 +24,32 @@ PAGES: Final = (*STUDY_PAGES, *OWN_PAGES)
 #: Parameters of addresses that say what was done before, or where a list goes on.
 _PASSING: Final = frozenset({"done", "changed", "after"})
 _STUDY: Final = re.compile(r"[A-Za-z0-9_-]{1,64}")
-_NAME: Final[dict[str, Any]] = {"type": "string", "minLength": 1, "maxLength": MAX_NAME_LENGTH}
+_IN_REPORT: Final = Described("in_report", "", "whether it is a figure of the study's report", "flag")
 _QUERY: Final[dict[str, Any]] = {
     "type": "string",
     "maxLength": MAX_VIEW_QUERY,
     "description": "the choices as the query of the page's address, without `?`",
 }
-_IN_REPORT: Final = {"type": "boolean", "description": "whether it is a figure of the study's report"}
 
-#: JSON Schemas of a view to be saved and of a change.
-SCHEMA: Final[dict[str, Any]] = {
-    "type": "object",
-    "description": "A view to save; one of the same study, page and name is replaced.",
-    "required": ["page", "name"],
-    "additionalProperties": False,
-    "properties": {
+#: A view to be saved, and a change.
+VIEW: Final = Record(
+    {
         "page": {"enum": list(PAGES)},
         "study": {
             "type": ["string", "null"],
             "pattern": f"^{_STUDY.pattern}$",
             "description": "the study of the page; null for `studies` and `compare`",
         },
-        "name": {**_NAME, "description": "its name, one line"},
+        "name": NAME,
         "query": _QUERY,
         "in_report": _IN_REPORT,
     },
-}
-CHANGE_SCHEMA: Final[dict[str, Any]] = {
-    "type": "object",
-    "description": "The fields of a view to change; what is left out is kept.",
-    "additionalProperties": False,
-    "properties": {
-        "name": {**_NAME, "description": "its name, one line"},
+    "A view to save; one of the same study, page and name is replaced.",
+    required=("page", "name"),
+)
+CHANGE: Final = Record(
+    {
+        "name": NAME,
         "query": _QUERY,
         "in_report": _IN_REPORT,
         "place": {
@@ -66,7 +59,8 @@ CHANGE_SCHEMA: Final[dict[str, Any]] = {
             "description": "its position among the figures of the report",
         },
     },
-}
+    "The fields of a view to change; what is left out is kept.",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,84 +97,60 @@ def address_of(page: str, study: str | None, query: str) -> str:
 
 def read_view(data: object) -> View:
     """The view that a request saves; raises SpecError with every fault."""
-    report = Report(data)
-    found = read_object(report, "", data, SCHEMA["properties"]) or {}
-    page, study = found.get("page"), found.get("study")
-    if page not in PAGES:
-        report.fault("/page", "invalid-choice", "is not a page with views", page, allowed=", ".join(PAGES))
-    elif page in STUDY_PAGES and study is None:
-        report.fault(
-            "/study", "required", Sentence("is required for the page {page}", page=page), allowed="the id of a study"
-        )
-    elif page in OWN_PAGES and study is not None:
-        report.fault(
-            "/study", "not-used", Sentence("does not go with the page {page}", page=page), study, allowed="null"
-        )
-    if study is not None and not (isinstance(study, str) and _STUDY.fullmatch(study)):
-        report.fault("/study", "invalid-text", "is not an id of a study", study, allowed="the id of a study")
-    name, query = _read_name(report, found), _read_query(report, found)
-    if "name" not in found:
-        report.fault("/name", "required", "is required", allowed=characters(1, MAX_NAME_LENGTH))
-    in_report = _read_in_report(report, found, str(page)) or False
-    report.raise_if_any()
-    return View(str(page), name or "", query or "", study, in_report)
+    node = Node(Report(data), "", data)
+    VIEW.read(node)
+    page, study = node["page"], node["study"]
+    if page.value not in PAGES:
+        page.refuse("invalid-choice", "is not a page with views", allowed=", ".join(PAGES))
+    elif page.value in STUDY_PAGES and study.value is None:
+        message = Sentence("is required for the page {page}", page=page.value)
+        study.refuse("required", message, allowed="the id of a study")
+    elif page.value in OWN_PAGES and study.value is not None:
+        study.refuse("not-used", Sentence("does not go with the page {page}", page=page.value), allowed="null")
+    if study.value is not None and not (isinstance(study.value, str) and _STUDY.fullmatch(study.value)):
+        study.refuse("invalid-text", "is not an id of a study", allowed="the id of a study")
+    name, query = read_line(node["name"]), _read_query(node["query"])
+    if "name" not in node:
+        node["name"].refuse("required", "is required", allowed=characters(1, MAX_NAME_LENGTH))
+    in_report = _read_in_report(node, str(page.value)) or False
+    node.report.raise_if_any()
+    return View(str(page.value), name or "", query or "", study.value, in_report)
 
 
 def read_view_change(data: object, page: str) -> ViewChange:
     """The change of a view of ``page`` that a request asks for; raises SpecError with every fault."""
-    report = Report(data)
-    found = read_object(report, "", data, CHANGE_SCHEMA["properties"], given=True) or {}
-    name, query, in_report = _read_name(report, found), _read_query(report, found), _read_in_report(report, found, page)
-    place = found.get("place")
-    if "place" in found:
+    node = Node(Report(data), "", data)
+    CHANGE.read(node, null=False)
+    name, query, in_report = read_line(node["name"]), _read_query(node["query"]), _read_in_report(node, page)
+    place = node["place"]
+    if place.given:
         allowed = span(1, MAX_REPORT_FIGURES)
-        if type(place) is not int:
-            report.fault("/place", "wrong-type", "must be an integer", place, allowed=allowed)
-        elif not 1 <= place <= MAX_REPORT_FIGURES:
-            report.fault("/place", "out-of-range", "is out of range", place, allowed=allowed)
+        if type(place.value) is not int:
+            place.refuse("wrong-type", "must be an integer", allowed=allowed)
+        elif not 1 <= place.value <= MAX_REPORT_FIGURES:
+            place.refuse("out-of-range", "is out of range", allowed=allowed)
         elif page not in FIGURES or in_report is False:
-            report.fault("/place", "not-used", "needs a view that is in the report", place, allowed="left out")
-    report.raise_if_any()
-    return ViewChange(name, query, in_report, place)
+            place.refuse("not-used", "needs a view that is in the report", allowed="left out")
+    node.report.raise_if_any()
+    return ViewChange(name, query, in_report, place.value)
 
 
-def _read_name(report: Report, found: Mapping[str, Any]) -> str | None:
-    if "name" not in found:
-        return None
-    name = found["name"]
-    if isinstance(name, str) and name.isprintable() and 1 <= len(name.strip()) <= MAX_NAME_LENGTH:
-        return name.strip()
-    code: Any = "invalid-text" if isinstance(name, str) else "wrong-type"
-    allowed = printable_line(MAX_NAME_LENGTH)
-    report.fault("/name", code, "must be a printable text in one line", name, allowed=allowed)
-    return None
-
-
-def _read_query(report: Report, found: Mapping[str, Any]) -> str | None:
+def _read_query(node: Node) -> str | None:
     """The query without parameters that are empty or say what was done before."""
-    if "query" not in found:
-        return None
-    query = found["query"]
+    query = node.value
     if isinstance(query, str) and len(query) <= MAX_VIEW_QUERY:
         pairs = [(name, value) for name, value in parse_qsl(query.removeprefix("?")) if name not in _PASSING]
         if all((name + value).isprintable() for name, value in pairs):
             return urlencode(pairs)
-    code: Any = "invalid-text" if isinstance(query, str) else "wrong-type"
-    allowed = Sentence("at most {high} characters, such as x=shaft.load&y=efficiency", high=MAX_VIEW_QUERY)
-    report.fault("/query", code, "must be the query of an address", query, allowed=allowed)
+    if node.given:
+        allowed = Sentence("at most {high} characters, such as x=shaft.load&y=efficiency", high=MAX_VIEW_QUERY)
+        node.refuse(text_code(query), "must be the query of an address", allowed=allowed)
     return None
 
 
-def _read_in_report(report: Report, found: Mapping[str, Any], page: str) -> bool | None:
-    if "in_report" not in found:
-        return None
-    wanted = read_flag(report, "/in_report", found["in_report"])
+def _read_in_report(view: Node, page: str) -> bool | None:
+    node = view["in_report"]
+    wanted = node.flag() if node.given else None
     if wanted and page not in FIGURES:
-        report.fault(
-            "/in_report",
-            "not-used",
-            "is for figures",
-            wanted,
-            allowed=Sentence("views of {pages}", pages=", ".join(FIGURES)),
-        )
+        node.refuse("not-used", "is for figures", allowed=Sentence("views of {pages}", pages=", ".join(FIGURES)))
     return wanted

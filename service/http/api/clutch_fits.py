@@ -16,16 +16,12 @@ from sprag.service.http.respond import JSON
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import checks
+from sprag.service.results.fits import REQUEST
 from sprag.service.spec.report import SpecError
-from sprag.service.spec.schema.drive import measured_schema
-from sprag.service.spec.schema.quantity import QUANTITY
 
 router = api_router("clutch")
 
-SCHEMA: Final = measured_schema(
-    {"backlash": {**QUANTITY, "description": "backlash to be taken off the angles (rad)", "default": 0}},
-    "Measured data of a clutch and how well it is to be fitted; numbers in SI or texts with a unit.",
-)
+SCHEMA: Final = REQUEST.schema()
 
 
 @router.post(

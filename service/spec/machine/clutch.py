@@ -5,43 +5,42 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sprag.sentences import Sentence
 from sprag.service.reading.texts import quantity_text
-from sprag.service.spec.described import FIT, Listed
-from sprag.service.spec.fields import missing, nodes, read_number, read_object, values_of
+from sprag.service.spec.described import FIT, Listed, Record, Variants
 from sprag.service.spec.lists import read_list
-from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report, join
+from sprag.service.spec.schema.quantity import QUANTITY
 from sprag.worker import models
 from sprag.worker.limits import MAX_CLUTCH_LAWS, MAX_CLUTCH_ROWS
 from sprag.worker.models import CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, Parameter
 from sprag.worker.models.parameters import placed
 
 if TYPE_CHECKING:
+    from sprag.service.spec.node import Node
     from sprag.worker.models import ClutchFit
     from sprag.worker.study import Axis, Combine
 
-_BY_LAW = ("coefficients", "windup_limit")
-_BY_DATA = ("data", "accuracy", *FIT)
-FIELDS = (*_BY_LAW, *_BY_DATA)
-
 _ANGLE = Parameter("angle", "xi", "rad", 0.0, 1e3, False, None, "measured angle")
 _TORQUE = Parameter("torque", "M", "N*m", -1e9, 1e9, False, None, "measured torque")
-ACCURACY = Parameter("accuracy", "", "N*m", 0.0, 1e9, True, None, "largest residual of the fit that is accepted")
-
-
-COEFFICIENTS = Listed(
+_ACCURACY = Parameter("accuracy", "", "N*m", 0.0, 1e9, True, None, "largest residual of the fit that is accepted")
+_COEFFICIENTS = Listed(
     "clutch coefficients", 1, MAX_COEFFICIENTS,
     "c_1 .. c_p of the torque over the windup, c_1 first: N*m, N*m/rad, N*m/rad^2, ..",
     ", c_1 first (N*m, N*m/rad, N*m/rad^2, ..); or `data` with `accuracy`",
+    item=QUANTITY,
 )  # fmt: skip
-ROWS = Listed(
-    "measured rows", 2, MAX_CLUTCH_ROWS, "measured rows [angle, torque]: rad and N*m, or texts with their units"
-)
+_ROWS = Listed(
+    "measured rows", 2, MAX_CLUTCH_ROWS, "measured rows [angle, torque]: rad and N*m, or texts with their units",
+    item={"type": "array", "minItems": 2, "maxItems": 2, "items": QUANTITY, "description": "angle and torque"},
+)  # fmt: skip
+_LAW = Record({"coefficients": _COEFFICIENTS, "windup_limit": CLUTCH_WINDUP_LIMIT}, required=("coefficients",))
+MEASURED = Record({"data": _ROWS, "accuracy": _ACCURACY, **FIT}, required=("data", "accuracy"))
+CLUTCH = Variants((_LAW, MEASURED), "torque of the freewheel clutch over its windup", only=True)
 
 
 @dataclass(frozen=True)
@@ -85,68 +84,52 @@ class Clutch:
         }
 
 
-def read_clutch(report: Report, pointer: str, data: object, prefix: str, backlashes: Sequence[float]) -> Clutch | None:
-    """Read the clutch at ``pointer``; None, with the faults recorded, when it is invalid.
+def read_clutch(node: Node, prefix: str, backlashes: Sequence[float]) -> Clutch | None:
+    """Read a clutch; None, with the faults recorded, when it is invalid.
 
     Parameters
     ----------
     backlashes : backlash (rad) of each pendulum that has this clutch; needed when the angles include it
     """
-    found = read_object(report, pointer, data, FIELDS)
-    if found is None:
+    if not CLUTCH.read(node):
         return None
-    by_law, by_data = [name for name in _BY_LAW if name in found], [name for name in _BY_DATA if name in found]
+    by_law, by_data = ([name for name in way.fields if name in node] for way in (_LAW, MEASURED))
     if by_law and by_data:
-        report.fault(
-            pointer,
-            "conflict",
-            Sentence(
-                "is given both as a law ({law}) and as measured data ({data})",
-                law=", ".join(by_law),
-                data=", ".join(by_data),
-            ),
-            allowed=Sentence("either {first} or {second}", first=", ".join(_BY_LAW), second=", ".join(_BY_DATA)),
-        )
+        given = {"law": ", ".join(by_law), "data": ", ".join(by_data)}
+        either = {"first": ", ".join(_LAW.fields), "second": ", ".join(MEASURED.fields)}
+        node.refuse(
+            "conflict", Sentence("is given both as a law ({law}) and as measured data ({data})", **given), None,
+            allowed=Sentence("either {first} or {second}", **either),
+        )  # fmt: skip
         return None
-    if by_data:
-        return _measured(report, pointer, found, prefix, backlashes)
-    return _given(report, pointer, found, prefix)
+    return read_measured(node, prefix, backlashes) if by_data else _given(node, prefix)
 
 
-def _given(report: Report, pointer: str, data: Mapping[str, Any], prefix: str) -> Clutch | None:
-    where = join(pointer, "coefficients")
+def _given(node: Node, prefix: str) -> Clutch | None:
     limit: float | None = math.inf
-    if "windup_limit" in data:
-        limit = read_number(report, join(pointer, "windup_limit"), data["windup_limit"], CLUTCH_WINDUP_LIMIT)
-    items = values_of(COEFFICIENTS.read(Node(report, where, data.get("coefficients"))))
+    if "windup_limit" in node:
+        limit = node["windup_limit"].number(CLUTCH_WINDUP_LIMIT)
+    items = _COEFFICIENTS.read(node["coefficients"])
     if items is None:
         return None
     own = [placed(CLUTCH_COEFFICIENT, f"{prefix}coefficients.{k}") for k in range(len(items))]
-    given = [(join(where, k), item) for k, item in enumerate(items)]
-    read = values_of(read_list(nodes(report, given), [entry.unit for entry in own]))
+    read = read_list(items, [entry.unit for entry in own])
     if read is None:
         return None
-    numbers = [read_number(report, join(where, k), item, own[k]) for k, item in enumerate(read)]
+    numbers = [item.number(entry) for item, entry in zip(read, own, strict=True)]
     if limit is None or None in numbers:
         return None
-    return Clutch(pointer, prefix, tuple(number for number in numbers if number is not None), limit)
+    return Clutch(node.pointer, prefix, tuple(number for number in numbers if number is not None), limit)
 
 
-def _measured(
-    report: Report, pointer: str, data: Mapping[str, Any], prefix: str, backlashes: Sequence[float]
-) -> Clutch | None:
-    before = report.found
-    rows = ROWS.read_rows(Node(report, join(pointer, "data"), data.get("data")), _ANGLE, _TORQUE)
-    accuracy = None
-    if "accuracy" in data:
-        accuracy = read_number(report, join(pointer, "accuracy"), data["accuracy"], ACCURACY)
-    else:
-        missing(report, join(pointer, "accuracy"), ACCURACY)
-    options = {name: field.read(Node(report, pointer, data)) for name, field in FIT.items()}
+def read_measured(node: Node, prefix: str, backlashes: Sequence[float]) -> Clutch | None:
+    """Read a clutch that is given by measured data; None, with the faults recorded, when it is invalid."""
+    data = node["data"]
+    rows, accuracy = _ROWS.read_rows(data, _ANGLE, _TORQUE), node["accuracy"].number_or_default(_ACCURACY)
+    options = {name: field.read(node) for name, field in FIT.items()}
     if options["angles_include_backlash"]:
         if len(set(backlashes)) > 1:
-            report.fault(
-                join(pointer, "angles_include_backlash"),
+            node["angles_include_backlash"].refuse(
                 "conflict",
                 "the backlash can be subtracted only if all pendulums of a common clutch have the same one; give the "
                 "clutch in each pendulum instead",
@@ -156,22 +139,17 @@ def _measured(
             options["backlash"] = backlashes[0]
         else:
             return None  # the backlash could not be read, which is recorded already
-    if accuracy is None or report.found > before:
+    if accuracy is None or not data.sound:
         return None
     try:
         fit = models.fit_clutch(rows, accuracy, **options)
     except models.ClutchFitError as error:
-        report.fault(
-            join(pointer, *(error.name or "data").split(".")),
-            "no-clutch-law",
-            error.message,
-            _shown(error.value),
-            allowed=error.allowed,
-        )
+        where = node.below(error.name or "data")
+        where.refuse("no-clutch-law", error.message, _shown(error.value), allowed=error.allowed)
         return None
     for warning in fit.warnings:
-        report.adopt_warning(pointer, warning)
-    return Clutch(pointer, prefix, fit.coefficients, fit.windup_limit, fit)
+        node.report.adopt_warning(node.pointer, warning)
+    return Clutch(node.pointer, prefix, fit.coefficients, fit.windup_limit, fit)
 
 
 def _shown(value: object) -> object:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Final
 
 from sprag.sentences import Sentence
+from sprag.service.languages import N_
 from sprag.service.reading.texts import did_you_mean
-from sprag.service.spec.described import Listed
-from sprag.service.spec.fields import read_number, read_object, read_parameters, values_of
-from sprag.service.spec.machine.clutch import Clutch, read_clutch
+from sprag.service.spec.described import Field, Listed, Record
+from sprag.service.spec.machine.clutch import CLUTCH, Clutch, read_clutch
 from sprag.service.spec.machine.machine import Machine
 from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report, join
+from sprag.service.spec.schema.quantity import required_of
 from sprag.worker.models import (
     MAX_COEFFICIENTS,
     MAX_PENDULUMS,
@@ -28,9 +27,43 @@ from sprag.worker.models.parameters import placed
 if TYPE_CHECKING:
     from sprag.worker.models import ClutchFit
 
-PENDULUMS = Listed("pendulums", 1, MAX_PENDULUMS)
 #: Field of the base that a service replaces by the initial values that go on from the end of a case.
-START = "start"
+START: Final = "start"
+_PENDULUMS: Final = "pendulums"
+_CATALOGUE: Final = tuple(
+    entry for entry in parameter_catalogue(VIBRATION_DRIVE) if not entry.path.startswith("clutch.")
+)
+
+
+def _sections() -> dict[str, Field]:
+    """The parts of the base that have numbers: a number, an object of them, or the list of pendulums."""
+    sections: dict[str, Field] = {}
+    for name in dict.fromkeys(entry.path.split(".")[0] for entry in _CATALOGUE):
+        entries = {entry.path.split(".")[-1]: entry for entry in _CATALOGUE if entry.path.split(".")[0] == name}
+        clutch: dict[str, Field] = {"clutch": CLUTCH} if name == _PENDULUMS else {}
+        record = Record({**entries, **clutch}, required=required_of(entries))
+        sections[name] = entries.get(name, record)
+        if clutch:
+            sections[name] = Listed("pendulums", 1, MAX_PENDULUMS, item=record)
+    return sections
+
+
+_SECTIONS: Final = _sections()
+#: A start from the end of a case of a study of the same service.
+START_AT: Final = Record(
+    {
+        "study": {"type": "string", "description": "id of the study"},
+        "case": {"type": "integer", "minimum": 0, "description": "number of the case"},
+        "start": {"type": "integer", "minimum": 0, "description": "of a case with many starts: which of them"},
+    },
+    "begin in the state in which a case of another study ends; the service replaces it by initial values",
+    required=("study", "case"),
+)
+DRIVE: Final = Record(
+    {**_SECTIONS, "clutch": CLUTCH, START: START_AT},
+    "the machine that every case begins from",
+    required=[name for name in _SECTIONS if any(e.default is None for e in _CATALOGUE if e.path.split(".")[0] == name)],
+)
 _WHERE_STARTS = "submission to that service, or `sprag run --db` with its database"
 _PENDULUM_PATH = re.compile(r"pendulums\.([0-9]{1,9})\.(.+)")
 _CLUTCH_PATH = re.compile(r"(?:pendulums\.[0-9]{1,9}\.)?clutch\.(.+)")
@@ -94,121 +127,83 @@ class Drive(Machine):
         return Sentence("is not a numeric parameter of the clutch{hint}", hint=did_you_mean(path, self.parameters))
 
 
-def read_drive(report: Report, data: object) -> Drive:
-    """Read the machine in ``data`` (the spec's `base`); faults are recorded in ``report``."""
+def read_drive(base: Node) -> Drive:
+    """Read the machine of a spec; faults are recorded."""
     machine = Drive()
-    catalogue = [entry for entry in parameter_catalogue(VIBRATION_DRIVE) if not entry.path.startswith("clutch.")]
-    sections = list(dict.fromkeys(entry.path.split(".")[0] for entry in catalogue))
-    found = read_object(report, "/base", data, (*sections, "clutch", START))
-    if found is None:
-        _assume_everything(catalogue, machine)
+    if not DRIVE.read(base):
+        _assume_everything(machine)
         return machine
-    if START in found:
-        report.fault(
-            f"/base/{START}",
-            "not-used",
-            "refers to a study of a service, which replaces it by initial values",
-            found[START],
-            allowed=_WHERE_STARTS,
+    if START in base:
+        base[START].refuse(
+            "not-used", "refers to a study of a service, which replaces it by initial values", allowed=_WHERE_STARTS
         )
-    for section in sections:
-        entries = [entry for entry in catalogue if entry.path.split(".")[0] == section]
-        pointer = join("/base", section)
-        if section == "pendulums":
-            _read_pendulums(report, pointer, found.get(section), entries, machine)
-        elif entries[0].path == section:
-            value = found.get(section, entries[0].default)
-            number = read_number(report, pointer, value, entries[0])
-            machine.values.update({} if number is None else {section: number})
-            machine.parameters[section] = entries[0]
-        else:
-            _read_section(report, pointer, found.get(section), section, entries, machine)
+    for name, section in _SECTIONS.items():
+        if isinstance(section, Listed):
+            _read_pendulums(base[name], section, machine)
+        elif isinstance(section, Record):
+            _read_section(base[name], section, name, machine)
+        elif isinstance(section, Parameter):
+            number = base[name].otherwise(section.default).number(section)
+            machine.values.update({} if number is None else {name: number})
+            machine.parameters[name] = section
     if machine.pendulums is None:
-        _assume_everything(catalogue, machine)
-    _read_clutches(report, found, machine)
+        _assume_everything(machine)
+    _read_clutches(base, machine)
     return machine
 
 
-def _read_section(
-    report: Report, pointer: str, data: object, prefix: str, entries: list[Parameter], machine: Drive
-) -> None:
-    """Read the object whose fields are the last names of ``entries``' paths, placed under ``prefix``."""
-    parameters = {name: placed(entry, f"{prefix}.{name}") for entry in entries if (name := entry.path.split(".")[-1])}
+def _read_section(node: Node, section: Record, prefix: str, machine: Drive) -> None:
+    """Read an object of numbers, placed under ``prefix``."""
+    parameters = {name: placed(e, f"{prefix}.{name}") for name, e in section.fields.items() if isinstance(e, Parameter)}
     machine.parameters.update({entry.path: entry for entry in parameters.values()})
-    names = (*parameters, "clutch") if prefix.startswith("pendulums.") else tuple(parameters)
-    if data is None:
-        required = [name for name, entry in parameters.items() if entry.default is None]
-        report.fault(
-            pointer,
-            "required",
-            Sentence("is required, with at least {names}", names=", ".join(required)),
-            allowed="an object",
-        )
+    if node.value is None and not prefix.startswith(f"{_PENDULUMS}."):
+        names = ", ".join(section.required)
+        node.refuse("required", Sentence("is required, with at least {names}", names=names), allowed="an object")
         return
-    found = read_object(report, pointer, data, names)
-    if found is not None:
-        values = read_parameters(report, pointer, found, parameters)
-        for name, entry in parameters.items():
-            if name in START_STATES and name not in found:
-                del values[entry.path]
-            elif name == "initial_clutch" and not values.get(entry.path, 0.0).is_integer():
-                report.fault(
-                    join(pointer, name), "invalid-choice", "is not the number of a state", found[name],
-                    allowed=entry.help,
-                )  # fmt: skip
-        machine.values.update(values)
-
-
-def _read_pendulums(report: Report, pointer: str, data: object, entries: list[Parameter], machine: Drive) -> None:
-    listed = values_of(PENDULUMS.read(Node(report, pointer, data)))
-    if listed is None:
+    # A null in the list is an invalid pendulum, not a missing section.
+    if not section.read(node if node.value is not None else Node(node.report, node.pointer, "null")):
         return
-    machine.pendulums = len(listed)
-    for index, pendulum in enumerate(listed):
-        # A null in the list is an invalid pendulum, not a missing section.
-        item = "null" if pendulum is None else pendulum
-        _read_section(report, join(pointer, index), item, f"pendulums.{index}", entries, machine)
+    for name, entry in parameters.items():
+        number = node[name].number_or_default(entry)
+        if number is None or (name in START_STATES and name not in node):
+            continue
+        if name == "initial_clutch" and not number.is_integer():
+            node[name].refuse("invalid-choice", "is not the number of a state", allowed=entry.help)
+        machine.values[entry.path] = number
 
 
-def _read_clutches(report: Report, base: Mapping[str, Any], machine: Drive) -> None:
-    listed = base.get("pendulums")
-    pendulums = listed if isinstance(listed, list) and machine.pendulums is not None else []
-    own = [index for index, item in enumerate(pendulums) if isinstance(item, Mapping) and "clutch" in item]
-    backlashes = [machine.values.get(f"pendulums.{index}.backlash") for index in range(len(pendulums))]
-    known = [value for value in backlashes if value is not None]
-    if "clutch" in base:
+def _read_pendulums(node: Node, listed: Listed, machine: Drive) -> None:
+    pendulums = listed.read(node)
+    if pendulums is None or not isinstance(listed.item, Record):
+        return
+    machine.pendulums = len(pendulums)
+    for index, pendulum in enumerate(pendulums):
+        _read_section(pendulum, listed.item, f"{_PENDULUMS}.{index}", machine)
+
+
+def _read_clutches(base: Node, machine: Drive) -> None:
+    node, allowed = base["clutch"], N_("one clutch in `base`, or one in each pendulum")
+    pendulums = base[_PENDULUMS].parts() if machine.pendulums is not None else []
+    own = [index for index, pendulum in enumerate(pendulums) if "clutch" in pendulum]
+    backlashes = [machine.values.get(f"{_PENDULUMS}.{index}.backlash") for index in range(len(pendulums))]
+    if node.given:
         if own:
-            report.fault(
-                "/base/clutch",
-                "conflict",
-                Sentence(
-                    "is common to all pendulums, but pendulums {numbers} also have their own",
-                    numbers=", ".join(map(str, own)),
-                ),
-                allowed="one clutch in `base`, or one in each pendulum",
+            message = Sentence(
+                "is common to all pendulums, but pendulums {numbers} also have their own",
+                numbers=", ".join(map(str, own)),
             )
-        _add(machine, read_clutch(report, "/base/clutch", base["clutch"], "clutch.", known))
+            node.refuse("conflict", message, None, allowed=allowed)
+        _add(machine, read_clutch(node, "clutch.", [value for value in backlashes if value is not None]))
     elif not own:
-        report.fault(
-            "/base/clutch",
-            "required",
-            "is required: coefficients, or measured data with an accuracy",
-            allowed="one clutch in `base`, or one in each pendulum",
-        )
-    for index in range(len(pendulums)) if own else ():
-        pointer = f"/base/pendulums/{index}/clutch"
+        node.refuse("required", "is required: coefficients, or measured data with an accuracy", allowed=allowed)
+    for index, pendulum in enumerate(pendulums) if own else ():
         backlash = backlashes[index]
         if index in own:
-            prefix = f"pendulums.{index}.clutch."
             shared = [] if backlash is None else [backlash]
-            _add(machine, read_clutch(report, pointer, pendulums[index]["clutch"], prefix, shared))
-        elif "clutch" not in base:
-            report.fault(
-                pointer,
-                "required",
-                Sentence("is required, since pendulum {number} has its own", number=str(own[0])),
-                allowed="one clutch in `base`, or one in each pendulum",
-            )
+            _add(machine, read_clutch(pendulum["clutch"], f"{_PENDULUMS}.{index}.clutch.", shared))
+        elif not node.given:
+            message = Sentence("is required, since pendulum {number} has its own", number=str(own[0]))
+            pendulum["clutch"].refuse("required", message, allowed=allowed)
 
 
 def _add(machine: Drive, clutch: Clutch | None) -> None:
@@ -218,9 +213,9 @@ def _add(machine: Drive, clutch: Clutch | None) -> None:
         machine.parameters.update(clutch.parameters)
 
 
-def _assume_everything(catalogue: list[Parameter], machine: Drive) -> None:
+def _assume_everything(machine: Drive) -> None:
     """Let axes name any parameter a machine could have, so that an unreadable base causes no further faults there."""
-    for entry in catalogue:
+    for entry in _CATALOGUE:
         for index in range(MAX_PENDULUMS if ".N." in entry.path else 1):
             path = entry.path.replace(".N.", f".{index}.")
             machine.parameters.setdefault(path, placed(entry, path))

@@ -7,22 +7,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from sprag.sentences import Sentence
 from sprag.service.languages import N_
 from sprag.service.spec.axes.axes import varied_values
 from sprag.service.spec.derive import case_table, layout
+from sprag.service.spec.described import Field, Record
 from sprag.service.spec.machine.choices import Choice, drive_choices, shaft_choices
 from sprag.service.spec.machine.clutch import check_laws
-from sprag.service.spec.machine.drive import Drive, read_drive
+from sprag.service.spec.machine.drive import DRIVE, Drive, read_drive
 from sprag.service.spec.machine.machine import read_plain
-from sprag.service.spec.machine.shaft import check_shaft, read_shaft
+from sprag.service.spec.machine.shaft import SHAFT, check_shaft, read_shaft
 from sprag.service.spec.machine.start_states import check_starts
-from sprag.service.spec.run import read_run, refuse_run
-from sprag.service.spec.schema.drive import drive_schema, run_schema
-from sprag.service.spec.schema.quantity import object_schema, plain_schema
-from sprag.service.spec.schema.shaft import shaft_schema
+from sprag.service.spec.run import RUN, read_run, refuse_run
+from sprag.service.spec.schema.quantity import plain_schema
 from sprag.service.spec.warnings import warn_machine_shaft, warn_vibration_drive
 from sprag.worker import models
 from sprag.worker.derived import distinct_values
@@ -31,19 +30,18 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
     from sprag.service.spec.machine.machine import Machine
+    from sprag.service.spec.node import Node
     from sprag.service.spec.report import Report
-    from sprag.service.spec.schema.quantity import Schema
     from sprag.worker.study import Axis, Combine, Study
 
     Axes = tuple[Axis, ...]
 
 
-def _no_run(report: Report, data: object, *_: object) -> dict[str, Any]:
-    return refuse_run(report, data)
+_NO_RUN: Final = Record({}, "nothing: this model has no run")
 
 
-def _no_run_schema() -> Schema:
-    return object_schema({}, description="nothing: this model has no run")
+def _no_run(run: Node, *_: object) -> dict[str, Any]:
+    return refuse_run(run)
 
 
 def _nothing(*_: object) -> None:
@@ -62,7 +60,7 @@ class SpecPart:
     ----------
     read_base : reads `base`
     check_base : checks a machine as a whole that could be read without faults
-    base_schema, run_schema : their JSON Schemas
+    base, run : their descriptions
     read_run : reads `run` as stored in a study, for a machine with its axes (None where they could not be read) and
         their combination
     check : checks what depends on both machine and axes
@@ -70,21 +68,21 @@ class SpecPart:
     choices : the non-numeric fields of a study's machine; also takes the user's spec
     """
 
-    read_base: Callable[[Report, object], Machine]
-    base_schema: Callable[[], Schema]
+    read_base: Callable[[Node], Machine]
+    base: Field
     check_base: Callable[[Report, Machine], None] = _nothing
-    read_run: Callable[[Report, object, Machine, Axes | None, Combine], dict[str, Any]] = _no_run
-    run_schema: Callable[[], Schema] = _no_run_schema
+    read_run: Callable[[Node, Axes | None, Combine], dict[str, Any]] = _no_run
+    run: Field = _NO_RUN
     check: Callable[[Report, Machine, Axes, Combine], None] = _nothing
     warn: Callable[[Report, Study], None] = _nothing
     choices: Callable[[Study, Mapping[str, Any]], Iterable[Choice]] = _no_choices
 
 
-def _drive_run(report: Report, data: object, machine: Machine, axes: Axes | None, combine: Combine) -> dict[str, Any]:
-    path = "excitation.frequency"
-    if path in machine.derive and axes is not None and not report.faults:
-        return read_run(report, data, distinct_values(layout(machine, axes, combine), path))
-    return read_run(report, data, varied_values(path, axes, machine.values))
+def _drive_run(run: Node, axes: Axes | None, combine: Combine) -> dict[str, Any]:
+    path, machine = "excitation.frequency", run.machine
+    if path in machine.derive and axes is not None and not run.report.faults:
+        return read_run(run, distinct_values(layout(machine, axes, combine), path))
+    return read_run(run, varied_values(path, axes, machine.values))
 
 
 def _drive_check(report: Report, machine: Machine, axes: Axes, combine: Combine) -> None:
@@ -108,31 +106,26 @@ def _drive_check(report: Report, machine: Machine, axes: Axes, combine: Combine)
             check_laws(report, [clutch], case_table(study, paths), "zip", "/derive")
 
 
-def _shaft_run(report: Report, data: object, *_: object) -> dict[str, Any]:
-    why = N_("belongs to the vibration drive: a machine shaft is solved for its whole cycle at once")
-    return refuse_run(report, data, why)
-
-
-def _shaft_run_schema() -> Schema:
-    return object_schema({}, description="nothing: a machine shaft is solved for its whole cycle")
+def _shaft_run(run: Node, *_: object) -> dict[str, Any]:
+    return refuse_run(run, N_("belongs to the vibration drive: a machine shaft is solved for its whole cycle at once"))
 
 
 _PARTS = {
     models.VIBRATION_DRIVE: SpecPart(
         read_base=read_drive,
-        base_schema=drive_schema,
+        base=DRIVE,
         read_run=_drive_run,
-        run_schema=run_schema,
+        run=RUN,
         check=_drive_check,
         warn=warn_vibration_drive,
         choices=drive_choices,
     ),
     models.MACHINE_SHAFT: SpecPart(
         read_base=read_shaft,
-        base_schema=shaft_schema,
+        base=SHAFT,
         check_base=check_shaft,
         read_run=_shaft_run,
-        run_schema=_shaft_run_schema,
+        run=Record({}, "nothing: a machine shaft is solved for its whole cycle"),
         warn=warn_machine_shaft,
         choices=shaft_choices,
     ),
@@ -144,4 +137,4 @@ def part_of(model: str) -> SpecPart:
     if model in _PARTS:
         return _PARTS[model]
     catalogue = models.parameter_catalogue(model)
-    return SpecPart(partial(read_plain, catalogue=catalogue), partial(plain_schema, catalogue))
+    return SpecPart(partial(read_plain, catalogue=catalogue), plain_schema(catalogue))

@@ -13,14 +13,19 @@ from typing import Any, Final
 from sprag.sentences import Sentence
 from sprag.service.languages import N_
 from sprag.service.reading.texts import did_you_mean
-from sprag.service.spec.described import choice
-from sprag.service.spec.fields import nodes, read_object
+from sprag.service.spec.described import Record, choice
 from sprag.service.spec.lists import refuse_mixed
 from sprag.service.spec.machine.machine import Machine, read_numbers
 from sprag.service.spec.machine.shaft_check import check_machine
-from sprag.service.spec.machine.shaft_drive import read_balance, read_drive
+from sprag.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, DRIVE, read_balance, read_drive
 from sprag.service.spec.machine.shaft_parts import (
+    CONSTANTS,
+    CYCLE,
+    MECHANISM,
+    OPERATION,
+    PARTS,
     PHI_C,
+    numbers_under,
     read_constants,
     read_cycle,
     read_mechanism,
@@ -28,17 +33,31 @@ from sprag.service.spec.machine.shaft_parts import (
     read_parts,
 )
 from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report, join
+from sprag.service.spec.report import Report
 from sprag.worker import models
 from sprag.worker.models import machine_shaft
 from sprag.worker.models.parameters import model_parameter
 
-FIELDS: Final = (
-    "cycle", "mean_speed", "mean_speed_is", "drive", "mechanism", "operation", "parts", "balance", "balance_side",
-    "phi_c", "constants", "wanted_irregularity", "friction_torque", "gravity",
-)  # fmt: skip
 _MEAN_HELP: Final = "which mean of the speed the given mean speed and the irregularity refer to"
 MEAN_SPEED_IS: Final = choice("mean_speed_is", _MEAN_HELP, "midrange", "angle", "time", default="midrange")
+SHAFT: Final = Record(
+    {
+        "cycle": CYCLE,
+        "mean_speed": numbers_under("")["mean_speed"],
+        "mean_speed_is": MEAN_SPEED_IS,
+        "drive": DRIVE,
+        "mechanism": MECHANISM,
+        "operation": OPERATION,
+        "parts": PARTS,
+        "balance": BALANCE,
+        "balance_side": BALANCE_SIDE,
+        "phi_c": PHI_C,
+        "constants": CONSTANTS,
+        **numbers_under(""),
+    },
+    "the machine that every case begins from",
+    required=("drive",),
+)
 _INDEXED = re.compile(r"(?:parts\.[0-9]{1,9}\.)?(operation\.steps|drive\.stages)\.([0-9]{1,9})\.")
 #: What is said about a step or a stage that there is not.
 _NO_ITEM: Final = {
@@ -92,37 +111,35 @@ class ShaftMachine(Machine):
         return super().why_not(path)
 
 
-def read_shaft(report: Report, data: object) -> ShaftMachine:
-    """Read the machine in ``data`` (the spec's `base`); faults are recorded in ``report``."""
+def read_shaft(base: Node) -> ShaftMachine:
+    """Read the machine of a spec; faults are recorded."""
     machine = ShaftMachine()
-    found = read_object(report, "/base", data, FIELDS)
-    if found is None:
+    if not SHAFT.read(base):
         return machine
-    structure = _read_structure(report, found, machine.places)
+    structure = _read_structure(base, machine.places)
     if structure is None:
         return machine
     machine.structure = structure
     machine.parameters = machine_shaft.parameters_of(structure)
-    _unused(report, found, structure)
-    _refuse_mixed_steps(report, found, machine)
-    read_numbers(report, found, machine)
+    _unused(base, structure)
+    _refuse_mixed_steps(base, machine)
+    read_numbers(base, machine)
     return machine
 
 
-def _refuse_mixed_steps(report: Report, found: Mapping[str, Any], machine: Machine) -> None:
+def _owners(base: Node) -> list[tuple[str, Node]]:
+    """The base, and each of its parts with the beginning of its paths."""
+    return [("", base), *((f"parts.{k}.", part) for k, part in enumerate(base["parts"].parts()))]
+
+
+def _refuse_mixed_steps(base: Node, machine: Machine) -> None:
     """Record bare numbers in a column of steps beside quantities of another scale."""
-    owners = [("/base", found), *((join("/base/parts", k), part) for k, part in enumerate(found.get("parts") or ()))]
-    for pointer, owner in owners:
-        operation = owner.get("operation")
-        steps = operation.get("steps") if isinstance(operation, Mapping) else None
-        where = join(pointer, "operation", "steps")
-        prefix = where.removeprefix("/base/").replace("/", ".")
+    for prefix, owner in _owners(base):
+        steps = owner["operation"]["steps"].parts()
         for names in (("from", "to"), ("value",)):
-            entry = machine.parameters.get(f"{prefix}.0.{names[0]}")
-            column = [(join(where, k, name), step[name]) for k, step in enumerate(steps or ()) for name in names
-                      if name in step]  # fmt: skip
+            entry = machine.parameters.get(f"{prefix}operation.steps.0.{names[0]}")
             if entry is not None:
-                refuse_mixed(nodes(report, column), entry.unit)
+                refuse_mixed([step[name] for step in steps for name in names if name in step], entry.unit)
 
 
 def check_shaft(report: Report, machine: Machine) -> None:
@@ -132,70 +149,55 @@ def check_shaft(report: Report, machine: Machine) -> None:
         check_machine(report, machine.structure, machine.values, machine.places)
 
 
-def _read_structure(report: Report, found: Mapping[str, Any], places: dict[str, str]) -> dict[str, Any] | None:
+def _read_structure(base: Node, places: dict[str, str]) -> dict[str, Any] | None:
     """Read the structure as plain data; None, with the faults recorded, when some part could not be read."""
-    drive = read_drive(report, found.get("drive"), places)
-    mechanism = read_mechanism(report, found.get("mechanism"), places)
-    operation = read_operation(report, found.get("operation"), places)
-    several = [] if found.get("parts") is None else read_parts(report, found["parts"], places)
-    _refuse_both(report, found)
-    cycle = read_cycle(report, found.get("cycle", 1))
-    constants = read_constants(report, found.get("constants", {}))
-    balance = read_balance(report, found, drive)
-    mean = MEAN_SPEED_IS.read(Node(report, "/base", found))
-    before = report.found
-    phi_c = None if found.get("phi_c") is None else PHI_C.read(Node(report, "/base", found))
+    drive = read_drive(base["drive"], places)
+    mechanism = read_mechanism(base["mechanism"], places)
+    operation = read_operation(base["operation"], places)
+    several = [] if base["parts"].value is None else read_parts(base["parts"], places)
+    _refuse_both(base)
+    cycle, constants = read_cycle(base["cycle"]), read_constants(base["constants"])
+    balance, mean = read_balance(base, drive), MEAN_SPEED_IS.read(base)
+    node = base["phi_c"]
+    phi_c = None if node.value is None else PHI_C.read(base)
     parts = (drive, mechanism, operation, several, cycle, constants, balance, mean)
-    if any(part is None for part in parts) or report.found > before:
+    if any(part is None for part in parts) or not node.sound:
         return None
     structure = {
         "cycle": cycle, "mean_speed_is": mean, "balance": balance, "drive": drive, "mechanism": mechanism,
         "operation": operation, "constants": constants, "phi_c": phi_c,
     }  # fmt: skip
-    if found.get("balance_side") == "operation":
+    if base["balance_side"].value == "operation":
         structure["balance_side"] = "operation"
     return structure | {"parts": several} if several else structure
 
 
-def _refuse_both(report: Report, found: Mapping[str, Any]) -> None:
+def _refuse_both(base: Node) -> None:
     """Record a mechanism or an operation beside a list of parts."""
     for name in ("mechanism", "operation"):
-        if found.get("parts") is not None and found.get(name) is not None:
+        if base["parts"].value is not None and base[name].value is not None:
             allowed = Sentence("{name} in each of the parts, or no parts", name=name)
-            report.fault(f"/base/{name}", "conflict", "cannot be given beside parts, which have their own", found[name],
-                         allowed=allowed)  # fmt: skip
+            base[name].refuse("conflict", "cannot be given beside parts, which have their own", allowed=allowed)
 
 
-def _unused(report: Report, found: Mapping[str, Any], structure: Mapping[str, Any]) -> None:
+def _unused(base: Node, structure: Mapping[str, Any]) -> None:
     """Record numbers that this machine does not use; they are certainly a mistake."""
-    if structure["balance"] == "motor" and "mean_speed" in found:
-        report.fault("/base/mean_speed", "not-used", "is not used with a motor: the speed is a result",
-                       found["mean_speed"], allowed='no mean_speed, or another balance than "motor"')  # fmt: skip
-    drive = found.get("drive")
-    if isinstance(drive, Mapping) and "scale" in drive and "drive.scale" not in machine_shaft.parameters_of(structure):
-        report.fault(
-            "/base/drive/scale",
-            "not-used",
-            "scales a table or formula of the driving torque, but none is given",
-            drive["scale"],
-        )
-    flywheel = drive.get("flywheel") if isinstance(drive, Mapping) else None
-    if isinstance(flywheel, Mapping) and structure["drive"].get("flywheel") == "rim" and "poisson_ratio" in flywheel:
-        report.warn(
-            "no-effect",
-            "/base/drive/flywheel/poisson_ratio",
-            Sentence("is not used: the stress of a rim does not depend on it"),
-        )
-    owners = [("/base", found, structure)]
-    several = zip(found.get("parts") or (), structure.get("parts", ()), strict=True)
-    owners += [(f"/base/parts/{k}", given, own) for k, (given, own) in enumerate(several)]
-    for pointer, given, own in owners:
-        operation = given.get("operation")
-        if isinstance(operation, Mapping) and own["operation"]["quantity"] == "torque" and "sense" in operation:
+    if structure["balance"] == "motor" and "mean_speed" in base:
+        base["mean_speed"].refuse("not-used", "is not used with a motor: the speed is a result",
+                                  allowed='no mean_speed, or another balance than "motor"')  # fmt: skip
+    drive = base["drive"]
+    if "scale" in drive and "drive.scale" not in machine_shaft.parameters_of(structure):
+        drive["scale"].refuse("not-used", "scales a table or formula of the driving torque, but none is given")
+    ratio = drive["flywheel"]["poisson_ratio"]
+    if ratio.given and structure["drive"].get("flywheel") == "rim":
+        text = Sentence("is not used: the stress of a rim does not depend on it")
+        base.report.warn("no-effect", ratio.pointer, text)
+    several = (structure, *structure.get("parts", ()))
+    for (_, given), own in zip(_owners(base), several, strict=True):
+        operation = given["operation"]
+        if "sense" in operation and own["operation"]["quantity"] == "torque":
             sense = Sentence("is not used: a positive torque always resists; `sense` is for forces")
-            report.warn("no-effect", f"{pointer}/operation/sense", sense)
-        if isinstance(operation, Mapping) and own["operation"]["over"] == "angle" and "during" in operation:
-            report.fault(
-                f"{pointer}/operation/during", "not-used", "selects strokes, but this diagram is over the angle",
-                operation["during"], allowed='with `over` "stroke" only',
-            )  # fmt: skip
+            base.report.warn("no-effect", operation["sense"].pointer, sense)
+        if "during" in operation and own["operation"]["over"] == "angle":
+            operation["during"].refuse("not-used", "selects strokes, but this diagram is over the angle",
+                                       allowed='with `over` "stroke" only')  # fmt: skip

@@ -6,18 +6,20 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from sprag.sentences import Sentence
-from sprag.service.spec.described import Listed, choice
-from sprag.service.spec.fields import read_object, read_one, values_of
+from sprag.service.spec.described import Listed, Record, choice
 from sprag.service.spec.machine.shaft_parts import (
     ANGLE,
+    INTERPOLATION,
+    diagram_of,
     numbers_of,
     numbers_under,
     read_diagram,
     refuse_foreign,
+    rows_of,
     value_in,
 )
 from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report, join
+from sprag.service.spec.schema.quantity import quantity_schema, required_of
 from sprag.worker.models import Parameter, machine_shaft
 
 BALANCE_SIDE: Final = choice(
@@ -31,138 +33,144 @@ BALANCE: Final = choice("balance", _BALANCE_HELP, "constant", "scale", "refuse",
 MOTOR: Final = choice("kind", "kind of the motor", "linear", "kloss", "table")
 #: The rows of a motor's table.
 _SPEED: Final = Parameter("speed", "w", "rad/s", 0.0, 1e6, False, None, "speed of the motor")
-_OF_TABLE: Final = ("table", "csv", "interpolation")
 FLYWHEEL: Final = choice("kind", "shape of the flywheel: a thin rim or a solid disc", "rim", "disc")
 STAGE: Final = choice("kind", "kind of the stage", *machine_shaft.STAGE_KINDS)
-STAGES: Final = Listed("stages", 1, machine_shaft.MAX_STAGES, "stages between motor and main shaft, motor first")
+_STAGE: Final = Record({"kind": STAGE, **numbers_under("drive.stages.K.")}, required=("kind",))
+STAGES: Final = Listed(
+    "stages", 1, machine_shaft.MAX_STAGES, "stages between motor and main shaft, motor first", item=_STAGE
+)
+_TABLE: Final = {**rows_of("speed (rad/s) and torque (N*m)"), "interpolation": INTERPOLATION}
+_MOTOR: Final = Record(
+    {"kind": MOTOR, **numbers_under("drive.motor."), **_TABLE},
+    "a motor whose torque depends on its speed",
+    required=("kind",),
+)
+_WHEEL: Final = numbers_under("drive.flywheel.")
+_FLYWHEEL: Final = Record(
+    {"kind": FLYWHEEL, **_WHEEL},
+    "a flywheel on the main shaft, given by its dimensions",
+    required=("kind", *required_of(_WHEEL)),
+)
+_DIAGRAM: Final = Record(
+    {
+        **diagram_of("angle (rad) and torque (N*m)", "torque in N*m as a formula of phi (rad)"),
+        "interpolation": INTERPOLATION,
+    },
+    "either a table or a formula",
+)
+_NUMBERS: Final = numbers_under("drive.")
+_TORQUE: Final = quantity_schema(_NUMBERS["torque"])
+_DRIVE: Final = Record(
+    {
+        **_NUMBERS,
+        "torque": {**_TORQUE, "anyOf": [*_TORQUE["anyOf"], _DIAGRAM.schema()]},
+        "motor": _MOTOR,
+        "stages": STAGES,
+        "flywheel": _FLYWHEEL,
+    },
+    "what turns the shaft",
+)
+#: JSON Schema of the drive, which has an inertia.
+DRIVE: Final = {
+    **_DRIVE.schema(), "anyOf": [{"required": [name]} for name in ("inertia", "stages", "flywheel")],
+}  # fmt: skip
 
 
-def read_balance(report: Report, found: Mapping[str, Any], drive: Mapping[str, Any] | None) -> str | None:
+def read_balance(base: Node, drive: Mapping[str, Any] | None) -> str | None:
     """Read how the work over a cycle is made zero; by default a motor does it, and a given torque is kept."""
     motor = drive is not None and drive["motor"] is not None
-    given = isinstance(found.get("drive"), Mapping) and "torque" in found["drive"]
-    side = BALANCE_SIDE.read(Node(report, "/base", found))
-    if side is None or (side == "operation" and not _has_drive(report, motor, given)):
+    given, acts = "torque" in base["drive"], any(base[name].value is not None for name in ("operation", "parts"))
+    side = BALANCE_SIDE.read(base)
+    if side is None or (side == "operation" and not _has_drive(base, motor, given)):
         return None
-    acts = found.get("operation") is not None or found.get("parts") is not None
     default = "motor" if motor else "refuse" if given else "constant"
     if side == "operation":
         default = "scale" if acts else "constant"
-    balance: str | None = BALANCE.read(Node(report, "/base", {"balance": default, **found}))
+    node = base["balance"].otherwise(default)
+    balance = node.choice(BALANCE.values)
     if balance is None or drive is None:
         return balance
+    torque = base["drive"]["torque"]
     if balance == "motor" and not motor:
-        report.fault(
-            "/base/drive/motor",
-            "required",
-            'is required by the balance "motor"',
-            allowed="a motor: linear, kloss or table",
-        )
-        return None
-    if balance != "motor" and motor:
-        report.fault(
-            "/base/balance", "conflict", "is not possible for a machine with a motor", balance, allowed="'motor'"
-        )
-        return None
-    if balance == "scale" and side == "operation" and not acts:
-        report.fault(
-            "/base/operation", "required",
-            'is required by the balance "scale" on its side, which multiplies it by a factor', allowed="an operation",
+        base["drive"]["motor"].refuse("required", 'is required by the balance "motor"',
+                                      allowed="a motor: linear, kloss or table")  # fmt: skip
+    elif balance != "motor" and motor:
+        node.refuse("conflict", "is not possible for a machine with a motor", allowed="'motor'")
+    elif balance == "scale" and side == "operation" and not acts:
+        base["operation"].refuse(
+            "required", 'is required by the balance "scale" on its side, which multiplies it by a factor', None,
+            allowed="an operation",
         )  # fmt: skip
-        return None
-    if balance == "scale" and not given:
-        report.fault(
-            "/base/drive/torque",
-            "required",
-            'is required by the balance "scale", which multiplies it by a factor',
-            allowed="a torque, a table or a formula",
-        )
-        return None
-    return balance
+    elif balance == "scale" and not given:
+        torque.refuse("required", 'is required by the balance "scale", which multiplies it by a factor',
+                      allowed="a torque, a table or a formula")  # fmt: skip
+    return balance if node.sound else None
 
 
-def _has_drive(report: Report, motor: bool, given: bool) -> bool:
+def _has_drive(base: Node, motor: bool, given: bool) -> bool:
     """Whether the drive is given, as a balance on the side of the operation needs; else a fault is recorded."""
     if motor:
-        report.fault("/base/balance_side", "conflict", "is not possible with a motor: the speed follows from the load",
-                     "operation", allowed="'drive', or a torque instead of the motor")  # fmt: skip
+        base["balance_side"].refuse("conflict", "is not possible with a motor: the speed follows from the load",
+                                    allowed="'drive', or a torque instead of the motor")  # fmt: skip
     elif not given:
-        report.fault("/base/drive/torque", "required", "is required where the operation is to be found",
-                     allowed="a torque, a table or a formula")  # fmt: skip
+        base["drive"]["torque"].refuse("required", "is required where the operation is to be found",
+                                       allowed="a torque, a table or a formula")  # fmt: skip
     return given and not motor
 
 
-def read_drive(report: Report, data: object, places: dict[str, str]) -> dict[str, Any] | None:
+def read_drive(node: Node, places: dict[str, str]) -> dict[str, Any] | None:
     """Read the drive: the form of its torque, or its motor."""
-    places["drive"] = "/base/drive"
-    found = read_object(report, "/base/drive", data, ("inertia", "torque", "scale", "motor", "stages", "flywheel"))
-    if found is None:
+    places["drive"] = node.pointer
+    if not _DRIVE.read(node):
         return None
     drive: dict[str, Any] = {"form": "constant", "table": None, "formula": None, "motor": None}
-    if "stages" in found:
-        stages = _read_stages(report, found["stages"])
-        if stages is None:
+    if "stages" in node:
+        drive["stages"] = _read_stages(node["stages"])
+    if "flywheel" in node and drive.get("stages", ()) is not None:
+        wheel = node["flywheel"]
+        drive["flywheel"] = FLYWHEEL.read(wheel) if _FLYWHEEL.read(wheel) else None
+    if drive.get("stages", ()) is None or drive.get("flywheel", "") is None:
+        return None
+    torque = node["torque"]
+    if "motor" in node:
+        if torque.given:
+            torque.refuse("conflict", "cannot be given with a motor, which sets the torque",
+                          allowed="a torque or a motor")  # fmt: skip
             return None
-        drive["stages"] = stages
-    if "flywheel" in found:
-        flywheel = read_object(
-            report, "/base/drive/flywheel", found["flywheel"], ("kind", *numbers_under("drive.flywheel."))
-        )
-        kind = None if flywheel is None else FLYWHEEL.read(Node(report, "/base/drive/flywheel", flywheel))
-        if kind is None:
-            return None
-        drive["flywheel"] = kind
-    if "motor" in found:
-        if "torque" in found:
-            report.fault("/base/drive/torque", "conflict", "cannot be given with a motor, which sets the torque",
-                           found["torque"], allowed="a torque or a motor")  # fmt: skip
-            return None
-        return _read_motor(report, found["motor"], drive, places)
-    torque = found.get("torque")
-    if not isinstance(torque, Mapping):
+        return _read_motor(node["motor"], drive, places)
+    if not isinstance(torque.value, Mapping):
         return drive
-    given = read_object(report, "/base/drive/torque", torque, ("table", "csv", "formula", "interpolation"))
-    diagram = None if given is None else read_diagram(report, "/base/drive/torque", given, ANGLE, value_in("N*m"))
+    diagram = read_diagram(torque, ANGLE, value_in("N*m")) if _DIAGRAM.read(torque) else None
     if diagram is None:
         return None
-    form = "csv" if "csv" in torque else diagram["form"]
-    places["drive"] = f"/base/drive/torque/{form}"
+    places["drive"] = torque["csv" if "csv" in torque else diagram["form"]].pointer
     return drive | diagram
 
 
-def _read_stages(report: Report, data: object) -> list[str] | None:
+def _read_stages(node: Node) -> list[str] | None:
     """Read the kinds of the stages between motor and main shaft."""
-    where = "/base/drive/stages"
-    before = report.found
     kinds: list[str] = []
-    for index, item in enumerate(values_of(STAGES.read(Node(report, where, data))) or ()):
-        pointer = join(where, index)
-        found = read_object(report, pointer, item, ("kind", *numbers_under("drive.stages.K.")))
-        kind = None if found is None else STAGE.read(Node(report, pointer, found))
-        if found is None or kind is None:
-            continue
-        own = numbers_of({"drive": {"stages": [kind]}}, "drive.stages.0.")
-        refuse_foreign(report, pointer, found, ("kind", *own), Sentence("a stage of the kind {kind}", kind=str(kind)))
-        kinds.append(kind)
-    return None if report.found > before else kinds
+    for item in STAGES.read(node) or ():
+        kind = STAGE.read(item) if _STAGE.read(item) else None
+        if kind is not None:
+            own = numbers_of({"drive": {"stages": [kind]}}, "drive.stages.0.")
+            refuse_foreign(item, ("kind", *own), Sentence("a stage of the kind {kind}", kind=str(kind)))
+            kinds.append(kind)
+    return kinds if node.sound else None
 
 
-def _read_motor(report: Report, data: object, drive: dict[str, Any], places: dict[str, str]) -> dict[str, Any] | None:
-    pointer = "/base/drive/motor"
-    found = read_object(report, pointer, data, ("kind", *numbers_under("drive.motor."), *_OF_TABLE))
-    if found is None:
-        return None
-    kind = MOTOR.read(Node(report, pointer, found))
+def _read_motor(node: Node, drive: dict[str, Any], places: dict[str, str]) -> dict[str, Any] | None:
+    kind = MOTOR.read(node) if _MOTOR.read(node) else None
     if kind is None:
         return None
     own = numbers_of({"balance": "motor", "drive": {"motor": kind}}, "drive.motor.")
-    fields = ("kind", *own, *(_OF_TABLE if kind == "table" else ()))
-    refuse_foreign(report, pointer, found, fields, Sentence("a {kind} motor", kind=str(kind)))
+    fields = ("kind", *own, *(_TABLE if kind == "table" else ()))
+    refuse_foreign(node, fields, Sentence("a {kind} motor", kind=str(kind)))
     if kind != "table":
         return drive | {"motor": kind}
-    form = read_one(report, pointer, found, ("table", "csv"))
-    diagram = None if form is None else read_diagram(report, pointer, found, _SPEED, value_in("N*m"))
+    form = node.one_of(("table", "csv"))
+    diagram = None if form is None else read_diagram(node, _SPEED, value_in("N*m"))
     if form is None or diagram is None:
         return None
-    places["drive"] = join(pointer, form)
+    places["drive"] = node[form].pointer
     return drive | {"motor": kind, "table": diagram["table"]}

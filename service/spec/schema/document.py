@@ -15,7 +15,7 @@ from sprag.service.spec.draws.tolerances import SPREAD
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.plan import outline
 from sprag.service.spec.schema.quantity import Schema, object_schema, without_numbers
-from sprag.service.spec.starts import starts_schema
+from sprag.service.spec.starts import STARTS
 from sprag.worker import models
 from sprag.worker.limits import MAX_NAME_LENGTH
 
@@ -40,7 +40,7 @@ def spec_schema() -> Schema:
             "exclude": EXCLUDE,
             **{name: record.schema() for name, record in outline.FIELDS.items()},
             "derive": derive_schema(),
-            "starts": starts_schema(),
+            "starts": STARTS.schema(),
             **{name: schema_of(field) for name, field in SPREAD.items()},
         },
         required=("sprag", "model", "base"),
@@ -54,12 +54,12 @@ def spec_schema() -> Schema:
 def _of_model(model: str, *, derived: bool) -> Schema:
     """What holds for the specs of a model, with or without derived parameters."""
     part = part_of(model)
-    base = part.base_schema()
+    base = schema_of(part.base)
     return {
         "if": {
             "properties": {"model": {"const": model}},
             "required": ["model", *(["derive"] if derived else [])],
             **({} if derived else {"not": {"required": ["derive"]}}),
         },
-        "then": {"properties": {"base": without_numbers(base) if derived else base, "run": part.run_schema()}},
+        "then": {"properties": {"base": without_numbers(base) if derived else base, "run": schema_of(part.run)}},
     }

@@ -31,6 +31,7 @@ from sprag.service.spec.derive import with_values
 from sprag.service.spec.document import ParsedSpec, SpecError, load_spec, parse_spec
 from sprag.service.spec.machine.clutch import read_clutch
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
+from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report
 from sprag.service.spec.stored import accepted
 
@@ -262,7 +263,8 @@ def _fit(found: Checked, pointer: str) -> None:
     if not clutch.get("data") or "accuracy" not in clutch:
         return
     known = backlashes(found.spec if found.parsed is None else _with_derived(found.spec, found.parsed.study), pointer)
-    read = read_clutch(Report(), pointer, clutch, pointer.removeprefix("/base/").replace("/", ".") + ".", known)
+    prefix = pointer.removeprefix("/base/").replace("/", ".") + "."
+    read = read_clutch(Node(Report(), pointer, clutch), prefix, known)
     if read is not None and read.fit is not None:
         found.fits[pointer] = (fit_json(read.fit), fit_chart(read.fit, clutch, known[0] if known else 0.0))
 

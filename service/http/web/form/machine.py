@@ -27,6 +27,7 @@ from sprag.service.spec.machine.shaft_parts import (
     PHI_C,
     RECORDED_AT,
 )
+from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report
 from sprag.worker import models
 from sprag.worker.models import Parameter
@@ -315,7 +316,7 @@ def choices_of(values: Mapping[str, str], base: Mapping[str, Any]) -> Groups:
     """The parameters of a machine that can vary, by group; none while its structure cannot be read."""
     model, form = model_name(values), form_of(values)
     groups: dict[str, list[Choice]] = {}
-    for path, entry in part_of(model).read_base(Report(), base).parameters.items():
+    for path, entry in part_of(model).read_base(Node(Report(), BASE, base)).parameters.items():
         group, known = group_of(model, path), form.labels.get(_general(path))
         if known:
             group = _(words(path.rsplit(".", 2)[0]))

@@ -35,7 +35,7 @@ def read(changes: dict[str, Any]) -> tuple[dict[str, Any] | None, Report]:
     """The plan of the goal with other fields, and the report."""
     data = {name: value for name, value in {**GOAL, **changes}.items() if value is not ...}
     report = Report({"goal": data})
-    report.machine = part_of("vibration-drive").read_base(report, SPEC["base"])
+    report.machine = part_of("vibration-drive").read_base(Node(report, "/base", SPEC["base"]))
     goal = Node(report, "", {"goal": data})["goal"]
     variables = read_variables(goal)
     points = read_points(goal, variables)

@@ -10,10 +10,12 @@ import jsonschema
 import pytest
 
 from sprag.service.spec.axes.axes import AXIS
+from sprag.service.spec.described import schema_of
 from sprag.service.spec.document import SpecError, format_of, load_spec, parse_spec
+from sprag.service.spec.machine.clutch import CLUTCH
 from sprag.service.spec.machine.registry import part_of
+from sprag.service.spec.run import RUN
 from sprag.service.spec.schema.document import spec_schema
-from sprag.service.spec.schema.drive import clutch_schema, run_schema
 from sprag.worker.models import model_names, parameter_catalogue
 from tests.service.spec_sample import SPEC, changed
 
@@ -117,7 +119,7 @@ def test_it_accepts_what_the_reader_accepts(validator: Any, changes: dict[str, A
 
 def test_it_follows_the_catalogue() -> None:
     for model in model_names():
-        text = json.dumps(part_of(model).base_schema())
+        text = json.dumps(schema_of(part_of(model).base))
         for entry in parameter_catalogue(model):
             if not entry.path.startswith(("clutch.", "constants.")):
                 assert f'"{entry.path.split(".")[-1]}"' in text
@@ -127,5 +129,5 @@ def test_it_follows_the_catalogue() -> None:
 
 
 def test_the_parts_stand_alone() -> None:
-    for part in (AXIS.schema(), clutch_schema(), run_schema()):
+    for part in (AXIS.schema(), CLUTCH.schema(), RUN):
         jsonschema.Draft202012Validator.check_schema(part)
