@@ -18,7 +18,6 @@ from typer.main import get_command
 from sprag.service import languages
 from sprag.service.actor import Door, act_as, of_machine
 from sprag.service.cli import (
-    batches,
     calibrations,
     case_views,
     cases,
@@ -31,10 +30,7 @@ from sprag.service.cli import (
     explore,
     extend,
     fit,
-    fronts,
-    key_answers,
     local,
-    pictures,
     processes,
     regimes,
     remote,
@@ -44,6 +40,7 @@ from sprag.service.cli import (
     settle,
     single_case,
     studies,
+    study_views,
     token,
     user,
     workers,
@@ -151,23 +148,15 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "cancel": remote.cancel,
         "retry": remote.retry,
         "prioritize": remote.prioritize,
-        "answers": key_answers.answers,
         "case": single_case.case,
         "cases": cases.cases,
         "compare": compare.compare,
-        "curve": pictures.curve,
-        "explore": explore.explore,
         "export": remote.export,
-        "front": fronts.front,
-        "calibration": calibrations.calibration,
-        "map": pictures.draw_map,
         "models": catalogue.models,
-        "ribbon": batches.ribbon,
         "rounds": remote.rounds,
-        "sensitivity": pictures.sensitivity,
         "workers": workers.workers,
-        "yield": batches.yields,
     },
+    N_("See results"): study_views.COMMANDS,
 }
 for _title, _commands in _COMMANDS.items():
     for _name, _command in _commands.items():

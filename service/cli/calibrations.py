@@ -1,4 +1,4 @@
-"""``sprag calibrate`` and ``sprag calibration``: the parameters of a measured machine."""
+"""``sprag calibrate``: the parameters of a measured machine."""
 
 from __future__ import annotations
 
@@ -12,21 +12,13 @@ from sprag.service.cli.configured import read_settings
 from sprag.service.cli.console import WrongInputError, say, show_table, warning_lines, write_json, write_text
 from sprag.service.cli.file_formats import file_format
 from sprag.service.cli.files import MAX_DATA_BYTES, decode, read_bytes, read_spec, spec_failure, write_pieces
-from sprag.service.cli.names import study_of
 from sprag.service.cli.options import (
-    DEFAULT_SERVER,
     JsonFlag,
-    PictureLanguage,
     Processes,
-    Server,
     SpecFile,
-    StudyId,
-    Token,
-    in_language,
 )
-from sprag.service.cli.pictures import heading
-from sprag.service.cli.remote import connection
 from sprag.service.cli.running import run_parsed
+from sprag.service.cli.shown import heading
 from sprag.service.cli.stores import store_of
 from sprag.service.faults import Fault
 from sprag.service.languages import N_, _
@@ -67,7 +59,11 @@ def calibrate(
     found, study_id = _run(parsed, db, processes)
     if file is not None and form is not None:
         write_pieces(file, [_content(found, form, parsed.study.name)])
-    _tell(_report(study_id, found), as_json)
+    answer = _report(study_id, found)
+    if as_json:
+        write_json(answer)
+    else:
+        show_calibration(answer)
     if file is not None:
         say(_("file: {file}", file=file))
 
@@ -128,30 +124,8 @@ def _report(study_id: str, found: Calibration) -> dict[str, Any]:
     return cast("dict[str, Any]", calibration_json(study_id, found))
 
 
-def calibration(
-    study_id: StudyId,
-    file: _File = None,
-    language: PictureLanguage = None,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
-) -> None:
-    """Show what a calibration has found: values with their intervals, what cannot be separated, the next point."""
-    form = None if file is None else file_format(file, _FORMS)
-    with connection(server, token) as client:
-        study_id = study_of(client, study_id)
-        found = client.calibration(study_id)
-        if file is not None and form is not None:
-            write_pieces(file, client.calibration_file(study_id, form, in_language(language)))
-    _tell(found, as_json)
-    if file is not None:
-        say(_("file: {file}", file=file))
-
-
-def _tell(found: dict[str, Any], as_json: bool) -> None:
-    if as_json:
-        write_json(found)
-        return
+def show_calibration(found: dict[str, Any]) -> None:
+    """Values with their intervals, correlations, and what to do next."""
     heads = (_("parameter"), _("value"), _("from"), _("to"), _("deviation"))
     columns = [(head, place > 0) for place, head in enumerate(heads)]
     rows = [

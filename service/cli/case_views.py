@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from inspect import Parameter, Signature
 from pathlib import Path
@@ -68,12 +68,14 @@ def command(about: About) -> Callable[..., None]:
         **settings: Any,
     ) -> None:  # fmt: skip
         written = value_format(form, file, as_json, PICTURES if about.pictures else ())
-        if _is_study(spec):
-            query = [(one.alias, str(settings[one.name])) for one in asked if settings[one.name] is not None]
-            query += [] if start is None else [("start", str(start))]
+        if is_study(spec):
+            from sprag.service.client.wire import case_path
+
+            query = [*query_of(asked, settings), *([] if start is None else [("start", str(start))])]
             with connection(server, token) as client:
-                pieces = client.case_file(study_of(client, spec), case, about.name, [*query, ("format", written)])
-                write_pieces(file, pieces)
+                path = case_path(study_of(client, spec), case, f"/{about.name}")
+                with client.pieces(path, [*query, ("format", written)]) as pieces:
+                    write_pieces(file, pieces)
             return
         from sprag.service.views import cases
 
@@ -92,37 +94,69 @@ def command(about: About) -> Callable[..., None]:
         else:
             _write(view, study, case, chosen, start, written, file, as_json)
 
-    options = [_parameter(one.name, _option(one), one.default) for one in asked]
+    options = [parameter(one.name, option(one), one.default) for one in asked]
     last = [
-        _parameter("case", CaseOption, 0),
-        *([_parameter("start", StartOption, None)] if about.starts else ()),
-        *([_parameter("every", _EachCase, False)] if about is TRANSIENT else ()),
-        *([_parameter("points_file", PointsFile, None)] if not counted else ()),
-        _parameter("tables", TableFiles, None), _parameter("file", OutputFile, None),
-        _parameter("form", ValueFormatOption, None), _parameter("server", Server, DEFAULT_SERVER),
-        _parameter("token", Token, None), _parameter("as_json", JsonFlag, False),
+        parameter("case", CaseOption, 0),
+        *([parameter("start", StartOption, None)] if about.starts else ()),
+        *([parameter("every", _EachCase, False)] if about is TRANSIENT else ()),
+        *([parameter("points_file", PointsFile, None)] if not counted else ()),
+        parameter("tables", TableFiles, None), parameter("file", OutputFile, None),
+        parameter("form", ValueFormatOption, None), parameter("server", Server, DEFAULT_SERVER),
+        parameter("token", Token, None), parameter("as_json", JsonFlag, False),
     ]  # fmt: skip
     run.__doc__ = about.summary
-    run.__signature__ = Signature([_parameter("spec", SpecOrStudy, ...), *options, *last])  # type: ignore[attr-defined]
+    run.__signature__ = Signature([parameter("spec", SpecOrStudy, ...), *options, *last])  # type: ignore[attr-defined]
     return run
 
 
-def _is_study(spec: str) -> bool:
+def is_study(spec: str) -> bool:
     """Whether an argument names a study of a service: it is no file, and looks like none."""
     return spec != "-" and not Path(spec).exists() and not Path(spec).suffix and os.sep not in spec
 
 
-def _parameter(name: str, annotation: Any, default: Any) -> Parameter:
+def parameter(name: str, annotation: Any, default: Any) -> Parameter:
     default = Parameter.empty if default is ... else default
     return Parameter(name, Parameter.POSITIONAL_OR_KEYWORD, annotation=annotation, default=default)
 
 
-def _option(asked: Asked) -> Any:
+#: What the shell offers for a value, by what stands for it in the help.
+_COMPLETED: dict[str, Callable[..., Any]] = {
+    "PATH": completion.parameters, "RESULT": completion.results, "NAME": completion.quantities,
+    "ENDING": completion.endings, "REGIME": completion.regimes, "FLAG": completion.flags, "SORT": completion.sortings,
+}  # fmt: skip
+
+
+def option(asked: Asked) -> Any:
     """A setting as an option."""
     setting = asked.setting
     meaning = f"{setting.meaning[0].upper()}{setting.meaning[1:]}."
-    numbers = {"min": setting.low, "max": setting.high} if asked.type is int else {"metavar": setting.metavar}
-    return Annotated[asked.type, typer.Option(asked.option, help=meaning, **numbers)]
+    if asked.type is bool:
+        return Annotated[bool, typer.Option(asked.option, help=meaning)]
+    if asked.type is int:
+        return Annotated[
+            int | None, typer.Option(asked.option, metavar="N", help=meaning, min=setting.low, max=setting.high)
+        ]
+    if setting.positional:
+        return Annotated[list[str], typer.Argument(metavar=f"{setting.metavar}...", help=meaning)]
+    texts = list[str] if "list" in str(asked.type) else asked.type
+    given = texts if asked.default is ... else texts | None
+    return Annotated[
+        given,
+        typer.Option(
+            asked.option, metavar=setting.metavar, help=meaning, autocompletion=_COMPLETED.get(setting.metavar)
+        ),
+    ]
+
+
+def query_of(asked: Sequence[Asked], settings: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Settings as the query of the view's address, without those that are as the service has them anyway."""
+    query: list[tuple[str, str]] = []
+    for one in asked:
+        value = settings[one.name]
+        if value is not None and value != one.default:
+            values = value if isinstance(value, list) else [value]
+            query += [(one.alias, str(item).lower() if isinstance(item, bool) else str(item)) for item in values]
+    return query
 
 
 def _check_start(study: Study, start: int | None) -> None:

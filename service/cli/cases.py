@@ -12,8 +12,8 @@ from sprag.service.cli.compare import pair
 from sprag.service.cli.console import WrongInputError, show_table, write_json
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, OfEnding, OfFlag, OfRegime, Server, StudyId, Token
-from sprag.service.cli.pictures import heading
 from sprag.service.cli.remote import connection
+from sprag.service.cli.shown import heading
 from sprag.service.faults import Fault
 from sprag.service.languages import N_, _
 
@@ -55,12 +55,13 @@ def cases(
 ) -> None:
     """List finished cases of a study, in order of their numbers or sorted over all of them."""
     from sprag.service.client.queries import cases_query
+    from sprag.service.client.wire import study_path
 
     held = dict(pair(text) for text in at or ())
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
         query = [*cases_query(ending, regime, flag, where or (), held, sort), ("page_size", str(min(limit, _PAGE)))]
-        found, units = _first(client.case_pages(study_id, query), limit)
+        found, units = _first(client.pages(f"{study_path(study_id)}/cases", query), limit)
     if as_json:
         write_json({"cases": found})
     elif found:

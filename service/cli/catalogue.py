@@ -27,8 +27,10 @@ def models(
     as_json: JsonFlag = False,
 ) -> None:
     """List the models of a service, or the parameters and results of one."""
+    from sprag.service.client.wire import model_path
+
     with connection(server, token) as client:
-        found = client.models() if name is None else client.model(name)
+        found = client.request("GET", "/models" if name is None else model_path(name))
     if as_json:
         write_json(found)
     elif name is None:

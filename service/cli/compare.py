@@ -12,8 +12,8 @@ from sprag.service.cli import completion
 from sprag.service.cli.console import Column, say, show_table, write_json, wrong_option
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, CurveBy, JsonFlag, Server, Token
-from sprag.service.cli.pictures import show_curves
 from sprag.service.cli.remote import connection
+from sprag.service.cli.shown import show_curves
 from sprag.service.languages import N_, _
 
 

@@ -12,7 +12,7 @@ from sprag.service.languages import _
 from sprag.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, REGIME_CODES
 
 if TYPE_CHECKING:
-    from sprag.service.client import ServiceClient
+    from sprag.service.client import Client
     from sprag.service.storage.store import Store
 
 #: Variable in which typer's scripts ask for completions, or people for such a script.
@@ -32,7 +32,7 @@ def studies(context: typer.Context, incomplete: str) -> list[tuple[str, str]]:
     return _asked(context, lambda client: _studies(client, incomplete))
 
 
-def _studies(client: ServiceClient, incomplete: str) -> list[tuple[str, str]]:
+def _studies(client: Client, incomplete: str) -> list[tuple[str, str]]:
     found = client.request("GET", "/studies", params={"page_size": _OFFERED})["studies"]
     ids = [(study["id"], f"{study['name'] or study['model']}, {study['state']}") for study in found]
     names = _names(incomplete, ((study["name"], study["id"]) for study in found))
@@ -45,8 +45,8 @@ def _studies(client: ServiceClient, incomplete: str) -> list[tuple[str, str]]:
 def schedules(context: typer.Context, incomplete: str) -> list[tuple[str, str]]:
     """Ids of the schedules, each with its name and times, and names; nothing where no service answers."""
 
-    def asked(client: ServiceClient) -> list[tuple[str, str]]:
-        found = client.schedules()["schedules"]
+    def asked(client: Client) -> list[tuple[str, str]]:
+        found = client.request("GET", "/schedules")["schedules"]
         ids = [(s["id"], f"{s['name']}, {s['cron'] or s['at']}") for s in found]
         return ids + _names(incomplete, ((s["name"], s["id"]) for s in found))
 
@@ -94,7 +94,7 @@ def presets() -> list[tuple[str, str]]:
 
 def models(context: typer.Context) -> list[str]:
     """Models of the service."""
-    return _asked(context, lambda client: [model["name"] for model in client.models()["models"]])
+    return _asked(context, lambda client: [model["name"] for model in client.request("GET", "/models")["models"]])
 
 
 def parameters(context: typer.Context) -> list[tuple[str, str]]:
@@ -120,28 +120,30 @@ def sortings(context: typer.Context) -> list[tuple[str, str]]:
 
 def _of_study(context: typer.Context, parts: Sequence[str]) -> list[tuple[str, str]]:
     # A word after an option without its value is not yet the value of an argument.
-    named = [context.params.get("study_id"), *(context.params.get("studies") or ()), *context.args]
+    given = context.params
+    named = [given.get("study_id"), given.get("study"), given.get("spec"), *(given.get("studies") or ()), *context.args]
     study = next((name for name in named if name), None)
     if study is None:
         return []
 
-    def names(client: ServiceClient) -> list[tuple[str, str]]:
+    def names(client: Client) -> list[tuple[str, str]]:
         from sprag.service.cli.names import study_of
+        from sprag.service.client.wire import case_path
 
-        case = client.of_case(study_of(client, study), 0, "", ())
+        case = client.request("GET", case_path(study_of(client, study), 0, ""))
         return [(name, case["units"].get(name, "")) for part in parts for name in case[part]]
 
     return _asked(context, names)
 
 
-def _asked(context: typer.Context, ask: Callable[[ServiceClient], list[Offered]]) -> list[Offered]:
+def _asked(context: typer.Context, ask: Callable[[Client], list[Offered]]) -> list[Offered]:
     """What the service of the command answers; nothing where none answers."""
     from sprag.service.cli.console import CommandFailureError
-    from sprag.service.client import RefusedError, ServiceClient, UnreachableError
+    from sprag.service.client import Client, RefusedError, UnreachableError
 
     given: dict[str, Any] = context.params
     try:
-        with ServiceClient(given.get("server"), given.get("token"), retry=0.0, timeout=_TIMEOUT) as client:
+        with Client(given.get("server"), given.get("token"), retry=0.0, timeout=_TIMEOUT) as client:
             return ask(client)
     except (CommandFailureError, RefusedError, UnreachableError, ValueError):  # ValueError: the address of the service
         return []

@@ -31,9 +31,10 @@ def list_components(
     with connection(server, token) as client:
         if file is not None:
             query = [("format", "csv"), *([] if kind is None else [("kind", kind)])]
-            write_pieces(file, client.download("/components", query))
+            with client.pieces("/components", query) as pieces:
+                write_pieces(file, pieces)
             return
-        found = client.components(kind)
+        found = client.request("GET", "/components", params={} if kind is None else {"kind": kind})
     if as_json:
         write_json(found)
         return
@@ -56,7 +57,7 @@ def put(
     text = decode(file, read_bytes(file, MAX_BODY_BYTES))
     body = cast("dict[str, Any]", read_spec(file)) if file.lower().endswith(".json") else {"csv": text}
     with connection(server, token) as client:
-        made = client.put_components(body)
+        made = client.request("POST", "/components", json=body)
     if as_json:
         write_json(made)
     else:

@@ -23,7 +23,7 @@ from sprag.service.cli.remote import connection
 from sprag.service.languages import N_, _, decimal
 
 if TYPE_CHECKING:
-    from sprag.service.client import ServiceClient
+    from sprag.service.client import Client
 
 PRESET = "one_pendulum"
 _STOP_SECONDS = 15.0
@@ -95,15 +95,16 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
         process.wait()
 
 
-def _show(client: ServiceClient, picture: Path, as_json: bool) -> dict[str, Any]:
+def _show(client: Client, picture: Path, as_json: bool) -> dict[str, Any]:
     """Submit the study, follow it, show its curve and write the picture; the study at its end."""
+    from sprag.service.client.wire import study_path
     from sprag.service.presets import preset_text
     from sprag.service.spec.text import load_spec
     from sprag.worker.models import cache_folder
 
     text = preset_text(PRESET)[1]
     spec = load_spec(text, "json")
-    created = client.create_study(spec)
+    created = client.request("POST", "/studies", json=spec, key="")
     what = {"name": repr(created["name"]), "cases": created["cases"]}
     say(_("Submitted {name} to {server}: {cases} cases.", server=client.server, **what))
     if not any(cache_folder().iterdir()):
@@ -114,8 +115,10 @@ def _show(client: ServiceClient, picture: Path, as_json: bool) -> dict[str, Any]
     done = {"done": study["progress"]["done"], "ok": study["progress"]["ok"]}
     say(_("{done} cases done in {seconds} s, {ok} ok.", seconds=seconds, **done))
     query = [("x", _AXIS), *(("y", name) for name in _SHOWN), *(("at", f"{path}={value}") for path, value in _HELD)]
-    curves = client.drawn(study["id"], "curves", query)
-    write_pieces(str(picture), client.picture(study["id"], "curves", query, picture.suffix[1:]))
+    path = f"{study_path(study['id'])}/curves"
+    curves = client.request("GET", path, params=query)
+    with client.pieces(path, [*query, ("format", picture.suffix[1:])]) as pieces:
+        write_pieces(str(picture), pieces)
     if as_json:
         write_json({"study": study, "curves": curves, "picture": str(picture), "server": client.server})
     else:

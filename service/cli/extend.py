@@ -11,7 +11,7 @@ from sprag.sentences import Name, WarningText
 from sprag.service.cli import completion
 from sprag.service.cli.console import say, warning_lines, wrong_option
 from sprag.service.cli.files import decode, read_bytes
-from sprag.service.cli.following import submitted, submitting
+from sprag.service.cli.following import further, submitted
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token, Wait, WaitTimeout
 from sprag.service.cli.remote import connection
@@ -49,12 +49,13 @@ def extend(
     as_json: JsonFlag = False,
 ) -> None:
     """Submit a study with more values on the axes of an old one, or more cases; only new cases are run."""
+    from sprag.service.client.wire import study_path
+
     addition = _addition(axis or [], points)
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
-        old = client.study(study_id)
-        with submitting():
-            study = client.extend(study_id, addition)
+        old = client.request("GET", study_path(study_id))
+        study = further(client, study_id, "extend", json=addition)
         say(_what_is_new(old, study))
         submitted(client, study, wait, timeout, as_json)
 
@@ -86,10 +87,10 @@ def longer(
     as_json: JsonFlag = False,
 ) -> None:
     """Submit a study of the unsettled cases of another, with more time for each."""
+    from sprag.service.client.queries import longer_query
+
     with connection(server, token) as client:
-        study_id = study_of(client, study_id)
-        with submitting():
-            study = client.run_longer(study_id, regime, at_most)
+        study = further(client, study_of(client, study_id), "longer", params=longer_query(regime, at_most))
         submitted(client, study, wait, timeout, as_json)
 
 
@@ -114,9 +115,7 @@ def narrow(
     """Submit the sweep of a study once more, with smaller steps where its motion jumps."""
     query = [("steps", str(steps)), *(("at", text) for text in at or [])]
     with connection(server, token) as client:
-        study_id = study_of(client, study_id)
-        with submitting():
-            study = client.narrow(study_id, query)
+        study = further(client, study_of(client, study_id), "narrow", params=query)
         submitted(client, study, wait, timeout, as_json)
 
 

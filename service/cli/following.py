@@ -22,10 +22,18 @@ from sprag.service.languages import _, earlier
 from sprag.worker.states import TERMINAL, StudyState
 
 if TYPE_CHECKING:
-    from sprag.service.client import ServiceClient
+    from sprag.service.client import Client
 
 
-def submitted(client: ServiceClient, study: dict[str, Any], wait: bool, timeout: float | None, as_json: bool) -> None:
+def further(client: Client, study_id: str, verb: str, **arguments: Any) -> dict[str, Any]:
+    """The study that a verb of another one submits."""
+    from sprag.service.client.wire import study_path
+
+    with submitting():
+        return client.request("POST", f"{study_path(study_id)}:{verb}", key="", **arguments)
+
+
+def submitted(client: Client, study: dict[str, Any], wait: bool, timeout: float | None, as_json: bool) -> None:
     """Tell of a study that was submitted, at once or when it has ended."""
     with outlived(study["id"]):
         say(*warning_lines(study.get("warnings", ()), study.get("warning_codes", ())))
@@ -36,9 +44,7 @@ def submitted(client: ServiceClient, study: dict[str, Any], wait: bool, timeout:
         exit_as(study)
 
 
-def follow(
-    client: ServiceClient, study_id: str, timeout: float | None = None, *, patient: bool = True
-) -> dict[str, Any]:
+def follow(client: Client, study_id: str, timeout: float | None = None, *, patient: bool = True) -> dict[str, Any]:
     """Wait, with a bar on standard error, until a study has ended or reached its deadline; returns its final state.
 
     For a held study the reason is printed, and watching continues until it is resumed or cancelled. The same applies to

@@ -1,55 +1,16 @@
-"""``sprag front``: the designs of a study with a goal."""
+"""The designs of a study with a goal as a table."""
 
 from __future__ import annotations
 
 from itertools import chain
-from typing import Annotated, Any
+from typing import Any
 
-import typer
-
-from sprag.service.cli.console import say, show_table, write_json
-from sprag.service.cli.file_formats import file_format
-from sprag.service.cli.files import write_pieces
-from sprag.service.cli.names import study_of
-from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
-from sprag.service.cli.pictures import heading
-from sprag.service.cli.remote import connection
+from sprag.service.cli.console import show_table
+from sprag.service.cli.shown import heading
 from sprag.service.languages import _
 
-#: Designs of a file: every one.
-_EVERY = 1_000_000
 
-
-def front(
-    study_id: StudyId,
-    limit: Annotated[int, typer.Option("--limit", min=1, metavar="N", help="Most designs, the best first.")] = 20,
-    exact: Annotated[
-        bool, typer.Option("--exact", help="Designs must meet equalities to 1e-6 to be feasible.")
-    ] = False,
-    file: Annotated[
-        str | None, typer.Option("-o", "--output", metavar="FILE", help="File to write: .csv, with all designs.")
-    ] = None,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
-) -> None:
-    """Show the best designs of a study with a goal: goals, variables, results of limits."""
-    form = None if file is None else file_format(file, ("csv",))
-    with connection(server, token) as client:
-        study_id = study_of(client, study_id)
-        query = [("exact", str(exact).lower())]
-        found = client.front(study_id, [*query, ("limit", str(limit))])
-        if file is not None and form is not None:
-            write_pieces(file, client.front_file(study_id, [*query, ("limit", str(_EVERY)), ("format", form)]))
-    if as_json:
-        write_json(found)
-    else:
-        _show(found)
-    if file is not None:
-        say(_("table: {file}", file=file))
-
-
-def _show(found: dict[str, Any]) -> None:
+def show_designs(found: dict[str, Any]) -> None:
     """A line for each design, the best first."""
     counts = found["counts"]
     parts = [

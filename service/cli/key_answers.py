@@ -1,91 +1,23 @@
-"""``sprag answers``: what one asks of a study first."""
+"""The answers of a study as tables."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from sprag.service.cli import completion
-from sprag.service.cli.console import Column, cell_text, say, show_table, write_json
-from sprag.service.cli.file_formats import file_format
-from sprag.service.cli.files import write_pieces
-from sprag.service.cli.names import study_of
-from sprag.service.cli.options import (
-    DEFAULT_SERVER,
-    CurveBy,
-    FileUnits,
-    JsonFlag,
-    PictureLanguage,
-    Server,
-    StudyId,
-    Token,
-    in_language,
-    in_units,
-)
-from sprag.service.cli.pictures import ChosenOf, HeldAt, heading, held_text
-from sprag.service.cli.remote import connection
+from sprag.service.cli.console import Column, cell_text, show_table
+from sprag.service.cli.shown import heading, held_text
 from sprag.service.languages import _
 
 if TYPE_CHECKING:
     from sprag.service.answers.key import AnswerValue
     from sprag.service.reading.reader import Reading
 
-_FORMATS = ("csv", "svg", "png", "pdf")
 
-
-def answers(
-    study_id: StudyId,
-    point: Annotated[
-        str | None,
-        typer.Option("--point", metavar="VALUE", help='Working point on the axis along the curves, such as "0.3 N*m".'),
-    ] = None,
-    x: Annotated[
-        str | None,
-        typer.Option(
-            "--x",
-            metavar="PATH",
-            help="Axis along the curves; default: that of the page.",
-            autocompletion=completion.parameters,
-        ),
-    ] = None,
-    by: CurveBy = None,
-    at: HeldAt = None,
-    of: ChosenOf = None,
-    file: Annotated[
-        str | None,
-        typer.Option("-o", "--output", metavar="FILE", help="Table or picture to write: .csv, .svg, .png or .pdf."),
-    ] = None,
-    units: FileUnits = None,
-    language: PictureLanguage = None,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
-) -> None:
-    """Show what one asks of a study first: no-load speed, largest power, best efficiency, stall torque."""
-    form = None if file is None else file_format(file, _FORMATS)
-    query = [("point", point)] if point is not None else []
-    query += [("x", x)] if x is not None else []
-    query += [("by", path) for path in by or ()]
-    query += [*(("at", item) for item in at or ()), *(("of", item) for item in of or ())]
-    with connection(server, token) as client:
-        study_id = study_of(client, study_id)
-        found, record = client.answers(study_id, query), client.study(study_id)
-        if file is not None and form is not None:
-            drawing = [*in_units(units), *in_language(language), ("format", form)]
-            write_pieces(file, client.answers_file(study_id, [*query, *drawing]))
-    if as_json:
-        write_json(found)
-    else:
-        from sprag.service.reading.reader import Reading  # knows the models
-
-        _show(found, Reading(record["model"]))
-    if file is not None:
-        say(_("table: {file}", file=file) if form == "csv" else _("picture: {file}", file=file))
-
-
-def _show(found: dict[str, Any], reading: Reading) -> None:
+def show_answers(found: dict[str, Any], model: str) -> None:
     """A table for each curve: its answers and its working point; then the extremes among all cases."""
+    from sprag.service.reading.reader import Reading  # knows the models
+
+    reading = Reading(model)
     x = heading(found["x"] or "", found["unit"] or "1")
     columns: list[Column] = [
         (_("answer"), False, True),

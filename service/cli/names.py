@@ -11,11 +11,11 @@ from sprag.service.faults import Fault
 from sprag.service.languages import N_, _
 
 if TYPE_CHECKING:
-    from sprag.service.client import ServiceClient
+    from sprag.service.client import Client
     from sprag.service.storage.store import Store
 
 
-def study_of(client: ServiceClient, text: str) -> str:
+def study_of(client: Client, text: str) -> str:
     """The id of the study that is meant, as the client finds it; WrongInputError where several fit or none is named."""
     from sprag.service.client.synchronous import naming
 
@@ -23,7 +23,7 @@ def study_of(client: ServiceClient, text: str) -> str:
         return naming.study_of(client, text)
 
 
-def schedule_of(client: ServiceClient, text: str) -> str:
+def schedule_of(client: Client, text: str) -> str:
     """The id of the schedule that is meant; errors as of `study_of`."""
     from sprag.service.client.synchronous import naming
 

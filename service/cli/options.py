@@ -54,6 +54,10 @@ TableFiles = Annotated[
 OutputFile = Annotated[
     str | None, typer.Option("-o", "--output", metavar="FILE", help="File to write; default: standard output.")
 ]
+TableOrPicture = Annotated[
+    str | None,
+    typer.Option("-o", "--output", metavar="FILE", help="Table or picture to write: .csv, .svg, .png or .pdf."),
+]
 CsvHeader = Annotated[
     Header | None,
     typer.Option(

@@ -49,7 +49,7 @@ from sprag.service.languages import N_, _, earlier
 from sprag.worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
 
 if TYPE_CHECKING:
-    from sprag.service.client import Query, RefusedError, ServiceClient
+    from sprag.service.client import Client, Query, RefusedError
 
 #: A parameter as in the service's messages: "by=", "at=shaft.load=0.2".
 _PARAMETER_IN_TEXT = re.compile(r"(?<![\w.-])(x|y|by|at)=(?=(\w?))")
@@ -61,19 +61,19 @@ PriorityOption = Annotated[
 
 
 @contextmanager
-def connection(server: str, token: str | None) -> Iterator[ServiceClient]:
+def connection(server: str, token: str | None) -> Iterator[Client]:
     """A client of the service; its errors become failures of the command."""
     from sprag.service.client import (
         ArgumentError,
+        Client,
         RefusedError,
-        ServiceClient,
         StudyTimeoutError,
         UnreachableError,
         UntrustedError,
     )
 
     try:
-        client = ServiceClient(server, token)
+        client = Client(server, token)
     except ValueError as error:
         raise WrongInputError("invalid-parameter", str(error)) from error
     with client:
@@ -152,10 +152,13 @@ def submit(
     as_json: JsonFlag = False,
 ) -> None:
     """Submit a study to the service and print its id."""
+    from sprag.service.client.queries import given
+
     data = read_spec(spec, points, MAX_BODY_BYTES, tables)
+    query = given({"priority": priority or None, "fresh": "true" if fresh else None, "finish_by": finish_by})
     with naming_points(points), connection(server, token) as client:
         with submitting():
-            study = client.create_study(data, key, priority, fresh, finish_by)
+            study = client.request("POST", "/studies", json=data, key=key or "", params=query)
         submitted(client, study, wait, timeout, as_json)
 
 
@@ -167,9 +170,11 @@ def watch(
     as_json: JsonFlag = False,
 ) -> None:
     """Follow a study until it has ended, even across restarts of the service."""
+    from sprag.service.client.wire import study_path, within
+
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
-        client.study(study_id, timeout)  # a wrong address or id fails immediately
+        client.request("GET", study_path(study_id), timeout=within(timeout))  # a wrong address or id fails immediately
         with outlived(study_id):
             study = follow(client, study_id, timeout)
     show_study(study, as_json)
@@ -178,9 +183,11 @@ def watch(
 
 def act_on(study_id: str, verb: str, server: str, token: str | None, as_json: bool, query: Query = ()) -> None:
     """Let the service do ``verb`` with a study, and print it."""
+    from sprag.service.client.wire import study_path
+
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
-        study = client.act(study_id, verb, query)
+        study = client.request("POST", f"{study_path(study_id)}:{verb}", params=list(query))
     show_study(study, as_json)
 
 
@@ -233,9 +240,11 @@ def prioritize(
 
 def rounds(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:
     """List the rounds of a study that chooses its own cases, with what was known before each."""
+    from sprag.service.client.wire import study_path
+
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
-        found = client.rounds(study_id)
+        found = client.request("GET", f"{study_path(study_id)}/rounds")
     if as_json:
         write_json(found)
         return
@@ -281,6 +290,8 @@ def export(
     as_json: JsonFlag = False,
 ) -> None:
     """Write all case rows of a study, or a report of it, to a file or to standard output."""
+    from sprag.service.client.wire import study_path
+
     chosen = table_format(form, file, as_json)
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
@@ -294,8 +305,11 @@ def export(
                 f"--{given[0][0]}", "not-used", N_("only reports have it"), given[0][1], allowed="pdf, html"
             )
         asked = [*in_units(units), *given, *([] if header is None else [("header", header)])]
-        pieces = (client.results if table else client.report)(study_id, chosen, asked)
-        written = write_pieces(file, pieces)
+        path = study_path(study_id)
+        report = f"{path}/report", [*asked, ("format", chosen)]
+        opened = client.rows(path, chosen, asked) if table else client.pieces(*report)
+        with opened as pieces:
+            written = write_pieces(file, pieces)
     if to_file(file):
         say(_("{file}: {size} bytes", file=file, size=written))
         if as_json:

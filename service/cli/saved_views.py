@@ -29,7 +29,7 @@ def list_views(
 ) -> None:
     """List saved views: figures of reports in order, then the others by name."""
     with connection(server, token) as client:
-        found = client.views(study)
+        found = client.request("GET", "/views", params={} if study is None else {"study": study})
     if as_json:
         write_json(found)
         return
@@ -55,7 +55,7 @@ def save(
     """Save the address of a page under a name."""
     body = {**_place(address), "name": name, "in_report": report}
     with connection(server, token) as client:
-        _show(client.save_view(body), as_json)
+        _show(client.request("POST", "/views", json=body), as_json)
 
 
 @app.command()
@@ -73,9 +73,12 @@ def change(
     as_json: JsonFlag = False,
 ) -> None:
     """Rename a view, or change whether and where it is in the report of its study."""
+    from sprag.service.client.wire import view_path
+
     given = {"name": name, "in_report": report, "place": place}
+    fields = {key: value for key, value in given.items() if value is not None}
     with connection(server, token) as client:
-        _show(client.change_view(view_id, {key: value for key, value in given.items() if value is not None}), as_json)
+        _show(client.request("PATCH", view_path(view_id), json=fields), as_json)
 
 
 @app.command()

@@ -150,14 +150,14 @@ def add(
         "fresh": fresh,
     }
     with connection(server, token) as client:
-        _show(client.create_schedule(fields, key), as_json)
+        _show(client.request("POST", "/schedules", json=fields, key=key or ""), as_json)
 
 
 @app.command("list")
 def list_schedules(server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:
     """List the schedules with their last and their next run."""
     with connection(server, token) as client:
-        found = client.schedules()
+        found = client.request("GET", "/schedules")
     if as_json:
         write_json(found)
         return
@@ -176,8 +176,10 @@ def show(
     schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False
 ) -> None:
     """Show a schedule and the outcome of its latest due times; with --json also its spec."""
+    from sprag.service.client.wire import schedule_path
+
     with connection(server, token) as client:
-        schedule = client.schedule(schedule_of(client, schedule_id))
+        schedule = client.request("GET", schedule_path(schedule_of(client, schedule_id)))
     if as_json:
         write_json(schedule)
         return
@@ -197,7 +199,7 @@ def night(
 ) -> None:
     """Show what schedules did in the last hours, first what needs attention; exit code 1 if anything does."""
     with connection(server, token) as client:
-        found = client.night(hours)
+        found = client.request("GET", "/night", params={"hours": hours})
     if as_json:
         write_json(found)
     else:
@@ -280,15 +282,19 @@ def resume(
 @app.command()
 def delete(schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Token = None) -> None:
     """Delete a schedule; its studies are kept."""
+    from sprag.service.client.wire import schedule_path
+
     with connection(server, token) as client:
         schedule_id = schedule_of(client, schedule_id)
-        client.delete_schedule(schedule_id)
+        client.delete(schedule_path(schedule_id))
     say(_("{what} is deleted", what=schedule_id))
 
 
 def _change(schedule_id: str, fields: Mapping[str, Any], server: str, token: str | None, as_json: bool) -> None:
+    from sprag.service.client.wire import schedule_path
+
     with connection(server, token) as client:
-        _show(client.change_schedule(schedule_of(client, schedule_id), fields), as_json)
+        _show(client.request("PATCH", schedule_path(schedule_of(client, schedule_id)), json=dict(fields)), as_json)
 
 
 def _given(**fields: Any) -> dict[str, Any]:

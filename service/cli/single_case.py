@@ -53,20 +53,23 @@ def case(
 
     The settings of a motion are the parameters of its address in the HTTP interface.
     """
+    from sprag.service.client.wire import case_path
+
     query = [_setting(text) for text in settings or ()]
     if part is None:
         if query or file is not None:
             name = "--set" if query else "--output"
             raise wrong_option(name, "not-used", N_("belongs to a motion, and none is named"), allowed=", ".join(Part))
         with connection(server, token) as client:
-            found = client.of_case(study_of(client, study_id), number, "", ())
+            found = client.request("GET", case_path(study_of(client, study_id), number, ""))
         _show(found, as_json)
         return
     named = file is not None and to_file(file)
     form = file_format(file, _FORMATS) if named and file is not None else "json" if as_json else "csv"
     with connection(server, token) as client:
-        study_id = study_of(client, study_id)
-        written = write_pieces(file, client.case_file(study_id, number, part.value, [*query, ("format", form)]))
+        path = case_path(study_of(client, study_id), number, f"/{part.value}")
+        with client.pieces(path, [*query, ("format", form)]) as pieces:
+            written = write_pieces(file, pieces)
     if named:
         say(_("{file}: {size} bytes", file=file, size=written))
 

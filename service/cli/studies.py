@@ -20,7 +20,7 @@ from sprag.service.languages import N_, _
 from sprag.worker.states import StudyState
 
 if TYPE_CHECKING:
-    from sprag.service.client import ServiceClient
+    from sprag.service.client import Client
 
 #: Most studies of one request.
 _PAGE: Final = 100
@@ -53,7 +53,7 @@ def list_studies(
     query += [(name, value) for name, value in words.items() if value is not None]
     query += [(name, "true") for name, chosen in (("archived", archived), ("deleted", deleted)) if chosen]
     with connection(server, token) as client:
-        studies = list(islice(client.studies(query), limit))
+        studies = list(islice(client.items("/studies", "studies", query), limit))
     if as_json:
         write_json({"studies": studies})
         return
@@ -86,6 +86,8 @@ def edit(
     as_json: JsonFlag = False,
 ) -> None:
     """Change the name, notes and tags of a study, or archive it."""
+    from sprag.service.client.wire import study_path
+
     given = {"name": name, "notes": notes, "add_tags": tag, "remove_tags": untag, "archived": archived}
     fields = {field: value for field, value in given.items() if value is not None}
     if not fields:
@@ -94,7 +96,7 @@ def edit(
             "--name", "required", N_("no change is given"), allowed=_("at least one of {options}", options=allowed)
         )
     with connection(server, token) as client:
-        study = client.change_study(study_of(client, study_id), fields)
+        study = client.request("PATCH", study_path(study_of(client, study_id)), json=fields)
     show_study(study, as_json)
 
 
@@ -112,6 +114,8 @@ def delete(
 
     With --at-once, one that is deleted already can be named by its whole id, as `sprag list --deleted` has it.
     """
+    from sprag.service.client.wire import study_path
+
     with connection(server, token) as client:
         study = _to_delete(client, study_id, at_once=at_once)
         described = _(
@@ -127,7 +131,7 @@ def delete(
             if not confirmed(_("Delete {what} with all its results?", what=described)):
                 say(_("nothing is deleted"))
                 return
-        client.delete_study(study["id"], [("at_once", "true")] if at_once else ())
+        client.delete(study_path(study["id"]), [("at_once", "true")] if at_once else ())
     if as_json:
         write_json({"deleted": study["id"]})
     else:
@@ -136,14 +140,16 @@ def delete(
         say(said if at_once else f"{said}; {undone}")
 
 
-def _to_delete(client: ServiceClient, text: str, *, at_once: bool) -> dict[str, Any]:
+def _to_delete(client: Client, text: str, *, at_once: bool) -> dict[str, Any]:
     """The study that is meant; ``at_once``: also one that is deleted and can be restored, by its whole id."""
+    from sprag.service.client.wire import study_path
+
     study_id = study_of(client, text)
     try:
-        return client.study(study_id)
+        return client.request("GET", study_path(study_id))
     except FaultError as error:
         if at_once and error.code == "study-not-found":
-            for study in client.studies([("search", study_id), ("deleted", "true")]):
+            for study in client.items("/studies", "studies", [("search", study_id), ("deleted", "true")]):
                 if study["id"] == study_id:
                     return study
         raise

@@ -27,7 +27,6 @@ from sprag.service.client.errors import (
 from sprag.service.client.events import StudyEvent
 from sprag.service.client.frames import Curves
 from sprag.service.client.motions import Engagements, Motion
-from sprag.service.client.plain import ServiceClient
 from sprag.service.client.synchronous.client import Client
 from sprag.service.client.synchronous.study import Study
 from sprag.service.client.tabular import with_units
@@ -45,7 +44,6 @@ __all__ = [
     "Motion",
     "Query",
     "RefusedError",
-    "ServiceClient",
     "ServiceError",
     "SpecFileError",
     "Study",

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from operator import index
 from pathlib import Path
-from typing import Any, BinaryIO, Final, Literal
+from typing import Any, BinaryIO, Final
 from urllib.parse import quote
 
 import httpx
@@ -38,8 +38,6 @@ EVENTS_TIMEOUT: Final = httpx.Timeout(SILENCE, connect=10.0)
 _TOKEN: Final = re.compile(r"[A-Za-z0-9._~+/-]+=*")
 
 Query = Sequence[tuple[str, str]]
-#: Parts of a study that the service draws, as numbers and as a picture.
-Drawn = Literal["curves", "map", "sensitivity", "ribbon", "yield"]
 
 
 def connection_options(server: str, token: str | None) -> dict[str, Any]:

@@ -38,6 +38,8 @@ class Setting:
         Name of its option, where another one has the name of the setting.
     metavar : str
         What stands for the value in the help of a command.
+    positional : bool
+        Whether it is an argument of the command rather than an option.
     """
 
     meaning: str
@@ -50,6 +52,7 @@ class Setting:
     choices: tuple[str, ...] = ()
     option: str = ""
     metavar: str = "VALUE"
+    positional: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -73,7 +73,11 @@ LineAlong = Annotated[
     str | None,
     Setting("path of the axis along the lines; default: that of the curves", examples=("shaft.load",), metavar="PATH"),
 ]
-OfKind = Annotated[str | None, Setting("only cases of this kind", least=1, longest=40, metavar="NAME")]
+Ending = Annotated[str | None, Setting("only cases with this ending", least=1, longest=40, metavar="ENDING")]
+Regime = Annotated[
+    str | None, Setting("only cases of this regime, of a settled study", least=1, longest=40, metavar="REGIME")
+]
+Flag = Annotated[str | None, Setting("only cases with this flag", least=1, longest=40, metavar="FLAG")]
 Result = Annotated[
     list[str] | None,
     Setting("result; may be repeated; default: those of the page", examples=(["shaft.speed.mean"],), metavar="RESULT"),
@@ -159,7 +163,7 @@ Sort = Annotated[
         "largest down; cases without it come last",
         examples=("-efficiency",),
         longest=100,
-        metavar="NAME",
+        metavar="SORT",
     ),
 ]
 
@@ -207,9 +211,9 @@ class SelectionQuestion:
     """Which cases, in which order."""
 
     where: Where = None
-    ending: OfKind = None
-    regime: OfKind = None
-    flag: OfKind = None
+    ending: Ending = None
+    regime: Regime = None
+    flag: Flag = None
     sort: Sort = "case"
 
 
@@ -262,6 +266,7 @@ class YieldQuestion:
             examples=(["shaft.speed.mean >= 90 % of nominal"],),
             least=1,
             metavar="CONDITION",
+            positional=True,
         ),
     ]
     x: LineAlong = None

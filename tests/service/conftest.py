@@ -16,7 +16,7 @@ import pytest
 from anyio.from_thread import BlockingPortal, start_blocking_portal
 from fastapi import FastAPI
 
-from sprag.service.client.plain import ServiceClient
+from sprag.service.client import Client
 from sprag.service.http.app import chunking, create_app
 from sprag.service.languages.elsewhere import speak
 from sprag.service.settings import Settings
@@ -188,8 +188,8 @@ def connected(
     """Makes the commands of a module ask the service of this test."""
 
     @contextmanager
-    def connection(*_: object) -> Iterator[ServiceClient]:
-        with ServiceClient("http://localhost", transport=PortalTransport(service.app, portal)) as client:
+    def connection(*_: object) -> Iterator[Client]:
+        with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
             yield client
 
     return lambda module: monkeypatch.setattr(module, "connection", connection)

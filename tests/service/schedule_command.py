@@ -19,7 +19,7 @@ Run = Callable[..., tuple[int, str, str]]
 def runner(service: Service, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
     """Runs a command; exit code, standard output, standard error."""
 
-    class Connected(client.ServiceClient):
+    class Connected(client.Client):
         def __init__(self, server: str, token: str | None = None) -> None:
             super().__init__(server, token)
             self._http.close()
@@ -28,7 +28,7 @@ def runner(service: Service, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Cap
         def __exit__(self, *_: object) -> None:
             """The test goes on with it."""
 
-    monkeypatch.setattr(client, "ServiceClient", Connected)
+    monkeypatch.setattr(client, "Client", Connected)
 
     def execute_and_read(*arguments: str) -> tuple[int, str, str]:
         code = execute(["schedule", *arguments])

@@ -190,8 +190,8 @@ def test_commands_read_and_write_them(
 
     from sprag.service import client as clients
 
-    genuine = clients.ServiceClient
-    monkeypatch.setattr(clients, "ServiceClient", partial(genuine, transport=PortalTransport(service.app, portal)))
+    genuine = clients.Client
+    monkeypatch.setattr(clients, "Client", partial(genuine, transport=PortalTransport(service.app, portal)))
     file = tmp_path / "components.json"
     file.write_text(json.dumps({"components": ALL}))
     assert sprag("component", "put", file).code == 0

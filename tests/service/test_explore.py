@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag.service.cli import explore
+from sprag.service.cli import study_views
 from sprag.service.client import AsyncClient, Client, RefusedError
 from sprag.service.http.web import explore as explore_pages
 from sprag.service.http.web.form.spec import spec_of
@@ -119,7 +119,7 @@ def test_the_command_lists_and_writes_them(
     connected: Callable[[ModuleType], None],
     tmp_path: Path,
 ) -> None:
-    connected(explore)
+    connected(study_views)
     service, study_id = filled
     options = ("--where", "shaft.load <= 0.3", "--sort=-efficiency", "--limit", 3)
     shown = sprag("explore", study_id, *options, "-o", tmp_path / "best.csv")
@@ -142,10 +142,10 @@ def test_a_file_that_has_not_the_whole_selection_says_so(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    connected(explore)
+    connected(study_views)
     service, study_id = filled
     assert ">The selection as" in service.http.get(f"/studies/{study_id}/explore").text
-    for module in (explore, explore_pages):
+    for module in (study_views, explore_pages):
         monkeypatch.setattr(module, "MAX_SELECTED", 10)
     assert ">The first 10 cases of the selection as" in service.http.get(f"/studies/{study_id}/explore").text
     file = tmp_path / "first.csv"

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag.service.cli import key_answers
+from sprag.service.cli import study_views
 from sprag.service.cli.console import cell_text
 from sprag.service.client import AsyncClient, Client
 from tests.conftest import Finished
@@ -98,7 +98,7 @@ def test_the_command_shows_them_and_writes_them(
     connected: Callable[[ModuleType], None],
     tmp_path: Path,
 ) -> None:
-    connected(key_answers)
+    connected(study_views)
     service, study_id = filled
     shown = sprag("answers", study_id, "--point", "0.2 N*m", "-o", tmp_path / "answers.svg")
     assert shown.code == 0

@@ -204,7 +204,7 @@ def test_commands_for_a_running_service_need_no_extra(command: list[str]) -> Non
 def test_answers_are_shown_without_an_extra() -> None:
     program = """
 from sprag.service.cli.console import OK
-from sprag.service.cli.pictures import show_curves
+from sprag.service.cli.shown import show_curves
 from sprag.service.cli.remote import show_study
 progress = {"done": 2, "total": 2, "ok": 1, "endings": {OK: 1, "chatter": 1}}
 about = {"id": "st_1", "name": "one", "model": "m", "state": "finished", "time_over": False}

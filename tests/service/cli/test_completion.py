@@ -55,7 +55,7 @@ def offered(program: dict[str, str], *words: str) -> list[str]:
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
 def test_bash_completes_commands_options_and_choices(program: dict[str, str]) -> None:
-    assert offered(program, "ex") == ["extend", "explore", "export"]
+    assert offered(program, "ex") == ["extend", "export", "explore"]
     assert offered(program, "db", "up") == ["upgrade"]
     assert offered(program, "export", "--pro") == ["--project"]
     assert offered(program, "export", "--format", "p") == ["parquet", "pdf"]

@@ -23,7 +23,7 @@ from sprag.service.cli.console import (
     write_json,
 )
 from sprag.service.cli.extend import _what_is_new
-from sprag.service.cli.pictures import show_curves, show_map
+from sprag.service.cli.shown import show_curves, show_map
 from sprag.service.faults import Fault
 
 

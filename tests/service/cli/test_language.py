@@ -20,7 +20,7 @@ from sprag.service.cli.app import command_line
 from sprag.service.cli.console import ExitCode, WrongInputError, confirmed, duration_text, warning_lines
 from sprag.service.cli.following import show_study
 from sprag.service.cli.language import chosen, refusal
-from sprag.service.client.plain import ServiceClient
+from sprag.service.client import Client
 from sprag.service.fault_meanings import MEANINGS, WARNING_MEANINGS
 from sprag.service.faults import Fault
 from sprag.service.languages.catalogue import Catalogue, Entry
@@ -249,7 +249,7 @@ def here(service: Service, portal: BlockingPortal, monkeypatch: pytest.MonkeyPat
             return handle(request)
 
     monkeypatch.setattr(transport, "handle_request", in_english)
-    monkeypatch.setattr(clients, "ServiceClient", partial(ServiceClient, transport=transport))
+    monkeypatch.setattr(clients, "Client", partial(Client, transport=transport))
 
 
 #: Commands for a service, with the names in what they show.

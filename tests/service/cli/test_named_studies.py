@@ -20,7 +20,7 @@ from sprag.service import client as clients
 from sprag.service.cli.app import execute
 from sprag.service.cli.console import WrongInputError
 from sprag.service.cli.names import study_of
-from sprag.service.client.plain import ServiceClient
+from sprag.service.client import Client
 from sprag.service.client.synchronous import naming
 from sprag.service.settings import default_database_path
 from sprag.worker.models import cache_folder
@@ -34,7 +34,7 @@ API = "/api/v1"
 def here(service: Service, portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch) -> None:
     """Commands ask the service of the test."""
     transport = PortalTransport(service.app, portal)
-    monkeypatch.setattr(clients, "ServiceClient", partial(ServiceClient, transport=transport))
+    monkeypatch.setattr(clients, "Client", partial(Client, transport=transport))
 
 
 def submit(service: Service, spec: dict[str, Any], name: str) -> str:
@@ -42,7 +42,7 @@ def submit(service: Service, spec: dict[str, Any], name: str) -> str:
 
 
 def test_what_names_a_study(service: Service, portal: BlockingPortal, spec: dict[str, Any]) -> None:
-    with ServiceClient("http://localhost", transport=PortalTransport(service.app, portal)) as client:
+    with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
         assert study_of(client, "latest") == "latest", "there is none"
         first, second = submit(service, spec, "Feeder, slow"), submit(service, spec, "Feeder, fast")
         for text, meant in (

@@ -13,7 +13,7 @@ import httpx
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag.service.cli import calibrations
+from sprag.service.cli import study_views
 from sprag.service.client import AsyncClient, Client
 from tests.conftest import Finished
 from tests.service.calibrating import calibration, spec_of
@@ -39,7 +39,7 @@ def test_both_clients_and_the_command_give_a_calibration(
         assert client.study(study_id).calibration() == found
     assert portal.call(partial(asynchronous, service, study_id)) == found
 
-    connected(calibrations)
+    connected(study_views)
     shown = sprag("calibration", study_id, "-o", tmp_path / "points.csv")
     assert shown.code == 0
     for sentence in found["sentences"]:

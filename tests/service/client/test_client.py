@@ -11,7 +11,7 @@ from typing import Any
 import httpx
 import pytest
 
-from sprag.service.client import Client, RefusedError, ServiceClient, UnreachableError
+from sprag.service.client import Client, RefusedError, UnreachableError
 
 Sprag = Callable[..., Any]
 
@@ -59,11 +59,11 @@ def answering(request: pytest.FixtureRequest) -> Iterator[tuple[str, int]]:
 def test_every_foreign_answer_is_one_of_two_failures(answering: tuple[str, int]) -> None:
     address, status = answering
     # Without repetition, which is for services that come back; 502 would be asked again for a minute.
-    with ServiceClient(address, token="secret", retry=0.0) as client:
+    with Client(address, token="secret", retry=0.0) as client:
         for ask in (
             lambda: client.study("st_1"),
-            lambda: client.create_study({}),
-            lambda: client.drawn("st_1", "curves", [("x", "shaft.load")]),
+            lambda: client.submit({}),
+            lambda: client.request("GET", "/studies/st_1/curves", params=[("x", "shaft.load")]),
         ):
             with pytest.raises((UnreachableError, RefusedError)) as caught:
                 ask()
@@ -97,8 +97,8 @@ def test_white_space_around_a_token_is_not_part_of_it() -> None:
         return httpx.Response(200, json={})
 
     for token in (" sprag_Ab-_1=\r\n", "\n"):
-        with ServiceClient("http://127.0.0.1:9", token=token, transport=httpx.MockTransport(answer)) as client:
-            client.models()
+        with Client("http://127.0.0.1:9", token=token, transport=httpx.MockTransport(answer)) as client:
+            client.request("GET", "/models")
     assert sent == ["Bearer sprag_Ab-_1=", None]
 
 
@@ -107,10 +107,10 @@ def test_a_header_that_http_does_not_allow_is_not_shown() -> None:
         raise httpx.LocalProtocolError(f"Illegal header value {request.headers['Idempotency-Key']!r}")
 
     with (
-        ServiceClient("http://127.0.0.1:9", transport=httpx.MockTransport(send)) as client,
+        Client("http://127.0.0.1:9", transport=httpx.MockTransport(send)) as client,
         pytest.raises(UnreachableError, match="a header that HTTP does not allow") as caught,
     ):
-        client.create_study({}, key="hidden")
+        client.submit({}, key="hidden")
     assert "hidden" not in str(caught.value)
 
 
@@ -125,7 +125,7 @@ def test_commands_say_so_in_a_sentence(answering: tuple[str, int], sprag: Sprag)
 @pytest.mark.parametrize("server", ["", "nonsense", "ftp://127.0.0.1", "http://"])
 def test_what_is_no_address(server: str) -> None:
     with pytest.raises(ValueError, match="address"):
-        ServiceClient(server)
+        Client(server)
 
 
 def test_certificates_that_cannot_be_read_are_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -133,4 +133,4 @@ def test_certificates_that_cannot_be_read_are_named(monkeypatch: pytest.MonkeyPa
     monkeypatch.setenv("SSL_CERT_FILE", str(file))
     file.write_text("no certificate")
     with pytest.raises(ValueError, match="SSL_CERT_FILE or SSL_CERT_DIR"):
-        ServiceClient("https://sprag.example")
+        Client("https://sprag.example")

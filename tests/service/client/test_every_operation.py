@@ -163,12 +163,12 @@ def test_and_a_command_unless_a_reason_is_given(
     spec = tmp_path / "spec.json"
     spec.write_text(json.dumps({"sprag": 1}))
     words = {"SPEC": str(spec), "ID": ID, "SCHEDULE": SCHEDULE}
-    genuine = clients.ServiceClient
+    genuine = clients.Client
     for name, (_, command) in OPERATIONS.items():
         if command.startswith("-"):
             continue
         recorder = Recorder()
-        monkeypatch.setattr(clients, "ServiceClient", partial(genuine, transport=httpx.MockTransport(recorder)))
+        monkeypatch.setattr(clients, "Client", partial(genuine, transport=httpx.MockTransport(recorder)))
         done = sprag(*(words.get(word, word) for word in command.split()))
         assert recorder.reached(*operations[name]), (name, recorder.asked, done.err)
 

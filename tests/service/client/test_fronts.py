@@ -13,7 +13,7 @@ from typing import Any
 import httpx
 from anyio.from_thread import BlockingPortal
 
-from sprag.service.cli import fronts
+from sprag.service.cli import study_views
 from sprag.service.client import AsyncClient, Client
 from tests.conftest import Finished
 from tests.service.conftest import PortalTransport, Service
@@ -43,7 +43,7 @@ def test_the_command_shows_the_best_designs(
     connected: Callable[[ModuleType], None],
     tmp_path: Path,
 ) -> None:
-    connected(fronts)
+    connected(study_views)
     study_id = search(service)
     found = service.get(f"/studies/{study_id}/front")
     shown = sprag("front", study_id, "--limit", 3, "-o", tmp_path / "front.csv")

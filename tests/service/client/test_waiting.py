@@ -15,7 +15,6 @@ from sprag.service.client import (
     AsyncClient,
     Client,
     RefusedError,
-    ServiceClient,
     StudyTimeoutError,
     UnreachableError,
     waiting,
@@ -157,12 +156,12 @@ def test_a_service_that_hangs_does_not_outlast_the_time(wait: Waits, sleeps: lis
 
 
 @pytest.fixture
-def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Scripted], ServiceClient]]:
+def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Scripted], Client]]:
     """A client of a scripted service."""
-    opened: list[ServiceClient] = []
+    opened: list[Client] = []
 
-    def make(scripted: Scripted) -> ServiceClient:
-        opened.append(ServiceClient("http://sprag", transport=httpx.MockTransport(scripted)))
+    def make(scripted: Scripted) -> Client:
+        opened.append(Client("http://sprag", transport=httpx.MockTransport(scripted)))
         return opened[-1]
 
     yield make
@@ -171,7 +170,7 @@ def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Scripted], Ser
 
 
 def test_the_command_says_what_it_waits_for(
-    served: Callable[[Scripted], ServiceClient], sleeps: list[float], capsys: pytest.CaptureFixture[str]
+    served: Callable[[Scripted], Client], sleeps: list[float], capsys: pytest.CaptureFixture[str]
 ) -> None:
     held = study("paused", reason="the disk is full")
     client = served(Scripted([held, DOWN, DOWN, held, study("finished")], [[], []]))
@@ -184,7 +183,7 @@ def test_the_command_says_what_it_waits_for(
 
 
 def test_the_demonstration_does_not_wait_for_a_service_that_it_started_itself(
-    served: Callable[[Scripted], ServiceClient], sleeps: list[float]
+    served: Callable[[Scripted], Client], sleeps: list[float]
 ) -> None:
     with pytest.raises(UnreachableError):
         remote.follow(served(Scripted([study("running"), DOWN], [[]])), STUDY, patient=False)

@@ -14,7 +14,7 @@ import httpx
 import pytest
 from pydantic import SecretStr, ValidationError
 
-from sprag.service.client.plain import ServiceClient
+from sprag.service.client import Client
 from sprag.service.http.app import create_app
 from sprag.service.http.prefix import PREFIX, here
 from sprag.service.http.web.templates import _TRANSLATED, Addresses, _templates
@@ -194,7 +194,7 @@ def test_a_login_leads_back_and_its_cookie_is_for_the_prefix(
 def test_the_client_works_below_a_prefix(below: tuple[Service, OnlyBelow], portal: BlockingPortal) -> None:
     _, proxy = below
     transport = PortalTransport(proxy, portal)
-    with ServiceClient(f"http://localhost{OWN}", transport=transport) as client:
+    with Client(f"http://localhost{OWN}", transport=transport) as client:
         assert client.models()
     assert proxy.refused == []
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sprag.service.cli.pictures import show_map
+from sprag.service.cli.shown import show_map
 from sprag.service.faults import SelectionError
 from sprag.service.http.web.figures.maps import map_figure
 from sprag.service.results.curve_cases import draw_map

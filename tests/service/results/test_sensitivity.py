@@ -13,7 +13,7 @@ from SALib.analyze import morris as morris_analyze
 from SALib.sample import morris as morris_sample
 
 from sprag.service.answers import results
-from sprag.service.cli.pictures import _show_effects
+from sprag.service.cli.shown import _show_effects
 from sprag.service.faults import SelectionError
 from sprag.service.reading.wording import number as number_text
 from sprag.service.results.curves import Fetch

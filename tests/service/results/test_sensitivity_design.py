@@ -11,7 +11,7 @@ import pytest
 from SALib.analyze import rbd_fast
 from scipy.stats import qmc
 
-from sprag.service.cli.pictures import _show_effects
+from sprag.service.cli.shown import _show_effects
 from sprag.service.reading.quantities import Units
 from sprag.service.reading.reader import CODES, Reading
 from sprag.service.results.pictures.sensitivity import draw_sensitivity

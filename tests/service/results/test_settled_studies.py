@@ -89,7 +89,7 @@ def test_a_grid_of_curves_has_regime_and_order_of_every_point(
 def test_the_command_shows_the_regime_of_every_point_of_a_curve(
     service: Service, study_id: str, linked: Linked, sprag: Any
 ) -> None:
-    linked("pictures")
+    linked("study_views")
     done = sprag("curve", study_id, "--x", "shaft.load", "--y", "shaft.speed.mean")
     assert done.code == 0, done.err
     lines = [line.split() for line in done.out.splitlines()]

@@ -13,10 +13,9 @@ import pandas as pd
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag.service.cli.pictures import held_text
+from sprag.service.cli.shown import held_text
 from sprag.service.client import AsyncClient, Client
 from sprag.service.client.frames import Curves, grid_of, table_of
-from sprag.service.client.plain import ServiceClient
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.form.spec import field_of, spec_of, values_of
 from sprag.service.jobs.local import run_here
@@ -176,7 +175,7 @@ def test_jumps_are_narrowed_over_http_by_clients_a_command_and_a_button(
     with Client("http://localhost", transport=transport) as client:
         ids = [client.study(study_id).narrow(4, at={"shaft.load": "0.1 N*m", "sweep": "up"}).id, portal.call(narrowed)]
     monkeypatch.setattr(
-        "sprag.service.cli.extend.connection", lambda *_: ServiceClient("http://localhost", transport=transport)
+        "sprag.service.cli.extend.connection", lambda *_: Client("http://localhost", transport=transport)
     )
     done = sprag("narrow", study_id, "--steps", 4, "--at", "shaft.load=0.1", "--at", "sweep=up", "--json")
     assert done.code == 0, done.err

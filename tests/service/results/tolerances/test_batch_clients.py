@@ -13,7 +13,7 @@ from typing import Any
 import httpx
 from anyio.from_thread import BlockingPortal
 
-from sprag.service.cli import batches
+from sprag.service.cli import study_views
 from sprag.service.client import AsyncClient, Client
 from tests.conftest import Finished
 from tests.service.conftest import PortalTransport, Service
@@ -57,7 +57,7 @@ def test_the_commands_show_and_write_them(
     connected: Callable[[ModuleType], None],
     tmp_path: Path,
 ) -> None:
-    connected(batches)
+    connected(study_views)
     study_id = finish(service, {**SPEC, "drives": 128})
     own = f"/studies/{study_id}"
     file = tmp_path / "ribbon.csv"

@@ -1,152 +1,20 @@
-"""Commands that draw what a running service has: curve, map, sensitivity."""
+"""Curves, maps and sensitivities as tables."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from sprag.service.cli import completion
-from sprag.service.cli.console import OK, cell_text, say, show_table, warning_lines, write_json
-from sprag.service.cli.file_formats import file_format
-from sprag.service.cli.files import write_pieces
-from sprag.service.cli.names import study_of
-from sprag.service.cli.options import (
-    DEFAULT_SERVER,
-    CurveBy,
-    FileUnits,
-    JsonFlag,
-    PictureLanguage,
-    Server,
-    StudyId,
-    Token,
-    in_language,
-    in_units,
-)
-from sprag.service.cli.remote import connection
+from sprag.service.cli.console import OK, cell_text, say, show_table, warning_lines
 from sprag.service.languages import N_, _, decimal
 
 if TYPE_CHECKING:
     from sprag.service.answers import Value
-    from sprag.service.client.plain import ServiceClient
-    from sprag.service.client.wire import Drawn
 
-HeldAt = Annotated[
-    list[str] | None, typer.Option("--at", metavar="PATH=VALUE", help="Value at which another axis is held.")
-]
-PictureFile = Annotated[
-    str | None, typer.Option("-o", "--output", metavar="FILE", help="Picture to write: .svg, .png or .pdf.")
-]
-
-ChosenOf = Annotated[
-    list[str] | None,
-    typer.Option("--of", metavar="PATH=VALUE", help="Value of an axis of --by that has a curve; default: all."),
-]
-
-_PICTURES = ("svg", "png", "pdf")
 #: Indices and the headings of their columns.
 _SHARES = {"first_order": N_("first order"), "first_order_error": "+-", "total": N_("total"), "total_error": "+-"}
 _ELEMENTARY = {"mu": "mu", "mu_star": "mu*", "mu_star_error": "+-", "sigma": "sigma"}
-
-
-def answer(
-    client: ServiceClient,
-    study_id: str,
-    part: Drawn,
-    query: list[tuple[str, str]],
-    file: str | None,
-    show: Callable[[dict[str, Any]], None],
-    as_json: bool,
-    formats: tuple[str, ...] = _PICTURES,
-    drawing: Sequence[tuple[str, str]] = (),
-) -> None:
-    """Show what the service draws of a study, and write it where a file is named; ``drawing`` is said for it only."""
-    form = None if file is None else file_format(file, formats)
-    found = client.drawn(study_id, part, query)
-    if file is not None and form is not None:
-        write_pieces(file, client.picture(study_id, part, [*query, *drawing], form))
-    if as_json:
-        write_json(found)
-    else:
-        show(found)
-    if file is not None:
-        say(_("table: {file}", file=file) if form == "csv" else _("picture: {file}", file=file))
-
-
-def curve(
-    study_id: StudyId,
-    x: Annotated[
-        str | None,
-        typer.Option(
-            "--x",
-            metavar="PATH",
-            help="Axis along the curve; default: that of the page.",
-            autocompletion=completion.parameters,
-        ),
-    ] = None,
-    y: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--y",
-            metavar="RESULT",
-            help="Result to draw; may be repeated; default: those of the page.",
-            autocompletion=completion.results,
-        ),
-    ] = None,
-    by: CurveBy = None,
-    at: HeldAt = None,
-    of: ChosenOf = None,
-    file: PictureFile = None,
-    units: FileUnits = None,
-    language: PictureLanguage = None,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
-) -> None:
-    """Show results against an axis as a table, and write them as a picture."""
-    query = [*([] if x is None else [("x", x)]), *(("y", name) for name in y or ())]
-    query += [("by", path) for path in by or ()]
-    query += [*(("at", item) for item in at or ()), *(("of", item) for item in of or ())]
-    drawing = [*in_units(units), *in_language(language)]
-    with connection(server, token) as client:
-        study_id = study_of(client, study_id)
-        answer(client, study_id, "curves", query, file, show_curves, as_json, drawing=drawing)
-
-
-def draw_map(
-    study_id: StudyId,
-    x: Annotated[
-        str,
-        typer.Option(
-            "--x", metavar="PATH", help="Axis to the right, such as shaft.load.", autocompletion=completion.parameters
-        ),
-    ],
-    y: Annotated[
-        str,
-        typer.Option(
-            "--y",
-            metavar="PATH",
-            help="Axis upwards, such as excitation.frequency.",
-            autocompletion=completion.parameters,
-        ),
-    ],
-    z: Annotated[str, typer.Option("--z", metavar="RESULT", help="Result to draw.", autocompletion=completion.results)],
-    at: HeldAt = None,
-    file: PictureFile = None,
-    units: FileUnits = None,
-    language: PictureLanguage = None,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
-) -> None:
-    """Show one result over two axes as a table, and write it as a picture."""
-    query = [("x", x), ("y", y), ("z", z), *(("at", item) for item in at or ())]
-    drawing = [*in_units(units), *in_language(language)]
-    with connection(server, token) as client:
-        study_id = study_of(client, study_id)
-        answer(client, study_id, "map", query, file, show_map, as_json, drawing=drawing)
 
 
 def show_map(found: dict[str, Any]) -> None:
@@ -194,27 +62,8 @@ def _percent(share: float) -> str:
     return decimal(f"{100.0 * share:.2g} %")
 
 
-def sensitivity(
-    study_id: StudyId,
-    y: Annotated[
-        list[str],
-        typer.Option("--y", metavar="RESULT", help="Result; may be repeated.", autocompletion=completion.results),
-    ],
-    file: PictureFile = None,
-    language: PictureLanguage = None,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
-) -> None:
-    """Show what results depend on: the share of their variance for every axis, and the range of its main effect."""
-    with connection(server, token) as client:
-        study_id = study_of(client, study_id)
-        query = [("y", name) for name in y]
-        drawing = in_language(language)
-        answer(client, study_id, "sensitivity", query, file, _show_sensitivity, as_json, drawing=drawing)
-
-
-def _show_sensitivity(found: dict[str, Any]) -> None:
+def show_sensitivity(found: dict[str, Any]) -> None:
+    """A table for each result: shares of its variance or elementary effects, interactions, warnings."""
     for result in found["results"]:
         _show_effects(result)
     say(*warning_lines(found["warnings"]))

@@ -1,0 +1,209 @@
+"""``sprag curve``, ``map``, ``answers``, ``explore`` and their like: the views of a study, run here or of a service.
+
+Their options are the settings of the views (`sprag.service.views.study_questions`); nothing else is loaded before one
+runs.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from inspect import Signature
+from typing import TYPE_CHECKING, Any, Final, cast
+
+from sprag.service import languages
+from sprag.service.cli.calibrations import show_calibration
+from sprag.service.cli.case_views import SpecOrStudy, is_study, naming_options, option, parameter, query_of
+from sprag.service.cli.configured import read_settings
+from sprag.service.cli.console import say, warning_lines, write_json, wrong_option
+from sprag.service.cli.explore import show_cases
+from sprag.service.cli.file_formats import PICTURES, file_format
+from sprag.service.cli.files import read_study, write_pieces
+from sprag.service.cli.fronts import show_designs
+from sprag.service.cli.key_answers import show_answers
+from sprag.service.cli.names import study_of
+from sprag.service.cli.options import (
+    DEFAULT_SERVER,
+    FileUnits,
+    JsonFlag,
+    PictureLanguage,
+    Server,
+    TableOrPicture,
+    Token,
+    in_language,
+    in_units,
+)
+from sprag.service.cli.remote import connection
+from sprag.service.cli.ribbons import show_ribbon, show_yield
+from sprag.service.cli.running import run_parsed
+from sprag.service.cli.shown import show_curves, show_map, show_sensitivity
+from sprag.service.languages import N_, _
+from sprag.service.views import study_questions as questions
+from sprag.service.views.setting import settings_of
+from sprag.worker.limits import MAX_DESIGNS, MAX_SELECTED
+
+if TYPE_CHECKING:
+    from sprag.service.views.setting import About, Asked
+
+#: Formats of their files.
+_FORMATS: Final = ("csv", *PICTURES)
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """The command of a view: its name, how it shows the answer, and what differs from the settings of the view.
+
+    ``show`` gets the answer, and the model of the study. ``limits`` gives the most rows of a table and of a file.
+    """
+
+    name: str
+    about: About
+    show: Callable[[dict[str, Any], str], None]
+    limits: Callable[[], tuple[int, int]] | None = None
+
+
+_COMMANDS: Final = (
+    Command("answers", questions.ANSWERS, show_answers),
+    Command("curve", questions.CURVES, lambda found, _model: show_curves(found)),
+    Command("explore", questions.EXPLORE, lambda found, _model: show_cases(found), lambda: (20, MAX_SELECTED)),
+    Command("front", questions.FRONT, lambda found, _model: show_designs(found), lambda: (20, MAX_DESIGNS)),
+    Command("calibration", questions.CALIBRATION, lambda found, _model: show_calibration(found)),
+    Command("map", questions.MAP, lambda found, _model: show_map(found)),
+    Command("ribbon", questions.RIBBON, lambda found, _model: show_ribbon(found)),
+    Command("sensitivity", questions.SENSITIVITY, lambda found, _model: show_sensitivity(found)),
+    Command("yield", questions.YIELD, lambda found, _model: show_yield(found)),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class _Source:
+    """Where a view comes from: the answer as data, the pieces of a file, and the model of the study."""
+
+    answer: Callable[[dict[str, Any]], dict[str, Any]]
+    pieces: Callable[[dict[str, Any], str, list[tuple[str, str]]], Iterable[bytes]]
+    model: Callable[[], str]
+
+
+def _made(command: Command) -> Callable[..., None]:
+    about = command.about
+    asked = settings_of(about.question)
+
+    def run(
+        study: str, file: str | None, units: str | None, language: str | None, server: str, token: str | None,
+        as_json: bool, **settings: Any,
+    ) -> None:  # fmt: skip
+        form = None if file is None else file_format(file, _FORMATS)
+        if settings.get("quantile"):
+            settings["quantile"] = list(map(_probability, settings["quantile"]))
+        whole, most = settings, None
+        if command.limits is not None:
+            few, most = command.limits()
+            settings = {**settings, "limit": settings["limit"] or few}
+            whole = {**settings, "limit": most}
+        drawing = [*in_units(units), *in_language(language)]
+        opened = _remote(study, server, token, about, asked) if is_study(study) else _local(study, about, asked)
+        with opened as source:
+            found = source.answer(settings)
+            if file is not None and form is not None:
+                write_pieces(file, source.pieces(whole, form, drawing))
+            if as_json:
+                write_json(found)
+            else:
+                command.show(found, source.model())
+        if file is not None:
+            _say_file(file, form, None if most is None or found.get("selected", 0) <= most else most)
+
+    run.__doc__ = about.summary
+    own = [
+        parameter(one.name, option(one), None if one.name == "limit" and command.limits else one.default)
+        for one in asked
+    ]
+    run.__signature__ = Signature(  # type: ignore[attr-defined]
+        [
+            parameter("study", SpecOrStudy, ...), *own, parameter("file", TableOrPicture, None),
+            parameter("units", FileUnits, None), parameter("language", PictureLanguage, None),
+            parameter("server", Server, DEFAULT_SERVER), parameter("token", Token, None),
+            parameter("as_json", JsonFlag, False),
+        ]
+    )  # fmt: skip
+    return run
+
+
+def _say_file(file: str, form: str | None, first: int | None) -> None:
+    """Say what was written; of a selection that is larger than a file only the ``first`` cases."""
+    if form != "csv":
+        say(_("picture: {file}", file=file))
+    elif first is None:
+        say(_("table: {file}", file=file))
+    else:
+        say(_("table: {file}, the first {count} cases of the selection", file=file, count=f"{first:,}"))
+
+
+def _probability(text: str) -> float:
+    """The probability of ``5%`` or ``0.05``."""
+    number, percent, rest = text.partition("%")
+    try:
+        value = float(number) / (100.0 if percent else 1.0)
+    except ValueError:
+        value = -1.0
+    if rest.strip() or not 0.0 < value < 1.0:
+        raise wrong_option(
+            "--quantile", "out-of-range", N_("is no probability"), text, allowed=_("such as 5 % or 0.05")
+        )
+    return value
+
+
+@contextmanager
+def _remote(text: str, server: str, token: str | None, about: About, asked: tuple[Asked, ...]) -> Iterator[_Source]:
+    """The view of a study of a running service."""
+    from sprag.service.client.wire import study_path
+
+    with connection(server, token) as client:
+        path = study_path(study_of(client, text))
+        view = f"{path}/{about.name}"
+
+        def pieces(settings: dict[str, Any], form: str, drawing: list[tuple[str, str]]) -> Iterator[bytes]:
+            with client.pieces(view, [*query_of(asked, settings), *drawing, ("format", form)]) as found:
+                yield from found
+
+        yield _Source(
+            lambda settings: client.request("GET", view, params=query_of(asked, settings)),
+            pieces,
+            lambda: str(client.request("GET", path)["model"]),
+        )
+
+
+@contextmanager
+def _local(path: str, about: About, asked: tuple[Asked, ...]) -> Iterator[_Source]:
+    """The view of the study of a spec, which is run here first."""
+    from sprag.service.jobs.library import Library
+    from sprag.service.reading.quantities import SI
+    from sprag.service.reading.reader import CAPTIONS, Choice
+    from sprag.service.views.studies import STUDY_VIEWS
+    from sprag.service.views.study_view import study_file
+
+    parsed = read_study(path)
+    say(*warning_lines(parsed.warnings))
+    view = STUDY_VIEWS[about.name]
+
+    def file_of(settings: dict[str, Any], form: str, drawing: dict[str, str]) -> bytes:
+        with naming_options(study, asked, ""):
+            chosen = view.choose(study, about.question(**settings))
+            choice = Choice(drawing.get("units", SI), CAPTIONS)
+            with languages.language(drawing.get("language", languages.ENGLISH)):
+                title = study.name or study.model
+                return study_file(library, done.record.id, view, chosen, choice, title, form)
+
+    with run_parsed(parsed, read_settings(), lambda _now: "", db=None, processes=None) as done:
+        library, study = Library(done.store), done.store.study(done.record.id)
+        yield _Source(
+            lambda settings: cast("dict[str, Any]", json.loads(file_of(settings, "json", {}))),
+            lambda settings, form, drawing: [file_of(settings, form, dict(drawing))],
+            lambda: study.model,
+        )
+
+
+#: The commands by name.
+COMMANDS: Final = {command.name: _made(command) for command in _COMMANDS}

@@ -1,0 +1,111 @@
+"""Commands of views: a spec, which is run here, and a study of a service give the same answer by the same options."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from typer.main import get_command
+
+from sprag.service.cli import case_views, study_views
+from sprag.service.cli.app import app
+from sprag.service.views.case_questions import CASE_VIEWS
+from sprag.service.views.cases import CASE_VIEWS as VIEWS_OF_CASES
+from sprag.service.views.setting import settings_of
+from sprag.service.views.studies import STUDY_VIEWS
+from sprag.worker.models import run_chunk
+from tests.service import conftest
+from tests.service.timed_spec import SPEC
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+    from types import ModuleType
+
+    from tests.conftest import Finished
+    from tests.service.conftest import Service
+
+_SMALL = {**SPEC, "axes": [{"path": "shaft.load", "values": ["0 N*m", "0.1 N*m", "0.2 N*m"]}]}
+
+
+@pytest.fixture
+def sources(
+    service: Service, connected: Callable[[ModuleType], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> tuple[Path, str]:
+    """The same study as a file, and run by a service."""
+    monkeypatch.setattr(conftest, "made_up", lambda study: run_chunk(study, 0, study.cases))
+    connected(study_views)
+    connected(case_views)
+    file = tmp_path / "study.json"
+    file.write_text(json.dumps(_SMALL))
+    study_id = service.submit(_SMALL)
+    service.fill(study_id)
+    return file, study_id
+
+
+@pytest.mark.parametrize(
+    ("command", "options"),
+    [
+        ("curve", ("--y", "shaft.speed.mean", "--y", "efficiency")),
+        ("answers", ("--point", "100 N*mm")),
+        ("explore", ("--where", "shaft.load >= 0.1", "--sort=-efficiency")),
+        ("sensitivity", ("--y", "shaft.speed.mean")),
+    ],
+)
+def test_views_of_a_study(
+    sprag: Callable[..., Finished], sources: tuple[Path, str], tmp_path: Path, command: str, options: tuple[str, ...]
+) -> None:
+    here, there = (_answer(sprag(command, source, *options, "--json")) for source in sources)
+    assert here == there
+    tables = []
+    for number, source in enumerate(sources):
+        file = tmp_path / f"{number}.csv"
+        assert sprag(command, source, *options, "-o", file, "--units", "rpm").code == 0
+        tables.append(file.read_bytes())
+    assert tables[0] == tables[1]
+
+
+def test_views_of_a_case(sprag: Callable[..., Finished], sources: tuple[Path, str], tmp_path: Path) -> None:
+    for name, options in (("trajectory", ("--points", 5)), ("engagements", ()), ("strobes", ("--table", "strobes"))):
+        here, there = (sprag(name, source, "--case", 1, *options, "--json") for source in sources)
+        assert (here.code, there.code) == (0, 0), here.err + there.err
+        assert json.loads(here.out) == json.loads(there.out)
+    pictures = []
+    for number, source in enumerate(sources):
+        file = tmp_path / f"{number}.svg"
+        assert sprag("strobes", source, "--case", 1, "-o", file).code == 0
+        pictures.append(file.read_bytes())
+    assert pictures[0] == pictures[1]
+    refused = sprag("engagements", sources[0], "-o", tmp_path / "wrong.svg")
+    assert (refused.code, "a name that ends in .csv, .json" in refused.err) == (2, True)
+
+
+def _answer(done: Finished) -> dict[str, Any]:
+    assert done.code == 0, done.err
+    answer: dict[str, Any] = json.loads(done.out)
+    answer.pop("study")
+    return answer
+
+
+def test_wrong_settings_name_their_options(sprag: Callable[..., Finished], sources: tuple[Path, str]) -> None:
+    done = sprag("curve", sources[0], "--x", "shaft.lode")
+    assert done.code == 2
+    assert "--x: not an axis of this study; did you mean 'shaft.load'?" in done.err
+    done = sprag("ribbon", sources[0], "--quantile", "105%")
+    assert (done.code, "--quantile: is no probability" in done.err) == (2, True)
+
+
+def test_every_view_has_a_command_with_its_settings() -> None:
+    commands = get_command(app).commands  # type: ignore[attr-defined]
+    named = {**{name: name for name in commands}, "curve": "curves"}
+    abouts = {about.name: about for about in CASE_VIEWS} | {name: view.about for name, view in STUDY_VIEWS.items()}
+    assert {about.name for about in CASE_VIEWS} == set(VIEWS_OF_CASES)
+    for command, view in named.items():
+        if view in abouts:
+            options = {name for parameter in commands[command].params for name in (*parameter.opts, parameter.name)}
+            asked = {
+                one.name if one.setting.positional else one.option for one in settings_of(abouts.pop(view).question)
+            }
+            assert asked <= options, command
+    assert not abouts
