@@ -197,7 +197,7 @@ def _local(path: str, about: About, asked: tuple[Asked, ...]) -> Iterator[_Sourc
                 return study_file(library, done.record.id, view, chosen, choice, title, form)
 
     with run_parsed(parsed, read_settings(), lambda _now: "", db=None, processes=None) as done:
-        library, study = Library(done.store), done.store.study(done.record.id)
+        library, study = Library(done.store), done.store.studies.study(done.record.id)
         yield _Source(
             lambda settings: cast("dict[str, Any]", json.loads(file_of(settings, "json", {}))),
             lambda settings, form, drawing: [file_of(settings, form, dict(drawing))],
