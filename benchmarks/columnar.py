@@ -23,7 +23,7 @@ import pyarrow.parquet as pq
 
 from benchmarks.at_once import timed
 from benchmarks.ten_million import CHUNK, INNER, study_of, values_of
-from sprag.service.storage.private_files import sync_folder
+from sprag.service.storage.database.private_files import sync_folder
 from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.chunking import Chunking

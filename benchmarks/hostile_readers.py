@@ -27,8 +27,8 @@ import httpx
 from benchmarks.faults.harness import PATIENCE, Service, spec, until
 from benchmarks.reading import build, grid
 from sprag.service.formats import FORMATS
-from sprag.service.storage.scopes import TokenScope
-from sprag.service.storage.sqlite_files import sqlite_driver
+from sprag.service.storage.database.sqlite_files import sqlite_driver
+from sprag.service.storage.people.scopes import TokenScope
 from sprag.service.storage.store import Store
 
 if TYPE_CHECKING:

@@ -19,9 +19,9 @@ from time import process_time
 import numpy as np
 import sqlalchemy as sa
 
-from sprag.service.storage.case_keys import add_keys
+from sprag.service.storage.rows.case_keys import add_keys
 from sprag.service.storage.store import Store
-from sprag.service.storage.study_row import study_row
+from sprag.service.storage.studies.study_row import study_row
 from sprag.service.storage.tables import STUDIES
 from sprag.worker import fingerprint
 from sprag.worker.case_keys import case_keys

@@ -24,7 +24,7 @@ from sprag.service.presets import preset_text
 from sprag.service.spec.document import load_spec, parse_spec
 from sprag.service.storage.part import SystemClock
 from sprag.service.storage.store import Store
-from sprag.service.storage.work import Work
+from sprag.service.storage.work.work import Work
 from sprag.worker import models
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.inline import InlineExecutor

@@ -30,12 +30,13 @@ import sqlalchemy as sa
 from sqlalchemy.engine import make_url
 
 from benchmarks.at_once import AtOnce
-from sprag.service.storage import blocks, work
+from sprag.service.storage.database import blocks
+from sprag.service.storage.database.sqlite_files import sqlite_driver
 from sprag.service.storage.part import SystemClock
-from sprag.service.storage.records import StudyRecord
-from sprag.service.storage.sqlite_files import sqlite_driver
 from sprag.service.storage.store import Store
+from sprag.service.storage.studies.records import StudyRecord
 from sprag.service.storage.tables import results_table
+from sprag.service.storage.work import work
 from sprag.worker import fingerprint, models
 from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import Dispatcher

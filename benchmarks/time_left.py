@@ -1,8 +1,8 @@
 """How often the interval of the time left contains the actual time, for studies with different courses of cost.
 
-The estimator is the service's own (`sprag.service.storage.progress`). Chunks of synthetic cost are run on simulated
-processes, in the order of the service; after certain commits the interval is compared with the actual time left. With
-``--real`` studies of the engine are run here too, and the intervals of ``sprag run`` are used.
+The estimator is the service's own (`sprag.service.storage.studies.progress`). Chunks of synthetic cost are run on
+simulated processes, in the order of the service; after certain commits the interval is compared with the actual time
+left. With ``--real`` studies of the engine are run here too, and the intervals of ``sprag run`` are used.
 
     python -m benchmarks.time_left [--studies 60] [--seed 1] [--real]
 """
@@ -27,8 +27,8 @@ from sprag.engine.vibration_drive.settle import settle
 from sprag.service.jobs.local import run_here
 from sprag.service.presets import preset_text
 from sprag.service.spec.document import load_spec, parse_spec
-from sprag.service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
-from sprag.service.storage.records import Progress
+from sprag.service.storage.studies.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
+from sprag.service.storage.studies.records import Progress
 from sprag.worker.chunking import work_of
 from sprag.worker.order import order_of
 from sprag.worker.study import Axis, Study

@@ -22,7 +22,7 @@ from sprag.service.reading.quantities import KINDS
 from sprag.service.schedules.outcomes import Result
 from sprag.service.spec.machine.shaft_parts import MECHANISM_CHOICES
 from sprag.service.spec.saved_views import PAGES
-from sprag.service.storage.scopes import TokenScope
+from sprag.service.storage.people.scopes import TokenScope
 from sprag.worker import models
 from sprag.worker.directions import DIRECTIONS
 from sprag.worker.models.machine_shaft import REMARKS

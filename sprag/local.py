@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from os import PathLike
 
     from sprag.service.client.queries import Spec
-    from sprag.service.storage.records import Progress
+    from sprag.service.storage.studies.records import Progress
 
 
 def run(

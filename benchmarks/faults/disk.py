@@ -11,8 +11,8 @@ from typing import Any
 
 from benchmarks.faults import harness
 from sprag.service.jobs.preview import estimated_bytes
-from sprag.service.storage.room import RESERVE_BYTES
 from sprag.service.storage.store import Store
+from sprag.service.storage.work.room import RESERVE_BYTES
 
 _STATE = "SELECT state FROM studies WHERE id = ?"
 

@@ -24,7 +24,7 @@ import numpy as np
 from benchmarks.faults.fate import Fate, before_commits, before_writes
 from benchmarks.faults.harness import PATIENCE, ROOT, environment, spec, study_of
 from sprag.service.jobs.dispatching import WorkerSettings, run_dispatcher
-from sprag.service.storage.postgres import EPOCHS
+from sprag.service.storage.database.postgres import EPOCHS
 from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.chunking import Chunking

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from sprag.service.storage.errors import StoreError
-from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.store import Store
+from sprag.service.storage.studies.records import StudyRecord
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
 from tests.worker import fakes

@@ -22,7 +22,7 @@ import psutil
 
 from sprag.service.presets import preset_text
 from sprag.service.spec.document import load_spec, parse_spec
-from sprag.service.storage.sqlite_files import sqlite_driver
+from sprag.service.storage.database.sqlite_files import sqlite_driver
 from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.study import Study

@@ -27,7 +27,7 @@ from sprag.service.delivery import Delivery
 from sprag.service.jobs.reports import reporter
 from sprag.service.jobs.scheduler import Scheduler
 from sprag.service.schedules.fields import read_fields
-from sprag.service.storage.reports import CLAIM, ReportState
+from sprag.service.storage.schedules.reports import CLAIM, ReportState
 from sprag.service.storage.store import Store
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.inline import InlineExecutor

@@ -17,7 +17,7 @@ from typing import Any
 
 from benchmarks.faults.harness import environment
 from benchmarks.faults.syscalls import Call, Disk, record
-from sprag.service.storage.sqlite_files import sqlite_driver
+from sprag.service.storage.database.sqlite_files import sqlite_driver
 from sprag.service.storage.store import Store
 
 _PROGRAM = """

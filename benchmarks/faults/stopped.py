@@ -12,7 +12,7 @@ from typing import Any
 import psutil
 
 from benchmarks.faults import harness
-from sprag.service.storage.session import Session
+from sprag.service.storage.database.session import Session
 from sprag.service.storage.store import Store
 from sprag.worker.chunking import Chunking
 

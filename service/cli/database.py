@@ -21,7 +21,7 @@ from sprag.service.faults import FaultError
 from sprag.service.languages import _
 
 if TYPE_CHECKING:
-    from sprag.service.storage.session import Session
+    from sprag.service.storage.database.session import Session
 
 
 class AuditForm(StrEnum):
@@ -194,7 +194,7 @@ def audit(
 ) -> None:
     """Write the audit log: who changed what, when and from where; earliest first."""
     from sprag.service.results.exports.audit import audit_pieces
-    from sprag.service.storage.audit import audit_filter
+    from sprag.service.storage.people.audit import audit_filter
 
     try:
         wanted = audit_filter(since, until, actor, action, target)
@@ -217,7 +217,7 @@ def _tell_damaged(problems: Sequence[str]) -> None:
 @contextmanager
 def _opened(db: str | None, *, create: bool = False) -> Iterator[Session]:
     """Connections to the database, which is there; where it may be created, its folder is."""
-    from sprag.service.storage.session import Session, file_of
+    from sprag.service.storage.database.session import Session, file_of
 
     location = read_settings(database=db).database_url if create else database_of(db)
     file = file_of(location)

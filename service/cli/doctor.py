@@ -137,15 +137,15 @@ def _versions() -> tuple[bool, str]:
 
 
 def _sqlite() -> tuple[bool, str]:
-    from sprag.service.storage.sqlite_files import sqlite_version, sqlite_warning
+    from sprag.service.storage.database.sqlite_files import sqlite_version, sqlite_warning
 
     warning = sqlite_warning()
     return warning is None, warning or ".".join(map(str, sqlite_version()))
 
 
 def _database(url: str, file: Path | None) -> tuple[bool, str]:
+    from sprag.service.storage.database.session import Session
     from sprag.service.storage.maintenance import MOVING, other_revision, revision
-    from sprag.service.storage.session import Session
     from sprag.service.storage.tables import HEAD_REVISION
 
     if file is not None and not file.exists():
@@ -170,7 +170,7 @@ def _database(url: str, file: Path | None) -> tuple[bool, str]:
 def _rights(file: Path) -> tuple[bool, str]:
     """Whether the database and its backups are private; earlier versions created them readable by everybody."""
     from sprag.service.jobs.maintenance import backups
-    from sprag.service.storage.private_files import readable_by_others
+    from sprag.service.storage.database.private_files import readable_by_others
 
     folder = read_settings().backup_folder
     copies = [path for _, path in backups(Path(folder).expanduser())] if folder else []

@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from sprag.service.results.report import ReportFormat
     from sprag.service.settings import Settings
     from sprag.service.spec.document import ParsedSpec
-    from sprag.service.storage.records import Progress, StudyRecord
+    from sprag.service.storage.studies.records import Progress, StudyRecord
 
 
 #: Rough start time (s) of the program and its pool of processes.
@@ -150,7 +150,7 @@ def _show_preview(made: Mapping[str, Any]) -> None:
 
 def _reusable(settings: Settings, parsed: ParsedSpec) -> int:
     """Number of cases in the database; 0 where there is no database yet."""
-    from sprag.service.storage.session import file_of
+    from sprag.service.storage.database.session import file_of
     from sprag.service.storage.store import Store
 
     file = file_of(settings.database_url)

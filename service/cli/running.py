@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from sprag.service.jobs.local import LocalRun
     from sprag.service.settings import Settings
     from sprag.service.spec.document import ParsedSpec
-    from sprag.service.storage.records import Progress
+    from sprag.service.storage.studies.records import Progress
 
 
 @contextmanager

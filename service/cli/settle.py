@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from sprag.service.storage.records import RowBlock
+    from sprag.service.storage.studies.records import RowBlock
     from sprag.worker.models import ChunkResult, ResultInfo
     from sprag.worker.study import Study
 
@@ -111,7 +111,7 @@ def _block(infos: tuple[ResultInfo, ...], cases: NDArray[np.int64], done: ChunkR
     """The rows of a run of these cases, in their order: those of a case one after the other."""
     import numpy as np
 
-    from sprag.service.storage.records import RowBlock
+    from sprag.service.storage.studies.records import RowBlock
     from sprag.worker.models import OK
 
     if done.further is None:
@@ -128,7 +128,7 @@ def _of_lines(study: Study, cases: NDArray[np.int64]) -> RowBlock:
     """The rows of cases of a sweep: whole lines are run, because every case needs those before it."""
     import numpy as np
 
-    from sprag.service.storage.records import RowBlock
+    from sprag.service.storage.studies.records import RowBlock
     from sprag.worker.models import run_chunk, study_results
     from sprag.worker.reuse import taken
     from sprag.worker.sweeps import LineOrder

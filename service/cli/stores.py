@@ -20,7 +20,7 @@ def database_of(db: str | None) -> str:
 
     Raises WrongInputError for a file that does not exist.
     """
-    from sprag.service.storage.session import file_of
+    from sprag.service.storage.database.session import file_of
 
     url = read_settings(database=db).database_url
     file = file_of(url)

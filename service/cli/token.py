@@ -15,13 +15,13 @@ from sprag.service.cli.names import token_of, user_of
 from sprag.service.cli.options import Database, JsonFlag
 from sprag.service.cli.user import users_of
 from sprag.service.languages import N_, _
-from sprag.service.storage.scopes import TokenScope, TokenState
+from sprag.service.storage.people.scopes import TokenScope, TokenState
 from sprag.worker.limits import MAX_NAME_LENGTH
 
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from sprag.service.storage.people import TokenRecord
+    from sprag.service.storage.people.people import TokenRecord
 
 _STATES: Final = {
     TokenState.VALID: N_("valid"),

@@ -15,12 +15,12 @@ from sprag.service.cli.names import user_of
 from sprag.service.cli.options import Database, JsonFlag
 from sprag.service.cli.stores import named_store
 from sprag.service.languages import N_, _
-from sprag.service.storage.scopes import MAX_USER_NAME
+from sprag.service.storage.people.scopes import MAX_USER_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.service.storage.people import Quota, UserRecord
+    from sprag.service.storage.people.people import Quota, UserRecord
     from sprag.service.storage.store import Store
 
 app = typer.Typer(
@@ -188,7 +188,7 @@ def users_of(db: str | None, as_json: bool) -> Iterator[Store]:
 
 
 def _quota(cases: int | None, storage: int | None, checks: int | None) -> Quota:
-    from sprag.service.storage.people import Quota
+    from sprag.service.storage.people.people import Quota
 
     return Quota(cases, None if storage is None else storage * 2**20, checks)
 

@@ -28,15 +28,15 @@ from sprag.service.languages import N_
 from sprag.service.languages.recorded import TOKEN_EXPIRED, TOKEN_OF_REMOVED_USER, TOKEN_REVOKED
 from sprag.service.logs import REQUEST_ID
 from sprag.service.storage.part import micros_of
-from sprag.service.storage.people import digest_of
-from sprag.service.storage.scopes import MAX_USER_NAME, TokenScope, TokenState
+from sprag.service.storage.people.people import digest_of
+from sprag.service.storage.people.scopes import MAX_USER_NAME, TokenScope, TokenState
 
 if TYPE_CHECKING:
     from starlette.datastructures import Headers
     from starlette.types import Scope
 
     from sprag.service.settings import Settings
-    from sprag.service.storage.people import People, SessionSecrets, TokenRecord, UserRecord
+    from sprag.service.storage.people.people import People, SessionSecrets, TokenRecord, UserRecord
 
 COOKIE: Final = "sprag_session"
 SESSION_SECONDS: Final = 12 * 3600

@@ -99,7 +99,7 @@ from sprag.service.spec import labels
 from sprag.service.spec import saved_views as view_spec
 from sprag.service.spec.extend import EXTENSION
 from sprag.service.spec.schema.document import spec_schema
-from sprag.service.storage.people import quota_of
+from sprag.service.storage.people.people import quota_of
 from sprag.service.storage.readiness import Readiness
 from sprag.service.storage.store import Store
 from sprag.worker.chunking import Chunking

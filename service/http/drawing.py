@@ -20,7 +20,7 @@ from sprag.service.results.pictures import curves as pictures
 from sprag.worker import models
 
 if TYPE_CHECKING:
-    from sprag.service.storage.records import StudyRecord
+    from sprag.service.storage.studies.records import StudyRecord
 
 #: Panels in a row of a figure; a narrow place asks for one.
 Columns = Annotated[int, Query(ge=1, le=2)]

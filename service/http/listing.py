@@ -8,8 +8,8 @@ from fastapi import Depends, Query
 
 from sprag.service.answers.studies import StudyOrder
 from sprag.service.faults import parameter_error
-from sprag.service.storage.listing import StudyFilter
-from sprag.service.storage.scopes import MAX_USER_NAME
+from sprag.service.storage.people.scopes import MAX_USER_NAME
+from sprag.service.storage.studies.listing import StudyFilter
 from sprag.worker import models
 from sprag.worker.limits import MAX_PAGE_TOKEN, MAX_SEARCH_LENGTH, MAX_TAG_LENGTH
 from sprag.worker.states import StudyState

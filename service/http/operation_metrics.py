@@ -15,14 +15,14 @@ from prometheus_client.registry import Collector
 from sprag.service.jobs.maintenance import backups
 from sprag.service.jobs.nights import why_off
 from sprag.service.schedules.outcomes import Result
-from sprag.service.storage.runs import RunState
+from sprag.service.storage.schedules.runs import RunState
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from sprag.service.http.shares import Shares
     from sprag.service.settings import Settings
-    from sprag.service.storage.runs import ScheduleRecord
+    from sprag.service.storage.schedules.runs import ScheduleRecord
     from sprag.service.storage.store import Store
 
 #: States of workers in the reports of executors.

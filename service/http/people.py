@@ -8,11 +8,11 @@ from fastapi import Query
 
 from sprag.service.answers import filled
 from sprag.service.answers.people import QuotaUse, User
-from sprag.service.storage.audit import TIME_ALLOWED
-from sprag.service.storage.people import Quota
+from sprag.service.storage.people.audit import TIME_ALLOWED
+from sprag.service.storage.people.people import Quota
 
 if TYPE_CHECKING:
-    from sprag.service.storage.people import UserRecord
+    from sprag.service.storage.people.people import UserRecord
     from sprag.service.storage.store import Store
 
 Since = Annotated[

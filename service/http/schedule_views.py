@@ -13,7 +13,7 @@ from sprag.service.jobs.nights import outcome_json, why_off
 from sprag.service.schedules.times import local_time
 
 if TYPE_CHECKING:
-    from sprag.service.storage.runs import RunRecord, ScheduleRecord
+    from sprag.service.storage.schedules.runs import RunRecord, ScheduleRecord
     from sprag.service.storage.store import Store
 
 

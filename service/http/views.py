@@ -21,8 +21,8 @@ from sprag.service.spec.document import format_of, load_spec
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.storage.origins import Origin as OriginRecord
-    from sprag.service.storage.records import Kinds, Progress, StudyRecord
+    from sprag.service.storage.rows.origins import Origin as OriginRecord
+    from sprag.service.storage.studies.records import Kinds, Progress, StudyRecord
     from sprag.worker.study import Study
 
 API_PREFIX: Final = "/api/v1"

@@ -12,7 +12,7 @@ import numpy as np
 from sprag.service.faults import choice_of, parameter_error
 from sprag.service.jobs.explore import explored
 from sprag.service.results.explore import After, ExploreQuery
-from sprag.service.storage.records import RowBlock
+from sprag.service.storage.studies.records import RowBlock
 from sprag.worker import models
 from sprag.worker.codes import FLAG_MASKS
 

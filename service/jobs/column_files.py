@@ -18,8 +18,8 @@ import numpy as np
 import platformdirs
 
 from sprag.service.stale_files import marked, sweep
-from sprag.service.storage.columns import RowColumns
-from sprag.service.storage.private_files import PRIVATE_FOLDER_MODE
+from sprag.service.storage.database.private_files import PRIVATE_FOLDER_MODE
+from sprag.service.storage.rows.columns import RowColumns
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -21,12 +21,12 @@ from sprag.service.jobs.reports.reporter import Reporter
 from sprag.service.jobs.reports.watchdog import Watchdog
 from sprag.service.jobs.scheduler import Scheduler
 from sprag.service.logs import LogFormat
+from sprag.service.storage.database.lock import DispatcherLock
+from sprag.service.storage.database.session import file_of
 from sprag.service.storage.errors import DatabaseError
-from sprag.service.storage.lock import DispatcherLock
 from sprag.service.storage.part import SILENT_SECONDS, SystemClock
-from sprag.service.storage.people import Quota, quota_of
+from sprag.service.storage.people.people import Quota, quota_of
 from sprag.service.storage.readiness import LOCKED_SECONDS
-from sprag.service.storage.session import file_of
 from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from types import FrameType
 
     from sprag.service.settings import Settings
-    from sprag.service.storage.server_lock import ServerLock
+    from sprag.service.storage.database.server_lock import ServerLock
     from sprag.worker.ports import Executor
 
 _LOG = logging.getLogger(__name__)

@@ -22,10 +22,10 @@ from sprag.service.jobs.dispatching import (
     renewed_pool,
 )
 from sprag.service.stale_files import marked, sweep
-from sprag.service.storage.owners import run_owner
 from sprag.service.storage.part import SystemClock
-from sprag.service.storage.room import GOES_ON
 from sprag.service.storage.store import Store
+from sprag.service.storage.work.dispatchers import run_owner
+from sprag.service.storage.work.room import GOES_ON
 from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.inline import InlineExecutor
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from datetime import datetime
     from types import FrameType
 
-    from sprag.service.storage.records import Progress, StudyRecord
+    from sprag.service.storage.studies.records import Progress, StudyRecord
     from sprag.worker.ports import Executor
     from sprag.worker.study import Study
 

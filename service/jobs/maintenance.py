@@ -21,9 +21,9 @@ from sprag.service.actor import Actor, Door, act_as
 from sprag.service.schedules.times import Timing, read_time_of_day
 from sprag.service.stale_files import sweep
 from sprag.service.storage.clock_watch import ClockWatch
+from sprag.service.storage.database.private_files import PRIVATE_FOLDER_MODE
 from sprag.service.storage.errors import StoreError
 from sprag.service.storage.maintenance import PART_SUFFIX
-from sprag.service.storage.private_files import PRIVATE_FOLDER_MODE
 
 if TYPE_CHECKING:
     from sprag.service.storage.store import Store

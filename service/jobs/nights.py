@@ -20,9 +20,9 @@ from sprag.worker import models
 
 if TYPE_CHECKING:
     from sprag.service.schedules.outcomes import Outcome
-    from sprag.service.storage.reports import ReportRecord
-    from sprag.service.storage.runs import EndedRun
-    from sprag.service.storage.runs import NightRun as Run
+    from sprag.service.storage.schedules.reports import ReportRecord
+    from sprag.service.storage.schedules.runs import EndedRun
+    from sprag.service.storage.schedules.runs import NightRun as Run
     from sprag.service.storage.store import Store
 
 #: Hours that are looked back on by default, and at most.

@@ -26,8 +26,8 @@ from sprag.worker.states import TransitionError
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from sprag.service.storage.runs import OpenRun, ScheduleRecord
-    from sprag.service.storage.schedules import BoundStudy
+    from sprag.service.storage.schedules.runs import OpenRun, ScheduleRecord
+    from sprag.service.storage.schedules.schedules import BoundStudy
     from sprag.service.storage.store import Store
     from sprag.worker.study import Study
 

@@ -12,8 +12,8 @@ from sprag.service.faults import FaultError
 from sprag.service.jobs.preview import estimated_bytes, estimated_seconds
 from sprag.service.languages import recorded
 from sprag.service.schedules.deadline import finish_warnings
-from sprag.service.storage.room import RESERVE_BYTES
-from sprag.service.storage.study_row import study_row
+from sprag.service.storage.studies.study_row import study_row
+from sprag.service.storage.work.room import RESERVE_BYTES
 from sprag.worker.limits import MAX_WAITING_STUDIES
 from sprag.worker.planning import most_cases
 
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from datetime import datetime
 
     from sprag.service.spec.document import ParsedSpec
-    from sprag.service.storage.records import StudyRecord
-    from sprag.service.storage.runs import OpenRun
+    from sprag.service.storage.schedules.runs import OpenRun
     from sprag.service.storage.store import Store
+    from sprag.service.storage.studies.records import StudyRecord
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Submission:
     Attributes
     ----------
     row : dict
-        See `sprag.service.storage.study_row`.
+        See `sprag.service.storage.studies.study_row`.
     body_hash : str
         Hash of the spec and the parameters of the request, for the idempotency key.
     bytes : int

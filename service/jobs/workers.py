@@ -8,8 +8,8 @@ from sprag.service.json_text import timestamp
 
 if TYPE_CHECKING:
     from sprag.service.answers.workers import Dispatcher, WorkerList
-    from sprag.service.storage.records import DispatcherRecord
     from sprag.service.storage.store import Store
+    from sprag.service.storage.studies.records import DispatcherRecord
 
 
 def worker_list(store: Store) -> WorkerList:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
         NextMeasurement,
     )
     from sprag.service.results.curves import Fetch
-    from sprag.service.storage.records import RoundRecord
+    from sprag.service.storage.studies.records import RoundRecord
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
 

@@ -20,7 +20,7 @@ from sprag.worker.models import OK, WorkerEnding
 
 if TYPE_CHECKING:
     from sprag.service.results.refined_maps import RefinedMap
-    from sprag.service.storage.records import CaseColumns
+    from sprag.service.storage.studies.records import CaseColumns
     from sprag.worker.models import ResultInfo
     from sprag.worker.planning.refine import Curve as Refined
     from sprag.worker.planning.refine_plan import RefinePlan

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag.service.reading.reader import Reading
-    from sprag.service.storage.columns import RowColumns
+    from sprag.service.storage.rows.columns import RowColumns
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
 

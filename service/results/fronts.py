@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag.service.results.curves import Fetch
-    from sprag.service.storage.records import RoundRecord
+    from sprag.service.storage.studies.records import RoundRecord
     from sprag.worker.models import ResultInfo
     from sprag.worker.planning.goals import Front, Limit
     from sprag.worker.study import Study

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag.service.results.curves import CurveQuery, Curves, Fetch
-    from sprag.service.storage.records import CaseColumns
+    from sprag.service.storage.studies.records import CaseColumns
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
 

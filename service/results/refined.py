@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from sprag.service.answers.results import Jump
     from sprag.service.results.curves import Line
-    from sprag.service.storage.records import CaseColumns
+    from sprag.service.storage.studies.records import CaseColumns
     from sprag.worker.study import Study
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from sprag.service.answers.studies import Round, Rounds
-    from sprag.service.storage.records import RoundProgress, RoundRecord
+    from sprag.service.storage.studies.records import RoundProgress, RoundRecord
 
 
 def rounds_json(rounds: RoundProgress, state: StudyState, units: Sequence[str] = ()) -> Rounds:

@@ -19,8 +19,8 @@ from sprag.worker import models
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.storage.records import StudyRecord
     from sprag.service.storage.store import Store
+    from sprag.service.storage.studies.records import StudyRecord
     from sprag.worker.study import Study
 
     Cases = NDArray[np.int64]

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from sprag.migrations import REVISIONS
 from sprag.service.storage import deployment, maintenance
+from sprag.service.storage.database.session import Session
 from sprag.service.storage.errors import in_use
-from sprag.service.storage.session import Session
 from sprag.service.storage.tables import HEAD_REVISION
 
 if TYPE_CHECKING:

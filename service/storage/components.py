@@ -11,17 +11,34 @@ import sqlalchemy as sa
 
 from sprag.service.actor import acting
 from sprag.service.spec.components import Component
-from sprag.service.storage.audit import note, require_own
-from sprag.service.storage.component_tables import COMPONENTS
 from sprag.service.storage.editions import edition_of, require_edition
 from sprag.service.storage.errors import ComponentNotFoundError, TooManyComponentsError
 from sprag.service.storage.part import Part, moment
-from sprag.service.storage.pools import pool_of
+from sprag.service.storage.people.audit import note, require_own
+from sprag.service.storage.people.pools import pool_of
+from sprag.service.storage.tables import METADATA
 from sprag.worker.limits import MAX_COMPONENTS
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
     from datetime import datetime
+
+COMPONENTS = sa.Table(
+    "components",
+    METADATA,
+    sa.Column("number", sa.Integer, primary_key=True, autoincrement=True),
+    sa.Column("id", sa.String(40), nullable=False, unique=True),
+    sa.Column("kind", sa.String(16), nullable=False),
+    sa.Column("name", sa.Text, nullable=False),
+    sa.Column("note", sa.Text, nullable=False),
+    # Its fields as JSON: names and quantities as somebody wrote them.
+    sa.Column("fields", sa.Text, nullable=False),
+    sa.Column("changed_at", sa.BigInteger, nullable=False),
+    # Name of the user who added it; NULL: nobody's, so every designer may change it.
+    sa.Column("owner", sa.String(80)),
+    sa.UniqueConstraint("kind", "name", name="uq_components_kind_name"),
+    sqlite_autoincrement=True,
+)
 
 _C = COMPONENTS.c
 

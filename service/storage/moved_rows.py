@@ -11,7 +11,7 @@ import sqlalchemy as sa
 if TYPE_CHECKING:
     from collections.abc import Generator, Sequence
 
-    from sprag.service.storage.session import Session
+    from sprag.service.storage.database.session import Session
 
     Row = tuple[Any, ...]
     #: Rows after the first key (None: from the beginning) up to the second one (None: to the end).
@@ -74,7 +74,7 @@ class TableOf:
             return
         columns = self._columns(connection)
         if not replace and connection.dialect.name == "postgresql":
-            from sprag.service.storage.postgres import copy_in
+            from sprag.service.storage.database.postgres import copy_in
 
             copy_in(connection, f"{self._quoted(connection, self.name)} ({columns})", rows)
             return

@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Any, Final
 import sqlalchemy as sa
 
 from sprag.service.storage import deployment, maintenance
+from sprag.service.storage.database.lock import DispatcherLock
 from sprag.service.storage.errors import DatabaseError
-from sprag.service.storage.lock import DispatcherLock
 from sprag.service.storage.moved_rows import TableOf, tables_of
 from sprag.service.storage.tables import HEAD_REVISION, all_tables
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from sprag.service.storage.server_lock import ServerLock
-    from sprag.service.storage.session import Session
+    from sprag.service.storage.database.server_lock import ServerLock
+    from sprag.service.storage.database.session import Session
 
 #: Tables that belong to the database itself.
 _NOT_MOVED: Final = frozenset({"alembic_version", "sqlite_sequence"})

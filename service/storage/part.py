@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 import sqlalchemy as sa
 
+from sprag.service.storage.database.reserve import spend, spend_share
 from sprag.service.storage.errors import DatabaseFullError, StudyNotFoundError
-from sprag.service.storage.reserve import spend, spend_share
 from sprag.service.storage.stored_sentences import written
 from sprag.service.storage.tables import CHUNKS, STUDIES
 from sprag.worker.states import ChunkState, StudyEvent, StudyState, follow
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from pathlib import Path
 
-    from sprag.service.storage.session import Session
+    from sprag.service.storage.database.session import Session
     from sprag.worker.ports import Chunk, Clock
 
 _A = ParamSpec("_A")

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Final
 from sprag.sentences import Sentence
 from sprag.service.languages import recorded
 from sprag.service.storage.clock_watch import clock_problem
-from sprag.service.storage.dispatchers import TAKE_OVER_SECONDS
 from sprag.service.storage.errors import DatabaseError
 from sprag.service.storage.part import SILENT_SECONDS
+from sprag.service.storage.work.dispatchers import TAKE_OVER_SECONDS
 from sprag.worker.ports import StoreError
 
 if TYPE_CHECKING:

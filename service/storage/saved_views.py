@@ -11,13 +11,12 @@ import sqlalchemy as sa
 from sprag.service.actor import acting
 from sprag.service.faults import Fault, FaultError
 from sprag.service.spec.saved_views import View
-from sprag.service.storage.audit import note, require_own
 from sprag.service.storage.editions import edition_of, require_edition
 from sprag.service.storage.errors import TooManyViewsError, ViewNotFoundError
 from sprag.service.storage.part import Part, change_row, moment, row_of
-from sprag.service.storage.pools import pool_of
-from sprag.service.storage.tables import STUDIES
-from sprag.service.storage.view_tables import SAVED_VIEWS
+from sprag.service.storage.people.audit import note, require_own
+from sprag.service.storage.people.pools import pool_of
+from sprag.service.storage.tables import METADATA, STUDIES
 from sprag.worker.limits import MAX_REPORT_FIGURES, MAX_VIEWS
 
 if TYPE_CHECKING:
@@ -25,6 +24,26 @@ if TYPE_CHECKING:
     from datetime import datetime
 
     from sprag.service.spec.saved_views import ViewChange
+
+SAVED_VIEWS = sa.Table(
+    "saved_views",
+    METADATA,
+    sa.Column("number", sa.Integer, primary_key=True, autoincrement=True),
+    sa.Column("id", sa.String(40), nullable=False, unique=True),
+    # NULL: of a page that belongs to no study.
+    sa.Column("study", sa.Integer, sa.ForeignKey("studies.number"), index=True),
+    sa.Column("page", sa.String(16), nullable=False),
+    # Unique among the views of a page of a study: a view that is saved under the same name replaces the old one.
+    sa.Column("name", sa.Text, nullable=False),
+    # The choices as the query of the page's address.
+    sa.Column("query", sa.Text, nullable=False),
+    # Position in the report of the study; NULL: not in it.
+    sa.Column("place", sa.Integer),
+    sa.Column("changed_at", sa.BigInteger, nullable=False),
+    # Name of the user who saved it; NULL: nobody's, so every designer may change it.
+    sa.Column("owner", sa.String(80)),
+    sqlite_autoincrement=True,
+)
 
 _V = SAVED_VIEWS.c
 #: Views whose study is not deleted, with its id, number and owner.

@@ -50,13 +50,13 @@ STUDIES = sa.Table(
     sa.Column("deleted_at", sa.BigInteger),
     # Among the studies of one owner, the one with the higher priority runs first.
     sa.Column("priority", sa.Integer, nullable=False, server_default="0"),
-    # The part of its priority that counts against studies of other owners (`sprag.service.storage.pools.rank_of`).
+    # The part of its priority that counts against studies of other owners (`people.pools.rank_of`).
     sa.Column("rank", sa.Integer, nullable=False, server_default="0"),
     # What a paused study waits for (`WAITS_FOR_ROOM` and below); NULL where the user or a fault paused it.
     sa.Column("waits_for", sa.String(12)),
     # Equal for studies that may share cases (`sprag.worker.reuse`).
     sa.Column("kin_hash", sa.String(64), nullable=False, server_default=""),
-    # Whether its cases are in `CASE_KEYS` (`sprag.service.storage.case_keys`).
+    # Whether its cases are in `CASE_KEYS` (`sprag.service.storage.rows.case_keys`).
     sa.Column("keyed", sa.Integer, nullable=False, server_default="0"),
     # 1: every case is run, without reuse of other studies.
     sa.Column("fresh", sa.Integer, nullable=False, server_default="0"),
@@ -85,11 +85,11 @@ STUDIES = sa.Table(
     # Until then a deleted study can be restored; 0, or NULL in those deleted before revision 0023: its rows are being
     # removed.
     sa.Column("purge_at", sa.BigInteger),
-    # Name, tags and notes as they are searched (`sprag.service.storage.labels`).
+    # Name, tags and notes as they are searched (`sprag.service.storage.studies.labels`).
     sa.Column("search", sa.Text, nullable=False, server_default=""),
     # Epoch of the dispatcher to which it belongs; NULL: to none, so any of them may take it.
     sa.Column("dispatcher", sa.Integer),
-    # Of its inputs (`sprag.service.storage.study_digests`); NULL: from before revision 0039.
+    # Of its inputs (`sprag.service.storage.studies.study_digests`); NULL: from before revision 0039.
     sa.Column("digest", sa.BigInteger),
     # The values of `reason` (`sprag.service.storage.stored_sentences`).
     sa.Column("reason_values", sa.Text),
@@ -136,7 +136,7 @@ CHUNKS = sa.Table(
     # rows copied from other studies the hosts there, several with commas between them.
     sa.Column("host", sa.String(255)),
     sa.Column("fingerprint", sa.String(64)),
-    # Of its rows (`sprag.service.storage.digests`); NULL: no rows yet, or from before revision 0036.
+    # Of its rows (`sprag.service.storage.rows.digests`); NULL: no rows yet, or from before revision 0036.
     sa.Column("digest", sa.BigInteger),
     sa.Index("ix_chunks_study_state_finished_at", "study", "state", "finished_at"),
     sqlite_with_rowid=False,

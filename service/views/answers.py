@@ -13,7 +13,7 @@ from sprag.service.results.figures.answers import answers_figure
 from sprag.service.results.key_answer_words import answers_csv, curve_name, curve_named, report
 from sprag.service.results.key_answers import StudyAnswers, answers_query, find_answers
 from sprag.service.results.pictures.curves import Picture, require_drawable
-from sprag.service.storage.records import CaseColumns
+from sprag.service.storage.studies.records import CaseColumns
 from sprag.service.views import study_view
 from sprag.service.views.curves import completed_query
 from sprag.service.views.study_questions import ANSWERS, AnswersQuestion

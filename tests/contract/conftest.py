@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from sprag.service.storage import sqlite_files
+from sprag.service.storage.database import sqlite_files
 from sprag.service.storage.store import Store
 from sprag.worker.chunking import Chunking
 from tests.worker import fakes

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.store import Store
+from sprag.service.storage.studies.records import StudyRecord
 from sprag.worker import models
 from tests.worker import fakes
 

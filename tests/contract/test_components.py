@@ -6,8 +6,8 @@ import pytest
 
 from sprag.service.actor import Actor, Door, act_as
 from sprag.service.spec.components import Component
-from sprag.service.storage.audit import AuditFilter
 from sprag.service.storage.errors import ComponentNotFoundError, NotOwnerError, TooManyComponentsError
+from sprag.service.storage.people.audit import AuditFilter
 from sprag.service.storage.store import Store
 from sprag.worker.limits import MAX_COMPONENTS
 

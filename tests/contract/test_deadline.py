@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from sprag.service.storage.errors import NothingToRetryError
-from sprag.service.storage.records import InTime, StudyRecord
 from sprag.service.storage.store import Store
+from sprag.service.storage.studies.records import InTime, StudyRecord
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
 from sprag.worker.models import ChunkResult

@@ -9,9 +9,9 @@ import pytest
 import sqlalchemy as sa
 
 from sprag.service.jobs.housekeeping import Scrubbing
-from sprag.service.storage import digests
 from sprag.service.storage.errors import DatabaseError, NothingToRetryError
-from sprag.service.storage.row_hashes import as_kept, digest_of, digests_of, row_words
+from sprag.service.storage.rows import digests
+from sprag.service.storage.rows.hashes import as_kept, digest_of, digests_of, row_words
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import CASE_KEYS, CHUNKS, ENDINGS, STUDIES, results_table
 from sprag.worker import models

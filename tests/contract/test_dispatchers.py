@@ -8,9 +8,9 @@ from functools import partial
 import pytest
 
 from sprag.service.jobs.workers import worker_list
-from sprag.service.storage.owners import run_owner
 from sprag.service.storage.readiness import Readiness
 from sprag.service.storage.store import Store
+from sprag.service.storage.work.dispatchers import run_owner
 from sprag.worker import fingerprint
 from sprag.worker.ports import EpochLostError, Finished, Peer
 from sprag.worker.reports import WorkerReport

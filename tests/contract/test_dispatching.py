@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.storage.dispatchers import CLAIMED
-from sprag.service.storage.owners import run_owner
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import CHUNKS
+from sprag.service.storage.work.dispatchers import CLAIMED, run_owner
 from sprag.worker.ports import Chunk, EpochLostError
 from sprag.worker.states import StudyState
 from tests.contract.filling import SPEC, create, finish

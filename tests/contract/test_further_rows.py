@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.storage.columns import records
+from sprag.service.storage.rows.columns import records
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import further_table
 from sprag.worker import models

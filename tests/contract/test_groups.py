@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.storage.origins import Origin, names_of
+from sprag.service.storage.rows.origins import Origin, names_of
 from sprag.service.storage.store import Store
 from sprag.worker import fingerprint, models
 from sprag.worker.models import ChunkResult

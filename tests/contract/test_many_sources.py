@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.storage import reuse, studies
-from sprag.service.storage.case_keys import TOO_MANY, add_keys
-from sprag.service.storage.records import StudyRecord
+from sprag.service.storage.rows import reuse
+from sprag.service.storage.rows.case_keys import TOO_MANY, add_keys
 from sprag.service.storage.store import Store
+from sprag.service.storage.studies import studies
+from sprag.service.storage.studies.records import StudyRecord
 from sprag.service.storage.tables import CASE_KEYS, CHUNKS, STUDIES
 from sprag.worker import reuse as physics
 from sprag.worker.case_keys import case_keys
@@ -181,7 +182,7 @@ def test_studies_of_before_get_keys_and_lose_nothing(store: Store) -> None:
 
 
 def test_studies_with_many_cases_have_no_keys_and_are_found(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sprag.service.storage.case_keys.MAX_KEYED", 2)
+    monkeypatch.setattr("sprag.service.storage.rows.case_keys.MAX_KEYED", 2)
     finished(store, over_loads(0.1, 0.2, 0.3))
     assert store.reuse.count(over_loads(0.2, 0.3)) == 2
     with store.session.read() as connection:

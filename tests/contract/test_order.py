@@ -10,10 +10,10 @@ from sprag.service.actor import Actor, Door, act_as
 from sprag.service.faults import FaultError
 from sprag.service.spec.labels import StudyChange, read_change
 from sprag.service.spec.report import SpecError
-from sprag.service.storage.audit import AuditFilter
 from sprag.service.storage.errors import NotOwnerError, PageTokenError, StudyNotFoundError
-from sprag.service.storage.listing import StudyFilter, StudyOrder
+from sprag.service.storage.people.audit import AuditFilter
 from sprag.service.storage.store import Store
+from sprag.service.storage.studies.listing import StudyFilter, StudyOrder
 from sprag.worker.limits import MAX_TAGS
 from sprag.worker.states import StudyState
 from tests.contract.filling import create, finish

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.service.storage import cases as cases_of_store
+from sprag.service.storage.rows import rows as cases_of_store
 from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.chunking import Chunking

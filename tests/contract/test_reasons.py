@@ -15,7 +15,7 @@ from sprag.service.schedules.fields import read_fields
 from sprag.service.schedules.outcomes import Outcome
 from sprag.service.schedules.policies import DueTime
 from sprag.service.schedules.times import Window
-from sprag.service.storage.schedule_tables import SCHEDULE_RUNS
+from sprag.service.storage.schedules.tables import SCHEDULE_RUNS
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import STUDIES
 from tests.contract.filling import create

@@ -9,7 +9,7 @@ from sprag.service.jobs.nights import conclude_runs
 from sprag.service.jobs.scheduler import Scheduler
 from sprag.service.schedules.fields import read_fields
 from sprag.service.schedules.outcomes import Result
-from sprag.service.storage.reports import CLAIM, ReportState
+from sprag.service.storage.schedules.reports import CLAIM, ReportState
 from sprag.service.storage.store import Store
 from tests.service.timed_spec import SPEC
 from tests.worker import fakes

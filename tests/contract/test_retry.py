@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sprag.service.storage.errors import NothingToRetryError, StudyNotFoundError
-from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.store import Store
+from sprag.service.storage.studies.records import StudyRecord
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
 from sprag.worker.models import ChunkResult

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from sprag.service.storage.errors import DatabaseError, StudyNotFoundError
 from sprag.service.storage.part import SystemClock
-from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.store import Store
+from sprag.service.storage.studies.records import StudyRecord
 from sprag.service.storage.tables import ROUNDS, results_table
 from sprag.worker import models
 from sprag.worker.dispatcher import Dispatcher

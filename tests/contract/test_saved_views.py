@@ -11,9 +11,9 @@ import sqlalchemy as sa
 from sprag.service.actor import Actor, Door, act_as
 from sprag.service.faults import FaultError
 from sprag.service.spec.saved_views import View, ViewChange
-from sprag.service.storage.audit import AuditFilter
 from sprag.service.storage.errors import NotOwnerError, StudyNotFoundError, TooManyViewsError, ViewNotFoundError
-from sprag.service.storage.view_tables import SAVED_VIEWS
+from sprag.service.storage.people.audit import AuditFilter
+from sprag.service.storage.saved_views import SAVED_VIEWS
 from sprag.worker.limits import MAX_REPORT_FIGURES
 from tests.contract.filling import create, finish
 

@@ -12,9 +12,9 @@ from sprag.service.faults import FaultError
 from sprag.service.spec.components import Component
 from sprag.service.spec.saved_views import View
 from sprag.service.storage.errors import TooManyComponentsError, TooManyViewsError
-from sprag.service.storage.people import Quota
-from sprag.service.storage.records import StudyRecord
-from sprag.service.storage.study_row import study_row
+from sprag.service.storage.people.people import Quota
+from sprag.service.storage.studies.records import StudyRecord
+from sprag.service.storage.studies.study_row import study_row
 from sprag.worker.states import StudyState
 from tests.contract.filling import create, finish
 from tests.worker import fakes
@@ -61,7 +61,7 @@ def test_nobody_fills_the_queue(office: Store) -> None:
 
 
 def test_nobody_fills_it_with_ended_studies_that_are_run_again(office: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sprag.service.storage.studies.MAX_WAITING_STUDIES", 4)
+    monkeypatch.setattr("sprag.service.storage.studies.studies.MAX_WAITING_STUDIES", 4)
     with act_as(DORA):
         made = [create(office, 3) for _ in range(3)]
     for record in made:
@@ -140,7 +140,7 @@ def held_at_deadline(store: Store, clock: fakes.HandClock, count: int) -> list[S
 def test_nobody_fills_the_queue_with_studies_that_were_held_at_their_deadline(
     office: Store, clock: fakes.HandClock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sprag.service.storage.studies.MAX_WAITING_STUDIES", 4, raising=False)
+    monkeypatch.setattr("sprag.service.storage.studies.studies.MAX_WAITING_STUDIES", 4, raising=False)
     with act_as(DORA):
         made = held_at_deadline(office, clock, 3)
         for record in made[:2]:

@@ -7,10 +7,10 @@ from functools import partial
 
 import pytest
 
-from sprag.service.storage import sqlite_files
+from sprag.service.storage.database import sqlite_files
 from sprag.service.storage.errors import IdempotencyConflictError, PageTokenError, StudyBusyError, StudyNotFoundError
-from sprag.service.storage.listing import StudyFilter
 from sprag.service.storage.store import Store
+from sprag.service.storage.studies.listing import StudyFilter
 from sprag.worker import models
 from sprag.worker.ports import Chunk
 from sprag.worker.states import StudyState, TransitionError

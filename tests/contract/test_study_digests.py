@@ -8,7 +8,7 @@ import sqlalchemy as sa
 from sprag.service.jobs.housekeeping import Scrubbing
 from sprag.service.storage.errors import DatabaseError
 from sprag.service.storage.store import Store
-from sprag.service.storage.study_digests import WITH_DIGEST, digest_of_study
+from sprag.service.storage.studies.study_digests import WITH_DIGEST, digest_of_study
 from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.inline import InlineExecutor

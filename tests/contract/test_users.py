@@ -18,12 +18,12 @@ from sprag.service.faults import FaultError
 from sprag.service.spec.components import Component
 from sprag.service.spec.labels import StudyChange
 from sprag.service.spec.saved_views import View
-from sprag.service.storage import studies as studies_of_store
-from sprag.service.storage.audit import AuditFilter
 from sprag.service.storage.errors import IdempotencyConflictError, NotOwnerError, UserExistsError, UserNotFoundError
-from sprag.service.storage.people import STUDY_BYTES, TEXTS, Quota
-from sprag.service.storage.scopes import TokenScope
+from sprag.service.storage.people.audit import AuditFilter
+from sprag.service.storage.people.people import STUDY_BYTES, TEXTS, Quota
+from sprag.service.storage.people.scopes import TokenScope
 from sprag.service.storage.store import Store
+from sprag.service.storage.studies import studies as studies_of_store
 from sprag.service.storage.tables import STUDIES
 from sprag.worker.limits import MAX_NOTES_LENGTH
 from sprag.worker.states import StudyState
@@ -249,7 +249,7 @@ def test_an_ended_study_is_restored_over_the_quota_of_cases(store: Store) -> Non
 
 
 def _row(store: Store) -> dict[str, Any]:
-    from sprag.service.storage.study_row import study_row
+    from sprag.service.storage.studies.study_row import study_row
 
     return study_row({}, fakes.study(3), store.dispatchers.chunking)
 

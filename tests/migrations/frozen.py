@@ -16,7 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-from sprag.service.storage.sqlite_files import sqlite_driver
+from sprag.service.storage.database.sqlite_files import sqlite_driver
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import HEAD_REVISION
 from sprag.worker.chunking import Chunking

@@ -17,9 +17,9 @@ from sprag.migrations import REVISIONS
 from sprag.service.actor import Actor, Door, act_as
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage import maintenance
+from sprag.service.storage.database.session import Session
+from sprag.service.storage.database.sqlite_files import sqlite_driver
 from sprag.service.storage.errors import DatabaseError, SchemaError
-from sprag.service.storage.session import Session
-from sprag.service.storage.sqlite_files import sqlite_driver
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import HEAD_REVISION
 from sprag.worker import models

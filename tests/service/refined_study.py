@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sprag.service.spec.document import parse_spec
-from sprag.service.storage.records import CaseColumns
+from sprag.service.storage.studies.records import CaseColumns
 from sprag.worker import models
 from sprag.worker.models import ChunkResult
 from sprag.worker.planning import planner_of

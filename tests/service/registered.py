@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from sprag.service.settings import Settings
-from sprag.service.storage.session import Session
+from sprag.service.storage.database.session import Session
 from sprag.service.storage.tables import METADATA, results_table
 from sprag.worker import models
 from sprag.worker.models.model import Model

@@ -14,7 +14,7 @@ from sprag.service.results.unaffected import unaffected
 from sprag.service.schedules.deadline import finish_warnings
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.measured import parse_measured
-from sprag.service.storage import reuse
+from sprag.service.storage.rows import reuse
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
 from tests.service import refined_study, swept_study

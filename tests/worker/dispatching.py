@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from sprag.service.storage.part import SystemClock
-from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.store import Store
+from sprag.service.storage.studies.records import StudyRecord
 from sprag.worker.dispatcher import (
     Dispatcher,
 )

@@ -10,8 +10,8 @@ import pytest
 
 from sprag.service.actor import Actor, Door, Role, act_as
 from sprag.service.storage.part import SystemClock
-from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.store import Store
+from sprag.service.storage.studies.records import StudyRecord
 from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import (
     HEARTBEAT_SECONDS,

@@ -8,7 +8,7 @@ from functools import partialmethod
 import pytest
 
 from sprag.service.storage.store import Store
-from sprag.service.storage.work import Work
+from sprag.service.storage.work.work import Work
 from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import (
     POLL_SECONDS,

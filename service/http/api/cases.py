@@ -21,7 +21,7 @@ from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs.case_pages import by_number, case_page
 from sprag.service.results.directions import case_units, case_values
 from sprag.service.results.exports import row_json, rows_json
-from sprag.service.storage.records import CaseRow
+from sprag.service.storage.studies.records import CaseRow
 from sprag.service.views.curves import pairs
 from sprag.service.views.explore import selection
 from sprag.service.views.study_questions import CasesQuestion

@@ -17,8 +17,8 @@ from sprag.service.http.respond import choose_format, json_response, page_respon
 from sprag.service.http.routers import api_router
 from sprag.service.http.threads import in_thread, iterated
 from sprag.service.results.exports.audit import AUDIT_FORMATS, audit_pieces, entry_json
-from sprag.service.storage.audit import audit_filter
-from sprag.service.storage.people import Quota
+from sprag.service.storage.people.audit import audit_filter
+from sprag.service.storage.people.people import Quota
 from sprag.worker.limits import MAX_PAGE_SIZE
 
 if TYPE_CHECKING:

@@ -34,7 +34,7 @@ from sprag.service.views.study_questions import ReportQuestion
 
 if TYPE_CHECKING:
     from sprag.service.jobs.library import Library
-    from sprag.service.storage.records import StudyRecord
+    from sprag.service.storage.studies.records import StudyRecord
 
 _LOG = logging.getLogger("sprag.service")
 router = api_router("results", "/studies/{study_id:study}")

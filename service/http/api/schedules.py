@@ -28,7 +28,7 @@ from sprag.service.schedules.times import ALIASES
 from sprag.service.spec.described import schemas
 from sprag.service.storage.editions import require_edition
 from sprag.service.storage.errors import ChangedMeanwhileError
-from sprag.service.storage.runs import ScheduleRecord
+from sprag.service.storage.schedules.runs import ScheduleRecord
 from sprag.worker.codes import FLAG_MASKS
 from sprag.worker.limits import MAX_NAME_LENGTH
 

@@ -19,7 +19,7 @@ from sprag.service.views.studies import STUDY_VIEWS
 from sprag.service.views.study_view import study_file
 
 if TYPE_CHECKING:
-    from sprag.service.storage.records import StudyRecord
+    from sprag.service.storage.studies.records import StudyRecord
     from sprag.service.views.study_view import StudyView
 
 router = api_router("results", "/studies/{study_id:study}")

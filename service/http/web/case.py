@@ -39,7 +39,7 @@ from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
     from sprag.service.http.context import Context
-    from sprag.service.storage.records import CaseRow
+    from sprag.service.storage.studies.records import CaseRow
     from sprag.worker.study import Study
 
 router = page_router()

@@ -40,7 +40,7 @@ from sprag.service.results.figures.read import read_figure
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.pictures.curves import draw_compare
 from sprag.service.storage.errors import StudyNotFoundError
-from sprag.service.storage.listing import StudyFilter
+from sprag.service.storage.studies.listing import StudyFilter
 from sprag.worker import models
 from sprag.worker.limits import MAX_SEARCH_LENGTH
 
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from starlette.datastructures import QueryParams
 
     from sprag.service.reading.reader import Choice, Reading
-    from sprag.service.storage.records import StudyRecord
+    from sprag.service.storage.studies.records import StudyRecord
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
 

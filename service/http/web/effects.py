@@ -28,7 +28,7 @@ from sprag.worker import models
 if TYPE_CHECKING:
     from sprag.service.answers.results import ResultSensitivity
     from sprag.service.http.context import Context
-    from sprag.service.storage.records import StudyRecord
+    from sprag.service.storage.studies.records import StudyRecord
 
 router = page_router()
 

@@ -25,7 +25,7 @@ from sprag.service.views.front import FrontView
 from sprag.service.views.study_questions import FrontQuestion
 
 if TYPE_CHECKING:
-    from sprag.service.storage.records import StudyRecord
+    from sprag.service.storage.studies.records import StudyRecord
 
 router = page_router()
 

@@ -14,7 +14,7 @@ from sprag.service.http.routers import page_router
 from sprag.service.http.web.form.check import message
 from sprag.service.http.web.templates import page
 from sprag.service.results.exports.audit import entry_json
-from sprag.service.storage.audit import AuditPage, audit_filter
+from sprag.service.storage.people.audit import AuditPage, audit_filter
 
 router = page_router()
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from sprag.service.answers import Value
     from sprag.service.faults import Fault
     from sprag.service.http.context import Context
-    from sprag.service.storage.records import CaseRow
+    from sprag.service.storage.studies.records import CaseRow
     from sprag.worker.study import Study
 
 router = page_router()

@@ -42,7 +42,7 @@ from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.regimes import DOUBTFUL, ORDER, counted
 from sprag.service.results.shown_inputs import inputs, run_settings
 from sprag.service.spec.narrow import narrowed_cases
-from sprag.service.storage.records import Kinds
+from sprag.service.storage.studies.records import Kinds
 from sprag.service.views.study_view import FEW
 from sprag.worker import models
 from sprag.worker.limits import MAX_CASES, NARROW_STEPS

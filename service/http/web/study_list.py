@@ -30,8 +30,8 @@ from sprag.service.presets import preset_names
 from sprag.service.spec.labels import StudyChange, read_change, tags_of
 from sprag.service.spec.report import SpecError
 from sprag.service.storage.errors import ChangedMeanwhileError, StoreError
-from sprag.service.storage.listing import StudyFilter
-from sprag.service.storage.records import StudyPage
+from sprag.service.storage.studies.listing import StudyFilter
+from sprag.service.storage.studies.records import StudyPage
 from sprag.worker import models
 from sprag.worker.limits import MAX_PAGE_TOKEN, MAX_SEARCH_LENGTH
 from sprag.worker.states import StudyState

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from email.message import EmailMessage
 
     from sprag.service.delivery import Delivery, MailServer
-    from sprag.service.storage.reports import Claimed
+    from sprag.service.storage.schedules.reports import Claimed
 
 #: Seconds for each step of sending.
 TIMEOUT: Final = 30.0

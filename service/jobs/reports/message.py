@@ -23,7 +23,7 @@ from sprag.service.schedules.times import wall_clock
 
 if TYPE_CHECKING:
     from sprag.service.delivery import Delivery
-    from sprag.service.storage.reports import Claimed
+    from sprag.service.storage.schedules.reports import Claimed
 
 _CURVE: Final = "curve"
 #: What the addresses of `links` lead to.

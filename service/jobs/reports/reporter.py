@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import ssl
 
     from sprag.service.delivery import Delivery
-    from sprag.service.storage.reports import Claimed
+    from sprag.service.storage.schedules.reports import Claimed
     from sprag.service.storage.store import Store
 
 _LOG = logging.getLogger("sprag.reports")

@@ -17,7 +17,7 @@ from sprag.service.schedules.times import local_time, wall_clock
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from sprag.service.storage.runs import ExpectedRun
+    from sprag.service.storage.schedules.runs import ExpectedRun
     from sprag.service.storage.store import Store
 
 _LOG = logging.getLogger("sprag.watchdog")

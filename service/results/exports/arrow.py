@@ -16,7 +16,7 @@ from sprag.worker.directions import SWEEP
 
 if TYPE_CHECKING:
     from sprag.service.results.exports.source import Source
-    from sprag.service.storage.records import RowBlock
+    from sprag.service.storage.studies.records import RowBlock
 
 #: Rows of one group of a Parquet file: about 20 MB of numbers.
 _GROUP_ROWS: Final = 50_000

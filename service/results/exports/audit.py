@@ -14,7 +14,7 @@ from sprag.service.spec.csv_text import escape
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from sprag.service.storage.audit import AuditRecord
+    from sprag.service.storage.people.audit import AuditRecord
 
 AuditFormat = Literal["json", "csv", "jsonl"]
 #: Formats of the log; `json` is a page of it.

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag.service.formats import Header
-    from sprag.service.storage.records import RowBlock, StudyRecord
     from sprag.service.storage.store import Store
+    from sprag.service.storage.studies.records import RowBlock, StudyRecord
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
 

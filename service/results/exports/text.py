@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from sprag.service.answers.results import Case
     from sprag.service.reading.quantities import Units
     from sprag.service.results.exports.source import Source
-    from sprag.service.storage.records import CaseRow, RowBlock
+    from sprag.service.storage.studies.records import CaseRow, RowBlock
     from sprag.worker.study import Study
 
 #: Spreadsheets interpret cells that begin with these characters as formulas.

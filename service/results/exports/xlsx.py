@@ -19,7 +19,7 @@ from sprag.service.results.exports.spool import spooled
 
 if TYPE_CHECKING:
     from sprag.service.results.exports.source import Source
-    from sprag.service.storage.records import RowBlock
+    from sprag.service.storage.studies.records import RowBlock
 
 #: Rows of a sheet, including those of units and names; further cases continue on another sheet.
 SHEET_ROWS: Final = 1_048_576

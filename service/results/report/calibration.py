@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from sprag.service.results.calibration import Calibration
     from sprag.service.results.curves import Fetch
-    from sprag.service.storage.records import RoundRecord
+    from sprag.service.storage.studies.records import RoundRecord
     from sprag.worker.study import Study
 
 

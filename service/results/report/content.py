@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     from sprag.service.results.curves import CurveQuery
     from sprag.service.results.figures.figure import Figure
     from sprag.service.results.key_answers import Found, StudyAnswers
-    from sprag.service.storage.records import Kinds, RowBlock, StudyRecord
     from sprag.service.storage.store import Store
+    from sprag.service.storage.studies.records import Kinds, RowBlock, StudyRecord
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
 

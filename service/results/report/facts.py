@@ -15,7 +15,7 @@ from sprag.service.reading.wording import number
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from sprag.service.storage.records import StudyRecord
+    from sprag.service.storage.studies.records import StudyRecord
     from sprag.worker.study import Study
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag.service.results.curves import Fetch
-    from sprag.service.storage.records import CaseColumns
+    from sprag.service.storage.studies.records import CaseColumns
     from sprag.worker.study import Study
 
 

@@ -13,8 +13,8 @@ import pytest
 
 from sprag.service.cli.app import command_line, execute
 from sprag.service.jobs import local
-from sprag.service.storage.audit import AuditFilter
-from sprag.service.storage.scopes import TokenScope
+from sprag.service.storage.people.audit import AuditFilter
+from sprag.service.storage.people.scopes import TokenScope
 from sprag.service.storage.store import Store
 from tests.contract.filling import create, finish
 from tests.migrations.frozen import thaw

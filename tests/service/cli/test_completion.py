@@ -17,7 +17,7 @@ from sprag.service.actor import Role
 from sprag.service.cli import completion
 from sprag.service.cli.app import app
 from sprag.service.settings import Settings
-from sprag.service.storage.scopes import TokenScope
+from sprag.service.storage.people.scopes import TokenScope
 from sprag.worker.models import ENDING_SENTENCES, REGIME_SENTENCES, flags_of, model_names
 from tests.conftest import ROOT
 from tests.service.conftest import Service

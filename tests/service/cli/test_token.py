@@ -12,8 +12,8 @@ import pytest
 from sprag.service import languages
 from sprag.service.actor import Role
 from sprag.service.cli.app import execute
-from sprag.service.storage.people import digest_of
-from sprag.service.storage.scopes import TokenScope
+from sprag.service.storage.people.people import digest_of
+from sprag.service.storage.people.scopes import TokenScope
 from sprag.service.storage.store import Store
 
 if TYPE_CHECKING:

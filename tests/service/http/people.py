@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from sprag.service.actor import Door, Role, act_as, of_machine
 from sprag.service.http.app import create_app
-from sprag.service.storage.scopes import TokenScope
+from sprag.service.storage.people.scopes import TokenScope
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -14,7 +14,7 @@ import pytest
 from sprag.service.actor import Door, Role
 from sprag.service.http.api import examples
 from sprag.service.http.roles import ROLES
-from sprag.service.storage.audit import AuditFilter
+from sprag.service.storage.people.audit import AuditFilter
 from tests.service.calibrating import CALIBRATE
 from tests.service.http.people import OWN, Office
 from tests.service.swept_study import swept_study

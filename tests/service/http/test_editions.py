@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import pytest
 
     from sprag.service.schedules.fields import ScheduleFields
-    from sprag.service.storage.runs import ScheduleRecord
+    from sprag.service.storage.schedules.runs import ScheduleRecord
 
 
 def _ended(service: Service) -> str:

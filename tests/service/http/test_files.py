@@ -12,7 +12,7 @@ import httpx
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag.service.http.api import curves
+from sprag.service.http.api import results as results_of_api
 from sprag.service.http.kept_files import KeptFiles
 from tests.service.conftest import API, Service
 
@@ -82,7 +82,7 @@ def test_every_format_in_parts_is_the_whole(service: Service, ended: str) -> Non
 def test_a_large_study_is_streamed_unless_a_part_is_asked_for(
     service: Service, ended: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(curves, "_AT_ONCE", 8)
+    monkeypatch.setattr(results_of_api, "_AT_ONCE", 8)
     streamed = results(service, ended, "csv", Accept_Encoding="identity")
     assert "accept-ranges" not in streamed.headers
     assert results(service, ended, "csv", Range="bytes=0-9").content == streamed.content[:10]

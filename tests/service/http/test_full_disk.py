@@ -15,9 +15,9 @@ import httpx
 import pytest
 
 from sprag.service.formats import FORMATS
-from sprag.service.http.api import curves
+from sprag.service.http.api import results as results_of_api
 from sprag.service.results.exports import netcdf
-from sprag.service.storage.cases import Rows
+from sprag.service.storage.rows.rows import Rows
 from tests.service.conftest import API, Service
 from tests.serving import served
 
@@ -126,7 +126,7 @@ def test_rows_that_are_not_read_are_missed(
             Rows, "block", lambda self, study, after, limit: read(self, study, after if after < 5 else 99, limit)
         )
         assert ask(service, ended, form).status_code == 503
-        patch.setattr(curves, "_AT_ONCE", 0)  # as a large study, which is sent while it is read
+        patch.setattr(results_of_api, "_AT_ONCE", 0)  # as a large study, which is sent while it is read
         with served(service.app) as address:
             if form in (*BUILT, "parquet"):  # nothing is sent before all rows of a group are read
                 assert httpx.get(f"{address}{API}/studies/{ended}/results?format={form}").status_code == 503

@@ -15,12 +15,12 @@ from starlette.middleware import gzip
 
 from sprag.service.formats import FORMATS
 from sprag.service.http import guard, looks, work
-from sprag.service.http.api import curves
+from sprag.service.http.api import results as results_of_api
 from sprag.service.http.compression import Compression
 from sprag.service.http.problems import ApiError
 from sprag.service.http.threads import _NUMBERS, ThreadedRoute, Threads
 from sprag.service.jobs import row_files
-from sprag.service.storage.scopes import TokenScope
+from sprag.service.storage.people.scopes import TokenScope
 from sprag.worker.limits import FILE_PROCESSES, MAX_FILES_EACH, MAX_STREAMS_EACH, SENDING_PROCESSES, WRITING_THREADS
 from tests.service.conftest import API, Service
 
@@ -273,7 +273,7 @@ def test_the_wait_for_earlier_files_of_a_token_ends(
 def test_rows_that_are_read_slowly_leave_a_process_for_files(
     service: Service, ended: str, tokens: dict[str, str], portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(curves, "_AT_ONCE", 0)
+    monkeypatch.setattr(results_of_api, "_AT_ONCE", 0)
     assert SENDING_PROCESSES < FILE_PROCESSES
 
     async def export() -> None:

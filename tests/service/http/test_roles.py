@@ -17,7 +17,7 @@ from sprag.service.http.access import Grant
 from sprag.service.http.guard import OPEN_PATHS
 from sprag.service.http.handlers import install
 from sprag.service.http.roles import LOOKING, ROLES, require_role, role_needed
-from sprag.service.storage.scopes import TokenScope
+from sprag.service.storage.people.scopes import TokenScope
 from tests.service.http.people import NAMES, OWN, Office
 from tests.service.http.routes import every_route
 from tests.service.timed_spec import SPEC

@@ -20,7 +20,7 @@ from sprag.service.http import access
 from sprag.service.http.app import create_app
 from sprag.service.settings import Settings
 from sprag.service.storage.errors import TokenNotFoundError
-from sprag.service.storage.scopes import TokenScope
+from sprag.service.storage.people.scopes import TokenScope
 from sprag.service.storage.store import Store
 from sprag.worker.states import StudyState
 from tests.service.timed_spec import SPEC

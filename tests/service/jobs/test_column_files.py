@@ -17,7 +17,7 @@ from sprag.service.jobs import columns as module
 from sprag.service.jobs import explore
 from sprag.service.jobs.column_files import ColumnFiles
 from sprag.service.jobs.columns import Columns
-from sprag.service.storage.columns import RowColumns
+from sprag.service.storage.rows.columns import RowColumns
 from sprag.worker.pool.child_pool import JobStoppedError
 from sprag.worker.states import StudyState
 from tests.service.conftest import Service

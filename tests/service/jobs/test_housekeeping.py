@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from sprag.service.jobs.housekeeping import Housekeeping
-from sprag.service.storage import purging
 from sprag.service.storage.errors import DatabaseBusyError, StudyNotFoundError
-from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.store import Store
+from sprag.service.storage.studies import purging
+from sprag.service.storage.studies.records import StudyRecord
 from sprag.worker.chunking import Chunking
 from tests.worker import fakes
 

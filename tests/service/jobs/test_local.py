@@ -19,10 +19,10 @@ import pytest
 from sprag.service.jobs import dispatching
 from sprag.service.jobs.dispatching import StopFlag, WorkerSettings, run_dispatcher, start_dispatcher_process
 from sprag.service.jobs.local import RunInterruptedError, StudyHeldError, run_here
-from sprag.service.storage import room
-from sprag.service.storage.lock import DispatcherLock
-from sprag.service.storage.records import Progress
+from sprag.service.storage.database.lock import DispatcherLock
 from sprag.service.storage.store import Store
+from sprag.service.storage.studies.records import Progress
+from sprag.service.storage.work import room
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
 from sprag.worker.executors.inline import InlineExecutor

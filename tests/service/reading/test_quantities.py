@@ -27,7 +27,7 @@ from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.read import read_figure, read_map
 from sprag.service.results.pictures.curves import paint_figure, painting
 from sprag.service.spec.document import parse_spec
-from sprag.service.storage.records import CaseColumns
+from sprag.service.storage.studies.records import CaseColumns
 from sprag.worker import models
 from sprag.worker.models.vocabulary import caption
 from tests.service.spec_sample import changed

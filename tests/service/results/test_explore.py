@@ -15,7 +15,7 @@ from sprag.service.http.web.figures.linked import GRID, HEIGHT, TOP, linked
 from sprag.service.results.explore import ExploreQuery, explore, explored_json, histogram, plan_of
 from sprag.service.results.figures.explore import explore_figure
 from sprag.service.spec.document import parse_spec
-from sprag.service.storage.columns import RowColumns
+from sprag.service.storage.rows.columns import RowColumns
 from sprag.worker import models
 from sprag.worker.study import Axis
 

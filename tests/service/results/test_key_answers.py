@@ -17,7 +17,7 @@ from sprag.service.results.figures.answers import answers_figure
 from sprag.service.results.key_answer_words import answer_facts, note_of, report
 from sprag.service.results.key_answers import answers_query, find_answers
 from sprag.service.spec.document import parse_spec
-from sprag.service.storage.records import CaseColumns
+from sprag.service.storage.studies.records import CaseColumns
 from sprag.worker import models
 
 if TYPE_CHECKING:

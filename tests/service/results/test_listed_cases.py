@@ -18,7 +18,7 @@ from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import completed, main_query, no_curves
 from sprag.service.results.key_answers import answers_query, find_answers
 from sprag.service.spec.document import parse_spec
-from sprag.service.storage.records import CaseColumns
+from sprag.service.storage.studies.records import CaseColumns
 from sprag.worker import models
 
 if TYPE_CHECKING:

@@ -26,7 +26,7 @@ from sprag.service.results.figures.figure import BANDS, Figure, Line
 from sprag.service.results.pictures.curves import paint_figure, painting
 from sprag.service.results.report.content import report_of
 from sprag.service.results.rounds import sentence
-from sprag.service.storage.records import CaseColumns, RoundProgress, RoundRecord
+from sprag.service.storage.studies.records import CaseColumns, RoundProgress, RoundRecord
 from sprag.worker import models
 from sprag.worker.states import StudyState
 from sprag.worker.study import Study

@@ -21,7 +21,7 @@ from sprag.service.results.pictures.maps import draw_map as paint_map
 from sprag.service.results.report import write_report
 from sprag.service.results.report.content import report_of
 from sprag.service.results.report.document import TitleBlock
-from sprag.service.storage.records import CaseColumns
+from sprag.service.storage.studies.records import CaseColumns
 from sprag.worker import models
 from sprag.worker.study import Study
 from tests.service.conftest import API, Service

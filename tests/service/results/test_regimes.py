@@ -17,7 +17,7 @@ from sprag.service.results.pictures.curves import draw_compare, draw_curves
 from sprag.service.results.pictures.maps import draw_map as paint_map
 from sprag.service.results.regimes import MARKS, counted, regimes_of, stretches
 from sprag.service.spec.document import parse_spec
-from sprag.service.storage.records import CaseColumns
+from sprag.service.storage.studies.records import CaseColumns
 from sprag.worker import models
 from sprag.worker.study import Study
 from tests.service.spec_sample import changed

@@ -20,7 +20,7 @@ from sprag.service.results.curves import Fetch
 from sprag.service.results.sensitivity import sensitivity
 from sprag.service.results.unaffected import unaffected
 from sprag.service.spec.draws.unit import LEVELS
-from sprag.service.storage.records import CaseColumns
+from sprag.service.storage.studies.records import CaseColumns
 from sprag.worker import models
 from sprag.worker.models import ChunkResult
 from sprag.worker.study import Study

@@ -22,7 +22,7 @@ from sprag.service.results.sensitivity import sensitivity
 from sprag.service.results.tolerances.batch import Asked
 from sprag.service.results.tolerances.yields import yields
 from sprag.service.spec.document import parse_spec
-from sprag.service.storage.records import CaseColumns, RowBlock
+from sprag.service.storage.studies.records import CaseColumns, RowBlock
 from sprag.worker import models
 from sprag.worker.models.usable import against
 from sprag.worker.planning.goals.plan import GoalPlan

@@ -20,9 +20,9 @@ from sprag.service.jobs.reports.watchdog import Watchdog, late_runs
 from sprag.service.jobs.scheduler import Scheduler
 from sprag.service.schedules.fields import read_fields
 from sprag.service.storage import deployment, maintenance
-from sprag.service.storage.audit import AuditFilter
+from sprag.service.storage.database.session import Session
 from sprag.service.storage.moving import move
-from sprag.service.storage.session import Session
+from sprag.service.storage.people.audit import AuditFilter
 from sprag.service.storage.store import Store
 from tests import postgres
 from tests.service.conftest import InThread

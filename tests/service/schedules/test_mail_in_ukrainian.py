@@ -18,7 +18,7 @@ from sprag.service.delivery import Delivery, DeliverySettings
 from sprag.service.jobs.reports.message import mail, sentence, webhook_body
 from sprag.service.languages import recorded
 from sprag.service.schedules.outcomes import Outcome, Result
-from sprag.service.storage.reports import Claimed
+from sprag.service.storage.schedules.reports import Claimed
 from sprag.worker.order import Coverage
 
 NIGHT = datetime(2026, 11, 23, 1, tzinfo=UTC)

@@ -12,7 +12,7 @@ from sprag.service.schedules.deadline import FinishError
 from sprag.service.schedules.fields import ScheduleFields, change_fields, read_fields
 from sprag.service.schedules.policies import CatchUp, DueTime, Policies, check_grace, due_times
 from sprag.service.schedules.times import ALIASES, Timing, wall_clock
-from sprag.service.storage.runs import RunState
+from sprag.service.storage.schedules.runs import RunState
 from sprag.worker.states import StudyState
 from tests.service.schedules.conftest import NEW_YEAR
 from tests.service.timed_spec import SPEC

@@ -24,8 +24,8 @@ from sprag.service.jobs.reports.message import mail, subject
 from sprag.service.jobs.reports.reporter import Reporter
 from sprag.service.jobs.scheduler import Scheduler
 from sprag.service.schedules.fields import read_fields
-from sprag.service.storage.audit import AuditFilter
-from sprag.service.storage.reports import CLAIM, Claimed, ReportRecord, ReportState
+from sprag.service.storage.people.audit import AuditFilter
+from sprag.service.storage.schedules.reports import CLAIM, Claimed, ReportRecord, ReportState
 from sprag.service.storage.store import Store
 from tests.service.schedules.conftest import NEW_YEAR
 from tests.service.schedules.receivers import Hook, certificate, mail_server, webhook

@@ -11,7 +11,7 @@ import pytest
 from sprag.service.jobs.scheduler import Scheduler
 from sprag.service.schedules.fields import ScheduleFields, change_fields, read_fields
 from sprag.service.settings import Settings
-from sprag.service.storage.runs import RunState
+from sprag.service.storage.schedules.runs import RunState
 from sprag.service.storage.store import Store
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.inline import InlineExecutor

@@ -17,7 +17,7 @@ from sprag.service.jobs.scheduler import Scheduler
 from sprag.service.schedules.fields import ScheduleFields, read_fields
 from sprag.service.schedules.policies import DueTime
 from sprag.service.storage.errors import DatabaseBusyError, ScheduleNotFoundError
-from sprag.service.storage.runs import RunState
+from sprag.service.storage.schedules.runs import RunState
 from sprag.service.storage.store import Store
 from sprag.worker.states import StudyState
 from tests.service.conftest import Service
@@ -192,7 +192,9 @@ def test_a_scheduler_that_dies_as_it_submits_is_made_up_for_once(
     kept = service.store.schedules.create(fields(at="2026-01-01T02:00"))
     clock.set("2026-01-01T02:00")
     with monkeypatch.context() as patch:
-        patch.setattr("sprag.service.storage.runs.inherit_figures", Mock(side_effect=DatabaseBusyError("busy")))
+        patch.setattr(
+            "sprag.service.storage.schedules.runs.inherit_figures", Mock(side_effect=DatabaseBusyError("busy"))
+        )
         with pytest.raises(DatabaseBusyError):
             Scheduler(service.store).look()
     assert names(service.store) == [], "neither the study nor its outcome is there"

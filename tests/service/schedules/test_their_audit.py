@@ -8,8 +8,8 @@ from sprag.service.actor import Actor, Door, Role, act_as
 from sprag.service.jobs.maintenance import Maintenance, MaintenancePlan
 from sprag.service.jobs.scheduler import Scheduler
 from sprag.service.schedules.fields import change_fields, read_fields
-from sprag.service.storage.audit import AuditFilter
-from sprag.service.storage.people import Quota
+from sprag.service.storage.people.audit import AuditFilter
+from sprag.service.storage.people.people import Quota
 from tests.service.schedules.conftest import NEW_YEAR
 from tests.service.timed_spec import SPEC
 

@@ -19,7 +19,7 @@ HEAD = """
 import os, sys
 from pathlib import Path
 from sprag.service.storage.errors import DatabaseFullError
-from sprag.service.storage.lock import DispatcherLock
+from sprag.service.storage.database.lock import DispatcherLock
 from sprag.service.storage.readiness import Readiness
 from sprag.service.storage.store import Store
 from sprag.worker.chunking import Chunking

@@ -14,12 +14,12 @@ import sqlalchemy as sa
 
 from sprag.service.cli.app import execute
 from sprag.service.storage import maintenance, moved_rows
+from sprag.service.storage.database.lock import DispatcherLock
+from sprag.service.storage.database.session import Session
 from sprag.service.storage.errors import DatabaseError, SchemaError
-from sprag.service.storage.lock import DispatcherLock
 from sprag.service.storage.moved_rows import TableOf
 from sprag.service.storage.moving import Moved, move
-from sprag.service.storage.scopes import TokenScope
-from sprag.service.storage.session import Session
+from sprag.service.storage.people.scopes import TokenScope
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import all_tables
 from sprag.worker.states import ChunkState

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from sprag.service.storage import one_name
+from sprag.service.storage.database import one_name
 from sprag.service.storage.errors import DatabaseError
 from sprag.service.storage.readiness import Readiness
 from sprag.service.storage.store import Store

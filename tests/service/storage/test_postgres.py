@@ -23,11 +23,11 @@ from sprag.service.http.app import chunking, create_app
 from sprag.service.jobs import dispatching
 from sprag.service.jobs.dispatching import WorkerSettings, run_dispatcher
 from sprag.service.settings import Settings
-from sprag.service.storage import postgres as storage
-from sprag.service.storage import session as session_module
+from sprag.service.storage.database import postgres as storage
+from sprag.service.storage.database import session as session_module
+from sprag.service.storage.database.server_lock import ServerLock
+from sprag.service.storage.database.session import Session
 from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, SchemaError
-from sprag.service.storage.server_lock import ServerLock
-from sprag.service.storage.session import Session
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import HEAD_REVISION, STUDIES, all_tables
 from sprag.worker import models
@@ -86,8 +86,8 @@ def test_other_machines_are_spoken_to_in_secret(url: str, mode: str | None) -> N
 
 
 def test_without_the_driver_the_command_that_brings_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(sys.modules, "sprag.service.storage.postgres")
-    monkeypatch.delattr("sprag.service.storage.postgres")
+    monkeypatch.delitem(sys.modules, "sprag.service.storage.database.postgres")
+    monkeypatch.delattr("sprag.service.storage.database.postgres")
     monkeypatch.setitem(sys.modules, "psycopg", None)
     with refused(DatabaseError, "missing-extra"):
         Session("postgresql://localhost/sprag")
@@ -326,7 +326,7 @@ def test_workers_share_studies_and_take_over_those_of_one_that_is_killed_or_lose
 #: Takes the dispatcher's lock, begins to write, and stands still.
 STOPPED = """
 import os, signal, sys
-from sprag.service.storage.session import Session
+from sprag.service.storage.database.session import Session
 session = Session(sys.argv[1])
 with session.write() as connection:
     print("ready", flush=True)

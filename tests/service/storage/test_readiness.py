@@ -19,10 +19,10 @@ from sprag.service.http.app import create_app
 from sprag.service.jobs import dispatching
 from sprag.service.jobs.dispatching import WorkerSettings, require_file, run_dispatcher
 from sprag.service.settings import Settings
+from sprag.service.storage.database.lock import DispatcherLock
+from sprag.service.storage.database.sqlite_files import sqlite_driver
 from sprag.service.storage.errors import DatabaseError, DatabaseFullError
-from sprag.service.storage.lock import DispatcherLock
 from sprag.service.storage.readiness import Readiness
-from sprag.service.storage.sqlite_files import sqlite_driver
 from sprag.service.storage.store import Store
 from sprag.worker.executors.inline import InlineExecutor
 from sprag.worker.pool.process_table import processor_seconds, start_time
@@ -35,8 +35,8 @@ from tests.worker import fakes
 STOPPED = """
 import os, signal, sys
 from pathlib import Path
-from sprag.service.storage.lock import DispatcherLock
-from sprag.service.storage.session import Session
+from sprag.service.storage.database.lock import DispatcherLock
+from sprag.service.storage.database.session import Session
 session = Session(f"sqlite:///{sys.argv[1]}")
 lock = DispatcherLock(Path(sys.argv[1]))
 assert lock.take()

@@ -12,10 +12,10 @@ import sqlalchemy as sa
 
 from sprag.sentences import WarningText
 from sprag.service.results.exports.source import stored
-from sprag.service.storage.origins import CasesOf
 from sprag.service.storage.part import SystemClock
-from sprag.service.storage.records import StudyRecord
+from sprag.service.storage.rows.origins import CasesOf
 from sprag.service.storage.store import Store
+from sprag.service.storage.studies.records import StudyRecord
 from sprag.service.storage.tables import CHUNKS
 from sprag.worker import fingerprint, models
 from sprag.worker.chunking import Chunking

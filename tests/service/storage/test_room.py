@@ -10,8 +10,8 @@ import pytest
 import sqlalchemy as sa
 
 from sprag.service.storage.errors import DatabaseFullError
-from sprag.service.storage.room import RESERVE_BYTES
 from sprag.service.storage.store import Store
+from sprag.service.storage.work.room import RESERVE_BYTES
 from sprag.worker.chunking import Chunking
 from sprag.worker.ports import StoreFullError
 from tests.faults import refused

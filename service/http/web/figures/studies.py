@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from sprag.service.http.work import Work
     from sprag.service.jobs.library import Library
     from sprag.service.reading.reader import Choice
-    from sprag.service.storage.records import StudyRecord
+    from sprag.service.storage.studies.records import StudyRecord
     from sprag.service.views.study_view import StudyView
     from sprag.worker.study import Study
 

@@ -15,7 +15,7 @@ from sprag.service.answers import results
 from sprag.service.results import exports
 from sprag.service.results.exports import Source, csv_pieces, json_pieces
 from sprag.service.spec.csv_text import escape
-from sprag.service.storage.records import RowBlock
+from sprag.service.storage.studies.records import RowBlock
 from sprag.worker import models
 from tests.service.shapes import fits
 

@@ -11,7 +11,7 @@ import pytest
 
 from sprag.service.answers import studies
 from sprag.service.http.api.examples import SPEC_TOML
-from sprag.service.storage.room import RESERVE_BYTES, Room
+from sprag.service.storage.work.room import RESERVE_BYTES, Room
 from tests.service.shapes import fits
 from tests.service.timed_spec import SPEC
 

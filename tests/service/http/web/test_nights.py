@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, Page, expect
 from sprag.service.http.app import chunking, create_app
 from sprag.service.jobs.scheduler import Scheduler
 from sprag.service.settings import Settings
-from sprag.service.storage.scopes import TokenScope
+from sprag.service.storage.people.scopes import TokenScope
 from sprag.service.storage.store import Store
 from sprag.worker.models import ChunkResult
 from tests.acceptance.processes import SECONDS

@@ -23,7 +23,7 @@ from sprag.service.client.frames import grid_of
 from sprag.service.formats import FORMATS, MEDIA_TYPES, SUFFIXES, Format, format_of
 from sprag.service.results import exports
 from sprag.service.results.exports import Source, xlsx
-from sprag.service.storage.records import RowBlock
+from sprag.service.storage.studies.records import RowBlock
 from sprag.worker import fingerprint, models
 from sprag.worker.study import Study
 from tests.service.conftest import made_up

@@ -19,7 +19,7 @@ from sprag.service.results.figures.motion import motion_figure, phase_figure
 from sprag.service.results.figures.portrait import portrait_figure
 from sprag.service.results.pictures.curves import paint_figure, painting
 from sprag.service.spec.document import parse_spec
-from sprag.service.storage.records import CaseColumns
+from sprag.service.storage.studies.records import CaseColumns
 from sprag.worker import models
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from sprag.service.results.figures.read import read_map
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.pictures import maps
 from sprag.service.spec.document import parse_spec
-from sprag.service.storage.records import CaseColumns
+from sprag.service.storage.studies.records import CaseColumns
 from sprag.worker import models
 
 if TYPE_CHECKING:

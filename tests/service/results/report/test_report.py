@@ -24,8 +24,8 @@ from sprag.service.results.report.document import Document, Image, Section, Tabl
 from sprag.service.results.report.pdf import pdf_report
 from sprag.service.results.report.sketch import sketches
 from sprag.service.spec.document import load_spec, parse_spec
-from sprag.service.storage import digests
 from sprag.service.storage.errors import DatabaseError
+from sprag.service.storage.rows import digests
 from sprag.service.storage.tables import results_table
 from sprag.worker import models
 from tests.faults import refused

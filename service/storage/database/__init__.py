@@ -1,0 +1,1 @@
+"""Where the data lie: an SQLite file or a PostgreSQL server."""

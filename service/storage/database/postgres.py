@@ -1,0 +1,235 @@
+"""PostgreSQL instead of SQLite: its URL, connections and transactions, its lock, and notifications of changes.
+
+Each writer holds an advisory lock for the length of its transaction. So the store has one writer at a time on a server
+too, and reasoning about SQLite's immediate transactions remains valid.
+"""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, Final
+
+import psycopg
+import sqlalchemy as sa
+from sqlalchemy.engine import URL
+
+from sprag.service.storage.database import binary_copy
+from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError, busy
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from sprag.service.storage.database.blocks import Block, Target
+
+#: First key of the advisory locks of Sprag ("SPRA" in ASCII), of which the second key gives the purpose; and of those
+#: of the dispatchers ("SPRB"), whose second key is the epoch.
+LOCKS: Final = 0x53505241
+EPOCHS: Final = 0x53505242
+WRITER, CHORES, USERS = 1, 2, 3
+#: Begins a write transaction.
+TAKE_WRITER: Final = f"SELECT pg_advisory_xact_lock({LOCKS}, {WRITER})"
+#: The channel of notifications about changed studies.
+CHANNEL: Final = "sprag"
+#: Older versions lack features that are used here, and are out of support.
+OLDEST_SERVER: Final = 140_000
+#: Seconds after which either side counts a silent connection as lost.
+LOST_SECONDS: Final = 5
+#: Seconds for which a process frozen in a transaction blocks the others.
+FROZEN_SECONDS: Final = 60
+#: Options of the URL that are passed on to the driver.
+URL_OPTIONS: Final = frozenset({"host", "passfile", "sslcert", "sslkey", "sslmode", "sslrootcert"})
+_LOCAL: Final = frozenset({"", "localhost", "127.0.0.1", "::1"})
+
+
+def checked(url: URL) -> URL:
+    """The URL with the driver, and with encryption required of every server that is not on this machine.
+
+    Raises DatabaseError for an invalid URL.
+    """
+    if url.drivername not in {"postgresql", "postgresql+psycopg"}:
+        raise DatabaseError(
+            f"the driver {url.get_driver_name()!r} is not supported; write postgresql://...", "invalid-database-url"
+        )
+    unknown = sorted(set(url.query) - URL_OPTIONS)
+    if unknown:
+        raise DatabaseError(
+            f"unknown option {', '.join(unknown)} in the PostgreSQL URL; allowed are {', '.join(sorted(URL_OPTIONS))}",
+            "invalid-database-url",
+        )
+    if not url.database:
+        raise DatabaseError(
+            f"{location(url)} names no database; a URL looks like postgresql://user@host/sprag", "invalid-database-url"
+        )
+    host = str(url.query.get("host", url.host or ""))
+    if "sslmode" not in url.query and host not in _LOCAL and not host.startswith("/"):
+        url = url.update_query_dict({"sslmode": "require"})
+    return url.set(drivername="postgresql+psycopg")
+
+
+def location(url: URL) -> str:
+    """The database for display: without password and options."""
+    shown = URL.create("postgresql", url.username, None, url.host, url.port, url.database)
+    return shown.render_as_string()
+
+
+def _arguments(lock_seconds: float) -> dict[str, Any]:
+    """Arguments of every connection; both client and server notice when the other is gone."""
+    server = {
+        "tcp_keepalives_idle": 2,
+        "tcp_keepalives_interval": 1,
+        "tcp_keepalives_count": LOST_SECONDS - 2,
+        "tcp_user_timeout": LOST_SECONDS * 1000,
+        "lock_timeout": int(lock_seconds * 1000),
+        "idle_in_transaction_session_timeout": FROZEN_SECONDS * 1000,
+    }
+    return {
+        "connect_timeout": LOST_SECONDS,
+        "keepalives_idle": 2,
+        "keepalives_interval": 1,
+        "keepalives_count": LOST_SECONDS - 2,
+        "tcp_user_timeout": LOST_SECONDS * 1000,
+        "application_name": "sprag",
+        "options": " ".join(f"-c {name}={value}" for name, value in server.items()),
+    }
+
+
+def make_engine(url: URL, *, lock_seconds: float, connections: int) -> sa.Engine:
+    """Connections to the server; a lost one is replaced before use."""
+    engine = sa.create_engine(
+        url,
+        connect_args=_arguments(lock_seconds),
+        pool_size=connections,
+        max_overflow=64,
+        pool_pre_ping=True,
+    )
+    sa.event.listen(engine, "first_connect", _require_version)
+    return engine
+
+
+def _require_version(connection: Any, _record: object) -> None:
+    version = connection.info.server_version
+    if version < OLDEST_SERVER:
+        raise DatabaseError(
+            f"PostgreSQL {version // 10_000} is too old; Sprag needs {OLDEST_SERVER // 10_000} or newer",
+            "unsupported-database",
+        )
+
+
+def connect(url: URL, lock_seconds: float, application: str = "sprag") -> psycopg.Connection[Any]:
+    """A connection outside the pool, in autocommit mode. Raises DatabaseError."""
+    given = {**_arguments(lock_seconds), "application_name": application[:63]}
+    dialect = url.get_dialect()()
+    _, named = dialect.create_connect_args(url)
+    try:
+        return psycopg.connect(autocommit=True, **{**named, **given})
+    except psycopg.Error as error:
+        raise explained(error, location(url)) or DatabaseError(
+            _unreachable(error, location(url)), "database-unreachable"
+        ) from None
+
+
+def _first_line(error: BaseException) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return lines[0] if lines else type(error).__name__
+
+
+def _unreachable(error: BaseException, where: str) -> str:
+    return f"the database {where} cannot be reached: {_first_line(error)}"
+
+
+def explained(error: BaseException, where: str) -> DatabaseError | None:
+    """The DatabaseError for an error of the driver that has an external cause; None for other errors."""
+    state = getattr(error, "sqlstate", None) or ""
+    if state in {"55P03", "40001", "40P01"}:
+        return busy(where)
+    if state == "53100":
+        return DatabaseFullError(f"the disk of the server that holds {where} is full")
+    if state.startswith(("53", "58")):
+        return DatabaseBusyError(f"the server of the database {where} has a problem: {_first_line(error)}")
+    if state == "42501":
+        return DatabaseError(f"permission denied in the database {where}: {_first_line(error)}", "database-forbidden")
+    if state == "25006":
+        return DatabaseError(
+            f"the database {where} is read-only; name the primary server, not its copy", "database-read-only"
+        )
+    # A lost connection has no state, or one of classes 08 (connection) and 57 (the server is shutting down).
+    if state.startswith(("08", "57")) or (not state and isinstance(error, psycopg.OperationalError)):
+        return DatabaseError(_unreachable(error, where), "database-unreachable")
+    return None
+
+
+def writer_is_free(connection: sa.Connection, seconds: float) -> bool:
+    """Whether the writers' lock can be acquired within ``seconds``; it is released immediately."""
+    until = time.monotonic() + seconds
+    while True:
+        if connection.exec_driver_sql(f"SELECT pg_try_advisory_xact_lock({LOCKS}, {WRITER})").scalar_one():
+            return True
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.05)
+
+
+def copy_blocks(connection: sa.Connection, place: Target, blocks: Iterable[Block]) -> None:
+    """Insert rows by a binary COPY; the server takes a block while the next one is built.
+
+    Raises sqlalchemy.exc.DBAPIError.
+    """
+    driver: psycopg.Connection[Any] | None = connection.connection.driver_connection
+    assert driver is not None
+    statement = f"COPY {place.table} ({', '.join(place.columns)}) FROM STDIN (FORMAT BINARY)"
+    try:
+        with driver.cursor() as cursor, cursor.copy(statement.encode()) as copy:
+            copy.write(binary_copy.HEADER)
+            for rows in blocks:
+                copy.write(binary_copy.encoded(place, rows))
+            copy.write(binary_copy.TRAILER)
+    except psycopg.Error as error:
+        raise sa.exc.DBAPIError(statement, None, error) from error
+
+
+def copy_in(connection: sa.Connection, table: str, rows: Iterable[tuple[Any, ...]]) -> None:
+    """Insert any rows by COPY; ``table`` is its name with its columns. Raises sqlalchemy.exc.DBAPIError."""
+    driver: psycopg.Connection[Any] | None = connection.connection.driver_connection
+    assert driver is not None
+    statement = f"COPY {table} FROM STDIN"
+    try:
+        with driver.cursor() as cursor, cursor.copy(statement.encode()) as copy:
+            for row in rows:
+                copy.write_row(row)
+    except psycopg.Error as error:
+        raise sa.exc.DBAPIError(statement, None, error) from error
+
+
+class News:
+    """Notifications of changed studies as soon as they are committed by any process."""
+
+    def __init__(self, url: URL, lock_seconds: float) -> None:
+        self._url = url
+        self._lock_seconds = lock_seconds
+        self._connection: psycopg.Connection[Any] | None = None
+
+    def wait(self, timeout: float) -> bool:
+        """Whether something has or may have changed since the last call; waits at most ``timeout`` s."""
+        try:
+            if self._connection is None:
+                self._connection = connect(self._url, self._lock_seconds)
+                self._connection.execute(f"LISTEN {CHANNEL}".encode())
+                return True  # earlier changes are not reported
+            heard = False
+            for _ in self._connection.notifies(timeout=timeout, stop_after=1):
+                heard = True
+            for _ in self._connection.notifies(timeout=0.0):
+                heard = True
+        except (psycopg.Error, DatabaseError):
+            self.close()
+            time.sleep(timeout)
+            return True
+        return heard
+
+    def close(self) -> None:
+        """Stop listening."""
+        connection, self._connection = self._connection, None
+        if connection is not None:
+            with suppress(psycopg.Error):
+                connection.close()

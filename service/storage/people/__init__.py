@@ -1,0 +1,1 @@
+"""Users, tokens, sessions, their shares, and what they changed."""

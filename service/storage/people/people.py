@@ -1,0 +1,394 @@
+"""People: users with the quotas of what belongs to them, tokens, and the sessions of browsers.
+
+A user has no password: users log in with a token of theirs, or a trusted proxy names them. A token is shown once and
+never stored; only its SHA-256 digest is. A digest without salt or key stretching is enough: a token consists of 256
+random bits, which nobody can guess. The cookie of a session contains its expiry and a signature, so a session needs no
+row of its own and a login no write: the database has the key that signs, and the sessions that were ended early.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import sqlalchemy as sa
+
+from sprag.sentences import Sentence
+from sprag.service.actor import Role, acting
+from sprag.service.faults import FaultError
+from sprag.service.languages import grouped, recorded
+from sprag.service.storage.components import COMPONENTS
+from sprag.service.storage.errors import TokenNotFoundError, UserExistsError, UserNotFoundError
+from sprag.service.storage.part import Part, micros_of, moment, optional_moment
+from sprag.service.storage.people.audit import note
+from sprag.service.storage.people.pools import pool_of
+from sprag.service.storage.people.scopes import TokenScope, TokenState
+from sprag.service.storage.people.tables import ENDED_SESSIONS, SESSION_KEY, TOKENS, USERS
+from sprag.service.storage.saved_views import SAVED_VIEWS
+from sprag.service.storage.schedules.tables import SCHEDULES
+from sprag.service.storage.tables import HELD_AT_DEADLINE, STUDIES
+from sprag.worker.states import TERMINAL
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from datetime import datetime
+
+    from sprag.service.settings import Settings
+
+_U = USERS.c
+#: The texts of a study, which people can make long.
+TEXTS: Final = ("name", "spec", "study", "warnings", "notes", "tags", "search")
+#: What the rest of a study takes: its row, its first chunk, its key, and their places in indexes.
+STUDY_BYTES: Final = 1024
+#: Condition: a study has not ended, and is not held at its deadline.
+WAITING_STUDY = STUDIES.c.state.not_in([state.value for state in TERMINAL]) & STUDIES.c.waits_for.is_distinct_from(
+    HELD_AT_DEADLINE
+)
+#: Prefix of a token, so that people and secret scanners recognise it.
+TOKEN_PREFIX: Final = "sprag_"  # noqa: S105 - the beginning of all tokens is no secret
+_TOKEN_BYTES: Final = 32
+_KEY_BYTES: Final = 32
+#: Primary key of the only row of the key's table.
+_ONLY: Final = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Quota:
+    """Limits of one user: cases that wait, bytes of results, simultaneous checks of specs.
+
+    0: no limit; None: as the settings have it.
+    """
+
+    cases: int | None = None
+    bytes: int | None = None
+    checks: int | None = None
+
+    def over(self, default: Quota) -> Quota:
+        """This quota, where it says nothing ``default``."""
+        return Quota(
+            *(getattr(default if getattr(self, name) is None else self, name) for name in ("cases", "bytes", "checks"))
+        )
+
+
+def quota_of(settings: Settings) -> Quota:
+    """The quota of users who have none of their own."""
+    return Quota(settings.user_cases, settings.user_storage * 2**20, settings.user_checks)
+
+
+@dataclass(frozen=True, slots=True)
+class UserRecord:
+    """A user; ``removed_at`` is None for one who may use the service. ``quota`` is the user's own."""
+
+    name: str
+    role: Role
+    created_at: datetime
+    removed_at: datetime | None
+    quota: Quota
+
+
+@dataclass(frozen=True, slots=True)
+class Usage:
+    """What belongs to a user: cases that wait, and rough bytes of results."""
+
+    cases: int
+    bytes: int
+
+
+@dataclass(frozen=True, slots=True)
+class TokenRecord:
+    """A token without its secret; ``digest`` is the SHA-256 of the secret in hexadecimal digits.
+
+    ``owner`` is the user whose token it is, None for nobody's; ``used_at`` the time of its last use, to the minute.
+    """
+
+    id: str
+    name: str
+    scope: TokenScope
+    digest: str
+    created_at: datetime
+    revoked_at: datetime | None
+    owner: str | None = None
+    expires_at: datetime | None = None
+    used_at: datetime | None = None
+
+    def state_at(self, now: datetime, user: UserRecord | None) -> TokenState:
+        """The state of the token; ``user`` is the record of its owner, None where there is none."""
+        if self.revoked_at is not None:
+            return TokenState.REVOKED
+        if self.owner is not None and (user is None or user.removed_at is not None):
+            return TokenState.USER_REMOVED
+        return TokenState.VALID if self.expires_at is None or now < self.expires_at else TokenState.EXPIRED
+
+
+def digest_of(token: bytes) -> str:
+    """The digest that is stored for a token."""
+    return hashlib.sha256(token).hexdigest()
+
+
+@dataclass(frozen=True, slots=True)
+class SessionSecrets:
+    """The data that validate sessions: the signing key, and the signatures of the sessions that were ended early."""
+
+    #: None before the very first login.
+    key: bytes | None
+    #: Signature and expiry (seconds since 1970-01-01 UTC).
+    ended: Mapping[str, int]
+
+
+class People(Part):
+    """The users of a database, their tokens, and the sessions of their browsers."""
+
+    #: Quotas of users who have none of their own; set by the service.
+    default_quota = Quota()
+
+    def add_user(self, name: str, role: Role, quota: Quota | None = None) -> UserRecord:
+        """Add a user; raises UserExistsError, also for the name of a removed one."""
+        values = {"name": name, "role": role.value, "created_at": self._now(), **_columns(quota or Quota())}
+        with self.session.write() as connection:
+            if connection.execute(sa.select(_U.name).where(_U.name == name)).first():
+                raise UserExistsError(f"there is a user {name!r} already, or was one, who can be restored")
+            row = connection.execute(sa.insert(USERS).values(values).returning(USERS)).one()
+            note(connection, self._now(), "user.add", name, role=role.value, **_set(quota))
+            return _user_record(row)
+
+    def users(self) -> tuple[UserRecord, ...]:
+        """Every user, removed ones included, by name."""
+        with self.session.read() as connection:
+            return tuple(map(_user_record, connection.execute(sa.select(USERS).order_by(_U.name)).all()))
+
+    def change_user(
+        self, name: str, role: Role | None = None, quota: Quota | None = None, *, removed: bool | None = None
+    ) -> UserRecord:
+        """Change the given fields of a user, whose studies, schedules and tokens are kept; raises UserNotFoundError.
+
+        A number of ``quota`` that is None is kept. Tokens of a removed user are worth nothing until the
+        user is restored.
+        """
+        given = {column: value for column, value in _columns(quota or Quota()).items() if value is not None}
+        values: dict[str, Any] = {**given, **({} if role is None else {"role": role.value})}
+        if removed is not None:
+            values["removed_at"] = sa.func.coalesce(_U.removed_at, self._now()) if removed else None
+        with self.session.write() as connection:
+            row = None
+            if values:
+                change = sa.update(USERS).where(_U.name == name).values(values).returning(USERS)
+                row = connection.execute(change).one_or_none()
+            if row is None:
+                raise UserNotFoundError(name)
+            action = "user.change" if removed is None else "user.remove" if removed else "user.restore"
+            said = {} if role is None else {"role": role.value}
+            note(connection, self._now(), action, name, **said, **_set(quota))
+            return _user_record(row)
+
+    def hand_over(self, name: str, heir: str) -> tuple[int, int]:
+        """Give the studies, schedules, components and views of a user to another; returns the numbers of the first two.
+
+        Raises UserNotFoundError.
+        """
+        with self.session.write() as connection:
+            for each in (name, heir):
+                require_user(connection, each, removed=each == name)
+            present = STUDIES.c.deleted_at.is_(None) | (STUDIES.c.purge_at > self._now())  # those can be restored
+            studies, schedules = (
+                connection.execute(
+                    sa.update(table)
+                    .where(table.c.owner == name, present if table is STUDIES else table.c.deleted_at.is_(None))
+                    .values(owner=heir, **({"revision": table.c.revision + 1} if table is STUDIES else {}))
+                ).rowcount
+                for table in (STUDIES, SCHEDULES)
+            )
+            for kept in (COMPONENTS, SAVED_VIEWS):
+                connection.execute(sa.update(kept).where(kept.c.owner == name).values(owner=heir))
+            note(connection, self._now(), "user.hand-over", name, to=heir, studies=studies, schedules=schedules)
+        return studies, schedules
+
+    def usage(self, name: str) -> Usage:
+        """What counts against the quota of a user."""
+        with self.session.read() as connection:
+            return _usage(connection, name)
+
+    def require_quota(self, connection: sa.Connection, cases: int, size: int) -> None:
+        """Raise FaultError where that many more cases or bytes exceed a quota of the present user."""
+        user = acting().user
+        if user is None:
+            return
+        row = connection.execute(sa.select(USERS).where(_U.name == user)).one_or_none()
+        quota = (Quota() if row is None else _quota(row)).over(self.default_quota)
+        used = _usage(connection, user)
+        if cases and quota.cases and used.cases + cases > quota.cases:
+            raise FaultError(
+                "quota-exceeded",
+                f"{cases:,} more cases exceed the quota of {user}: {used.cases:,} of {quota.cases:,} wait already.",
+            )
+        if size > 0 and quota.bytes and used.bytes + size > quota.bytes:
+            raise FaultError(
+                "quota-exceeded",
+                f"That would take about {_mib(size)} MiB more, and {user} has used {_mib(used.bytes)} of "
+                f"{_mib(quota.bytes)} MiB: delete studies for good first; deleted ones that can be restored count too.",
+            )
+
+    def create_token(
+        self, name: str, scope: TokenScope, *, owner: str | None = None, expires_at: datetime | None = None
+    ) -> tuple[str, TokenRecord]:
+        """Create a token; returns its secret, which cannot be shown again, and its record.
+
+        ``owner`` is the user whose token it is; raises UserNotFoundError.
+        """
+        secret = TOKEN_PREFIX + secrets.token_urlsafe(_TOKEN_BYTES)
+        values = {
+            "id": f"tk_{secrets.token_hex(6)}",
+            "name": name,
+            "scope": scope.value,
+            "digest": digest_of(secret.encode("ascii")),
+            "created_at": self._now(),
+            "owner": owner,
+            "expires_at": None if expires_at is None else micros_of(expires_at),
+        }
+        with self.session.write() as connection:
+            if owner is not None:
+                require_user(connection, owner)
+            said = {"name": name, "scope": scope.value, "owner": owner}
+            note(connection, self._now(), "token.create", str(values["id"]), **said)
+            row = connection.execute(sa.insert(TOKENS).values(values).returning(TOKENS)).one()
+        return secret, _token_record(row)
+
+    def tokens(self) -> tuple[TokenRecord, ...]:
+        """Every token ever created, newest first."""
+        with self.session.read() as connection:
+            rows = connection.execute(sa.select(TOKENS).order_by(TOKENS.c.number.desc())).all()
+        return tuple(map(_token_record, rows))
+
+    def revoke_token(self, token_id: str) -> TokenRecord:
+        """Revoke a token; raises TokenNotFoundError. Revoking it twice has no further effect."""
+        with self.session.write() as connection:
+            row = connection.execute(
+                sa.update(TOKENS)
+                .where(TOKENS.c.id == token_id)
+                .values(revoked_at=sa.func.coalesce(TOKENS.c.revoked_at, self._now()))
+                .returning(TOKENS)
+            ).one_or_none()
+            if row is None:
+                raise TokenNotFoundError(token_id)
+            note(connection, self._now(), "token.revoke", token_id, name=row.name, owner=row.owner)
+            return _token_record(row)
+
+    def note_uses(self, uses: Mapping[str, int]) -> None:
+        """Record when tokens were last used: µs since 1970 by id."""
+        with self.session.write() as connection:
+            for token_id, used in uses.items():
+                later = TOKENS.c.used_at.is_(None) | (TOKENS.c.used_at < used)
+                connection.execute(sa.update(TOKENS).where(TOKENS.c.id == token_id, later).values(used_at=used))
+
+    def session_secrets(self) -> SessionSecrets:
+        """The key, and the sessions that were ended early."""
+        with self.session.read() as connection:
+            key = connection.execute(sa.select(SESSION_KEY.c.key)).scalar_one_or_none()
+            ended = dict(connection.execute(sa.select(ENDED_SESSIONS.c.seal, ENDED_SESSIONS.c.ends_at)).all())
+        return SessionSecrets(None if key is None else bytes.fromhex(key), ended)
+
+    def create_session_key(self) -> bytes:
+        """The signing key; created where there is none."""
+        with self.session.write() as connection:
+            key: str | None = connection.execute(sa.select(SESSION_KEY.c.key)).scalar_one_or_none()
+            if key is None:
+                key = secrets.token_hex(_KEY_BYTES)
+                connection.execute(sa.insert(SESSION_KEY).values(id=_ONLY, key=key, created_at=self._now()))
+        return bytes.fromhex(key)
+
+    def end_session(self, seal: str, ends_at: int) -> None:
+        """Record that a session was ended before its expiry; forget the expired ones."""
+        c = ENDED_SESSIONS.c
+        with self.session.write() as connection:
+            connection.execute(sa.delete(ENDED_SESSIONS).where(c.ends_at < self._now() // 1_000_000))
+            known = connection.execute(sa.select(c.seal).where(c.seal == seal)).scalar_one_or_none()
+            if known is None:
+                connection.execute(sa.insert(ENDED_SESSIONS).values(seal=seal, ends_at=ends_at))
+
+
+def require_queue(connection: sa.Connection, most: int | None) -> None:
+    """Raise FaultError where ``most`` studies wait already, or as many of the present sender's as are its share."""
+    pool = None if most is None else pool_of(connection, STUDIES, WAITING_STUDY, most)
+    if pool is None or pool.takes():
+        return
+    if not pool.free:
+        raise FaultError("queue-full", Sentence(recorded.MANY_STUDIES, count=grouped(pool.taken)))
+    shares = {"mine": grouped(pool.mine), "free": grouped(pool.free)}
+    raise FaultError("queue-full", Sentence(recorded.SHARE_OF_QUEUE, **shares))
+
+
+def require_user(connection: sa.Connection, name: str, *, removed: bool = False) -> None:
+    """Raise UserNotFoundError where there is no such user; ``removed``: one who was removed will do."""
+    query = sa.select(_U.name).where(_U.name == name, sa.true() if removed else _U.removed_at.is_(None))
+    if connection.execute(query).first() is None:
+        raise UserNotFoundError(name)
+
+
+def _usage(connection: sa.Connection, name: str) -> Usage:
+    """What counts against the quota: cases that wait, and what lies on the disk, of deleted studies too.
+
+    A study has its rows, all of them or, once it has ended, those that it got; the texts that describe it; and what
+    every study takes.
+    """
+    c = STUDIES.c
+    most = sa.func.coalesce(c.most_cases, c.cases)
+    ended = c.state.in_([state.value for state in TERMINAL])
+    whole = sa.func.coalesce(c.estimated_bytes, 0)
+    rows = sa.case((ended & (most > 0), whole * c.done / sa.func.nullif(most, 0)), else_=whole)
+    texts = sum((_octets(connection, c[name]) for name in TEXTS), start=sa.literal(STUDY_BYTES))
+    waits = WAITING_STUDY & c.deleted_at.is_(None)
+    row = connection.execute(
+        sa.select(
+            sa.func.coalesce(sa.func.sum(sa.case((waits, most - c.done), else_=0)), 0).label("cases"),
+            sa.func.coalesce(sa.func.sum(rows + texts), 0).label("bytes"),
+        ).where(c.owner == name)
+    ).one()
+    return Usage(int(row.cases), int(row.bytes))
+
+
+def size_of_texts(values: Mapping[str, str]) -> int:
+    """Bytes that these texts of a study take, by column; those that are missing are empty."""
+    return sum(len(values.get(name, "").encode()) for name in TEXTS)
+
+
+def _octets(connection: sa.Connection, column: sa.Column[str]) -> sa.ColumnElement[int]:
+    """The length of a text in bytes of UTF-8."""
+    if connection.dialect.name == "postgresql":
+        return sa.func.octet_length(column)
+    return sa.func.length(sa.cast(column, sa.LargeBinary))  # octet_length is missing before SQLite 3.43
+
+
+def _columns(quota: Quota) -> dict[str, int | None]:
+    return {"most_cases": quota.cases, "most_bytes": quota.bytes, "most_checks": quota.checks}
+
+
+def _set(quota: Quota | None) -> dict[str, int]:
+    """The numbers that a quota has, for the log."""
+    return {name: value for name, value in _columns(quota or Quota()).items() if value is not None}
+
+
+def _quota(row: Any) -> Quota:
+    return Quota(row.most_cases, row.most_bytes, row.most_checks)
+
+
+def _user_record(row: Any) -> UserRecord:
+    return UserRecord(row.name, Role(row.role), moment(row.created_at), optional_moment(row.removed_at), _quota(row))
+
+
+def _mib(size: int) -> str:
+    return f"{size / 2**20:,.{0 if size >= 100 * 2**20 else 1}f}"
+
+
+def _token_record(row: Any) -> TokenRecord:
+    return TokenRecord(
+        row.id,
+        row.name,
+        TokenScope(row.scope),
+        row.digest,
+        moment(row.created_at),
+        optional_moment(row.revoked_at),
+        row.owner,
+        optional_moment(row.expires_at),
+        optional_moment(row.used_at),
+    )

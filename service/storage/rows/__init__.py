@@ -1,0 +1,1 @@
+"""Rows of finished cases: read, looked over, found again for other studies."""

@@ -1,0 +1,1 @@
+"""Schedules, their due times and reports."""

@@ -1,0 +1,1 @@
+"""Studies: their rows, digests, lists and removal."""

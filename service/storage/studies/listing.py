@@ -1,0 +1,101 @@
+"""Lists of studies: searched, filtered and sorted, page by page."""
+
+from __future__ import annotations
+
+import base64
+import json
+from dataclasses import dataclass
+from typing import Any, Final
+
+import sqlalchemy as sa
+
+from sprag.service.answers.studies import StudyOrder
+from sprag.service.spec.labels import folded
+from sprag.service.storage.errors import PageTokenError
+from sprag.service.storage.part import MAX_INTEGER
+from sprag.service.storage.studies.labels import tag_text
+from sprag.service.storage.tables import STUDIES
+from sprag.worker.states import StudyState
+
+MAX_PAGE = 1000
+#: Characters of a name by which studies are sorted.
+_SORTED: Final = 100
+
+
+@dataclass(frozen=True, slots=True)
+class StudyFilter:
+    """Which studies are wanted.
+
+    ``search``: every word of it is a part of the name, the notes or a tag, or of the id, whatever case and accents.
+    ``tag`` is one of its tags. ``archived`` and ``deleted`` choose those only, of the deleted ones those that can be
+    restored; otherwise neither is listed.
+    """
+
+    search: str = ""
+    state: StudyState | None = None
+    tag: str = ""
+    owner: str = ""
+    model: str = ""
+    archived: bool = False
+    deleted: bool = False
+
+    def conditions(self, now: int) -> list[sa.ColumnElement[bool]]:
+        """The conditions of a query at ``now`` (µs since 1970)."""
+        if any("\0" in text for text in (self.search, self.tag, self.owner, self.model)):
+            return [sa.false()]  # no text that is stored has one, and PostgreSQL takes none
+        c = STUDIES.c
+        found: list[sa.ColumnElement[bool]]
+        if self.deleted:
+            found = [c.deleted_at.is_not(None), c.purge_at > now]
+        else:
+            found = [c.deleted_at.is_(None), c.archived_at.is_not(None) if self.archived else c.archived_at.is_(None)]
+        found += [
+            c.search.contains(word, autoescape=True) | c.id.contains(word, autoescape=True)
+            for word in folded(self.search).split()
+        ]
+        if self.state is not None:
+            found.append(c.state == self.state.value)
+        if self.tag:
+            found.append(c.search.contains(tag_text(self.tag), autoescape=True))
+        found += [c[name] == value for name in ("owner", "model") if (value := getattr(self, name))]
+        return found
+
+
+def sort_key(order: StudyOrder, *, on_server: bool) -> tuple[sa.ColumnElement[Any], bool]:
+    """What ``order`` sorts by, and whether from small to large."""
+    c = STUDIES.c
+    match order:
+        case StudyOrder.NAME:
+            # The search text begins with the name. Servers would sort by their own language.
+            name = sa.func.substr(c.search, 1, _SORTED)
+            return (sa.collate(name, "C") if on_server else name), True
+        case StudyOrder.STATE:
+            return sa.case({state.value: place for place, state in enumerate(StudyState)}, value=c.state), True
+        case StudyOrder.CASES:
+            return c.cases, False
+        case StudyOrder.ENDED:
+            return sa.func.coalesce(c.finished_at, 0), False
+    return c.number, False
+
+
+def token_of(order: StudyOrder, last: sa.Row[Any]) -> str:
+    """The token of the page after the row ``last``."""
+    text = json.dumps([order.value, last.sort_key, last.number], ensure_ascii=False, separators=(",", ":"))
+    return base64.urlsafe_b64encode(text.encode()).decode().rstrip("=")
+
+
+def read_token(token: str, order: StudyOrder) -> tuple[Any, int]:
+    """Sort key and number of the last study before the page; PageTokenError."""
+    try:
+        data = json.loads(base64.b64decode(token + "=" * (-len(token) % 4), altchars=b"-_", validate=True))
+        name, key, number = data
+    except (ValueError, TypeError, RecursionError):
+        name = key = number = None
+    kind = str if order is StudyOrder.NAME else int
+    if name != order.value or type(key) is not kind or type(number) is not int:
+        raise PageTokenError(f"{token[:40]!r} is not a page token of this list in the order {order.value}")
+    if isinstance(key, int):
+        key = max(min(key, 2**62), -(2**62)) if order is StudyOrder.ENDED else max(min(key, MAX_INTEGER), -1)
+    elif len(key) > _SORTED or "\0" in key or any("\ud800" <= sign <= "\udfff" for sign in key):
+        raise PageTokenError(f"{token[:40]!r} is not a page token of this list")
+    return key, max(min(number, MAX_INTEGER), -1)

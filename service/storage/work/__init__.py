@@ -1,0 +1,1 @@
+"""What the dispatcher does: claims, results, rounds, and room for them."""
