@@ -41,7 +41,7 @@ DesignLimit = TypedDict(
         "within": Annotated[float, Doc("half the width of the band around `is`, SI; 0 where it must be equal")],
     },
 )
-DesignLimit.__doc__ = "What a design must fulfil at every operating point."
+DesignLimit.__doc__ = "The limits that a design must keep at every operating point."
 
 
 class Design(TypedDict):

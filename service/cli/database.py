@@ -46,7 +46,7 @@ def upgrade(
     db: Database = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Bring the database to the revision of this program, or create it; stop Sprag first. A file is copied before."""
+    """Bring the database to the revision of this program, or create it; stop Sprag first. It copies a file before."""
     from sprag.service.jobs.dispatching import owner_name
     from sprag.service.storage.alone import upgrade as bring_up
 
@@ -150,7 +150,7 @@ def move(
 ) -> None:
     """Copy the whole database into another one, SQLite or PostgreSQL, and compare every row; stop Sprag first.
 
-    The source stays as it is. An interrupted move is continued by the same command. Schedules and reports of the target
+    The source stays as it is. The same command continues an interrupted move. Schedules and reports of the target
     are off until `sprag db adopt`. Exit code 3: rows in it changed on the disk, and were copied as they are.
     """
     from sprag.service.jobs.dispatching import owner_name

@@ -76,7 +76,7 @@ def outlived(study_id: str) -> Iterator[None]:
     except KeyboardInterrupt:
         say(
             _(
-                "The study {study} goes on without this command: `sprag watch {study}` follows it, `sprag cancel "
+                "The study {study} continues without this command: `sprag watch {study}` follows it, `sprag cancel "
                 "{study}` ends it.",
                 study=study_id,
             )

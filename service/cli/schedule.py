@@ -76,7 +76,7 @@ CatchUp = Annotated[
     typer.Option(
         "--catch-up",
         metavar="POLICY",
-        help="Of due times that were missed, run the latest (default), all (at most 50), or none.",
+        help="Which missed due times to run: the latest (default), all (at most 50), or none.",
     ),
 ]
 Grace = Annotated[
@@ -84,7 +84,7 @@ Grace = Annotated[
     typer.Option(
         "--misfire-grace",
         metavar="TIME",
-        help='Longest delay with which a due time is still run, such as "30 min"; "" for any.',
+        help='Longest delay with which a due time still runs, such as "30 min"; "" for any.',
     ),
 ]
 TroubleFlags = Annotated[
@@ -267,7 +267,7 @@ def pause(
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Pause a schedule: it is kept, but not due, until it is resumed or until a certain time."""
+    """Pause a schedule: it stays, but is not due, until somebody resumes it or until a certain time."""
     _change(schedule_id, {"enabled": False} if until is None else {"paused_until": until}, server, token, as_json)
 
 

@@ -36,7 +36,10 @@ Known = Annotated[
 ]
 RoleOption = Annotated[
     Role | None,
-    typer.Option("--role", help="viewer: reads; designer: submits and changes what is theirs; administrator: all."),
+    typer.Option(
+        "--role",
+        help="viewer: can read; designer: can also submit, and change their own; administrator: can do everything.",
+    ),
 ]
 Cases = Annotated[
     int | None,
@@ -88,7 +91,7 @@ def add(
 
 @app.command("list")
 def list_users(db: Database = None, as_json: JsonFlag = False) -> None:
-    """List all users with role, quotas, and what is used of them."""
+    """List all users with their roles, their quotas and the use of the quotas."""
     with users_of(db, as_json) as store:
         found = [(record, store.people.usage(record.name)) for record in store.people.users()]
         where = {"database": store.session.location}
@@ -118,7 +121,7 @@ def change(
     db: Database = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Change the role or the quotas of a user, within two seconds; what is not given is kept."""
+    """Change the role or the quotas of a user, within two seconds; options that are not given keep their values."""
     if role is None and cases is None and storage is None and checks is None:
         raise WrongInputError("invalid-parameter", _("nothing to change; `sprag user change --help` lists the options"))
     with users_of(db, as_json) as store:
@@ -135,7 +138,7 @@ def remove(name: Known, db: Database = None, as_json: JsonFlag = False) -> None:
         store,
         record,
         as_json,
-        _("{name} is removed; `sprag user hand-over` gives what was theirs to another user", name=record.name),
+        _("{name} is removed; `sprag user hand-over` gives what they owned to another user", name=record.name),
     )
 
 

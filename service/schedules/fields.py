@@ -203,7 +203,7 @@ def _require_open_window(report: Report, fields: ScheduleFields, now: datetime) 
             "/window",
             "conflict",
             Sentence(
-                "is closed from each due time to its deadline ({deadline}), so that no case would be run",
+                "is closed from each due time to its deadline ({deadline}), so that no case would run",
                 deadline=finish_by,
             ),
             [f"{window.begin:%H:%M}", f"{window.end:%H:%M}"],

@@ -342,7 +342,7 @@ MAP: Final = About("map", MapQuestion, "One result over two axes.")
 ANSWERS: Final = About(
     "answers",
     AnswersQuestion,
-    "What one asks of a study first: no-load speed, largest power, best efficiency, stall torque, a working point.",
+    "The main answers of a study: no-load speed, largest power, best efficiency, stall torque, a working point.",
 )
 EXPLORE: Final = About(
     "explore",
@@ -367,7 +367,7 @@ FRONT: Final = About(
 CALIBRATION: Final = About(
     "calibration",
     CalibrationQuestion,
-    "What a calibration has found: values with intervals, correlations, residuals, the next point to measure.",
+    "The results of a calibration: values with intervals, correlations, residuals, the next point to measure.",
 )
 SENSITIVITY: Final = About(
     "sensitivity",

@@ -58,7 +58,7 @@ class StudyAnswers(StudyPart):
         at: Mapping[str, Value] | None = None,
         of: Mapping[str, Sequence[Value]] | None = None,
     ) -> AnswerReport:
-        """What one asks of a study first, such as no-load speed, largest power, best efficiency and stall torque.
+        """The main answers of a study, such as no-load speed, largest power, best efficiency and stall torque.
 
         Parameters
         ----------

@@ -29,7 +29,7 @@ router = api_router("administration")
 
 @router.get("/me", response_model=m.Me, responses=problems("invalid-parameter"))
 def get_me(context: Ctx, request: Request) -> Response:
-    """Who asks: user, token and its scope, role, and what is used of the quotas."""
+    """The caller: user, token and its scope, role, and the use of the quotas."""
     grant = cast("Grant | None", request.scope.get("sprag.grant")) or OPEN
     store, quota = context.store, None
     if grant.user is not None:

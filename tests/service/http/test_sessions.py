@@ -307,7 +307,7 @@ def test_a_token_to_look_is_told_so_before_anything_is_typed(office: Office, pat
         browser = office.browser(**OWN)
         browser.post("/login", data={"token": token})
         text = browser.get(path).text
-        assert ("<b>Token manager</b> may only read" in text) is told
+        assert ("<b>Token manager</b> can only read" in text) is told
         assert bool(re.search(r'<button class="main"[^>]* disabled>', text)) is told
 
 

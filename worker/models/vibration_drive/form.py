@@ -19,7 +19,7 @@ _CLUTCH: Final = FormChoice(
             ),
             FormField(
                 "clutch/windup_limit", "number", "Windup limit",
-                "largest windup the law was measured to; beyond it goes on straight", range="> 0 rad",
+                "largest windup to which the law was measured; beyond it the law continues straight", range="> 0 rad",
                 default="none", example="0.05 rad", symbol="u_end", unit="rad", mark="clutch",
             ),
         )),

@@ -37,10 +37,10 @@ async def read_form(request: Request) -> Values:
 
 
 def changed_meanwhile() -> str:
-    """What a form says whose object somebody else changed after the form was shown."""
+    """What a form says whose object somebody else changed after the page showed the form."""
     return _(
-        "Somebody changed this after the form was shown, so nothing was saved. Look at the present values in another "
-        "window; saved once more, what stands here replaces them."
+        "Somebody changed this after this page showed the form, so nothing was saved. Look at the present values in "
+        "another window. If you save again, the values here replace them."
     )
 
 
