@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from sprag.service.http.web.figures.drive import drive_case
-from sprag.service.http.web.laboratory.drive_setting import machines, setting
+from sprag.service.http.web.laboratory.setting import machines, setting
 from sprag.service.json_text import to_bytes
 from sprag.service.reading.reader import Reading
 from sprag.worker import models
@@ -59,7 +59,7 @@ def _timed(function: Callable[..., Any], *args: Any) -> tuple[float, Any]:
 
 
 def _bytes_of(study: Any) -> tuple[bytes, dict[str, Any]]:
-    found = drive_case(study, None, Reading(study.model))
+    found = drive_case(study, Reading(study.model))
     return to_bytes(found), found
 
 
@@ -73,9 +73,9 @@ def _place(slider: Slider, share: float) -> str:
 def moves_of(name: str, count: int, random: np.random.Generator) -> list[Move]:
     """Random moves of one drive."""
     given = {"machine": name}
-    chosen = setting(given)
+    chosen = setting(models.VIBRATION_DRIVE, given)
     models.warm_up(chosen.study)
-    drive_case(chosen.study, None, Reading(chosen.study.model))
+    drive_case(chosen.study, Reading(chosen.study.model))
     sliders = [slider for slider in chosen.sliders if slider.high > slider.low]
     found = []
     for _ in range(count):
@@ -116,7 +116,7 @@ def main() -> None:
     parser.add_argument("--worst", type=int, default=5)
     asked = parser.parse_args()
     random = np.random.default_rng(asked.seed)
-    for name in machines():
+    for name in machines(models.VIBRATION_DRIVE):
         _told(name, moves_of(name, asked.moves, random), asked.worst)
 
 

@@ -23,6 +23,7 @@ from sprag.service.spec.plan.goal import GOAL
 from sprag.service.spec.plan.refine import REFINE
 from sprag.worker import models
 from sprag.worker.models.form import Block, Form, FormChoice, FormField
+from sprag.worker.models.laboratory import Laboratory
 
 
 def form_values() -> Iterator[str]:
@@ -41,6 +42,7 @@ def form_values() -> Iterator[str]:
     yield from (words(kind) for kind in MECHANISM_CHOICES)
     for name in models.model_names():
         yield from filter(None, _own(models.model_of(name).presentation.form))
+        yield from filter(None, _of_laboratory(models.model_of(name).presentation.laboratory))
         for parameter in models.parameter_catalogue(name):
             yield from (words(name) for name in parameter.path.split(".") if name not in ("K", "N"))
 
@@ -68,3 +70,11 @@ def _texts(items: Iterable[FormField | FormChoice]) -> Iterator[str]:
         for option in item.options:
             yield option.label or words(option.value)
             yield from _texts(option.items)
+
+
+def _of_laboratory(own: Laboratory) -> Iterator[str]:
+    """What the laboratory of a model itself says."""
+    yield from (own.title, own.lead, own.curves, own.note, *own.numbered.values(), *own.main.values())
+    yield from (text for kind in own.sliders for text in (kind.label, kind.group, kind.help))
+    yield from (word for word, _ in own.studies.values())
+    yield from (sentence for sentence, *_ in own.questions.values())

@@ -86,7 +86,6 @@ from sprag.service.http.web import units as unit_pages
 from sprag.service.http.web import workers as worker_pages
 from sprag.service.http.web.figures import cases as case_figures
 from sprag.service.http.web.form import page as form
-from sprag.service.http.web.laboratory import drive as drive_laboratory
 from sprag.service.http.web.laboratory import pages as laboratory
 from sprag.service.jobs import checks, row_files
 from sprag.service.jobs.housekeeping import Housekeeping
@@ -183,7 +182,6 @@ ROUTED = (
     basin_pages,
     transient_pages,
     compare,
-    drive_laboratory,
     laboratory,
     component_pages,
     view_pages,

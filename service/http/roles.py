@@ -64,11 +64,11 @@ _VIEWER: Final = (
     )),
     f"GET {_PAGE_CASE}",
     *(f"GET {_PAGE_CASE}/{part}" for part in (
-        "motion", "laboratory", "motion.svg", "strobes", "engagements", "branch", "branch/figure", "diagram",
+        "motion", "laboratory", "motion.svg", "strobes/figure", "engagements", "branch", "branch/figure", "diagram",
         "diagram/figure", "section/figure", "basin", "basin/figure", "transient", "transient/figure",
     )),
     "GET /compare", "GET /compare/figure", "GET /compare/picture.{form}", "GET /compare/curves.csv",
-    *(f"GET /laboratory{drive}{part}" for drive in ("", "/drive") for part in (
+    *(f"GET /laboratory{model}{part}" for model in ("", "/{model}") for part in (
         "", "/figure", "/picture.{form}", "/form", "/study",
     )),
     "GET /laboratory/questions",

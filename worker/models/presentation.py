@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 from sprag.worker.models.form import Form
+from sprag.worker.models.laboratory import Laboratory
 
 if TYPE_CHECKING:
     import numpy as np
@@ -102,7 +103,7 @@ class Presentation:
     symbols : symbol of the catalogue -> base and index as in print
     captions : what people read instead of a name of the catalogue, with N and K for indices; ``{}`` is the last index
     letters : base and index, as in print, of results
-    form : its machine as fields of a form
+    form, laboratory : its machine as fields of a form, and with sliders
     theory : beginning of paths without indices -> page of docs/ and heading that explain it, as in a URL
     """
 
@@ -129,6 +130,7 @@ class Presentation:
     captions: Mapping[str, str] = field(default_factory=dict)
     letters: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     form: Form = field(default_factory=Form)
+    laboratory: Laboratory = field(default_factory=Laboratory)
     theory: Mapping[str, str] = field(default_factory=dict)
 
     def explained(self, path: str) -> str:

@@ -16,7 +16,7 @@ from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.web.figures.motion import SAMPLES, motion_figures
-from sprag.service.http.web.form.own_machine import case_address, has_laboratory
+from sprag.service.http.web.form.own_machine import case_address
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
@@ -162,7 +162,6 @@ def case_page(
         has_clutches=models.has_clutches(study),
         has_strobes=models.has_strobes(study),
         has_transients=has_transients(study),
-        has_laboratory=has_laboratory(study.model),
         has_motion=row is None or row.ending != _NO_MOTION,
         settled=models.is_settled(study.run),
         last=study.cases - 1,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.worker.models.machine_shaft.form import FORM
+from sprag.worker.models.machine_shaft.laboratory import LABORATORY
 from sprag.worker.models.machine_shaft.words import CAPTIONS, LETTERS
 from sprag.worker.models.presentation import Answer, Panel, Presentation, Reference
 
@@ -102,6 +103,7 @@ PRESENTATION: Final = Presentation(
     captions=CAPTIONS,
     letters=LETTERS,
     form=FORM,
+    laboratory=LABORATORY,
     theory={path: f"theory-machine-shaft#{heading}" for path, heading in _THEORY.items()},
 )
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from sprag.worker.models.presentation import Answer, Panel, Presentation
 from sprag.worker.models.vibration_drive.form import FORM
+from sprag.worker.models.vibration_drive.laboratory import LABORATORY
 from sprag.worker.models.vibration_drive.words import CAPTIONS, LETTERS
 
 if TYPE_CHECKING:
@@ -96,6 +97,7 @@ PRESENTATION: Final = Presentation(
     captions=CAPTIONS,
     letters=LETTERS,
     form=FORM,
+    laboratory=LABORATORY,
     theory={
         **dict.fromkeys(
             ("gravity", "excitation", "pendulums", "pendulums.clutch", "shaft", "clutch"), "theory#equations-of-motion"

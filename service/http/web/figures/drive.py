@@ -15,6 +15,8 @@ from sprag.worker.models.abilities import case_turn
 from sprag.worker.models.turns import CaseTurn
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from sprag.service.reading.quantities import Units
     from sprag.service.reading.reader import Reading
     from sprag.service.results.figures.figure import Figure
@@ -29,25 +31,28 @@ _TRAVEL: Final = 14.0
 _FREQUENCY: Final = "excitation.frequency"
 
 
-def drive_case(study: Study, held: Study | None, reading: Reading) -> dict[str, Any]:
-    """Results, figure, frames and next state of a drive, and results of one that is held. For the computing process.
+def drive_case(
+    study: Study, reading: Reading, held: Sequence[tuple[str, Study]] = (), _columns: int = 1
+) -> dict[str, Any]:
+    """Results, figure, frames and next state of a drive, and results of those that are held, of which the first is in
+    the figure. For the computing process.
 
     The results are in SI, the figure in the units of ``reading``.
     """
     made = case_turn(study, 0, _SAMPLES)
-    other = None if held is None else case_turn(held, 0, _SAMPLES)
-    found = _turn_json(made) | {"held": None if other is None else _turn_json(other), "figure": None, "frames": None}
+    others = [(other, case_turn(other, 0, _SAMPLES)) for _name, other in held]
+    found = _turn_json(made) | {"held": [_turn_json(turn) for _, turn in others], "figure": None, "frames": None}
     if made.motion.times.size:
-        found["figure"] = plotly_figure(read_figure(_figure(study, made, held, other), reading))
+        found["figure"] = plotly_figure(read_figure(_figure(study, made, others), reading))
         found["frames"] = frames(made.motion, study.base[_FREQUENCY])
     return found
 
 
-def curves_of(study: Study, held: Study | None) -> Figure | None:
+def curves_of(study: Study, held: Sequence[tuple[str, Study]] = ()) -> Figure | None:
     """The figure of a drive; None where it has no motion. For the computing process."""
     made = case_turn(study, 0, _SAMPLES)
-    other = None if held is None else case_turn(held, 0, _SAMPLES)
-    return _figure(study, made, held, other) if made.motion.times.size else None
+    others = [(other, case_turn(other, 0, _SAMPLES)) for _name, other in held]
+    return _figure(study, made, others) if made.motion.times.size else None
 
 
 def turn_table(study: Study, units: Units) -> bytes | None:
@@ -56,11 +61,10 @@ def turn_table(study: Study, units: Units) -> bytes | None:
     return trajectory_csv(motion, units) if motion.times.size else None
 
 
-def _figure(study: Study, made: CaseTurn, held: Study | None, other: CaseTurn | None) -> Figure:
+def _figure(study: Study, made: CaseTurn, held: Sequence[tuple[Study, CaseTurn]]) -> Figure:
     shown = models.presentation_of(study)
-    beside = None
-    if held is not None and other is not None and other.motion.times.size:
-        beside = turn_figure(other.motion, held.base[_FREQUENCY], shown)
+    moving = [turn_figure(turn.motion, other.base[_FREQUENCY], shown) for other, turn in held if turn.motion.times.size]
+    beside = moving[0] if moving else None
     return turn_figure(made.motion, study.base[_FREQUENCY], shown, beside)
 
 

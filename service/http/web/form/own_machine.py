@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
@@ -34,8 +35,6 @@ OWN: Final = "own"
 FIELDS: Final = ("base", "run", "title", "case")
 _CASE: Final = re.compile(r"([A-Za-z0-9_-]{1,64})/([0-9]{1,12})(?:/([0-9]{1,9}))?")
 _NOT_HERE: Final = {*WHICH_CASES, "derive", "base"}
-#: Pages of the laboratory by model.
-_PAGES: Final = {models.MACHINE_SHAFT: "/laboratory", models.VIBRATION_DRIVE: "/laboratory/drive"}
 
 
 def single_machine(spec: Mapping[str, Any]) -> dict[str, Any]:
@@ -82,9 +81,13 @@ def _gives(base: Any, path: str) -> bool:
     return True
 
 
-def has_laboratory(model: str) -> bool:
-    """Whether the laboratory shows machines of a model."""
-    return model in _PAGES
+def laboratories() -> dict[str, str]:
+    """The address of the laboratory of each model."""
+    names = {model: models.model_of(model).presentation.laboratory.address for model in models.model_names()}
+    return {
+        model: "/laboratory" + ("" if name == "" else f"/{model if name is None else name}")
+        for model, name in names.items()
+    }
 
 
 def laboratory_address(spec: Mapping[str, Any], **further: str) -> str:
@@ -93,7 +96,7 @@ def laboratory_address(spec: Mapping[str, Any], **further: str) -> str:
     run = made.get("run")
     texts = {"base": _json(made["base"]), "run": _json(run) if run else "", "title": made.get("name", "")}
     given = {"machine": OWN, **{name: text for name, text in texts.items() if text}, **further}
-    address = f"{_PAGES[made['model']]}?{urlencode(given)}"
+    address = f"{laboratories()[made['model']]}?{urlencode(given)}"
     if not fits(address):
         message = N_("is too long for the address of the laboratory: give its tables fewer rows")
         allowed = Sentence("an address of at most {count} characters", count=MAX_ADDRESS_BYTES)
@@ -155,6 +158,9 @@ def read_machine(
     ``known`` are the names of the built-in machines of the model.
     """
     name = machine[0][1]
+    if not known and not name:
+        spec = example_spec(model)
+        return spec, parse_spec(spec).study
     if name not in {OWN, *known}:
         raise ApiError(
             "not-found", Sentence("Unknown machine; known machines: {machines}.", machines=", ".join(known) or "none")
@@ -165,6 +171,20 @@ def read_machine(
     except SpecError as error:
         texts = (f"{item.where or 'the spec'}: {message(item)}" for item in error.faults)
         raise ApiError("invalid-spec", "; ".join(texts)) from error
+
+
+def example_spec(model: str) -> dict[str, Any]:
+    """A machine of a model without examples: each number has its default, or 1 where that is in its range."""
+    base: dict[str, Any] = {}
+    for entry in models.parameter_catalogue(model):
+        *parts, name = entry.path.split(".")
+        if not {"N", "K", "NAME"} & {*parts, name}:
+            place = base
+            for part in parts:
+                place = place.setdefault(part, {})
+            usual = entry.default if entry.default is not None and math.isfinite(entry.default) else 1.0
+            place[name] = usual if entry.accepts(usual) else min(max(usual, entry.low), entry.high)
+    return {"sprag": 1, "model": model, "name": models.model_of(model).presentation.title or model, "base": base}
 
 
 def case_page(mark: str) -> str:

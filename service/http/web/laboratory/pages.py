@@ -1,4 +1,4 @@
-"""The machine-shaft laboratory: a machine's motion over a cycle, redrawn live while its numbers change."""
+"""The laboratory: a machine whose numbers change while its motion is redrawn, for every model."""
 
 from __future__ import annotations
 
@@ -15,71 +15,112 @@ from sprag.service.http.reading import CHOICE
 from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
-from sprag.service.http.views import preset_of
+from sprag.service.http.web.figures.drive import curves_of, drive_case, turn_table
 from sprag.service.http.web.figures.shaft import SAMPLES, irregularities, machine_case
-from sprag.service.http.web.form.own_machine import fits
+from sprag.service.http.web.form.own_machine import fits, laboratories
 from sprag.service.http.web.form.page import spec_in_form
-from sprag.service.http.web.laboratory.questions import QUESTIONS, estimates, question_spec
-from sprag.service.http.web.laboratory.setting import MOST_HELD, held_settings, machines, setting
+from sprag.service.http.web.laboratory.questions import estimates, studies, study_spec
+from sprag.service.http.web.laboratory.setting import held_settings, laboratory_of, machines, setting
 from sprag.service.http.web.laboratory.sliders import position
 from sprag.service.http.web.templates import fragment, page
 from sprag.service.http.work import Attended, Work
-from sprag.service.reading.phrases import meanings
+from sprag.service.reading.phrases import meanings, shown, term
 from sprag.service.reading.reader import Reading, reading_for
 from sprag.service.reading.wording import number
-from sprag.service.results.pictures.curves import draw_motion
+from sprag.service.results.figures.read import read_figure
+from sprag.service.results.pictures.curves import draw_figure, draw_motion
+from sprag.service.results.regimes import motion_sentence
 from sprag.service.views.trajectory import trajectory_csv
 from sprag.worker import models
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
     from sprag.service.http.web.laboratory.setting import Setting
     from sprag.worker.models import Trajectory
     from sprag.worker.study import Study
 
+    Page = Callable[..., Any]
+    Case = dict[str, Any]
+
 router = page_router()
-
-#: Results that are shown beside the picture.
-_SHOWN: Final = (
-    "irregularity", "omega.mean", "omega.max", "omega.angle_at_max", "omega.min", "omega.angle_at_min",
-    "energy.fluctuation", "energy.mean", "drive_torque.mean", "power.mean", "acceleration.max",
-    "omega_squared.amplitude", "s1.amplitude", "s2.amplitude", "s3.amplitude", "s4.amplitude", "s1.share", "s2.share",
-    "s3.share", "s4.share", "energy.coefficient", "required_inertia", "flywheel.required_mass",
-    "flywheel.required_diameter", "flywheel.stress", "flywheel.margin", "motor.torque.max", "motor.power.mean",
-)  # fmt: skip
-
-
 #: Names of the held machines.
 _NAMES: Final = "ABC"
+_OWN: Final = "/laboratory"
 
 
-@router.get("/laboratory")
+def _route(path: str) -> Callable[[Page], Page]:
+    """A page of the first laboratory, and of each other one."""
+
+    def both(page: Page) -> Page:
+        _PAGES[path] = page
+        return router.get(f"{_OWN}{path}")(page)
+
+    return both
+
+
+_PAGES: dict[str, Page] = {}
+
+
+def _model(work: Work) -> str:
+    """The model of an address; ApiError where there is no such laboratory."""
+    name = str(work.request.path_params.get("model", ""))
+    known = {address.removeprefix(_OWN).removeprefix("/"): model for model, address in laboratories().items()}
+    if name not in known:
+        raise ApiError("not-found", Sentence("Unknown model; known models: {models}.", models=", ".join(known)))
+    return known[name]
+
+
+@_route("")
 async def laboratory(work: Attended) -> Response:
     """The laboratory."""
     chosen, held = await _chosen(work)
     # The first compilation takes seconds: the page is shown immediately, and its script waits for the numbers.
     ready = models.is_compiled(models.shape_of(chosen.study))
     case = await _case(work, chosen, held) if ready and not chosen.faults else None
+    parts = _parts(work, chosen, held, case)
+    presentation = models.presentation_of(chosen.study)
     return page(
-        "laboratory.html",
+        laboratory_of(chosen.study.model).template,
         status=422 if chosen.faults else 200,
-        machines=[preset_of(name) for name in machines()],
+        machines=list(machines(chosen.study.model).items()),
+        presentation=presentation,
+        laboratories=_laboratories(),
         position=position,
         drawings=chosen.sketch,
-        picture=f"/laboratory/picture.svg?{_query(chosen, held)}",
-        **_parts(work, chosen, held, case),
+        picture=f"{parts['own']}/picture.svg?{parts['query']}",
+        state=_next_state(chosen, case),
+        frames=None if case is None else case.get("frames"),
+        looks=presentation.states,
+        words={state: shown(term(state)) for state in presentation.states},
+        pendulums=_pendulums(chosen.study),
+        **parts,
     )
+
+
+def _laboratories() -> list[tuple[str, str, str]]:
+    """Model, title and address of each laboratory, the first one first."""
+    found = [(model, models.model_of(model).presentation.title or model, at) for model, at in laboratories().items()]
+    return sorted(found, key=lambda laboratory: laboratory[2] != _OWN)
 
 
 async def _chosen(work: Work) -> tuple[Setting, list[Setting]]:
     """The setting of an address, and those that it holds."""
-    given = work.request.query_params
-    chosen = await work.check(setting, dict(given), CHOICE.get())
-    return chosen, await work.check(held_settings, given.getlist("held")) if "held" in given else []
+    given, model = work.request.query_params, _model(work)
+    chosen = await work.check(setting, model, dict(given), CHOICE.get())
+    queries = [query for query in given.getlist("held") if query]
+    return chosen, await work.check(held_settings, model, queries) if queries else []
 
 
-async def _case(work: Work, chosen: Setting, held: list[Setting], columns: int = 2) -> dict[str, Any]:
-    named = [(_NAMES[index], each.study) for index, each in enumerate(held)]
-    return await work.run_case(machine_case, chosen.study, _reading(chosen), named, columns)
+def _named(held: Iterable[Setting]) -> list[tuple[str, Study]]:
+    return list(zip(_NAMES, (each.study for each in held), strict=False))
+
+
+async def _case(work: Work, chosen: Setting, held: list[Setting], columns: int = 2) -> Case:
+    """Results, figure and more of a setting, and results of the held ones."""
+    case = drive_case if models.has_strobes(chosen.study) else machine_case
+    found: Case = await work.run_case(case, chosen.study, _reading(chosen), _named(held), columns)
+    return found
 
 
 def _reading(chosen: Setting) -> Reading:
@@ -92,18 +133,38 @@ def _query(chosen: Setting, held: list[Setting]) -> str:
     return "&".join([chosen.query, *(urlencode({"held": each.query}) for each in held)])
 
 
-def _parts(work: Work, chosen: Setting, held: list[Setting], case: dict[str, Any] | None) -> dict[str, Any]:
+def _next_state(chosen: Setting, case: Case | None) -> dict[str, str]:
+    """The initial values from which the next setting starts: those of the motion shown, where there is one."""
+    state = None if case is None else case.get("state")
+    return chosen.state if state is None else {path: repr(value) for path, value in state.items()}
+
+
+def _pendulums(study: Study) -> list[bool]:
+    """Of each pendulum of a drive, whether it hangs down."""
+    arms = (f"pendulums.{number}.arm" for number in range(models.MAX_PENDULUMS))
+    return [study.base[path] < 0.0 for path in arms if path in study.base]
+
+
+def _parts(work: Work, chosen: Setting, held: list[Setting], case: Case | None) -> dict[str, Any]:
     """What the page and its answers say about a setting: the answer that is always in sight, and all results."""
+    own, model = laboratory_of(chosen.study.model), chosen.study.model
     infos = {info.name: info for info in models.study_results(chosen.study)}
+    main = own.main or dict.fromkeys(name for name in models.presentation_of(chosen.study).drawn if name in infos)
     cases = [] if case is None else [case, *case["held"]]
-    hold = _query(chosen, [*held, chosen])
+    rows = [
+        (infos[name], [each["results"].get(name) for each in cases])
+        for name in ((*main, *own.further) if own.further else infos)
+        if name in infos and cases
+    ]
+    hold = _query(chosen, [*held, chosen] if own.held > 1 else [chosen])
     values = {
         "chosen": chosen,
+        "model": model,
+        "own": laboratories()[model],
         "case": case,
         "reading": _reading(chosen),
-        "shown": [
-            (infos[name], [each["results"][name] for each in cases]) for name in _SHOWN if name in infos and cases
-        ],
+        "main": [(info, main[info.name], numbers) for info, numbers in rows if info.name in main],
+        "rows": rows,
         "held": [
             {
                 "name": _NAMES[index],
@@ -113,59 +174,86 @@ def _parts(work: Work, chosen: Setting, held: list[Setting], case: dict[str, Any
             }
             for index, each in enumerate(held)
         ],
-        "hold": hold if len(held) < MOST_HELD and fits(hold) else "",
+        "hold": hold if len(held) < own.held + (own.held == 1) and fits(hold) else "",
         "query": _query(chosen, held),
         "sentence": "" if case is None else meanings(models.ENDING_SENTENCES).get(case["ending"], ""),
-        "questions": QUESTIONS,
+        "motions": [_motion(each) for each in cases],
+        "flags": [] if case is None else _flag_sentences(chosen.study, case),
+        "studies": studies(chosen),
+        "questions": own.questions,
         "now": work.context.store.clock.now().isoformat(),
     }
+    name = own.template.removesuffix(".html")
     return values | {
-        "answer": fragment("_laboratory_answer.html", **values),
-        "results": fragment("_laboratory_results.html", **values),
+        "answer": fragment(f"_{name}_answer.html", **values),
+        "details": fragment(f"_{name}_details.html", **values),
     }
 
 
-@router.get("/laboratory/figure")
+def _motion(case: Case) -> str:
+    """The regime in a sentence; "" where there is none."""
+    return motion_sentence(case["regime"], case["order"] or None) if case.get("regime") else ""
+
+
+def _flag_sentences(study: Study, case: Case) -> list[str]:
+    """What the flags of a case mean, but for those that its regime says."""
+    known = meanings(models.flags_of(study.model))
+    return [known[flag] for flag in case.get("flags", ()) if flag != case.get("regime")]
+
+
+@_route("/figure")
 async def laboratory_figure(work: Attended, columns: Annotated[int, Query(ge=1, le=2)] = 2) -> Response:
-    """Picture and numbers of a setting, for the sliders."""
+    """Picture, frames and numbers of a setting, for the sliders."""
     chosen, held = await _chosen(work)
     case = None if chosen.faults else await _case(work, chosen, held, columns)
     parts = _parts(work, chosen, held, case)
     return json_response(
         {
             "figure": None if case is None else case["figure"],
+            "frames": None if case is None else case.get("frames"),
             "answer": parts["answer"],
-            "results": parts["results"],
-            "sketch": fragment("_linkage.html", drawings=chosen.sketch),
+            "details": parts["details"],
+            "sketch": fragment("_linkage.html", drawings=chosen.sketch) if chosen.sketch else "",
+            "state": _next_state(chosen, case),
             "faults": chosen.faults,
             "values": {slider.path: number(slider.value) for slider in chosen.sliders},
+            "query": parts["query"],
+            "own": chosen.query,
         }
     )
 
 
-@router.get("/laboratory/picture.{form}")
+@_route("/picture.{form}")
 async def laboratory_picture(work: Attended, form: Literal["svg", "png", "csv"]) -> Response:
     """The motion as one picture or as a table, also for pages without JavaScript."""
     chosen, held = await _chosen(work)
     if chosen.faults:
         raise ApiError("invalid-spec", "; ".join(text for texts in chosen.faults.values() for text in texts))
-    motions = [await work.run_case(_motion, each.study) for each in (chosen, *held)]
+    study, reading = chosen.study, _reading(chosen)
+    if models.has_strobes(study):
+        run = (turn_table, study, reading.units) if form == "csv" else (curves_of, study, _named(held))
+        made = await work.run_case(*run)
+        if made is None:
+            raise ApiError("not-found", Sentence("The case did not end ok, so it has no motion to draw."))
+        if form == "csv":
+            return table(made, "csv", "laboratory")
+        return await picture(draw_figure, form, read_figure(made, reading), study.name).response(work)
+    motions = [await work.run_case(_whole, each.study) for each in (chosen, *held)]
     if form == "csv":
-        return table(await in_thread(trajectory_csv, motions[0], _reading(chosen).units), "csv", "laboratory")
+        return table(await in_thread(trajectory_csv, motions[0], reading.units), "csv", "laboratory")
     beside = [(_NAMES[index], motion) for index, motion in enumerate(motions[1:]) if motion.times.size]
-    shown, reading = models.presentation_of(chosen.study), _reading(chosen)
-    at = chosen.angle % chosen.degrees
-    return await picture(draw_motion, form, motions[0], shown, reading, chosen.study.name, beside, at).response(work)
+    presentation, at = models.presentation_of(study), chosen.angle % chosen.degrees
+    return await picture(draw_motion, form, motions[0], presentation, reading, study.name, beside, at).response(work)
 
 
-def _motion(study: Study) -> Trajectory:
+def _whole(study: Study) -> Trajectory:
     return models.run_trajectory(study, 0, 0.0, models.extent(study, 0).end, SAMPLES // 4)
 
 
-@router.get("/laboratory/questions")
+@router.get(f"{_OWN}/questions")
 async def laboratory_questions(work: Attended) -> Response:
     """Questions with a blank for an estimate, and the answers to those that have one."""
-    chosen = await work.check(setting, dict(work.request.query_params), CHOICE.get())
+    chosen, _held = await _chosen(work)
     asked = [] if chosen.faults else await work.check(estimates, chosen, dict(work.request.query_params))
     answers: list[tuple[str, float | None]] = []
     if asked:
@@ -176,23 +264,28 @@ async def laboratory_questions(work: Attended) -> Response:
         now=answers[0] if answers else None,
         asked=list(zip(asked, answers[1:], strict=True)),
         sentences=meanings(models.ENDING_SENTENCES),
-        questions=QUESTIONS,
+        studies=studies(chosen),
     )
 
 
-@router.get("/laboratory/form")
+@_route("/form")
 async def laboratory_form(work: Attended) -> Response:
     """The current machine in the form for a new study."""
-    chosen = await work.check(setting, dict(work.request.query_params), CHOICE.get())
+    chosen, _held = await _chosen(work)
     return await spec_in_form(work, {**chosen.spec, "axes": []})
 
 
-@router.get("/laboratory/study")
-async def laboratory_study(work: Attended, question: str = "inertia") -> Response:
-    """One of the questions about the current machine, as a study to check and submit."""
-    chosen = await work.check(setting, dict(work.request.query_params), CHOICE.get())
-    if question not in QUESTIONS:
-        raise ApiError(
-            "not-found", Sentence("Unknown question; known questions: {questions}.", questions=", ".join(QUESTIONS))
-        )
-    return await spec_in_form(work, question_spec(chosen, question))
+@_route("/study")
+async def laboratory_study(work: Attended, along: str = "", question: str = "") -> Response:
+    """The current machine as a study of some of its numbers, to check and submit."""
+    chosen, _held = await _chosen(work)
+    known = studies(chosen)
+    key = along or question or next(iter(known), "")
+    if key not in known:
+        raise ApiError("not-found", Sentence("Unknown axis; known axes: {axes}.", axes=", ".join(known)))
+    return await spec_in_form(work, study_spec(chosen, key))
+
+
+# The addresses of the other laboratories: those of the first one are none of them.
+for _path, _page in _PAGES.items():
+    router.get(f"{_OWN}/{{model}}{_path}")(_page)

@@ -1,19 +1,19 @@
-"""The questions about a machine, each a study of what is set."""
+"""Studies of what is set in a laboratory, and questions about it with estimates."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.http.web.figures.shaft import overridden
 from sprag.service.http.web.form.machine import row_of
-from sprag.service.http.web.laboratory.sliders import quantity_text
-from sprag.service.languages import N_, _, gettext
+from sprag.service.http.web.laboratory.setting import laboratory_of
+from sprag.service.http.web.laboratory.sliders import unit_of
+from sprag.service.languages import _, gettext
 from sprag.service.reading.numbers import parse_number
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.report import SpecError
-from sprag.worker import models
-from sprag.worker.models.parameters import parameter_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,32 +22,32 @@ if TYPE_CHECKING:
     from sprag.service.http.web.laboratory.sliders import Slider
     from sprag.worker.study import Study
 
-#: Name of each question, and what its study varies.
-QUESTIONS: Final = {
-    "inertia": N_("the drive's inertia"),
-    "masses": N_("the masses"),
-    "load": N_("the operation's load"),
-}
-#: What happens in each question to be estimated, and the factor on the numbers that it is about.
-CHANGES: Final = {
-    "inertia": (N_("The drive's inertia is doubled."), 2.0),
-    "masses": (N_("All masses and inertias of the mechanism are halved."), 0.5),
-    "load": (N_("The load of the operation is halved."), 0.5),
-}
-_VALUES: Final = 25
 _VALUES_EACH: Final = 9
+_LONGEST_TITLE: Final = 100
 
 
-def question_spec(chosen: Setting, question: str) -> dict[str, Any]:
-    """The study that answers a question about the machine as it is set."""
-    axes, groups = [], _alike(chosen, [slider for slider in chosen.first if _asked(slider, question)])
-    for group in groups if question == "masses" else groups[:1]:
+def studies(chosen: Setting) -> dict[str, str]:
+    """What the studies vary that can be made of a setting; of a model that names none, each number in sight."""
+    named = laboratory_of(chosen.study.model).studies
+    first = [slider for slider in chosen.sliders if slider.first] or chosen.sliders
+    return {key: word for key, (word, _path) in named.items()} or {slider.path: slider.label for slider in first}
+
+
+def study_spec(chosen: Setting, key: str) -> dict[str, Any]:
+    """The study of a machine as it is set."""
+    laboratory = laboratory_of(chosen.study.model)
+    word, pattern = laboratory.studies.get(key) or (studies(chosen)[key], re.escape(key))
+    asked = [slider for slider in chosen.sliders if re.fullmatch(pattern, _own(chosen.study, slider.path))]
+    groups = _alike(chosen, [slider for slider in asked if slider.first] or asked)
+    axes = []
+    for group in groups if key in laboratory.each else groups[:1]:
         slider, paths = group[0], [slider.path for slider in group]
         way = "geomspace" if slider.logarithmic else "linspace"
-        count = _VALUES_EACH if question == "masses" and len(groups) > 1 else _VALUES
-        ends = [float(quantity_text(end)) for end in (slider.low, slider.high)]
+        count = _VALUES_EACH if key in laboratory.each and len(groups) > 1 else laboratory.values
+        ends = [slider.written(end) for end in (slider.low, slider.high)]
         axes.append({"path": paths if len(paths) > 1 else paths[0], way: [*ends, count]})
-    return {**chosen.spec, "name": f"{chosen.study.name}: irregularity against {QUESTIONS[question]}", "axes": axes}
+    name = laboratory.against.format(machine=chosen.title[:_LONGEST_TITLE], what=word)
+    return {**chosen.spec, "name": name, "axes": axes}
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,11 +67,12 @@ class Estimate:
 
 def estimates(chosen: Setting, given: Mapping[str, str]) -> list[Estimate]:
     """The questions that this machine can be asked, with the estimates of an address."""
-    found = []
-    for name, (sentence, factor) in CHANGES.items():
-        paths = [path for path, value in chosen.study.base.items() if value and _meant(chosen.study, path, name)]
+    found, base = [], chosen.study.base
+    for name, (sentence, factor, pattern, units) in laboratory_of(chosen.study.model).questions.items():
+        paths = [path for path, value in base.items() if value and unit_of(chosen.study, path) in units
+                 and re.fullmatch(pattern, _own(chosen.study, path))]  # fmt: skip
         try:
-            spec = overridden(chosen.spec, {path: factor * chosen.study.base[path] for path in paths})
+            spec = overridden(chosen.spec, {path: factor * base[path] for path in paths})
             study = parse_spec(spec).study if paths else None
         except SpecError:  # such a machine cannot run: not a question for a lesson
             study = None
@@ -93,26 +94,14 @@ def _estimate(text: str) -> tuple[float | None, str]:
     return value, ""
 
 
-def _meant(study: Study, path: str, question: str) -> bool:
-    """Whether a question is about the number at ``path``."""
-    own, entry = row_of(models.MACHINE_SHAFT, path)[2], parameter_of(study, path)
-    if question == "masses":
-        return own.startswith("mechanism.") and entry is not None and entry.unit in {"kg", "kg*m^2"}
-    return own == {"inertia": "drive.inertia", "load": "operation.scale"}[question]
-
-
-def _asked(slider: Slider, question: str) -> bool:
-    own = row_of(models.MACHINE_SHAFT, slider.path)[2]
-    if question == "masses":
-        return slider.unit == "kg" and own.startswith("mechanism.")
-    return own == {"inertia": "drive.inertia", "load": "operation.scale"}[question]
+def _own(study: Study, path: str) -> str:
+    """The path within its part of a machine of several."""
+    return row_of(study.model, path)[2]
 
 
 def _alike(chosen: Setting, sliders: list[Slider]) -> list[list[Slider]]:
     """The sliders, those together that are the same number of parts that are alike: they vary together."""
     groups: dict[tuple[str, float], list[Slider]] = {}
     for slider in sliders:
-        groups.setdefault((row_of(models.MACHINE_SHAFT, slider.path)[2], chosen.study.base[slider.path]), []).append(
-            slider
-        )
+        groups.setdefault((_own(chosen.study, slider.path), chosen.study.base[slider.path]), []).append(slider)
     return list(groups.values())

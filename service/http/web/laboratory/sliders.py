@@ -1,37 +1,33 @@
-"""Sliders of the laboratory: which numbers have one, its range, and the place of its knob."""
+"""Sliders of the laboratory: which numbers have one in sight, its range, and the place of its knob."""
 
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from sprag.service.http.web.form.check import message
-from sprag.service.http.web.form.machine import row_of
-from sprag.service.languages import N_, _
+from sprag.service.http.web.form.machine import group_of, row_of
+from sprag.service.languages import _
 from sprag.service.reading.numbers import in_language, parse_number
 from sprag.service.reading.quantities import read_units
 from sprag.service.reading.units import QuantityError, has_unit, parse_quantity, split_quantity
 from sprag.service.reading.wording import words
 from sprag.worker import models
-from sprag.worker.models.parameters import parameter_of
+from sprag.worker.models.laboratory import SliderKind
+from sprag.worker.models.parameters import parameter_of, placed
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from sprag.service.reading.reader import Choice, Reading
     from sprag.service.spec.report import SpecError
+    from sprag.worker.models import Parameter
     from sprag.worker.study import Study
 
-#: Numbers that every machine shows first, and the range of their sliders: (lower, upper) factor on the machine's own.
-FIRST: Final = {"drive.inertia": (0.05, 20.0), "mean_speed": (0.25, 4.0), "operation.scale": (0.0, 3.0)}
-_MASSES: Final = (0.0, 4.0)
-_OTHERS: Final = (0.5, 2.0)
-#: Units in which a slider moves unless its reader has chosen others, and the SI value of one.
-_SHOWN: Final = {"rad": ("deg", math.pi / 180.0), "rad/s": ("rpm", math.pi / 30.0)}
-_SI: Final = ("", 1.0)
-#: Angles, in rad, whose sliders do not depend on the machine's own value.
-_ANGLES: Final = {"crank_angle": (-2.0 * math.pi, 2.0 * math.pi), "inclination": (-math.pi, math.pi)}
+#: A number without a slider in sight.
+_OTHER: Final = SliderKind("")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +36,7 @@ class Slider:
 
     Attributes
     ----------
+    group : heading under which it stands
     text, own : as given, and as the machine has it
     low, high : equal where the number has a field only
     shown, factor : unit in which the slider moves and the SI value of one; "" for the unit of the number itself
@@ -48,6 +45,7 @@ class Slider:
 
     path: str
     label: str
+    group: str
     symbol: str
     unit: str
     help: str
@@ -66,44 +64,115 @@ class Slider:
         """Whether its text has a unit of its own."""
         return has_unit(self.text)
 
+    def written(self, value: float) -> str | float:
+        """An SI value as it stands in a spec: in the slider's unit, where that is not of SI."""
+        text = quantity_text(value, self.shown, self.factor)
+        return text if self.shown else float(text)
 
-def slider_of(own: Study, study: Study, path: str, text: str, reading: Reading, choice: Choice) -> Slider:
-    """The slider of a number, as its reader reads it: of the machine as it comes (``own``) and as it is set (``study``,
-    ``text``).
+
+def sliders_of(own: Study, study: Study, texts: dict[str, str], reading: Reading, choice: Choice) -> list[Slider]:
+    """The sliders of all numbers as their reader reads them, in the order of the page: of the machine as it comes
+    (``own``) and as it is set (``study``, ``texts``).
     """
-    entry = parameter_of(own, path)
+    kinds = models.model_of(own.model).presentation.laboratory.sliders
+    found = [(_kind(own, path), path) for path in own.base]
+
+    def place(pair: tuple[int, str]) -> tuple[bool, int, int, str]:
+        _rows, number, rest = row_of(own.model, pair[1])
+        return pair[0] == len(kinds), number, pair[0], rest
+
+    return [
+        _slider(own, study, path, texts.get(path, ""), (*kinds, _OTHER)[kind], reading, choice)
+        for kind, path in sorted(found, key=place)
+    ]
+
+
+def entry_of(study: Study, path: str) -> Parameter | None:
+    """The parameter at a path, in its own unit."""
+    entry = parameter_of(study, path)
+    return None if entry is None else placed(entry, path)
+
+
+def unit_of(study: Study, path: str) -> str:
+    """The SI unit of a number; "" where it is no parameter."""
+    entry = entry_of(study, path)
+    return "" if entry is None else entry.unit
+
+
+def _kind(study: Study, path: str) -> int:
+    """Place of the kind of a slider among those of the model; their number for the other numbers."""
+    kinds, rest = models.model_of(study.model).presentation.laboratory.sliders, row_of(study.model, path)[2]
+    fitting = (
+        place for place, kind in enumerate(kinds)
+        if re.fullmatch(kind.path, rest) and (not kind.unit or (kind.unit == unit_of(study, path) and study.base[path]))
+    )  # fmt: skip
+    return next(fitting, len(kinds))
+
+
+def _slider(
+    own: Study, study: Study, path: str, text: str, kind: SliderKind, reading: Reading, choice: Choice
+) -> Slider:
+    entry, first, laboratory = entry_of(own, path), own.base[path], models.model_of(own.model).presentation.laboratory
     unit = "" if entry is None else entry.unit
-    factors, is_first = _factors(own, path)
-    first = own.base[path]
-    low, high = sorted((factors[0] * first, factors[1] * first)) if math.isfinite(first) else (0.0, 0.0)
-    low, high = _ANGLES.get(path.rsplit(".", 1)[-1], (low, high))
-    if entry is not None:
-        low, high = max(low, entry.low), min(high, entry.high)
-    shown, factor = scale(unit, _SHOWN.get(unit, _SI), reading, choice)
-    _rows, part, name = row_of(models.MACHINE_SHAFT, path)
-    label = _("Load, as a multiple of the diagram") if name == "operation.scale" else _(words(path.rsplit(".", 1)[-1]))
-    if name.startswith(("operation.steps.", "drive.stages.")):
-        place = name.split(".")
-        number = int(place[2]) + 1
-        step = name.startswith("operation.")
-        numbered = N_("Step {number}: {label}") if step else N_("Stage {number}: {label}")
-        label = _(numbered, number=number, label=label.lower())
+    low, high = _ends(own, path, kind, entry)
+    shown, factor = _scale(own, path, unit, reading, choice)
     given = quantity_text(first, shown, factor)
-    typed = given if is_own(text, first, unit) else text.strip()
+    label = _label(own, path, kind, reading)
     return Slider(
-        path, _("Part {number}: {label}", number=part, label=label) if part else label,
-        "" if entry is None else entry.symbol, unit,
-        "" if entry is None else _(entry.help), value_of(text, unit, study.base[path]), typed, given,
-        low, high, low > 0.0, shown, factor, is_first,
+        path, label, kind.group if kind.label else group_of(own.model, path),
+        kind.symbol or ("" if entry is None else entry.symbol), unit,
+        _(kind.help) if kind.help else "" if entry is None else _(entry.help),
+        value_of(text, unit, study.base[path]), given if is_own(text, first, unit) else text.strip(), given,
+        low, high, (kind.logarithmic or kind is _OTHER) and low > 0.0, shown, factor,
+        kind is not _OTHER or not laboratory.sliders,
     )  # fmt: skip
 
 
-def scale(si: str, usual: tuple[str, float], reading: Reading, choice: Choice) -> tuple[str, float]:
-    """Unit in which a slider moves, "" for SI, and the SI value of one: ``usual`` unless its reader has chosen."""
+def _label(own: Study, path: str, kind: SliderKind, reading: Reading) -> str:
+    laboratory, (rows, number, rest) = models.model_of(own.model).presentation.laboratory, row_of(own.model, path)
+    name = path.rpartition(".")[2]
+    label = _(kind.label or words(name)) if kind is not _OTHER or laboratory.numbered else reading.caption(path)
+    for at, text in laboratory.numbered.items():
+        found = re.match(rf"{re.escape(at)}\.(\d+)\.", rest)
+        if found is not None:
+            label = _(text, number=int(found[1]) + 1, label=label.lower())
+    pendulum = re.match(r"(\w+)\.(\d+)\.", path)
+    if rows is not None:
+        return _(rows.title, number=number, label=label)
+    several = (
+        pendulum and sum(re.fullmatch(rf"{pendulum[1]}\.\d+\.{name}", other) is not None for other in own.base) > 1
+    )
+    if kind.label and pendulum and several:
+        return _("{name} of pendulum {number}", name=label, number=pendulum[2])
+    return label
+
+
+def _ends(own: Study, path: str, kind: SliderKind, entry: Parameter | None) -> tuple[float, float]:
+    value, laboratory = own.base[path], models.model_of(own.model).presentation.laboratory
+    fixed = kind.ends or laboratory.angles.get(path.rpartition(".")[2])
+    if entry is not None and entry.unit == "1" and not laboratory.sliders:  # a share, such as a damping ratio
+        fixed = (entry.low, entry.high) if math.isfinite(entry.high - entry.low) else None
+    if kind.beside:
+        value = max(own.base.get(other, 0.0) for other in kind.beside)
+    low, high = sorted((kind.low * value, kind.high * value)) if math.isfinite(value) else (0.0, 0.0)
+    low, high = fixed or (low, max(high, kind.least))
+    return (low, high) if entry is None else (max(low, entry.low), min(high, entry.high))
+
+
+def _scale(own: Study, path: str, si: str, reading: Reading, choice: Choice) -> tuple[str, float]:
+    """Unit in which a slider moves, "" for SI, and the SI value of one: the reader's choice or that of the model."""
     shown = reading.unit(si)
     if shown != si:
         return shown, parse_quantity(f"1 {shown}", si)
-    return usual if read_units(choice.units)[0] else _SI
+    for pattern, unit in (
+        models.model_of(own.model).presentation.laboratory.shown_in if read_units(choice.units)[0] else ()
+    ):
+        if re.fullmatch(pattern, path):
+            try:
+                return unit, parse_quantity(f"1 {unit}", si)
+            except QuantityError:
+                continue
+    return "", 1.0
 
 
 def is_own(text: str, own: float, si: str) -> bool:
@@ -115,17 +184,6 @@ def is_own(text: str, own: float, si: str) -> bool:
         )
     except QuantityError:
         return False
-
-
-def _factors(study: Study, path: str) -> tuple[tuple[float, float], bool]:
-    """Range of a slider as factors on the machine's own value, and whether it is always in sight."""
-    own = row_of(models.MACHINE_SHAFT, path)[2]
-    if own in FIRST:
-        return FIRST[own], True
-    entry = parameter_of(study, path)
-    if own.startswith("mechanism.") and entry is not None and entry.unit == "kg" and study.base[path] > 0.0:
-        return _MASSES, True
-    return _OTHERS, False
 
 
 def value_of(text: str, unit: str, otherwise: float) -> float:
@@ -152,17 +210,6 @@ def position(slider: Slider) -> float:
         value = max(slider.value, slider.low)
         return 1000.0 * math.log(value / slider.low) / math.log(slider.high / slider.low)
     return 1000.0 * (slider.value - slider.low) / span if span else 0.0
-
-
-def in_order(sliders: list[Slider]) -> list[Slider]:
-    """The sliders as they stand on the page: the machine's own first, then those of each part."""
-    order = list(FIRST)
-
-    def place(slider: Slider) -> tuple[bool, int, bool, str]:
-        _rows, part, own = row_of(models.MACHINE_SHAFT, slider.path)
-        return not slider.first, part, own not in order, own
-
-    return sorted(sliders, key=place)
 
 
 def faults_by_field(error: SpecError, fields: Iterable[str], changed: Iterable[str]) -> dict[str, list[str]]:

@@ -4,23 +4,26 @@
 const lab = document.getElementById("lab"), plot = document.getElementById("lab-plot"), answer = document.getElementById("answer");
 const details = document.getElementById("details"), state = document.getElementById("state"), held = lab.elements.held;
 const hold = document.getElementById("hold"), release = document.getElementById("release");
+const place = lab.getAttribute("action");
 let busy = false, again = null, lost = false, own = "";
 
-const written = () => new URLSearchParams([...new FormData(lab)].filter(([, text]) => text !== "")).toString();
+// What is set, without the further numbers that are the machine's own.
+const changed = (name) => !("further" in (lab.elements[name]?.dataset ?? {})) || lab.elements[name].value !== lab.elements[name].dataset.own;
+const written = () => new URLSearchParams([...new FormData(lab)].filter(([name, text]) => text !== "" && changed(name))).toString();
 
 const take = async (found, query) => {
-  history.replaceState(null, "", `${sprag.prefix}/laboratory/drive?${query}`);
-  for (const place of lab.querySelectorAll(".wrong")) {
-    const name = place.id.slice("wrong:".length), texts = found.faults[name] || [];
-    place.textContent = texts.join("; ");
+  history.replaceState(null, "", `${place}?${query}`);
+  for (const told of lab.querySelectorAll(".wrong")) {
+    const name = told.id.slice("wrong:".length), texts = found.faults[name] || [];
+    told.textContent = texts.join("; ");
     lab.elements[name].toggleAttribute("aria-invalid", texts.length > 0);
   }
   answer.innerHTML = found.answer;
   details.innerHTML = found.details;
   state.replaceChildren(...Object.entries(found.state).map(([name, value]) => Object.assign(document.createElement("input"), { type: "hidden", name, value })));
   own = found.own;
-  hold.href = `${sprag.prefix}/laboratory/drive?${own}&${new URLSearchParams({ held: own })}`;
-  release.href = `${sprag.prefix}/laboratory/drive?${own}`;
+  hold.href = `${place}?${own}&${new URLSearchParams({ held: own })}`;
+  release.href = `${place}?${own}`;
   release.hidden = !held.value;
   plot.classList.toggle("stale", !found.figure);
   if (found.figure) await sprag.show(plot, found.figure);
@@ -33,7 +36,7 @@ const ask = async (queryOf = written) => {
   busy = true;
   const query = queryOf();
   try {
-    await take(await sprag.fetchJson(`${sprag.prefix}/laboratory/drive/figure?${query}`), query);
+    await take(await sprag.fetchJson(`${place}/figure?${query}`), query);
   } catch (error) {
     plot.classList.add("stale");
     lost = true;

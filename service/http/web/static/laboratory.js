@@ -4,6 +4,7 @@
 const lab = document.getElementById("lab"), plot = document.getElementById("lab-plot"), answer = document.getElementById("answer");
 const sketch = document.getElementById("sketch"), angle = document.getElementById("angle");
 const dial = document.querySelector("[data-angle]"), turn = document.querySelector("[data-turn]");
+const own = lab.getAttribute("action");
 let busy = false, again = false, old = false;
 
 // Numbers that are always in sight, and those that were changed.
@@ -19,14 +20,14 @@ const ask = async () => {
   busy = true;
   try {
     const asked = query();
-    const found = await sprag.fetchJson(sprag.narrowed(plot, `${sprag.prefix}/laboratory/figure?columns=2&${asked}`));
-    history.replaceState(null, "", `${sprag.prefix}/laboratory?${asked}`);
+    const found = await sprag.fetchJson(sprag.narrowed(plot, `${own}/figure?columns=2&${asked}`));
+    history.replaceState(null, "", `${own}?${asked}`);
     for (const place of document.querySelectorAll(".lab .wrong")) {
       const texts = found.faults[place.id.slice("wrong:".length)] || [];
       place.textContent = texts.join("; ");
     }
     answer.innerHTML = found.answer;
-    document.getElementById("results").innerHTML = found.results;
+    document.getElementById("details").innerHTML = found.details;
     plot.classList.toggle("stale", !found.figure);
     sketch.classList.toggle("stale", !found.figure);
     if (found.figure) {
@@ -48,7 +49,7 @@ const ask = async () => {
 sprag.slider.wire(lab, ask);
 
 // The sketch: frames a few degrees apart, and straight lines between them.
-const degrees = () => Number.parseFloat(angle.value) || 0;
+const degrees = () => Number.parseFloat(angle?.value) || 0;
 
 const between = (frames) => {
   const steps = frames.length - 1, place = ((degrees() % 360 + 360) % 360) / 360 * steps;
@@ -84,6 +85,7 @@ const pose = () => {
 
 // A line across all panels of the picture, at the angle of the sketch; part of the figure, so that paper has it too.
 const lines = (figure) => {
+  if (!dial) return [];
   const x = Number(dial.value), line = { type: "line", x0: x, x1: x, y0: 0, y1: 1, yref: "paper", line: { color: sprag.colour("--accent"), width: 1 } };
   return [...new Set(figure.data.map((trace) => trace.xaxis || "x"))].map((xref) => ({ ...line, xref }));
 };
@@ -103,26 +105,26 @@ const turned = () => {
   requestAnimationFrame(() => { pointing = false; point(); });
 };
 
-dial.addEventListener("input", () => {
+dial?.addEventListener("input", () => {
   angle.value = dial.value;
   dial.setAttribute("aria-valuetext", sprag.say("{angle} degrees", { angle: sprag.decimal(dial.value) }));
   turned();
 });
-angle.addEventListener("input", () => {
+angle?.addEventListener("input", () => {
   const cycle = Number(dial.max);
   dial.value = (degrees() % cycle + cycle) % cycle;
   turned();
 });
-dial.addEventListener("change", () => history.replaceState(null, "", `${sprag.prefix}/laboratory?${query()}`));
+dial?.addEventListener("change", () => history.replaceState(null, "", `${own}?${query()}`));
 
 // A turn of the shaft takes four seconds, until it is stopped.
 const SECONDS = 4;
-turn.addEventListener("click", () => {
+turn?.addEventListener("click", () => {
   const on = turn.getAttribute("aria-pressed") !== "true", from = Number(dial.value), begin = performance.now();
   turn.setAttribute("aria-pressed", String(on));
   turn.textContent = on ? sprag.say("Stop") : sprag.say("Turn");
   const run = (now) => {
-    if (turn.getAttribute("aria-pressed") !== "true") { history.replaceState(null, "", `${sprag.prefix}/laboratory?${query()}`); return; }
+    if (turn.getAttribute("aria-pressed") !== "true") { history.replaceState(null, "", `${own}?${query()}`); return; }
     dial.value = (from + 0.36 / SECONDS * Math.max(now - begin, 0)) % Number(dial.max);
     angle.value = dial.value;
     turned();

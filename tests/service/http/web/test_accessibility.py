@@ -65,12 +65,12 @@ PAGES: Final[dict[str, list[str]]] = {
     "/schedules/{schedule_id}": ["/schedules/{SCHEDULE}"],
     "/compare": ["/compare?study={STUDY}&study={OTHER}"],
     "/laboratory": ["/laboratory?machine=press"],
-    "/laboratory/drive": ["/laboratory/drive"],
+    "/laboratory/{model}": ["/laboratory/drive"],
     "/laboratory/questions": ["/laboratory/questions?machine=press"],
     "/laboratory/form": ["/laboratory/form?machine=press"],
     "/laboratory/study": ["/laboratory/study?machine=press"],
-    "/laboratory/drive/form": ["/laboratory/drive/form"],
-    "/laboratory/drive/study": ["/laboratory/drive/study"],
+    "/laboratory/{model}/form": ["/laboratory/drive/form"],
+    "/laboratory/{model}/study": ["/laboratory/drive/study"],
     "/studies/{study_id}": ["/studies/{STUDY}", "/studies/{SHAFT}", "/studies/{RUNNING}", "/studies/none"],
     "/studies/{study_id}/delete": ["/studies/{STUDY}/delete"],
     "/studies/{study_id}/extend": ["/studies/{STUDY}/extend"],
@@ -191,7 +191,8 @@ def test_no_other_route_answers_with_a_page(service: Service) -> None:
     study = service.submit()
     service.fill(study)
     schedule = service.http.post("/api/v1/schedules", json={"spec": SPEC, "cron": "0 22 * * *"}).json()["id"]
-    ids = {"study_id": study, "case": "0", "schedule_id": schedule, "slug": "x", "name": "live.js", "form": "svg"}
+    ids = {"study_id": study, "case": "0", "schedule_id": schedule, "slug": "x", "name": "live.js", "form": "svg",
+           "model": "drive"}  # fmt: skip
     programs = ("/api/", "/live/", "/docs/site/")  # what makes the site of the documentation judges its pages
     others = [path for verb, path in map(str.split, ROLES) if verb == "GET" and not path.startswith(programs)]
     assert set(PAGES) <= set(others)

@@ -175,7 +175,7 @@ def test_the_sheet_has_every_number_with_its_unit_and_nothing_to_press(visitor: 
     sheet = page.locator("section.paper")
     expect(sheet.locator("tr", has_text="Spring rate")).to_contain_text("9000N/m")
     expect(sheet.locator("tr", has_text="Horizontal amplitude")).to_contain_text("2 mm")
-    expect(sheet.locator("tr", has_text="Arm of the spring")).to_contain_text("50mm")
+    expect(sheet.locator("tr", has_text="Arm of the spring")).to_contain_text("50 mm")
     expect(sheet).to_contain_text("Held: One pendulum, load torque 0.4 N·m.")
     expect(sheet).to_contain_text("Printed 2")
     for selector in ("#lab", "#hold", "#play", "#reading"):

@@ -6,6 +6,7 @@ import json
 import math
 import re
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl
 
@@ -14,9 +15,8 @@ import pytest
 from sprag.service.http.problems import ApiError
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.figures.shaft import irregularities, machine_case
-from sprag.service.http.web.laboratory.drive_setting import setting as drive_setting
-from sprag.service.http.web.laboratory.questions import estimates, question_spec
-from sprag.service.http.web.laboratory.setting import MOST_HELD, held_settings, machines, setting
+from sprag.service.http.web.laboratory import setting as settings
+from sprag.service.http.web.laboratory.questions import estimates, study_spec
 from sprag.service.reading.reader import Choice, Reading
 from sprag.service.spec.document import parse_spec
 from sprag.worker import models
@@ -24,6 +24,10 @@ from sprag.worker import models
 if TYPE_CHECKING:
     from tests.service.conftest import Service
 
+SHAFT, DRIVE = models.MACHINE_SHAFT, models.VIBRATION_DRIVE
+MOST_HELD = settings.laboratory_of(SHAFT).held
+setting, drive_setting = partial(settings.setting, SHAFT), partial(settings.setting, DRIVE)
+held_settings = partial(settings.held_settings, SHAFT)
 BASE = json.dumps(preset_of("press")["spec"]["base"])
 
 
@@ -35,7 +39,7 @@ def test_an_address_gives_the_setting_again() -> None:
     assert again.study == chosen.study
     assert [slider.path for slider in chosen.changed] == ["drive.inertia", "mechanism.slider_crank.crank"]
     assert (chosen.angle, chosen.faults) == (400.0, {})
-    assert chosen.groups["Mechanism"]
+    assert chosen.groups(first=False)["Mechanism"]
 
 
 def shown(chosen: Any, path: str) -> Any:
@@ -81,7 +85,7 @@ def test_tables_of_laboratories_are_in_the_units_of_the_reader(service: Service)
         assert [b for _, b in pairs] == pytest.approx([a * 30.0 / math.pi for a, _ in pairs], rel=1e-9)
 
 
-@pytest.mark.parametrize("name", machines())
+@pytest.mark.parametrize("name", settings.machines(SHAFT))
 def test_every_machine_has_a_sketch_for_each_of_its_parts(name: str) -> None:
     chosen = setting({"machine": name})
     assert len(chosen.sketch) == len((chosen.study.structure or {}).get("parts", ("one",)))
@@ -155,7 +159,7 @@ def test_estimates_are_of_the_machine_with_one_change() -> None:
 
 def test_a_question_is_a_study_of_exactly_what_is_set() -> None:
     chosen = setting({"machine": "press", "operation.scale": "0.5"})
-    study = parse_spec(question_spec(chosen, "inertia")).study
+    study = parse_spec(study_spec(chosen, "inertia")).study
     assert study.base == chosen.study.base
     assert study.cases == 25
 
@@ -180,7 +184,7 @@ def cells(answer: dict[str, Any], part: str) -> dict[str, list[str]]:
 @pytest.mark.parametrize(
     ("address", "part", "name", "si", "shown", "factor"),
     [
-        ("/laboratory/figure?machine=press", "results", "omega.mean", "rad/s", "rpm", 30.0 / math.pi),
+        ("/laboratory/figure?machine=press", "details", "omega.mean", "rad/s", "rpm", 30.0 / math.pi),
         ("/laboratory/drive/figure?", "details", "torque.mean", "N·m", "N·mm", 1e3),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from functools import partial
 from urllib.parse import parse_qsl, urlsplit
 
 import pytest
@@ -16,12 +17,12 @@ from sprag.service.http.web.form.own_machine import (
     own_spec,
     single_machine,
 )
-from sprag.service.http.web.laboratory.drive_setting import setting as drive_setting
-from sprag.service.http.web.laboratory.setting import setting as shaft_setting
+from sprag.service.http.web.laboratory.setting import setting
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.report import SpecError
 from sprag.worker.limits import MAX_ADDRESS_BYTES
 
+shaft_setting, drive_setting = partial(setting, "machine-shaft"), partial(setting, "vibration-drive")
 DRIVE = preset_of("one_pendulum")["spec"]
 INERTIA = "pendulums.0.inertia"
 

@@ -1,0 +1,64 @@
+"""A model that its file alone knows, as a person uses it: form, laboratory, study, curves and case."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+from playwright.sync_api import expect
+
+from sprag.service.storage.part import SystemClock
+from sprag.worker.dispatcher import Dispatcher
+from sprag.worker.executors.inline import InlineExecutor
+from tests.service.http.web.fields import drawn, fill, named
+from tests.service.registered import create_table, registered
+from tests.service.test_toy_model import NAME, DampedOscillator
+from tests.serving import served
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from playwright.sync_api import Browser
+
+    from sprag.service.settings import Settings
+    from tests.service.conftest import Service
+
+
+@pytest.fixture(autouse=True)
+def toy() -> Iterator[None]:
+    """The model, for the time of a test."""
+    with registered(DampedOscillator()):
+        yield
+
+
+@pytest.fixture
+def settings(settings: Settings) -> Settings:
+    """Settings of a service whose database has the model's table."""
+    create_table(settings, NAME)
+    return settings
+
+
+def test_a_study_of_the_model_from_the_laboratory_to_its_case(service: Service, browser: Browser) -> None:
+    with served(service.app) as address, browser.new_context(base_url=address) as context:
+        page = context.new_page()
+        page.goto(f"/laboratory/{NAME}")
+        drawn(page, "#lab-plot")
+        fill(page, {"body.spring_rate": "1.5"})
+        page.wait_for_url("**body.spring_rate=1.5**")
+        page.get_by_role("link", name="Change parts of this machine in the form").click()
+        expect(named(page, "/base/body/spring_rate")).to_have_value("1.5")
+        page.get_by_role("button", name="Add an axis").click()
+        named(page, "/axes/0/path").select_option("damping")
+        fill(page, {"/axes/0/from": "0", "/axes/0/to": "0.8", "/axes/0/count": "3"})
+        page.get_by_role("button", name="Submit the study").click()
+        page.wait_for_url("**/studies/st_*")
+        study_id = page.url.rpartition("/")[2]
+        store = service.store
+        Dispatcher(store.work, InlineExecutor(), SystemClock()).run(lambda: store.studies.get(study_id).state.terminal)
+        page.goto(f"/studies/{study_id}/curves")
+        assert drawn(page, ".plot")
+        page.goto(f"/studies/{study_id}/cases/1")
+        assert drawn(page, ".plot")
+        page.get_by_role("link", name="This machine in the laboratory").click()
+        page.wait_for_url(f"**/laboratory/{NAME}?machine=own**")
+        expect(named(page, "damping")).to_have_value("0.4")
