@@ -16,12 +16,12 @@ from time import perf_counter
 import numpy as np
 
 from benchmarks.reading import build, grid
-from sprag.service.jobs.column_files import ColumnFiles
-from sprag.service.jobs.columns import Columns
+from sprag.service.figures.explore import explore_figure
 from sprag.service.json_text import to_bytes
 from sprag.service.results.explore import ExploreQuery, explore, explored_json, plan_of
-from sprag.service.results.figures.explore import explore_figure
 from sprag.service.storage.store import Store
+from sprag.service.views.column_files import ColumnFiles
+from sprag.service.views.columns import Columns
 
 
 def timed(what: str, work: Callable[[], object], unit: float | None = None) -> float:

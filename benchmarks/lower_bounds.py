@@ -28,7 +28,7 @@ TESTS = (
     "tests/engine/compile",
     "tests/engine/vibration_drive/test_balances.py",
     "tests/service/http",
-    "tests/service/results/exports",
+    "tests/service/exports",
     "tests/service/reading/test_units.py",
     "tests/service/storage",
     "tests/worker/executors",

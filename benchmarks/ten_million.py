@@ -25,8 +25,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.at_once import AtOnce
-from sprag.service.results import exports
-from sprag.service.results.exports.source import stored
+from sprag.service import exports
+from sprag.service.exports.source import stored
 from sprag.service.storage.part import SystemClock
 from sprag.service.storage.store import Store
 from sprag.worker import models

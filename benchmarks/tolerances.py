@@ -23,13 +23,13 @@ import numpy as np
 from scipy.stats import norm, qmc
 
 from sprag.service.client import Client
-from sprag.service.jobs.library import Library
 from sprag.service.results.explore import MOST_SHOWN
 from sprag.service.results.tolerances.quantiles import proportion, quantiles
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage.part import SystemClock
 from sprag.service.storage.store import Store
 from sprag.service.views.drives import RibbonQuery, YieldQuery, both
+from sprag.service.views.library import Library
 from sprag.worker import models
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.inline import InlineExecutor

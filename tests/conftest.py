@@ -61,7 +61,7 @@ LONG = (
     "service/test_presets.py",
     "service/http/web/test_motion_pages.py",
     "service/http/web/test_prefix_page.py",
-    "service/results/report/test_report.py",
+    "service/report/test_report.py",
     "service/schedules/test_two_nights.py",
 )
 

@@ -46,10 +46,10 @@ USED = {
     ("uvicorn", "uvicorn.server", "Server.handle_exit"): ("the first signal", "service/http/server.py"),
     ("uvicorn", "uvicorn.server", "Server.shutdown"): ("the grace of open requests", "service/http/server.py"),
     ("XlsxWriter", "xlsxwriter.worksheet", "Worksheet._xml_number_element"): (
-        "numbers with 17 digits", "service/results/exports/xlsx.py",
+        "numbers with 17 digits", "service/exports/xlsx.py",
     ),
     ("XlsxWriter", "xlsxwriter.worksheet", "Worksheet.add_table"): (
-        "tables of sheets written row by row: constant_memory, table, tables", "service/results/exports/xlsx.py",
+        "tables of sheets written row by row: constant_memory, table, tables", "service/exports/xlsx.py",
     ),
 }  # fmt: skip
 

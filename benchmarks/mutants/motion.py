@@ -76,10 +76,10 @@ MOTION: Final = (
     ),
     Mutant(
         "unstable motions drawn as stable ones",
-        "service/results/figures/branch.py",
+        "service/figures/branch.py",
         'Line(Phrase("unstable"), *_part(made.parameters, values, ~full), _UNSTABLE, 1,',
         'Line(Phrase("unstable"), *_part(made.parameters, values, ~full), _UNSTABLE, 0,',
-        ("tests/service/results/figures/test_branch.py::test_stable_parts_are_full_and_unstable_ones_dashed",),
+        ("tests/service/figures/test_branch.py::test_stable_parts_are_full_and_unstable_ones_dashed",),
     ),
     Mutant(
         "a sweep that starts every case from rest",

@@ -24,8 +24,8 @@ from sprag.service.faults import Fault
 from sprag.service.languages import N_, _
 
 if TYPE_CHECKING:
+    from sprag.service.figures.pictures.curves import Picture
     from sprag.service.results.calibration import Calibration
-    from sprag.service.results.pictures.curves import Picture
     from sprag.service.spec.document import ParsedSpec
 
 _FORMS = ("csv", "svg", "png", "pdf")
@@ -106,11 +106,11 @@ def _run(parsed: ParsedSpec, db: str | None, processes: int | None) -> tuple[Cal
 
 
 def _content(found: Calibration, form: str, title: str) -> bytes:
+    from sprag.service.figures.calibration import calibration_figure
+    from sprag.service.figures.pictures.curves import draw_figure
+    from sprag.service.figures.read import read_figure
     from sprag.service.reading.reader import Reading
     from sprag.service.results.calibration import calibration_csv
-    from sprag.service.results.figures.calibration import calibration_figure
-    from sprag.service.results.figures.read import read_figure
-    from sprag.service.results.pictures.curves import draw_figure
 
     if form == "csv":
         return calibration_csv(found)

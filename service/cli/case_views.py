@@ -209,8 +209,8 @@ def _write(
 
 def _write_all(study: Study, course: Course, file: str | None, *, as_json: bool) -> None:
     """Write a row for each case; a line of JSON each, or CSV with a line of headings."""
+    from sprag.service.exports.text import csv_lines
     from sprag.service.json_text import to_bytes
-    from sprag.service.results.exports.text import csv_lines
     from sprag.service.views.transient import case_rows, completed, row_headings
 
     ends: Counter[str] = Counter()

@@ -193,7 +193,7 @@ def audit(
     db: Database = None,
 ) -> None:
     """Write the audit log: who changed what, when and from where; earliest first."""
-    from sprag.service.results.exports.audit import audit_pieces
+    from sprag.service.exports.audit import audit_pieces
     from sprag.service.storage.people.audit import audit_filter
 
     try:

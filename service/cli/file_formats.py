@@ -12,7 +12,7 @@ from sprag.service.cli.options import ValueFormat
 from sprag.service.formats import REPORT_FORMATS, SUFFIXES, Format, Header, ReportFormat, format_of
 from sprag.service.languages import N_, _
 
-#: Formats of a whole study: case rows (`sprag.service.results.exports`) and documents (`sprag.service.results.report`).
+#: Formats of a whole study: case rows (`sprag.service.exports`) and documents (`sprag.service.report`).
 TableFormat = Literal[Format, ReportFormat]
 #: Formats of pictures.
 PICTURES: Final = ("svg", "png", "pdf")

@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
     from sprag.service.formats import Format, Header
     from sprag.service.jobs.local import LocalRun
-    from sprag.service.results.report import ReportFormat
+    from sprag.service.report import ReportFormat
     from sprag.service.settings import Settings
     from sprag.service.spec.document import ParsedSpec
     from sprag.service.storage.studies.records import Progress, StudyRecord
@@ -323,10 +323,10 @@ def _finish(text: str | None) -> datetime | None:
 
 def _rows(done: LocalRun, form: Format | ReportFormat, header: Header) -> Iterator[bytes]:
     """The rows of a finished study as the service exports them, or its report."""
-    from sprag.service.results.exports import export, stored
-    from sprag.service.results.report import write_report
-    from sprag.service.results.report.content import report_of
-    from sprag.service.results.report.document import TitleBlock
+    from sprag.service.exports import export, stored
+    from sprag.service.report import write_report
+    from sprag.service.report.content import report_of
+    from sprag.service.report.document import TitleBlock
 
     if form == "html" or form == "pdf":  # noqa: PLR1714 - narrows the type
         settings = read_settings()

@@ -46,7 +46,7 @@ def settle(
     as_json: JsonFlag = False,
 ) -> None:
     """Find the settled motions of cases, with many starts all: regime, order, stability and characteristics."""
-    from sprag.service.results.exports import Source, csv_pieces, rows_json
+    from sprag.service.exports import Source, csv_pieces, rows_json
     from sprag.worker.models import OK, study_results
     from sprag.worker.models.starts import count_of
 

@@ -178,9 +178,9 @@ def _remote(text: str, server: str, token: str | None, about: About, asked: tupl
 @contextmanager
 def _local(path: str, about: About, asked: tuple[Asked, ...]) -> Iterator[_Source]:
     """The view of the study of a spec, which is run here first."""
-    from sprag.service.jobs.library import Library
     from sprag.service.reading.quantities import SI
     from sprag.service.reading.reader import CAPTIONS, Choice
+    from sprag.service.views.library import Library
     from sprag.service.views.studies import STUDY_VIEWS
     from sprag.service.views.study_view import study_file
 

@@ -87,9 +87,8 @@ from sprag.service.http.web import workers as worker_pages
 from sprag.service.http.web.figures import cases as case_figures
 from sprag.service.http.web.form import page as form
 from sprag.service.http.web.laboratory import pages as laboratory
-from sprag.service.jobs import checks, row_files
+from sprag.service.jobs import checks
 from sprag.service.jobs.housekeeping import Housekeeping
-from sprag.service.jobs.library import Library
 from sprag.service.jobs.reports.reporter import Reporter
 from sprag.service.jobs.reports.watchdog import Watchdog, late_runs
 from sprag.service.settings import Settings, UnsafeSettingsError
@@ -101,6 +100,8 @@ from sprag.service.spec.schema.document import spec_schema
 from sprag.service.storage.people.people import quota_of
 from sprag.service.storage.readiness import Readiness
 from sprag.service.storage.store import Store
+from sprag.service.views import row_files
+from sprag.service.views.library import Library
 from sprag.worker.chunking import Chunking
 from sprag.worker.limits import (
     COMPUTATION_BYTES,

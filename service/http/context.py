@@ -15,9 +15,9 @@ from sprag.service.http.kept_files import KeptFiles
 from sprag.service.http.looks import Looks
 from sprag.service.http.problems import ApiError
 from sprag.service.http.shares import Shares
-from sprag.service.jobs.library import Library
 from sprag.service.settings import Settings
 from sprag.service.storage.store import Store
+from sprag.service.views.library import Library
 from sprag.worker.limits import (
     MAX_CASES,
     MAX_CHECKS,

@@ -12,11 +12,11 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from sprag.service import languages
+from sprag.service.figures.pictures import curves as pictures
 from sprag.service.formats import MEDIA_TYPES, Format
 from sprag.service.http.respond import entity_tag, not_modified, tagged
 from sprag.service.http.threads import in_thread
 from sprag.service.http.work import Work
-from sprag.service.results.pictures import curves as pictures
 from sprag.worker import models
 
 if TYPE_CHECKING:

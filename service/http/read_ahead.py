@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from sprag.service.http.problems import ApiError
 from sprag.service.http.threads import in_thread
-from sprag.service.jobs import explore
+from sprag.service.views import explore
 from sprag.worker.pool.child_pool import JobStoppedError
 from sprag.worker.ports import StoreError
 

@@ -10,8 +10,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from sprag.service.faults import FaultError, parameter_error
-from sprag.service.jobs.explore import selection_spec
-from sprag.service.jobs.library import Library
 from sprag.service.jobs.preview import preview_json
 from sprag.service.jobs.start_from import with_start
 from sprag.service.jobs.submission import Submission, hash_of, submission
@@ -30,6 +28,8 @@ from sprag.service.spec.narrow import narrowed_spec, swept_axis
 from sprag.service.spec.report import SpecError
 from sprag.service.spec.saved_views import View, ViewChange, read_view, read_view_change
 from sprag.service.spec.stored import accepted
+from sprag.service.views.explore import selection_spec
+from sprag.service.views.library import Library
 from sprag.worker import models
 
 if TYPE_CHECKING:

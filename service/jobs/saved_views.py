@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from sprag.service.results.chosen_figures import require_figure
+from sprag.service.report.chosen_figures import require_figure
 
 if TYPE_CHECKING:
     from collections.abc import Collection

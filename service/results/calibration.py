@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sprag.service import exports
 from sprag.service.faults import Fault, FaultError
 from sprag.service.json_text import numbers
 from sprag.service.languages import N_
 from sprag.service.reading.catalogue import unit_of
-from sprag.service.results import exports
 from sprag.service.results.calibration_words import sentences
 from sprag.worker import models
 from sprag.worker.models import WorkerEnding

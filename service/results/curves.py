@@ -13,7 +13,7 @@ from sprag.service.answers import filled
 from sprag.service.answers.results import Curve as CurveData
 from sprag.service.answers.results import CurvesData, Jump, MapData, MapPoints, MapResult, ResultMeaning
 from sprag.service.json_text import numbers
-from sprag.service.results.directions import in_words
+from sprag.service.reading.directions import in_words
 from sprag.service.results.refined import jumps_of
 from sprag.worker.codes import PENDING
 from sprag.worker.models import OK, WorkerEnding

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sprag.service.results import exports
+from sprag.service import exports
+from sprag.service.reading.directions import in_words
 from sprag.service.results.curves import flag_names
-from sprag.service.results.directions import in_words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

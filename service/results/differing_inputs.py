@@ -7,19 +7,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.answers.differing import differing
+from sprag.service.exports.inputs import inputs as every_input
 from sprag.service.languages import N_
 from sprag.service.languages import gettext as _
 from sprag.service.reading.catalogue import shown_values, unit_of
 from sprag.service.reading.phrases import model_title, plural
 from sprag.service.reading.wording import number, unit_text
-from sprag.service.results.exports.inputs import inputs as every_input
 from sprag.service.results.shown_inputs import choice_name, in_words, run_settings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from sprag.service.exports.inputs import Input
     from sprag.service.reading.reader import Reading
-    from sprag.service.results.exports.inputs import Input
     from sprag.worker.study import Axis, Study
 
 #: Characters of an input in the table.

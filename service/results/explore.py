@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.sentences import Sentence, joined, plural
+from sprag.service import exports
 from sprag.service.answers.explore import Exploration, ExploredCase, Histogram
 from sprag.service.faults import refused
 from sprag.service.languages import N_
 from sprag.service.reading.catalogue import result_of, unit_of
+from sprag.service.reading.directions import case_values
 from sprag.service.reading.limits import at_most
 from sprag.service.reading.texts import did_you_mean
 from sprag.service.reading.units import plain_signs
-from sprag.service.results import exports
-from sprag.service.results.directions import case_values
 from sprag.service.results.regimes import kind_columns
 from sprag.service.results.selection import listed, locate_axes, own_paths, refuse_mixed_texts, value_of
 from sprag.worker import models

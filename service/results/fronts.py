@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 
+from sprag.service import exports
 from sprag.service.answers.goals import Design, DesignGoal, DesignLimit, DesignVariable, FrontReport, Generation
 from sprag.service.faults import Fault, FaultError
 from sprag.service.json_text import numbers
 from sprag.service.languages import N_
 from sprag.service.reading.catalogue import unit_of
-from sprag.service.results import exports
 from sprag.service.results.regimes import kind_columns
 from sprag.worker import models
 from sprag.worker.models import WorkerEnding

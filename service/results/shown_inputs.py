@@ -7,20 +7,20 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.service.exports.inputs import inputs as every_input
+from sprag.service.exports.inputs import run_inputs
 from sprag.service.languages import N_, _, decimal, gettext, grouped, ngettext
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.part_names import NUMBERED, lower_first, part_name, run_name
 from sprag.service.reading.wording import number, unit_text, words
-from sprag.service.results.exports.inputs import inputs as every_input
-from sprag.service.results.exports.inputs import run_inputs
 from sprag.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN
 from sprag.worker.models.parameters import parameter_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from sprag.service.exports.inputs import Input
     from sprag.service.reading.reader import Reading
-    from sprag.service.results.exports.inputs import Input
     from sprag.worker.study import Study
 
 _RUN: Final = {entry.name: entry for entry in (*SETTLED_RUN.values(), DURATION, *ANY_RUN.values())}

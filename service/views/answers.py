@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 from sprag.service.answers import key as m
 from sprag.service.faults import refused
+from sprag.service.figures.answers import answers_figure
+from sprag.service.figures.pictures.curves import Picture, require_drawable
 from sprag.service.results.curves import CurveQuery
-from sprag.service.results.figures.answers import answers_figure
 from sprag.service.results.key_answer_words import answers_csv, curve_name, curve_named, report
 from sprag.service.results.key_answers import StudyAnswers, answers_query, find_answers
-from sprag.service.results.pictures.curves import Picture, require_drawable
 from sprag.service.storage.studies.records import CaseColumns
 from sprag.service.views import study_view
 from sprag.service.views.curves import completed_query
@@ -23,9 +23,9 @@ from sprag.worker import models
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.jobs.library import Library
+    from sprag.service.figures.figure import Figure
     from sprag.service.reading.reader import Reading
-    from sprag.service.results.figures.figure import Figure
+    from sprag.service.views.library import Library
     from sprag.worker.study import Study
 
 

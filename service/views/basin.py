@@ -10,13 +10,13 @@ import numpy as np
 
 from sprag.sentences import Sentence, Typed
 from sprag.service.answers.results import BasinData, RegimeRow
+from sprag.service.exports import table_csv
 from sprag.service.faults import FaultError, parameter_error
+from sprag.service.figures.basin import basin_figure
 from sprag.service.languages import N_
 from sprag.service.reading.catalogue import range_sentence
 from sprag.service.reading.texts import quantity_text
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
-from sprag.service.results.exports import table_csv
-from sprag.service.results.figures.basin import basin_figure
 from sprag.service.results.selection import ends_of_range
 from sprag.service.results.start_states import refuse_impossible
 from sprag.service.views.case_questions import BASIN, BasinQuestion
@@ -27,7 +27,7 @@ from sprag.worker.models.common import case_machine
 from sprag.worker.models.starts import STARTS, has_starts
 
 if TYPE_CHECKING:
-    from sprag.service.results.figures.figure import Figure
+    from sprag.service.figures.figure import Figure
     from sprag.worker.models import Parameter
     from sprag.worker.study import Study
 

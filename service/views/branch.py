@@ -10,14 +10,14 @@ import numpy as np
 from sprag.sentences import Amount, Sentence, Typed
 from sprag.service.answers import filled
 from sprag.service.answers.results import Branch, BranchContact
+from sprag.service.exports import table_csv
 from sprag.service.faults import choice_of, parameter_error
+from sprag.service.figures.branch import OwnCases, branch_figure, special_text
 from sprag.service.json_text import numbers
 from sprag.service.languages import N_, _
 from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.directions import case_values
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
-from sprag.service.results.directions import case_values
-from sprag.service.results.exports import table_csv
-from sprag.service.results.figures.branch import OwnCases, branch_figure, special_text
 from sprag.service.results.selection import ends_of_range
 from sprag.service.views.case_questions import BRANCH, BranchQuestion
 from sprag.service.views.case_view import CaseView, Said, Seen
@@ -33,7 +33,7 @@ from sprag.worker.models.vibration_drive.start_states import is_initial
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.results.figures.figure import Figure
+    from sprag.service.figures.figure import Figure
     from sprag.service.storage.store import Store
     from sprag.worker.study import Study
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sprag.service.answers.calibration import CalibrationReport
+from sprag.service.figures.calibration import calibration_figure
 from sprag.service.results.calibration import Calibration, calibration_csv, calibration_json, plan_of
-from sprag.service.results.figures.calibration import calibration_figure
 from sprag.service.views.study_questions import CALIBRATION, CalibrationQuestion
 from sprag.service.views.study_view import Found, StudyView
 
 if TYPE_CHECKING:
-    from sprag.service.jobs.library import Library
+    from sprag.service.figures.figure import Figure
     from sprag.service.reading.reader import Reading
-    from sprag.service.results.figures.figure import Figure
+    from sprag.service.views.library import Library
     from sprag.worker.study import Study
 
 

@@ -11,18 +11,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypeVar
 
+from sprag.service.figures.pictures.curves import draw_figure
+from sprag.service.figures.read import read_figure
 from sprag.service.json_text import to_bytes
 from sprag.service.reading.reader import Reading
-from sprag.service.results.figures.read import read_figure
-from sprag.service.results.pictures.curves import draw_figure
 from sprag.worker import models
 from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.results.figures.figure import Figure
-    from sprag.service.results.pictures.curves import Picture
+    from sprag.service.figures.figure import Figure
+    from sprag.service.figures.pictures.curves import Picture
     from sprag.service.storage.store import Store
     from sprag.service.views.setting import About
     from sprag.worker.models import KernelShape

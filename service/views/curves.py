@@ -6,18 +6,18 @@ from dataclasses import replace
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
+from sprag.service import exports
 from sprag.service.answers import results as m
 from sprag.service.faults import parameter_error
+from sprag.service.figures.curves import curves_figure
+from sprag.service.figures.pictures import curves as pictures
+from sprag.service.figures.pictures.maps import draw_map
+from sprag.service.figures.read import read_map
 from sprag.service.json_text import numbers
-from sprag.service.results import exports
+from sprag.service.reading.directions import in_words
 from sprag.service.results.choice import held
 from sprag.service.results.curves import CurveQuery, Curves, Map, flag_names
 from sprag.service.results.defaults import completed, drawn_numbers
-from sprag.service.results.directions import in_words
-from sprag.service.results.figures.curves import curves_figure
-from sprag.service.results.figures.read import read_map
-from sprag.service.results.pictures import curves as pictures
-from sprag.service.results.pictures.maps import draw_map
 from sprag.service.results.refined import not_joined
 from sprag.service.results.regimes import kind_columns
 from sprag.service.results.stored_curves import drawn_curves, stored_curves, stored_map
@@ -29,10 +29,10 @@ from sprag.worker import models
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from sprag.service.jobs.library import Library
+    from sprag.service.figures.figure import Figure
     from sprag.service.reading.reader import Reading
     from sprag.service.results.curves import Curve
-    from sprag.service.results.figures.figure import Figure
+    from sprag.service.views.library import Library
     from sprag.worker.study import Study
 
 

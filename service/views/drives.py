@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 from sprag.service.answers import tolerances as m
 from sprag.service.faults import parameter_error
+from sprag.service.figures.pictures.curves import Picture
+from sprag.service.figures.pictures.maps import draw_map
+from sprag.service.figures.read import read_map
+from sprag.service.figures.ribbons import ribbon_figure, ribbon_map, yield_figure, yield_map
 from sprag.service.results.defaults import drawn_results
-from sprag.service.results.figures.read import read_map
-from sprag.service.results.figures.ribbons import ribbon_figure, ribbon_map, yield_figure, yield_map
-from sprag.service.results.pictures.curves import Picture
-from sprag.service.results.pictures.maps import draw_map
 from sprag.service.results.tolerances.batch import Asked
 from sprag.service.results.tolerances.ribbons import QUANTILES, Ribbon, ribbon
 from sprag.service.results.tolerances.written import ribbon_csv, ribbon_json, yield_csv, yield_json
@@ -24,9 +24,9 @@ from sprag.service.views.study_view import Found, StudyView
 from sprag.worker import models
 
 if TYPE_CHECKING:
-    from sprag.service.jobs.library import Library
+    from sprag.service.figures.figure import Figure
     from sprag.service.reading.reader import Reading
-    from sprag.service.results.figures.figure import Figure
+    from sprag.service.views.library import Library
     from sprag.worker.study import Study
 
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Final
 
 from sprag.service.answers import filled
 from sprag.service.answers.results import EngagementRow, EngagementTables, PeriodRow
+from sprag.service.exports import table_csv
 from sprag.service.faults import FaultError, choice_of
 from sprag.service.languages import N_, _, decimal
-from sprag.service.results.directions import case_values
-from sprag.service.results.exports import table_csv
+from sprag.service.reading.directions import case_values
 from sprag.service.views.case_questions import ENGAGEMENTS, EngagementsQuestion
 from sprag.service.views.case_view import CaseView, Said, Seen
 from sprag.worker import models

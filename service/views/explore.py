@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sprag.service.answers import explore as m
-from sprag.service.jobs.explore import explored
-from sprag.service.results.explore import Explored, ExploreQuery, explored_csv, explored_json
-from sprag.service.results.figures.explore import explore_figure
+from sprag.service.faults import refused
+from sprag.service.figures.explore import explore_figure
+from sprag.service.results.explore import Explored, ExploreQuery, explore, explored_csv, explored_json, plan_of
+from sprag.service.spec.design import points_spec
+from sprag.service.spec.stored import accepted
 from sprag.service.views import study_view
 from sprag.service.views.study_questions import EXPLORE, CasesQuestion, ExploreQuestion, SelectionQuestion
 from sprag.service.views.study_view import Found, StudyView
 
 if TYPE_CHECKING:
-    from sprag.service.jobs.library import Library
+    from sprag.service.figures.figure import Figure
     from sprag.service.reading.reader import Reading
-    from sprag.service.results.figures.figure import Figure
+    from sprag.service.views.library import Library
     from sprag.worker.study import Study
 
 #: The query, and the two quantities of a picture.
@@ -26,6 +28,31 @@ def selection(question: SelectionQuestion | CasesQuestion, limit: int, show: tup
     """The query of a question about cases."""
     kinds = question.ending or "", question.regime or "", question.flag or ""
     return ExploreQuery(tuple(question.where or ()), *kinds, question.sort, limit, show)
+
+
+def read_ahead(library: Library, study_id: str) -> None:
+    """Read the columns that people see first; raises StudyNotFoundError."""
+    study = library.store.studies.study(study_id)
+    library.columns.of(study_id, plan_of(study, ExploreQuery()).results)
+
+
+def explored(library: Library, study_id: str, query: ExploreQuery) -> Explored:
+    """The cases that a question selects; raises StudyNotFoundError, and SelectionError as `plan_of` does."""
+    study = library.store.studies.study(study_id)
+    plan = plan_of(study, query)
+    return explore(study, plan, library.columns.of(study_id, plan.results))
+
+
+def selection_spec(library: Library, study_id: str, query: ExploreQuery) -> dict[str, Any]:
+    """The spec of a study of the first rows; raises SelectionError where there are none, or nothing varies."""
+    found = explored(library, study_id, query)
+    cases = found.rows.cases[found.order].tolist()
+    if not cases:
+        raise refused("where", "empty", "no case is selected")
+    try:
+        return points_spec(accepted(library.store.studies.spec(study_id), found.study), found.study, cases)
+    except ValueError as error:
+        raise refused("study", "nothing-varies", "no parameter of this study varies") from error
 
 
 class ExploreView(StudyView[ExploreQuestion, Chosen, Explored]):

@@ -5,17 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sprag.service.answers import goals as m
-from sprag.service.results.figures.front import front_figure
+from sprag.service.figures.front import front_figure
+from sprag.service.figures.pictures.curves import MAX_PICTURE_POINTS, Picture, check_size
 from sprag.service.results.fronts import Designs, front_csv, front_json, goal_of
-from sprag.service.results.pictures.curves import MAX_PICTURE_POINTS, Picture, check_size
 from sprag.service.views import study_view
 from sprag.service.views.study_questions import FRONT, FrontQuestion
 from sprag.service.views.study_view import Found, StudyView
 
 if TYPE_CHECKING:
-    from sprag.service.jobs.library import Library
+    from sprag.service.figures.figure import Figure
     from sprag.service.reading.reader import Reading
-    from sprag.service.results.figures.figure import Figure
+    from sprag.service.views.library import Library
     from sprag.worker.study import Study
 
 

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from sprag.service.answers.results import Portrait as PortraitData
 from sprag.service.faults import FaultError, choice_of
+from sprag.service.figures.portrait import portrait_figure
 from sprag.service.languages import N_
-from sprag.service.results.directions import case_values
-from sprag.service.results.figures.portrait import portrait_figure
+from sprag.service.reading.directions import case_values
 from sprag.service.views.case_questions import STROBES, StrobesQuestion
 from sprag.service.views.case_view import CaseView, Seen
 from sprag.service.views.setting import choices_of
@@ -18,7 +18,7 @@ from sprag.worker.models import Portrait
 
 if TYPE_CHECKING:
     from sprag.service.answers import Value
-    from sprag.service.results.figures.figure import Figure
+    from sprag.service.figures.figure import Figure
     from sprag.worker.study import Study
 
 

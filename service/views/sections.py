@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sprag.service.answers.sections import Sections
+from sprag.service.exports import table_csv
 from sprag.service.faults import choice_of, parameter_error
+from sprag.service.figures.sections import diagram_figure, section_figure
 from sprag.service.json_text import numbers
 from sprag.service.languages import N_
 from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.directions import case_values
 from sprag.service.reading.numbers import in_language
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
-from sprag.service.results.directions import case_values
-from sprag.service.results.exports import table_csv
-from sprag.service.results.figures.sections import diagram_figure, section_figure
 from sprag.service.results.start_states import refuse_impossible
 from sprag.service.views.branch import range_of
 from sprag.service.views.case_questions import DIAGRAM, SECTION, DiagramQuestion, SectionQuestion
@@ -27,7 +27,7 @@ from sprag.worker.models.common import case_machine
 from sprag.worker.models.sections import CaseSections, Sampling
 
 if TYPE_CHECKING:
-    from sprag.service.results.figures.figure import Figure
+    from sprag.service.figures.figure import Figure
     from sprag.worker.study import Study
 
 

@@ -6,10 +6,10 @@ from dataclasses import fields
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
+from sprag.service import exports
 from sprag.service.answers import results as m
 from sprag.service.faults import warned
-from sprag.service.results import exports
-from sprag.service.results.pictures.sensitivity import draw_sensitivity
+from sprag.service.figures.pictures.sensitivity import draw_sensitivity
 from sprag.service.results.sensitivity import Sensitivity, sensitivity
 from sprag.service.results.sensitivity_indices import Indices
 from sprag.service.views.study_questions import SENSITIVITY, SensitivityQuestion
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from typing import Any
 
-    from sprag.service.jobs.library import Library
+    from sprag.service.figures.pictures.curves import Picture
     from sprag.service.reading.reader import Reading
-    from sprag.service.results.pictures.curves import Picture
+    from sprag.service.views.library import Library
     from sprag.worker.study import Study
 
 

@@ -11,16 +11,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, TypeVar
 
-from sprag.service.jobs.reading import reading_of
+from sprag.service.figures.pictures.curves import draw_figure
+from sprag.service.figures.read import read_figure
 from sprag.service.json_text import to_bytes
-from sprag.service.results.figures.read import read_figure
-from sprag.service.results.pictures.curves import draw_figure
+from sprag.service.views.library import reading_of
 
 if TYPE_CHECKING:
-    from sprag.service.jobs.library import Library
+    from sprag.service.figures.figure import Figure
+    from sprag.service.figures.pictures.curves import Picture
     from sprag.service.reading.reader import Choice, Reading
-    from sprag.service.results.figures.figure import Figure
-    from sprag.service.results.pictures.curves import Picture
+    from sprag.service.views.library import Library
     from sprag.service.views.setting import About
     from sprag.worker.study import Study
 

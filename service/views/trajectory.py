@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Final
 from sprag.sentences import Part, Sentence, Typed, joined
 from sprag.service.answers.results import AngleTable
 from sprag.service.answers.results import Trajectory as TrajectoryData
+from sprag.service.exports import read_table
 from sprag.service.faults import parameter_error
 from sprag.service.json_text import numbers
 from sprag.service.languages import N_, _
+from sprag.service.reading.directions import case_values
 from sprag.service.reading.quantities import Units
 from sprag.service.reading.units import PERIOD_NAMES, QuantityError, parse_quantity, split_quantity, to_float
-from sprag.service.results.directions import case_values
-from sprag.service.results.exports import read_table
 from sprag.service.results.selection import ends_of_range
 from sprag.service.views.case_questions import TRAJECTORY, TrajectoryQuestion
 from sprag.service.views.case_view import CaseView, Said, Seen

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Final
 from sprag.sentences import Amount, Sentence, Typed
 from sprag.service.answers.transients import Transient as TransientData
 from sprag.service.faults import FaultError, choice_of, parameter_error
+from sprag.service.figures.transient import transient_figure
 from sprag.service.languages import N_, _
 from sprag.service.reading.limits import span
 from sprag.service.reading.numbers import in_language
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.service.reading.wording import number, unit_text
-from sprag.service.results.figures.transient import transient_figure
 from sprag.service.views.case_questions import TRANSIENT, TransientQuestion
 from sprag.service.views.case_view import CaseView, Said, Seen
 from sprag.service.views.trajectory import timed_values, trajectory_csv
@@ -25,7 +25,7 @@ from sprag.worker.models.transients import KINDS, RESULTS, Course, Transient
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from sprag.service.results.figures.figure import Figure
+    from sprag.service.figures.figure import Figure
     from sprag.worker.models import KernelShape
     from sprag.worker.models.transients import Kind
     from sprag.worker.study import Study

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from sprag.service.figures.curves import curves_figure
 from sprag.service.jobs.local import run_here
 from sprag.service.results.curve_cases import draw, select
 from sprag.service.results.defaults import main_query
-from sprag.service.results.figures.curves import curves_figure
 from sprag.service.spec.document import parse_spec
 from sprag.worker import models
 from sprag.worker.planning import planner_of

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 from sprag.service.client import Client
+from sprag.service.exports.components import components_csv
 from sprag.service.http.web.form.components import take_component
 from sprag.service.http.web.form.page import empty
 from sprag.service.http.web.form.spec import spec_of, values_of
-from sprag.service.results.exports.components import components_csv
 from sprag.service.spec.components import Component, fields_of, read_components
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.report import SpecError

@@ -22,8 +22,8 @@ from sprag.service.cli import study_views
 from sprag.service.client import AsyncClient, Client, RefusedError
 from sprag.service.http.web import explore as explore_pages
 from sprag.service.http.web.form.spec import spec_of
-from sprag.service.jobs.columns import Columns
 from sprag.service.reading.wording import number
+from sprag.service.views.columns import Columns
 from tests.conftest import ROOT, Finished
 from tests.service.conftest import API, PortalTransport, Service
 from tests.service.http.web.controls import Controls

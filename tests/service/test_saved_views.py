@@ -10,8 +10,8 @@ import pytest
 from sprag.service.cli import saved_views as commands
 from sprag.service.client import Client
 from sprag.service.jobs.reports.curve import small_curve
-from sprag.service.results.report.content import report_of
-from sprag.service.results.report.document import Image, Text, TitleBlock, document_of
+from sprag.service.report.content import report_of
+from sprag.service.report.document import Image, Text, TitleBlock, document_of
 from sprag.service.spec.report import SpecError
 from sprag.service.spec.saved_views import read_view, read_view_change
 from tests.service.conftest import PortalTransport, Service

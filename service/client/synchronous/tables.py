@@ -95,7 +95,7 @@ class StudyTables(StudyPart):
         language: str | None = None,
         point: Value | None = None,
     ) -> bytes:
-        """All rows in a format of `sprag.service.results.exports`, or the report as "html" or "pdf".
+        """All rows in a format of `sprag.service.exports`, or the report as "html" or "pdf".
 
         ``header`` of CSV: "names", with units that are not SI, or "units", with every unit. ``language`` of a report:
         a code such as "uk"; English without it. ``point`` of a report: its working point, such as "0.3 N*m".

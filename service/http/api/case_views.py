@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from starlette.responses import Response
 
+from sprag.service.figures.pictures.curves import draw_figure
+from sprag.service.figures.read import read_figure
 from sprag.service.http.api.document import CASE_PROBLEMS, files, format_query, problems
 from sprag.service.http.api.drawn_format import DrawnFormat
 from sprag.service.http.asked import asking
@@ -16,8 +18,6 @@ from sprag.service.http.respond import choose_format
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import Attended
 from sprag.service.reading.reader import Reading
-from sprag.service.results.figures.read import read_figure
-from sprag.service.results.pictures.curves import draw_figure
 from sprag.service.views.case_view import case_file, see
 from sprag.service.views.cases import CASE_VIEWS
 

@@ -9,6 +9,7 @@ from fastapi import Request
 from starlette.responses import Response
 
 from sprag.service.answers import results as m
+from sprag.service.exports import row_json, rows_json
 from sprag.service.faults import parameter_error
 from sprag.service.http.api.document import next_page, problems
 from sprag.service.http.asked import asking
@@ -18,10 +19,9 @@ from sprag.service.http.routers import api_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.views import study_address
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
-from sprag.service.jobs.case_pages import by_number, case_page
-from sprag.service.results.directions import case_units, case_values
-from sprag.service.results.exports import row_json, rows_json
+from sprag.service.reading.directions import case_units, case_values
 from sprag.service.storage.studies.records import CaseRow
+from sprag.service.views.case_pages import by_number, case_page
 from sprag.service.views.curves import pairs
 from sprag.service.views.explore import selection
 from sprag.service.views.study_questions import CasesQuestion

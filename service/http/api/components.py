@@ -9,6 +9,7 @@ from starlette.responses import Response
 
 from sprag.service.answers import components as m
 from sprag.service.answers import filled
+from sprag.service.exports.components import COMPONENT_FORMATS, components_csv
 from sprag.service.http.api.document import body, files, format_query, problems
 from sprag.service.http.context import ID_PATTERN, Ctx
 from sprag.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
@@ -17,7 +18,6 @@ from sprag.service.http.routers import api_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import checks
-from sprag.service.results.exports.components import COMPONENT_FORMATS, components_csv
 from sprag.service.storage.components import ComponentRecord
 
 router = api_router("components")

@@ -9,6 +9,7 @@ from starlette.responses import Response
 
 from sprag.service.answers import filled
 from sprag.service.answers import people as m
+from sprag.service.exports.audit import AUDIT_FORMATS, audit_pieces, entry_json
 from sprag.service.http.access import OPEN
 from sprag.service.http.api.document import files, format_query, next_page, problems
 from sprag.service.http.context import Ctx
@@ -16,7 +17,6 @@ from sprag.service.http.people import Action, Actor, Since, Target, Until, quota
 from sprag.service.http.respond import choose_format, json_response, page_response, streamed
 from sprag.service.http.routers import api_router
 from sprag.service.http.threads import in_thread, iterated
-from sprag.service.results.exports.audit import AUDIT_FORMATS, audit_pieces, entry_json
 from sprag.service.storage.people.audit import audit_filter
 from sprag.service.storage.people.people import Quota
 from sprag.worker.limits import MAX_PAGE_SIZE

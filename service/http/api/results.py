@@ -9,7 +9,7 @@ from fastapi import Query
 from starlette.responses import Response
 
 from sprag.sentences import Sentence
-from sprag.service import formats, languages
+from sprag.service import formats, languages, report
 from sprag.service.faults import FaultError, choice_of, parameter_error
 from sprag.service.http.api.document import CONTENT_RANGE, files, format_query, problems
 from sprag.service.http.api.document import not_modified as documented_304
@@ -24,17 +24,16 @@ from sprag.service.http.respond import JSON, choose_format, not_modified, tagged
 from sprag.service.http.routers import api_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
-from sprag.service.jobs import row_files
 from sprag.service.reading.quantities import SI
-from sprag.service.results import report
-from sprag.service.results.report.content import report_of
-from sprag.service.results.report.document import TitleBlock, today
+from sprag.service.report.content import report_of
+from sprag.service.report.document import TitleBlock, today
+from sprag.service.views import row_files
 from sprag.service.views.curves import completed_query
 from sprag.service.views.study_questions import ReportQuestion
 
 if TYPE_CHECKING:
-    from sprag.service.jobs.library import Library
     from sprag.service.storage.studies.records import StudyRecord
+    from sprag.service.views.library import Library
 
 _LOG = logging.getLogger("sprag.service")
 router = api_router("results", "/studies/{study_id:study}")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from starlette.responses import Response
 
+from sprag.service.figures.pictures.curves import PICTURES
 from sprag.service.http.api.document import files, not_modified, problems
 from sprag.service.http.api.drawn_format import DrawnFormat
 from sprag.service.http.asked import asking
@@ -14,7 +15,6 @@ from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditi
 from sprag.service.http.reading import FileChoice
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
-from sprag.service.results.pictures.curves import PICTURES
 from sprag.service.views.studies import STUDY_VIEWS
 from sprag.service.views.study_view import study_file
 

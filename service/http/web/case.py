@@ -9,6 +9,7 @@ from fastapi import Query
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.faults import FaultError
+from sprag.service.figures.pictures.curves import draw_motion
 from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, study_with
 from sprag.service.http.drawing import Columns, picture, unchanging
 from sprag.service.http.reading import CHOICE, FileChoice, address_pairs
@@ -20,18 +21,17 @@ from sprag.service.http.web.form.own_machine import case_address
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
-from sprag.service.jobs.reading import reading_of
 from sprag.service.languages import _
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.phrases import meanings, shown
 from sprag.service.reading.wording import number
 from sprag.service.results.defaults import main_results
-from sprag.service.results.pictures.curves import draw_motion
 from sprag.service.results.regimes import ORDER, motion_sentence
 from sprag.service.results.selection import axis_name, own_paths
 from sprag.service.results.start_states import check_start
 from sprag.service.results.sweeps import direction_texts
 from sprag.service.views import trajectory
+from sprag.service.views.library import reading_of
 from sprag.worker import models
 from sprag.worker.codes import PENDING
 from sprag.worker.models.abilities import has_transients

@@ -13,6 +13,10 @@ from starlette.responses import Response
 from sprag.sentences import Sentence
 from sprag.service.answers.differing import MOST_COMPARED, common_axes, unique_names
 from sprag.service.faults import SelectionError, refused
+from sprag.service.figures.curves import curves_figure
+from sprag.service.figures.pictures import curves as pictures
+from sprag.service.figures.pictures.curves import draw_compare
+from sprag.service.figures.read import read_figure
 from sprag.service.formats import MEDIA_TYPES
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx
@@ -25,7 +29,6 @@ from sprag.service.http.web.held import fixed_choices
 from sprag.service.http.web.saved_views import saved_here
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended, Work
-from sprag.service.jobs.reading import reading_of
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.limits import at_most
 from sprag.service.reading.reader import reading_for
@@ -35,12 +38,9 @@ from sprag.service.results.curves import CurveQuery, Curves
 from sprag.service.results.defaults import main_query
 from sprag.service.results.differences import compared_csv, differences
 from sprag.service.results.differing_inputs import DifferingInput, ReadStudy, differing_inputs
-from sprag.service.results.figures.curves import curves_figure
-from sprag.service.results.figures.read import read_figure
-from sprag.service.results.pictures import curves as pictures
-from sprag.service.results.pictures.curves import draw_compare
 from sprag.service.storage.errors import StudyNotFoundError
 from sprag.service.storage.studies.listing import StudyFilter
+from sprag.service.views.library import reading_of
 from sprag.worker import models
 from sprag.worker.limits import MAX_SEARCH_LENGTH
 

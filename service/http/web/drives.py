@@ -22,7 +22,6 @@ from sprag.service.http.web.results import axis_choices
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
-from sprag.service.jobs.reading import reading_of
 from sprag.service.reading.limits import at_most
 from sprag.service.results.choice import held
 from sprag.service.results.defaults import drawn_results, main_query
@@ -30,6 +29,7 @@ from sprag.service.results.tolerances.batch import Asked
 from sprag.service.results.tolerances.conditions import first_condition
 from sprag.service.results.tolerances.ribbons import MOST_QUANTILES, QUANTILES
 from sprag.service.views.drives import RibbonQuery, YieldQuery, both
+from sprag.service.views.library import reading_of
 from sprag.worker import models
 from sprag.worker.spread import DRIVE
 

@@ -9,6 +9,7 @@ from fastapi import Query, Request
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.faults import SelectionError
+from sprag.service.figures.pictures.sensitivity import MOST_RESULTS
 from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.drawing import Drawing, conditional, picture
@@ -20,7 +21,6 @@ from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.languages import N_
 from sprag.service.results.defaults import drawn_results, varying_axes
-from sprag.service.results.pictures.sensitivity import MOST_RESULTS
 from sprag.service.views.sensitivity import SensitivityView, sensitivities_shown
 from sprag.service.views.study_view import study_file
 from sprag.worker import models

@@ -10,6 +10,7 @@ from starlette.datastructures import QueryParams
 from starlette.responses import Response
 
 from sprag.service.faults import ParameterFault, SelectionError, shown
+from sprag.service.figures.explore import chosen_pair
 from sprag.service.http import views
 from sprag.service.http.context import Context, StudyId
 from sprag.service.http.reading import CHOICE, FileChoice, address_pairs, file_pairs
@@ -22,8 +23,6 @@ from sprag.service.http.web.form.page import spec_in_form
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
-from sprag.service.jobs.explore import explored, selection_spec
-from sprag.service.jobs.reading import reading_of
 from sprag.service.languages import _
 from sprag.service.reading.limits import span
 from sprag.service.reading.numbers import parse_number
@@ -31,9 +30,9 @@ from sprag.service.reading.phrases import meanings
 from sprag.service.reading.reader import Choice, Reading
 from sprag.service.reading.together import with_last_unit
 from sprag.service.results.explore import ROWS, ExploreQuery, explored_json, plan_of, quantities
-from sprag.service.results.figures.explore import chosen_pair
 from sprag.service.results.selection import own_paths
-from sprag.service.views.explore import Chosen
+from sprag.service.views.explore import Chosen, explored, selection_spec
+from sprag.service.views.library import reading_of
 from sprag.service.views.study_view import FEW
 from sprag.worker import models
 from sprag.worker.limits import MAX_SELECTED
@@ -43,7 +42,7 @@ if TYPE_CHECKING:
 
     from sprag.service.answers.explore import Exploration
     from sprag.service.faults import Fault
-    from sprag.service.jobs.library import Library
+    from sprag.service.views.library import Library
     from sprag.worker.study import Study
 
 router = page_router()

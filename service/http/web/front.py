@@ -8,6 +8,7 @@ from urllib.parse import urlencode
 from fastapi import Query
 from starlette.responses import Response
 
+from sprag.service.figures.pictures import curves as pictures
 from sprag.service.http import views
 from sprag.service.http.context import Context, StudyId
 from sprag.service.http.drawing import Columns, Drawing, conditional, picture
@@ -20,7 +21,6 @@ from sprag.service.http.web.front_view import FrontPage, front_view, search_pict
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
-from sprag.service.results.pictures import curves as pictures
 from sprag.service.views.front import FrontView
 from sprag.service.views.study_questions import FrontQuestion
 

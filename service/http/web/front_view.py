@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.faults import SelectionError
+from sprag.service.figures.front import chosen, history_figure, quantities
+from sprag.service.figures.pictures.curves import draw_figure
+from sprag.service.figures.read import read_figure
 from sprag.service.http.web.figures.plotly import plotly_figure
-from sprag.service.jobs.reading import reading_of
 from sprag.service.json_text import to_bytes
-from sprag.service.results.figures.front import chosen, history_figure, quantities
-from sprag.service.results.figures.read import read_figure
 from sprag.service.results.fronts import design_json, front_json
-from sprag.service.results.pictures.curves import draw_figure
+from sprag.service.views.library import reading_of
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
     from sprag.service.answers.goals import Design, FrontReport
     from sprag.service.faults import Fault
-    from sprag.service.jobs.library import Library
+    from sprag.service.figures.figure import Figure
+    from sprag.service.figures.pictures.curves import Picture
     from sprag.service.reading.reader import Choice
-    from sprag.service.results.figures.figure import Figure
     from sprag.service.results.fronts import Designs
-    from sprag.service.results.pictures.curves import Picture
+    from sprag.service.views.library import Library
     from sprag.worker.study import Study
 
 #: Designs in the table.

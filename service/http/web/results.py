@@ -9,6 +9,7 @@ from fastapi import Query, Request
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.faults import SelectionError
+from sprag.service.figures.pictures import curves as pictures
 from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.drawing import Columns
@@ -35,7 +36,6 @@ from sprag.service.results.choice import (
 from sprag.service.results.curve_cases import select
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import varying_axes
-from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.refined_maps import map_plan
 from sprag.service.views.answers import AnswersChoice
 from sprag.worker import models

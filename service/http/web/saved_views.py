@@ -18,8 +18,8 @@ from sprag.service.http.routers import page_router
 from sprag.service.http.web.form.values import Form
 from sprag.service.jobs.saved_views import change_view, save_view
 from sprag.service.languages import N_, _
+from sprag.service.report.chosen_figures import figure_query
 from sprag.service.results.choice import Address, MapQuery, pairs_of
-from sprag.service.results.chosen_figures import figure_query
 from sprag.service.spec.saved_views import FIGURES, read_view, read_view_change
 from sprag.worker.limits import MAX_NAME_LENGTH, MAX_REPORT_FIGURES
 

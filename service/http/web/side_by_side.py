@@ -15,9 +15,9 @@ from sprag.service.http.routers import page_router
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.directions import case_values
 from sprag.service.reading.limits import at_most, span
 from sprag.service.reading.numbers import parse_number
-from sprag.service.results.directions import case_values
 from sprag.service.results.selection import own_paths
 from sprag.worker import models
 

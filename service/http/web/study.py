@@ -14,6 +14,7 @@ from starlette.responses import RedirectResponse, Response
 from sprag.sentences import Sentence
 from sprag.service import formats
 from sprag.service.faults import SelectionError
+from sprag.service.figures.pictures import curves as pictures
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx, StudyId
 from sprag.service.http.problems import ApiError
@@ -31,13 +32,12 @@ from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.json_text import timestamp
 from sprag.service.languages import N_, _
+from sprag.service.reading.directions import ends_in_words
 from sprag.service.reading.phrases import meanings
 from sprag.service.reading.reader import Reading, reading_for
 from sprag.service.results.choice import characteristic, map_query, pairs_of
 from sprag.service.results.curve_cases import select
 from sprag.service.results.defaults import caption, drawn_numbers, main_query, no_curves, varying_axes
-from sprag.service.results.directions import ends_in_words
-from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.regimes import DOUBTFUL, ORDER, counted
 from sprag.service.results.shown_inputs import inputs, run_settings

@@ -9,11 +9,11 @@ from urllib.parse import urlencode
 from starlette.datastructures import QueryParams
 
 from sprag.service.faults import SelectionError
+from sprag.service.figures.pictures.curves import MAX_PICTURE_POINTS
 from sprag.service.http import views
 from sprag.service.http.language import language_pairs
 from sprag.service.http.reading import address_pairs
 from sprag.service.http.web.held import with_held
-from sprag.service.jobs.reading import reading_of
 from sprag.service.languages import decimal
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.units import split_quantity, to_float
@@ -21,19 +21,19 @@ from sprag.service.reading.wording import unit_text
 from sprag.service.results.choice import curve_query, pairs_of, value_choices
 from sprag.service.results.key_answer_words import answer_facts, curve_name, curve_named, note_of, place_text
 from sprag.service.results.key_answers import answers_query
-from sprag.service.results.pictures.curves import MAX_PICTURE_POINTS
 from sprag.service.views.answers import answers_of
+from sprag.service.views.library import reading_of
 from sprag.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from sprag.service.faults import Fault
-    from sprag.service.jobs.library import Library
     from sprag.service.reading.phrases import Phrase
     from sprag.service.reading.reader import Choice, Reading
     from sprag.service.results.curves import CurveQuery
     from sprag.service.results.key_answers import CurveAnswers, Found, StudyAnswers
+    from sprag.service.views.library import Library
     from sprag.worker.study import Study
 
 #: Parameters of the page's address that choose curves.

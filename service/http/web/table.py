@@ -17,12 +17,12 @@ from sprag.service.http.web.held import fixed_choices, with_held
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
-from sprag.service.jobs.case_pages import CasePage, by_number, case_page
-from sprag.service.jobs.reading import reading_of
 from sprag.service.reading.catalogue import result_of, unit_of
 from sprag.service.reading.phrases import meanings
 from sprag.service.results.explore import ExploreQuery
 from sprag.service.results.selection import own_paths
+from sprag.service.views.case_pages import CasePage, by_number, case_page
+from sprag.service.views.library import reading_of
 from sprag.service.views.study_view import FEW
 from sprag.worker import models
 from sprag.worker.limits import MAX_PAGE_TOKEN

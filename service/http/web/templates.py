@@ -95,7 +95,7 @@ def _warning(text: str, reading: Reading) -> str:
 def _templates() -> Environment:
     environment = Environment(
         # Sketches of machines stand in reports too.
-        loader=ChoiceLoader([PackageLoader("sprag.service.http.web"), PackageLoader("sprag.service.results.report")]),
+        loader=ChoiceLoader([PackageLoader("sprag.service.http.web"), PackageLoader("sprag.service.report")]),
         autoescape=True,
         extensions=[Addresses, "jinja2.ext.i18n"],
         undefined=StrictUndefined,

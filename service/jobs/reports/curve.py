@@ -6,12 +6,12 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
+from sprag.service.figures.pictures.curves import draw_curves
 from sprag.service.reading.quantities import TYPED
 from sprag.service.reading.reader import Choice, reading_for
-from sprag.service.results.chosen_figures import chosen_figures
+from sprag.service.report.chosen_figures import chosen_figures
 from sprag.service.results.curve_cases import draw, select
 from sprag.service.results.defaults import main_query
-from sprag.service.results.pictures.curves import draw_curves
 from sprag.worker import models
 
 if TYPE_CHECKING:

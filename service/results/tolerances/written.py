@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from sprag.service import exports
 from sprag.service.answers import filled
 from sprag.service.answers.results import ResultMeaning
 from sprag.service.json_text import numbers
 from sprag.service.reading.catalogue import unit_of
-from sprag.service.results import exports
 
 if TYPE_CHECKING:
     from sprag.service.answers.tolerances import (

@@ -14,9 +14,9 @@ from typing import Any
 import httpx
 import pytest
 
+from sprag.service.exports import netcdf
 from sprag.service.formats import FORMATS
 from sprag.service.http.api import results as results_of_api
-from sprag.service.results.exports import netcdf
 from sprag.service.storage.rows.rows import Rows
 from tests.service.conftest import API, Service
 from tests.serving import served

@@ -19,8 +19,8 @@ from sprag.service.http.api import results as results_of_api
 from sprag.service.http.compression import Compression
 from sprag.service.http.problems import ApiError
 from sprag.service.http.threads import _NUMBERS, ThreadedRoute, Threads
-from sprag.service.jobs import row_files
 from sprag.service.storage.people.scopes import TokenScope
+from sprag.service.views import row_files
 from sprag.worker.limits import FILE_PROCESSES, MAX_FILES_EACH, MAX_STREAMS_EACH, SENDING_PROCESSES, WRITING_THREADS
 from tests.service.conftest import API, Service
 

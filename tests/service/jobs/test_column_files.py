@@ -13,11 +13,11 @@ from anyio.from_thread import BlockingPortal
 
 from sprag.service.http import read_ahead as ahead
 from sprag.service.http.read_ahead import read_ahead
-from sprag.service.jobs import columns as module
-from sprag.service.jobs import explore
-from sprag.service.jobs.column_files import ColumnFiles
-from sprag.service.jobs.columns import Columns
 from sprag.service.storage.rows.columns import RowColumns
+from sprag.service.views import columns as module
+from sprag.service.views import explore
+from sprag.service.views.column_files import ColumnFiles
+from sprag.service.views.columns import Columns
 from sprag.worker.pool.child_pool import JobStoppedError
 from sprag.worker.states import StudyState
 from tests.service.conftest import Service

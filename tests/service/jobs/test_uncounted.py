@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
+from sprag.service.figures.pictures.text import writable
 from sprag.service.jobs import checks
-from sprag.service.results.pictures.text import writable
 from sprag.service.spec.document import parse_spec
 from sprag.worker import models
 from sprag.worker.pool import child_process

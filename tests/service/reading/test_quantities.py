@@ -13,7 +13,11 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
+from sprag.service.exports import read_table
 from sprag.service.faults import SelectionError
+from sprag.service.figures.curves import curves_figure
+from sprag.service.figures.pictures.curves import paint_figure, painting
+from sprag.service.figures.read import read_figure, read_map
 from sprag.service.http.web.figures.maps import map_figure
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.reading.phrases import Amount, Name, Phrase
@@ -22,10 +26,6 @@ from sprag.service.reading.reader import CODES, Choice, Reading, reading_for
 from sprag.service.reading.wording import unit_text
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import CurveQuery
-from sprag.service.results.exports import read_table
-from sprag.service.results.figures.curves import curves_figure
-from sprag.service.results.figures.read import read_figure, read_map
-from sprag.service.results.pictures.curves import paint_figure, painting
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage.studies.records import CaseColumns
 from sprag.worker import models

@@ -11,9 +11,9 @@ import pandas as pd
 import pytest
 
 from sprag.service.faults import SelectionError
+from sprag.service.figures.explore import explore_figure
 from sprag.service.http.web.figures.linked import GRID, HEIGHT, TOP, linked
 from sprag.service.results.explore import ExploreQuery, explore, explored_json, histogram, plan_of
-from sprag.service.results.figures.explore import explore_figure
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage.rows.columns import RowColumns
 from sprag.worker import models

@@ -13,18 +13,18 @@ from sprag.engine import Ending
 from sprag.sentences import WarningText
 from sprag.service import languages
 from sprag.service.faults import Fault
+from sprag.service.figures.branch import special_text
+from sprag.service.figures.figure import Figure, Line, Note, Panel, Quantity
+from sprag.service.figures.orders import motion_text
+from sprag.service.figures.pictures.curves import draw_figure
+from sprag.service.figures.read import read_figure
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.languages.elsewhere import speak
 from sprag.service.reading.faults import allowed_text, fault_text
 from sprag.service.reading.phrases import Amount, Phrase, joined, part_label, plural, shown, term, titled
 from sprag.service.reading.reader import CODES, Reading
 from sprag.service.reading.wording import typed_text, unit_text
-from sprag.service.results.figures.branch import special_text
-from sprag.service.results.figures.figure import Figure, Line, Note, Panel, Quantity
-from sprag.service.results.figures.orders import motion_text
-from sprag.service.results.figures.read import read_figure
 from sprag.service.results.key_answer_words import curve_named
-from sprag.service.results.pictures.curves import draw_figure
 from sprag.service.results.tolerances.conditions import read_conditions
 from sprag.worker.models import ResultInfo
 from sprag.worker.models.branches import BranchContact, SpecialPoint

@@ -11,9 +11,9 @@ import pytest
 from scipy.interpolate import interp1d
 
 from sprag.service.faults import SelectionError
+from sprag.service.figures.answers import answers_figure
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.results.curves import CurveQuery
-from sprag.service.results.figures.answers import answers_figure
 from sprag.service.results.key_answer_words import answer_facts, note_of, report
 from sprag.service.results.key_answers import answers_query, find_answers
 from sprag.service.spec.document import parse_spec

@@ -14,17 +14,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from sprag.service.figures.curves import curves_figure
+from sprag.service.figures.figure import BANDS, Figure, Line
+from sprag.service.figures.pictures.curves import paint_figure, painting
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.reading.quantities import Units
 from sprag.service.reading.reader import Reading
 from sprag.service.reading.wording import percent
+from sprag.service.report.content import report_of
 from sprag.service.results.curve_cases import draw, select
 from sprag.service.results.curves import CurveQuery, Curves
 from sprag.service.results.defaults import completed, main_query
-from sprag.service.results.figures.curves import curves_figure
-from sprag.service.results.figures.figure import BANDS, Figure, Line
-from sprag.service.results.pictures.curves import paint_figure, painting
-from sprag.service.results.report.content import report_of
 from sprag.service.results.rounds import sentence
 from sprag.service.storage.studies.records import CaseColumns, RoundProgress, RoundRecord
 from sprag.worker import models

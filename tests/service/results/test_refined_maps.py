@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from sprag.service.cli.shown import show_map
 from sprag.service.faults import SelectionError
+from sprag.service.figures.orders import map_edges
+from sprag.service.figures.pictures.maps import draw_map as paint_map
 from sprag.service.http.web.figures.maps import map_figure
+from sprag.service.report import write_report
+from sprag.service.report.content import report_of
+from sprag.service.report.document import TitleBlock
 from sprag.service.results.curve_cases import draw_map
 from sprag.service.results.curves import Map
-from sprag.service.results.figures.orders import map_edges
-from sprag.service.results.pictures.maps import draw_map as paint_map
-from sprag.service.results.report import write_report
-from sprag.service.results.report.content import report_of
-from sprag.service.results.report.document import TitleBlock
 from sprag.service.storage.studies.records import CaseColumns
 from sprag.worker import models
 from sprag.worker.study import Study

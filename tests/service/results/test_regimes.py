@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sprag.service.figures.curves import curves_figure
+from sprag.service.figures.pictures.curves import draw_compare, draw_curves
+from sprag.service.figures.pictures.maps import draw_map as paint_map
 from sprag.service.http.web.figures.maps import map_figure
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.reading.reader import Reading
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import CurveQuery, Curves
-from sprag.service.results.figures.curves import curves_figure
-from sprag.service.results.pictures.curves import draw_compare, draw_curves
-from sprag.service.results.pictures.maps import draw_map as paint_map
 from sprag.service.results.regimes import MARKS, counted, regimes_of, stretches
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage.studies.records import CaseColumns

@@ -12,9 +12,9 @@ from SALib.analyze import rbd_fast
 from scipy.stats import qmc
 
 from sprag.service.cli.shown import _show_effects
+from sprag.service.figures.pictures.sensitivity import draw_sensitivity
 from sprag.service.reading.quantities import Units
 from sprag.service.reading.reader import CODES, Reading
-from sprag.service.results.pictures.sensitivity import draw_sensitivity
 from sprag.service.results.sensitivity import Sensitivity
 from sprag.service.results.sensitivity_design import is_sample
 from sprag.service.views.sensitivity import indices_csv

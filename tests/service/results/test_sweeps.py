@@ -16,13 +16,13 @@ from anyio.from_thread import BlockingPortal
 from sprag.service.cli.shown import held_text
 from sprag.service.client import AsyncClient, Client
 from sprag.service.client.frames import Curves, grid_of, table_of
+from sprag.service.figures.curves import curves_figure
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.form.spec import field_of, spec_of, values_of
 from sprag.service.jobs.local import run_here
 from sprag.service.jobs.start_from import with_start
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import main_query
-from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.stored_curves import stored_curves
 from sprag.service.results.sweeps import hysteresis
 from sprag.service.spec.document import parse_spec

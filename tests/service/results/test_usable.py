@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from sprag.engine.vibration_drive.regimes import Regime
+from sprag.service.figures.curves import curves_figure, doubtful_marks
 from sprag.service.http.web.figures.maps import map_figure
+from sprag.service.report.content import ranges
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.differences import differences
-from sprag.service.results.figures.curves import curves_figure, doubtful_marks
 from sprag.service.results.joined import joined_points
 from sprag.service.results.key_answers import answers_query, find_answers
-from sprag.service.results.report.content import ranges
 from sprag.service.results.sensitivity import sensitivity
 from sprag.service.results.tolerances.batch import Asked
 from sprag.service.results.tolerances.yields import yields

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from sprag.service.jobs.reports.curve import small_curve
 from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.results.report.content import report_of
+from sprag.service.report.content import report_of
 from sprag.service.schedules.fields import read_fields
 from sprag.service.spec.saved_views import View
 from tests.service.schedules.conftest import NEW_YEAR

@@ -11,7 +11,7 @@ import pytest
 import sqlalchemy as sa
 
 from sprag.sentences import WarningText
-from sprag.service.results.exports.source import stored
+from sprag.service.exports.source import stored
 from sprag.service.storage.part import SystemClock
 from sprag.service.storage.rows.origins import CasesOf
 from sprag.service.storage.store import Store

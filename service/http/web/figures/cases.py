@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from starlette.responses import Response
 
+from sprag.service.figures.read import read_figure
 from sprag.service.http.asked import asking
 from sprag.service.http.context import CaseNumber, StartNumber, StudyId
 from sprag.service.http.drawing import Columns, unchanging
@@ -16,10 +17,9 @@ from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.web.figures.plotly import Data, plotly_figure
 from sprag.service.http.work import Attended
-from sprag.service.jobs.reading import reading_of
-from sprag.service.results.figures.read import read_figure
 from sprag.service.views.case_view import see
 from sprag.service.views.cases import CASE_VIEWS
+from sprag.service.views.library import reading_of
 
 if TYPE_CHECKING:
     from sprag.service.reading.reader import Reading

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.figures.read import read_figure
+from sprag.service.figures.turn import turn_figure
 from sprag.service.http.web.figures.plotly import plotly_figure
-from sprag.service.results.figures.read import read_figure
-from sprag.service.results.figures.turn import turn_figure
 from sprag.service.views.trajectory import trajectory_csv
 from sprag.worker import models
 from sprag.worker.models.abilities import case_turn
@@ -17,9 +17,9 @@ from sprag.worker.models.turns import CaseTurn
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from sprag.service.figures.figure import Figure
     from sprag.service.reading.quantities import Units
     from sprag.service.reading.reader import Reading
-    from sprag.service.results.figures.figure import Figure
     from sprag.worker.models import Trajectory
     from sprag.worker.study import Study
 

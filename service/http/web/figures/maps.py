@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from sprag.service.figures.curves import doubtful_marks, map_quantities
+from sprag.service.figures.orders import TITLE, OrderMap, map_edges, motion_text, order_map
 from sprag.service.http.web.figures.plotly import (
     BELOW,
     MOTIONS,
@@ -18,8 +20,6 @@ from sprag.service.json_text import numbers
 from sprag.service.languages import gettext
 from sprag.service.reading.phrases import shown
 from sprag.service.reading.wording import unit_text
-from sprag.service.results.figures.curves import doubtful_marks, map_quantities
-from sprag.service.results.figures.orders import TITLE, OrderMap, map_edges, motion_text, order_map
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

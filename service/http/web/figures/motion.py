@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from sprag.service.figures.motion import motion_figure, phase_figure
+from sprag.service.figures.orders import motion_text
+from sprag.service.figures.read import read_figure
 from sprag.service.http.web.figures.plotly import Data, plotly_figure
 from sprag.service.languages import gettext
 from sprag.service.reading.wording import number
-from sprag.service.results.figures.motion import motion_figure, phase_figure
-from sprag.service.results.figures.orders import motion_text
-from sprag.service.results.figures.read import read_figure
 from sprag.worker import models
 
 if TYPE_CHECKING:

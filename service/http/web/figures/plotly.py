@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.service.figures.figure import BANDS, NEUTRAL, NOTES, PALETTE, shortened
+from sprag.service.figures.orders import motion_text
 from sprag.service.http.web.figures.thinning import thin
 from sprag.service.json_text import numbers
 from sprag.service.languages import decimal, gettext
 from sprag.service.reading.phrases import shown
 from sprag.service.reading.wording import unit_text
-from sprag.service.results.figures.figure import BANDS, NEUTRAL, NOTES, PALETTE, shortened
-from sprag.service.results.figures.orders import motion_text
 from sprag.service.results.regimes import MARKS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.results.figures.figure import Band, Figure, Fill, Line, Marks, NoteKind, Panel, Quantity
+    from sprag.service.figures.figure import Band, Figure, Fill, Line, Marks, NoteKind, Panel, Quantity
 
 Data = dict[str, Any]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from copy import deepcopy
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.service.figures.motion import motion_figure
+from sprag.service.figures.read import read_figure
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.json_text import numbers
-from sprag.service.results.figures.motion import motion_figure
-from sprag.service.results.figures.read import read_figure
 from sprag.service.spec.fields import WHICH_CASES
 from sprag.worker import models
 

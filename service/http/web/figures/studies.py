@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 from starlette.responses import Response
 
+from sprag.service.figures.read import read_figure, read_map
 from sprag.service.http.drawing import Drawing, conditional
 from sprag.service.http.respond import JSON, json_response
 from sprag.service.http.web.figures.maps import map_figure
 from sprag.service.http.web.figures.plotly import plotly_figure
-from sprag.service.jobs.reading import reading_of
 from sprag.service.json_text import to_bytes
 from sprag.service.results.curves import Map
-from sprag.service.results.figures.read import read_figure, read_map
+from sprag.service.views.library import reading_of
 from sprag.service.views.studies import STUDY_VIEWS
 from sprag.service.views.study_view import Found
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from sprag.service.http.work import Work
-    from sprag.service.jobs.library import Library
     from sprag.service.reading.reader import Choice
     from sprag.service.storage.studies.records import StudyRecord
+    from sprag.service.views.library import Library
     from sprag.service.views.study_view import StudyView
     from sprag.worker.study import Study
 

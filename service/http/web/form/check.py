@@ -9,6 +9,7 @@ from urllib.parse import urlencode
 
 from sprag.sentences import Place, WarningText
 from sprag.service.faults import Fault
+from sprag.service.figures.linkage import Drawing, drawings
 from sprag.service.http.web.figures.fit import FitChart, fit_chart
 from sprag.service.http.web.form.columns import COLUMNS
 from sprag.service.http.web.form.entries import Faults, items_of, list_of, range_of
@@ -24,7 +25,6 @@ from sprag.service.reading.reader import CLUTCH, Choice, Reading, reading_for
 from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.reading.wording import duration, unit_text
 from sprag.service.results.draft_words import draft_words
-from sprag.service.results.figures.linkage import Drawing, drawings
 from sprag.service.results.fits import fit_json
 from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
 from sprag.service.spec.derive import with_values

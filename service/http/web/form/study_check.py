@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sprag.service.http.web.form.check import Checked, look_over
-from sprag.service.jobs.library import Library
 from sprag.service.jobs.submission import Submission, submission
+from sprag.service.views.library import Library
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -9,6 +9,8 @@ from fastapi import Query
 from starlette.responses import Response
 
 from sprag.sentences import Sentence
+from sprag.service.figures.pictures.curves import draw_figure, draw_motion
+from sprag.service.figures.read import read_figure
 from sprag.service.http.drawing import picture, table
 from sprag.service.http.problems import ApiError
 from sprag.service.http.reading import CHOICE
@@ -27,8 +29,6 @@ from sprag.service.http.work import Attended, Work
 from sprag.service.reading.phrases import meanings, shown, term
 from sprag.service.reading.reader import Reading, reading_for
 from sprag.service.reading.wording import number
-from sprag.service.results.figures.read import read_figure
-from sprag.service.results.pictures.curves import draw_figure, draw_motion
 from sprag.service.results.regimes import motion_sentence
 from sprag.service.views.trajectory import trajectory_csv
 from sprag.worker import models

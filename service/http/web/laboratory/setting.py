@@ -10,6 +10,7 @@ from urllib.parse import parse_qsl, urlencode
 
 from sprag.sentences import Amount
 from sprag.service.faults import Fault, shown
+from sprag.service.figures.linkage import Drawing, drawings
 from sprag.service.http.problems import ApiError
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.figures.shaft import overridden
@@ -23,7 +24,6 @@ from sprag.service.reading.quantities import TYPED
 from sprag.service.reading.reader import Choice, reading_for
 from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.reading.wording import words
-from sprag.service.results.figures.linkage import Drawing, drawings
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.report import SpecError
 from sprag.worker import models

@@ -9,11 +9,11 @@ from functools import partial
 import pytest
 
 from sprag.service.answers.calibration import CalibrationReport
+from sprag.service.report import write_report
+from sprag.service.report.content import report_of
+from sprag.service.report.document import TitleBlock
 from sprag.service.results import calibration as calibration_module
 from sprag.service.results.calibration import calibration_json, calibration_of
-from sprag.service.results.report import write_report
-from sprag.service.results.report.content import report_of
-from sprag.service.results.report.document import TitleBlock
 from tests.service.calibrating import DAMPING, INERTIA, calibration
 from tests.service.conftest import API, Service
 from tests.service.shapes import fits

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from sprag.service import exports
 from sprag.service.answers import results
-from sprag.service.results import exports
-from sprag.service.results.exports import Source, csv_pieces, json_pieces
+from sprag.service.exports import Source, csv_pieces, json_pieces
 from sprag.service.spec.csv_text import escape
 from sprag.service.storage.studies.records import RowBlock
 from sprag.worker import models

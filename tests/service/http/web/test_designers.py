@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 from playwright.sync_api import expect
 
-from sprag.service.results.figures.figure import NOTES
+from sprag.service.figures.figure import NOTES
 from sprag.service.results.regimes import MARKS
 from tests.service.http.web.fields import drawn, fill, named, wrong
 

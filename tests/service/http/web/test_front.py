@@ -132,7 +132,7 @@ def test_designs_are_ranked_once_for_all_that_shows_them(service: Service, monke
         ranked.append(exact)
         return designs_of(*args, exact=exact)
 
-    monkeypatch.setattr("sprag.service.jobs.fronts.designs_of", rank)
+    monkeypatch.setattr("sprag.service.views.kept.designs_of", rank)
     study_id = search(service, rounds=1)
     pages = [
         f"/studies/{study_id}{page}" for page in ("/front", "/figures/front", "/figures/search", "/front/search.svg")

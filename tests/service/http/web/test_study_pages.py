@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from playwright.sync_api import expect
 
-from sprag.service.results.figures.figure import NOTES
+from sprag.service.figures.figure import NOTES
 from sprag.service.results.regimes import MARKS
 from tests.service.http.web.fields import drawn
 from tests.service.searching import spec_of

@@ -14,8 +14,8 @@ from sprag.service.faults import WarningCode
 from sprag.service.http.views import preset_of
 from sprag.service.languages import language
 from sprag.service.reading.reader import Choice
-from sprag.service.results.report.content import report_of
-from sprag.service.results.report.document import TitleBlock, document_of
+from sprag.service.report.content import report_of
+from sprag.service.report.document import TitleBlock, document_of
 from sprag.service.spec.document import parse_spec
 from tests.service import warning_samples
 from tests.service.timed_spec import SPEC

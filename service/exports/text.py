@@ -1,0 +1,138 @@
+"""Rows as text: CSV for tables, JSON and JSON lines for programs. Rows do not depend on the batching of cases."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from sprag.service.exports.source import machine
+from sprag.service.json_text import to_bytes
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.directions import value_columns
+from sprag.service.spec.csv_text import escape
+
+if TYPE_CHECKING:
+    from sprag.service.answers import Value
+    from sprag.service.answers.results import Case
+    from sprag.service.exports.source import Source
+    from sprag.service.reading.quantities import Units
+    from sprag.service.storage.studies.records import CaseRow, RowBlock
+    from sprag.worker.study import Study
+
+#: Spreadsheets interpret cells that begin with these characters as formulas.
+
+
+def row_json(row: CaseRow, parameters: dict[str, Value]) -> Case:
+    """One case as JSON data; ``parameters`` are those on axes and derived ones, SI."""
+    return {
+        "case": row.case,
+        "parameters": parameters,
+        "ending": row.ending,
+        "flags": list(row.flags),
+        "results": row.results,
+    }
+
+
+def rows_json(study: Study, block: RowBlock) -> Iterator[Case]:
+    """The cases of a block as `row_json` gives them."""
+    columns = value_columns(study, block.cases)
+    for index, row in enumerate(block.rows()):
+        yield row_json(row, {path: column[index] for path, column in columns.items()})
+
+
+def json_pieces(source: Source) -> Iterator[bytes]:
+    """``{..., "axes": [...], "results": [...], "rows": [row, row, ...]}``, one row per line."""
+    study = source.study
+    head = {
+        **source.about,
+        "axes": [
+            {"paths": list(axis.paths), "unit": unit_of(study, axis.paths[0]), "values": len(axis)}
+            for axis in study.axes
+        ],
+        "results": [{"name": info.name, "unit": info.unit} for info in source.infos],
+        **machine(source),
+    }
+    yield to_bytes(head)[:-1] + b',"rows":['
+    separator = b"\n"
+    for block in source.blocks:
+        piece = [to_bytes(row) for row in rows_json(study, block)]
+        if piece:
+            yield separator + b",\n".join(piece)
+            separator = b",\n"
+    yield b"\n]}\n"
+
+
+def json_lines_pieces(source: Source) -> Iterator[bytes]:
+    """One flat object per line, with the names of the columns of `csv_pieces`; null for missing values."""
+    study = source.study
+    for block in source.blocks:
+        columns = value_columns(study, block.cases)
+        for index, row in enumerate(block.rows()):
+            parameters = {path: column[index] for path, column in columns.items()}
+            flat = {"case": row.case, **parameters, "ending": row.ending, "flags": list(row.flags), **row.results}
+            yield to_bytes(flat) + b"\n"
+
+
+def csv_pieces(source: Source) -> Iterator[bytes]:
+    """Header ``case, axis paths, derived paths, ending, flags, result names``; empty cells for missing values.
+
+    A column that is not in SI has its unit: ``shaft.speed.mean [rpm]``; with ``header`` "units" every one that has one.
+    """
+    paths = source.study.column_paths
+    shown = source.in_units()
+    every = source.header == "units"
+    named = [_headed(path, source.unit(path), "1" if every else unit_of(source.study, path)) for path in paths]
+    results = [
+        _headed(own.name, own.unit, "1" if every else si.unit)
+        for own, si in zip(shown.infos, source.infos, strict=True)
+    ]
+    yield csv_lines([["case", *named, "ending", "flags", *results]])
+    for block in shown.blocks:
+        columns = source.parameters(block.cases).values()
+        parameters = zip(*columns, strict=True) if paths else iter(lambda: (), None)
+        lines = (
+            [row.case, *map(_cell, values), row.ending, ";".join(row.flags), *map(_cell, row.results.values())]
+            for row, values in zip(block.rows(), parameters, strict=False)
+        )
+        yield csv_lines(lines)
+
+
+def table_csv(header: Iterable[str], columns: Iterable[Iterable[object]]) -> bytes:
+    """A small table given by its columns, as CSV with the same cells as `csv_pieces`."""
+    rows = ([_cell(value) for value in row] for row in zip(*columns, strict=True))
+    return csv_lines(_with_header(list(header), rows))
+
+
+def read_table(columns: Mapping[str, Sequence[Any]], si: Mapping[str, str], units: Units) -> bytes:
+    """A small table as CSV in a reader's ``units``; ``si`` are those of its columns.
+
+    A column whose numbers are not SI says so: ``shaft.speed.mean [rpm]``.
+    """
+    shown = {name: si.get(name, "1") for name in columns}
+    header = [_headed(name, units.unit(unit), unit) for name, unit in shown.items()]
+    return table_csv(header, [[units.cell(value, unit) for value in columns[name]] for name, unit in shown.items()])
+
+
+def _headed(name: str, unit: str, known: str) -> str:
+    """The head of a column, with its unit where that is not the known one."""
+    return name if unit in (known, "") else f"{name} [{unit}]"
+
+
+def _with_header(header: list[str], rows: Iterable[list[Any]]) -> Iterator[list[Any]]:
+    yield header
+    yield from rows
+
+
+def _cell(value: object) -> str:
+    if value is None or value != value:  # noqa: PLR0124 - NaN
+        return ""
+    return repr(value) if isinstance(value, float) else escape(str(value)) if isinstance(value, str) else str(value)
+
+
+def csv_lines(rows: Iterable[Iterable[object]]) -> bytes:
+    """The rows as lines of CSV."""
+    buffer = io.StringIO()
+    csv.writer(buffer, lineterminator="\n").writerows(rows)
+    return buffer.getvalue().encode("utf-8")

@@ -1,0 +1,129 @@
+"""Designs of a search as described figures: two quantities of each design, and how the search has come to them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sprag.service.faults import refused
+from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.phrases import Name, Phrase, plural
+from sprag.service.results.fronts import history
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from sprag.service.results.fronts import Designs
+
+#: The number of a design, as an axis.
+NUMBER: Final = "design"
+#: Colour of designs outside the limits.
+_OUTSIDE: Final = "#b0b8c4"
+#: Feasible designs from which on the picture is fitted to them.
+_FEW: Final = 5
+_NOTHING: Final = Phrase("No design has its results yet.")
+
+
+def quantities(found: Designs) -> dict[str, tuple[str, NDArray[np.float64]]]:
+    """What a design can be drawn over, by name: unit and values; goals first, then variables, results of limits."""
+    names = [goal.name for goal in found.plan.best]
+    shown = {name: (found.infos[name].unit, found.front.goals[:, index]) for index, name in enumerate(names)}
+    for index, one in enumerate(found.plan.vary):
+        shown[one.paths[0]] = (unit_of(found.study, one.paths[0]), found.front.variables[:, index])
+    for limit in found.plan.subject_to:
+        info = found.infos[limit.name]
+        if info.kind != "category" and info.name not in shown:
+            values = found.values[info.name]
+            worst = np.where(np.isnan(values), -np.inf, np.abs(values - limit.value)).argmax(axis=1)
+            shown[info.name] = (info.unit, values[np.arange(len(values)), worst])
+    return {**shown, NUMBER: ("1", found.numbers.astype(np.float64))}
+
+
+def chosen(found: Designs, x: str | None, y: str | None) -> tuple[str, str]:
+    """Names of the two quantities; by default the first two goals. Raises SelectionError for an unknown name."""
+    names = list(quantities(found))
+    goals = [goal.name for goal in found.plan.best]
+    first, second = [*goals, NUMBER, names[0]][:2] if len(goals) != 1 else (NUMBER, goals[0])
+    for parameter, name in (("x", x), ("y", y)):
+        if name is not None and name not in names:
+            raise refused(
+                parameter, "unknown-name", "is not a goal, a variable or a numeric limit of this study", name,
+                allowed=", ".join(names),
+            )  # fmt: skip
+    return x or first, y or second
+
+
+def front_figure(found: Designs, x: str | None = None, y: str | None = None) -> Figure:
+    """Every design as a point: on the front, feasible, or outside the limits (grey). Nothing joins them."""
+    first, second = chosen(found, x, y)
+    known = quantities(found)
+    (x_unit, xs), (y_unit, ys) = known[first], known[second]
+    ranked = found.front
+    best = ranked.feasible & (ranked.rank == 0)
+    near = ranked.feasible | (_near(xs, ranked.feasible) & _near(ys, ranked.feasible))
+    far = int(np.count_nonzero(~near & ~ranked.failed))
+    kinds = (
+        (Phrase("outside the limits"), _OUTSIDE, ~ranked.feasible & near),
+        (Phrase("feasible"), PALETTE[0], ranked.feasible & ~best),
+        (Phrase("front"), PALETTE[1], best),
+    )
+    cases = ranked.cases[:, 0]
+    lines = tuple(
+        Line(name, xs[which], ys[which], colour, index, str(index), cases=cases[which], joined=False)
+        for index, (name, colour, which) in enumerate(kinds)
+        if which.any()
+    )
+    across = Quantity(first, x_unit)
+    note = "" if len(found.numbers) else _NOTHING
+    below = (
+        plural(
+            "{count} design outside the limits lies beyond the edges.",
+            "{count} designs outside the limits lie beyond the edges.",
+            far,
+        )
+        if far
+        else ""
+    )
+    panel = Panel(Quantity(second, y_unit), lines, x=across)
+    return Figure(across, (panel,), note=note, below=below, most=20_000)
+
+
+def _near(values: NDArray[np.float64], feasible: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which values are within the range of the feasible ones, or as much as that beyond; all where few are feasible."""
+    known = values[feasible & np.isfinite(values)]
+    if known.size < _FEW or np.ptp(known) == 0.0:
+        return np.ones(len(values), dtype=np.bool_)
+    span = np.ptp(known)
+    return np.asarray((values >= known.min() - span) & (values <= known.max() + span))
+
+
+def history_figure(found: Designs, columns: int = 2) -> Figure:
+    """The best value of each goal, the hypervolume, and feasible designs over the generations; only what is known."""
+    after = [item for item in history(found.rounds) if item["phase"] != "polish" or item["generation"]]
+    # Of each generation what it had reached itself: the polish asks for the same best values more strictly.
+    first = {item["generation"]: item for item in reversed(after)}
+    at = np.array(sorted(first), dtype=np.float64)
+    rows = [first[int(generation)] for generation in at]
+    across = Quantity(Phrase("generation"), "1")
+    found_values: list[tuple[str, str, list[float | None]]] = [
+        (
+            Phrase("best {result}", result=Name(goal.name, within=True)),
+            found.infos[goal.name].unit,
+            [row["best"][index] for row in rows],
+        )
+        for index, goal in enumerate(found.plan.best)
+    ]
+    found_values.append((Phrase("hypervolume"), "1", [row["hypervolume"] for row in rows]))
+    drawn = [one for one in found_values if any(value is not None for value in one[2])]
+    drawn.append((Phrase("feasible designs"), "1", [float(row["feasible"]) for row in rows]))
+    panels = tuple(
+        Panel(
+            Quantity(name, unit),
+            (Line(name, at, np.array(values, dtype=np.float64), PALETTE[0], key="0", listed=False),),
+            x=across,
+        )
+        for name, unit, values in drawn
+    )
+    return Figure(across, panels, columns, note="" if rows else Phrase("No generation has ended yet."))

@@ -1,0 +1,43 @@
+"""The part of a report about a calibration: values, points on the fitted curve, what should be known."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sprag.service.figures.calibration import calibration_figure
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.phrases import Amount, Name, Phrase, joined
+from sprag.service.report.drives import DrivesPart
+from sprag.service.results.calibration import calibration_of
+from sprag.worker.planning.calibrate.plan import CALIBRATE
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from sprag.service.results.calibration import Calibration
+    from sprag.service.results.curves import Fetch
+    from sprag.service.storage.studies.records import RoundRecord
+    from sprag.worker.study import Study
+
+
+def calibration_part(study: Study, rounds: list[RoundRecord], fetch: Fetch) -> DrivesPart | None:
+    """The part about the calibration; None for a study without one."""
+    if study.plan is None or study.plan.get("kind") != CALIBRATE:
+        return None
+    found = calibration_of(study, rounds, fetch)
+    if found.answer is None:
+        return DrivesPart(None, (Phrase("The first fit has not ended yet."),))
+    return DrivesPart(calibration_figure(found), (*_values(found), *found.sentences))
+
+
+def _values(found: Calibration) -> Iterator[str]:
+    known = found.answer
+    assert known is not None
+    for index, name in enumerate(found.names):
+        unit = unit_of(found.study, name)
+        value = Phrase("{name} = {value}", name=Name(name), value=Amount(known.values[index], unit, 6))
+        if known.intervals is None:
+            yield joined("", (value, "."))
+            continue
+        low, high = (Amount(end, unit, 6, bare=True) for end in known.intervals[index])
+        yield Phrase("{value} (95 % interval {low} to {high}).", value=value, low=low, high=high)

@@ -1,0 +1,74 @@
+"""What takes seconds to find in the rows of a study, computed once for all that is shown of it."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from functools import partial
+from threading import Lock
+from typing import TYPE_CHECKING, Final
+
+from cachetools import LRUCache
+
+from sprag.service.results.calibration import calibration_of
+from sprag.service.results.fronts import designs_of
+
+if TYPE_CHECKING:
+    from sprag.service.results.calibration import Calibration
+    from sprag.service.results.fronts import Designs
+    from sprag.service.storage.store import Store
+
+#: Calibrations that are kept.
+_CALIBRATIONS: Final = 16
+#: Designs that are kept, of all studies together: some 20 MB.
+_DESIGNS: Final = 50_000
+
+
+class Calibrations:
+    """Calibrations, each followed through its rows again, which takes a second, only when it has other rows."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._lock = Lock()
+        self._kept: LRUCache[tuple[str, int], Calibration] = LRUCache(_CALIBRATIONS)
+
+    def of(self, study_id: str) -> Calibration:
+        """A calibration; raises StudyNotFoundError, and FaultError for a study that is not one."""
+        store = self._store
+        key = (study_id, store.studies.get(study_id).revision)
+        with self._lock:
+            found = self._kept.get(key)
+        if found is None:
+            found = calibration_of(
+                store.studies.study(study_id), store.studies.rounds(study_id), partial(store.rows.for_cases, study_id)
+            )
+            with self._lock:
+                self._kept[key] = found
+        return found
+
+
+class Fronts:
+    """The designs of studies, each ranked anew only when the study has other rows.
+
+    Ranking takes a time that grows faster than the number of designs, seconds for tens of thousands; a page with its
+    figures and files asks for the same designs several times.
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._lock = Lock()
+        self._kept: LRUCache[tuple[str, int, bool], Designs] = LRUCache(
+            _DESIGNS, getsizeof=lambda found: 100 + len(found.numbers)
+        )
+
+    def of(self, study_id: str, *, exact: bool) -> Designs:
+        """The designs of a study; raises StudyNotFoundError, and FaultError for a study without a goal."""
+        store = self._store
+        key = (study_id, store.studies.get(study_id).revision, exact)
+        with self._lock:
+            found = self._kept.get(key)
+        if found is None:
+            fetch = partial(store.rows.for_cases, study_id)
+            found = designs_of(store.studies.study(study_id), store.studies.rounds(study_id), fetch, exact=exact)
+            with self._lock, suppress(ValueError):  # too large to be kept
+                self._kept[key] = found
+        return found
