@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from sprag.service.reading.wording import words
-from sprag.service.spec.components import CHARACTERISTIC, CHARACTERISTICS
 from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN
 from sprag.service.spec.draws.described import DISTRIBUTION
 from sprag.service.spec.draws.tolerances import DRAWS
@@ -28,8 +27,7 @@ from sprag.worker.models.laboratory import Laboratory
 
 def form_values() -> Iterator[str]:
     """Labels and help of the fields of the form for a new study."""
-    yield from (words(name) for name in (CHARACTERISTIC, *OPERATION.either))
-    yield from map(words, CHARACTERISTICS)
+    yield from (words(name) for name in OPERATION.either)
     machine = (*MECHANISM_CHOICES.values(), OPERATION_CHOICES)
     drive = (MEAN_SPEED_IS, BALANCE, BALANCE_SIDE, FLYWHEEL, MOTOR, STAGE, INDICATOR_OVER, INTERPOLATION, PHI_C)
     plan = (*GOAL.described.values(), REFINE.listed["results"], *REFINE.described.values())
@@ -51,7 +49,15 @@ def _own(form: Form) -> Iterator[str]:
     """What the form of a model itself says."""
     yield from (form.called, form.batch, form.normal, form.advice, *form.labels.values())
     yield from (title for _, title in form.groups)
-    yield from (kind.title for kind in form.components)
+    for kind in form.components:
+        yield from (
+            kind.title,
+            kind.twice,
+            kind.foreign,
+            kind.change,
+            kind.keep,
+            *map(words, (kind.choice, *kind.ways)),
+        )
     for rows in form.lists:
         yield from (rows.title, rows.add, rows.drop, rows.every, rows.one)
         yield from _texts(rows.fields)

@@ -8,10 +8,10 @@ import pandas as pd
 
 from sprag.service.client.frames import table_of
 from sprag.service.client.queries import spec_of
+from sprag.service.exports import export, stored
 from sprag.service.jobs.local import pool_size, run_here
 from sprag.service.plain_data import plain
 from sprag.service.reading.catalogue import unit_of
-from sprag.service.exports import export, stored
 from sprag.service.settings import Settings
 from sprag.service.spec.document import SpecError, parse_spec
 

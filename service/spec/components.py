@@ -28,37 +28,15 @@ from sprag.service.spec.report import Report, SpecError
 from sprag.service.spec.table_text import heading_of
 from sprag.worker import models
 from sprag.worker.limits import MAX_COMPONENTS, MAX_NAME_LENGTH, MAX_NOTES_LENGTH
+from sprag.worker.models.form import ComponentKind
 from sprag.worker.models.parameters import placed
+from sprag.worker.models.registry import all_models
 
-SPRING, CLUTCH, MOTOR = "spring", "clutch", "motor"
-KINDS: Final = (SPRING, CLUTCH, MOTOR)
-#: What is said about components of each kind.
-_TWICE: Final = {
-    SPRING: N_("the spring is given twice"), CLUTCH: N_("the clutch is given twice"),
-    MOTOR: N_("the motor is given twice"),
-}  # fmt: skip
-_NO_FIELD: Final = {
-    SPRING: N_("is not a field of this spring"), CLUTCH: N_("is not a field of this clutch"),
-    MOTOR: N_("is not a field of this motor"),
-}  # fmt: skip
-#: Field of a motor with the kind of its characteristic, and the parameters of each.
-CHARACTERISTIC: Final = "characteristic"
-CHARACTERISTICS: Final = {
-    "kloss": ("synchronous_speed", "breakdown_torque", "breakdown_slip"),
-    "linear": ("no_load_speed", "stall_torque"),
-}
+#: Each kind, and the model whose machines have such components.
+_KINDS: Final = {kind.name: (model.name, kind) for model in all_models() for kind in model.presentation.form.components}
+KINDS: Final = tuple(_KINDS)
 #: Field of a clutch with a list.
 COEFFICIENTS: Final = "coefficients"
-_DRIVE: Final = models.VIBRATION_DRIVE
-_PATHS: Final[Mapping[str, tuple[tuple[str, str], ...]]] = {
-    SPRING: ((_DRIVE, "pendulums.N.spring_rate"), (_DRIVE, "pendulums.N.damping")),
-    CLUTCH: ((_DRIVE, "clutch.coefficients.K"), (_DRIVE, "clutch.windup_limit"), (_DRIVE, "pendulums.N.backlash")),
-    MOTOR: tuple(
-        (models.MACHINE_SHAFT, f"drive.motor.{name}")
-        for name in (*(name for names in CHARACTERISTICS.values() for name in names), "inertia")
-    ),
-}
-_REQUIRED: Final = {SPRING: ("spring_rate",), CLUTCH: (COEFFICIENTS,), MOTOR: (CHARACTERISTIC,)}
 #: What every component has beside its fields.
 COLUMNS: Final = ("kind", "name", "note")
 #: Columns of a CSV file that are no numbers.
@@ -103,17 +81,23 @@ class Component:
     fields: Mapping[str, str] = field(default_factory=dict)
 
 
+def kind_of(name: str) -> ComponentKind:
+    """What a model says about a kind."""
+    return _KINDS[name][1]
+
+
 @lru_cache(maxsize=8)
 def fields_of(kind: str) -> Mapping[str, models.Parameter | None]:
-    """The fields of a kind by name, with their parameters; None for the characteristic of a motor."""
-    catalogues = {model: {e.path: e for e in models.parameter_catalogue(model)} for model, _ in _PATHS[kind]}
-    known = {path.removesuffix(".K").rpartition(".")[2]: catalogues[model][path] for model, path in _PATHS[kind]}
-    return {CHARACTERISTIC: None, **known} if kind == MOTOR else known
+    """The fields of a kind by name, with their parameters; None for its choice."""
+    model, own = _KINDS[kind]
+    catalogue = {entry.path.removesuffix(".K"): entry for entry in models.parameter_catalogue(model)}
+    return {name: catalogue.get(place.replace("/", ".")) for name, place in own.fields.items()}
 
 
 def needed(kind: str, fields: Mapping[str, str]) -> tuple[str, ...]:
     """The fields that a component must have."""
-    return (*_REQUIRED[kind], *CHARACTERISTICS.get(fields.get(CHARACTERISTIC, ""), ()))
+    own = kind_of(kind)
+    return (*own.required, *own.ways.get(fields.get(own.choice, ""), ()))
 
 
 def list_text(text: str) -> list[str]:
@@ -133,7 +117,7 @@ def read_components(data: object) -> list[Component]:
     places: dict[tuple[str, str], str] = {}
     for where, one in made:
         if places.setdefault((one.kind, one.name), where) != where:
-            report.fault(where, "repeated", Sentence(_TWICE[one.kind]), one.name, allowed="each once")
+            report.fault(where, "repeated", Sentence(kind_of(one.kind).twice), one.name, allowed="each once")
     report.raise_if_any()
     return [one for _, one in made]
 
@@ -172,18 +156,18 @@ def _checked(node: Node, fields: Node) -> Component | None:
 
 def faults_of(kind: str, fields: Mapping[str, str]) -> list[Fault]:
     """What is wrong with the fields of a component; ``where`` is the name of the field."""
-    known, found = fields_of(kind), list[Fault]()
+    known, own, found = fields_of(kind), kind_of(kind), list[Fault]()
     for name in needed(kind, fields):
         if name not in fields:
             found.append(Fault(name, "required", "is required"))
-    others = {name for names in CHARACTERISTICS.values() for name in names} - set(needed(kind, fields))
+    others = {name for names in own.ways.values() for name in names} - set(needed(kind, fields))
     for name, text in fields.items():
-        if name not in known or (kind == MOTOR and name in others):
-            allowed = ", ".join(one for one in known if kind != MOTOR or one not in others)
-            found.append(Fault(name, "unknown-field", Sentence(_NO_FIELD[kind]), text, allowed))
-        elif name == CHARACTERISTIC:
-            if text not in CHARACTERISTICS:
-                allowed = ", ".join(CHARACTERISTICS)
+        if name not in known or name in others:
+            allowed = ", ".join(one for one in known if one not in others)
+            found.append(Fault(name, "unknown-field", Sentence(own.foreign), text, allowed))
+        elif name == own.choice:
+            if text not in own.ways:
+                allowed = ", ".join(own.ways)
                 found.append(Fault(name, "invalid-choice", "is not a characteristic", text, allowed))
         else:
             found += _faults_of_field(kind, name, text)

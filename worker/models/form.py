@@ -142,12 +142,24 @@ class ComponentKind:
     ----------
     name, title : of the kind, and of many
     fields : field of a component -> name of a field of the form, with ``N`` for a row of a list
-    sets : further fields that it fills in
+    required : fields that every one must have
+    ways : values of its choice, if it has one, and the fields that each needs and no other has
+    choice : the field with that choice
+    twice, foreign, change, keep : what is said of one that is given twice, and of a field that it does not have; texts
+        of its part of the page
+    sets : further fields of the form that it fills in
     """
 
     name: str
     title: str
     fields: Mapping[str, str]
+    required: tuple[str, ...]
+    twice: str
+    foreign: str
+    change: str
+    keep: str
+    choice: str = ""
+    ways: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     sets: Mapping[str, str] = field(default_factory=dict)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Final
+from typing import Annotated
 
 from fastapi import Query
 from starlette.responses import RedirectResponse, Response
@@ -20,15 +20,14 @@ from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.jobs import checks
 from sprag.service.json_text import to_bytes
-from sprag.service.languages import N_
 from sprag.service.reading.units import examples
 from sprag.service.reading.wording import words
 from sprag.service.spec.components import (
-    CHARACTERISTICS,
     COEFFICIENTS,
     KINDS,
     Component,
     fields_of,
+    kind_of,
     needed,
     require_component,
 )
@@ -36,8 +35,6 @@ from sprag.service.storage.errors import ComponentNotFoundError
 from sprag.worker.limits import MAX_COMPONENTS
 
 router = page_router()
-
-_TITLES: Final = {"spring": N_("Springs"), "clutch": N_("Clutches"), "motor": N_("Motors")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +54,7 @@ def _columns(kind: str) -> list[_Column]:
     for name, parameter in fields_of(kind).items():
         must = name in needed(kind, {})
         if parameter is None:
-            found.append(_Column(name, words(name), "", "", tuple(CHARACTERISTICS), must))
+            found.append(_Column(name, words(name), "", "", tuple(kind_of(kind).ways), must))
         elif name == COEFFICIENTS:
             found.append(_Column(name, words(name), "", "0; 200; 0; 20000", (), must))
         else:
@@ -133,7 +130,7 @@ def _page(context: Context, values: Values, faults: Faults, status: int, read: i
         "components.html",
         status=status,
         kinds=[
-            (kind, _TITLES[kind], _columns(kind), [record for record in records if record.component.kind == kind])
+            (kind_of(kind), _columns(kind), [record for record in records if record.component.kind == kind])
             for kind in KINDS
         ],
         values=values,

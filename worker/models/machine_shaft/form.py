@@ -15,6 +15,9 @@ MOTORS: Final = {
     "kloss": ("an induction motor (Kloss)", ("inertia", "synchronous_speed", "breakdown_torque", "breakdown_slip")),
     "table": ("a motor with a measured characteristic", ("inertia", "scale")),
 }
+_COMPONENT_MOTORS: Final = {
+    kind: tuple(name for name in MOTORS[kind][1] if name != "inertia") for kind in ("kloss", "linear")
+}
 _GEARED: Final = ("ratio", "efficiency", "output_inertia", "inertia")
 _STAGES: Final = {
     **dict.fromkeys(("gear", "worm"), _GEARED), **dict.fromkeys(("belt", "chain"), (*_GEARED, "mass", "radius")),
@@ -165,10 +168,16 @@ FORM: Final = Form(
         ),
     ),
     components=(
-        ComponentKind("motor", "Motors", {
-            "characteristic": "drive",
-            **{name: f"drive/motor/{name}" for kind in ("linear", "kloss") for name in MOTORS[kind][1]},
-        }),
+        ComponentKind(
+            "motor", "Motors",
+            {"characteristic": "drive",
+             **{name: f"drive/motor/{name}" for own in _COMPONENT_MOTORS.values() for name in own},
+             "inertia": "drive/motor/inertia"},
+            required=("characteristic",),
+            twice="the motor is given twice", foreign="is not a field of this motor",
+            change="Add or change a motor", keep="Keep the motor",
+            choice="characteristic", ways=_COMPONENT_MOTORS,
+        ),
     ),
     new={"/base/mechanism": "slider_crank", "/base/operation": "steps", "/refine/results": "irregularity"},
     called="a machine shaft",

@@ -64,14 +64,22 @@ FORM: Final = Form(
         Block("Surroundings", (FormField("*"),)),
     ),
     components=(
-        ComponentKind("spring", "Springs", {name: f"pendulums/N/{name}" for name in ("spring_rate", "damping")}),
+        ComponentKind(
+            "spring", "Springs", {name: f"pendulums/N/{name}" for name in ("spring_rate", "damping")},
+            required=("spring_rate",),
+            twice="the spring is given twice", foreign="is not a field of this spring",
+            change="Add or change a spring", keep="Keep the spring",
+        ),
         ComponentKind(
             "clutch", "Clutches",
             {
                 "coefficients": "clutch/coefficients", "windup_limit": "clutch/windup_limit",
                 "backlash": "pendulums/N/backlash",
             },
-            {"clutch/kind": "law", "clutch/windup_limit": ""},
+            required=("coefficients",),
+            twice="the clutch is given twice", foreign="is not a field of this clutch",
+            change="Add or change a clutch", keep="Keep the clutch",
+            sets={"clutch/kind": "law", "clutch/windup_limit": ""},
         ),
     ),
     called="a vibration drive",
