@@ -15,7 +15,7 @@ from sprag.service.http.problems import PROBLEM_TYPES
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.laboratory.setting import machines
 from sprag.service.presets import preset_names
-from sprag.service.reading.phrases import part_label
+from sprag.service.reading.reader import part_label
 from sprag.service.reading.quantities import KINDS
 from sprag.service.schedules.outcomes import Result
 from sprag.service.spec.machine.shaft_parts import MECHANISM_CHOICES

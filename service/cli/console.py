@@ -171,7 +171,7 @@ def _warning_text(text: str, code: str | None) -> str:
     if languages.current() == languages.ENGLISH:
         return text
     if isinstance(text, WarningText) and text.sentence is not None:
-        from sprag.service.reading.phrases import shown
+        from sprag.service.reading.reader import shown
 
         return shown(text)
     from sprag.service.fault_meanings import WARNING_MEANINGS

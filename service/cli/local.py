@@ -251,7 +251,7 @@ def run(
         study_id = record.id if db is not None else None
         write_json({"file": file, "study": study_id, **numbers, "endings": endings, "seconds": round(seconds, 3)})
     if record.time_over:
-        from sprag.service.reading.phrases import told
+        from sprag.service.reading.reader import told
 
         say(told(record.reason or ""))
     if record.ok != record.cases:

@@ -143,7 +143,7 @@ def _of_lines(study: Study, cases: NDArray[np.int64]) -> RowBlock:
 
 def _show(block: RowBlock, starts: int) -> None:
     """One case as a table, without missing values; a column for each of its regimes."""
-    from sprag.service.reading.phrases import shown as said
+    from sprag.service.reading.reader import shown as said
     from sprag.service.results.regimes import ORDER, motion_sentence
     from sprag.worker.models import ENDING_SENTENCES, OK
 

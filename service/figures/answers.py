@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from sprag.sentences import Amount
 from sprag.service.figures.curves import curves_figure
 from sprag.service.figures.figure import Figure, Note, NoteKind, Panel
-from sprag.service.reading.phrases import Amount, Phrase
+from sprag.service.reading.reader import Phrase
 
 if TYPE_CHECKING:
     from sprag.service.results.key_answers import Found, StudyAnswers

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sprag.sentences import Amount
 from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.reading.phrases import Amount, Phrase, joined, plural
+from sprag.service.reading.reader import Phrase, joined, plural
 from sprag.service.reading.wording import number
 
 if TYPE_CHECKING:

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.sentences import Amount
 from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
 from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.phrases import Amount, Phrase, joined, plural, term
+from sprag.service.reading.reader import Phrase, joined, plural, term
 from sprag.service.results.selection import axis_name
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 
 from sprag.service.figures.figure import Figure, Line, Panel, Quantity, line_colours
 from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.phrases import Phrase, joined
+from sprag.service.reading.reader import Phrase, joined
 from sprag.service.reading.wording import number
 from sprag.worker.planning.calibrate.candidates import along, groups
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.reading.phrases import Phrase
+from sprag.service.reading.reader import Phrase
 from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.worker import models
 

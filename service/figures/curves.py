@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.sentences import Amount, Name
 from sprag.service.figures.figure import Band, Figure, Line, Marks, Panel, Quantity, line_colours
 from sprag.service.figures.orders import TITLE, order_map, strip_of
-from sprag.service.reading.phrases import Amount, Name, Phrase, joined, term
+from sprag.service.reading.reader import Phrase, joined, term
 from sprag.service.results.joined import joined_points
 from sprag.service.results.refined import jumps_of, sentence
 from sprag.service.results.regimes import DOUBTFUL, MARKED, UNSETTLED, regimes_of

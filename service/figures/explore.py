@@ -8,7 +8,7 @@ import numpy as np
 
 from sprag.service.faults import refused
 from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.reading.phrases import Phrase, plural
+from sprag.service.reading.reader import Phrase, plural
 from sprag.service.results.explore import quantities
 from sprag.service.results.selection import listed
 

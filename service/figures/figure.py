@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.service.languages import gettext
-from sprag.service.reading.phrases import Phrase
+from sprag.service.reading.reader import Phrase
 
 #: Colours that are distinguishable with any kind of colour vision (after Okabe and Ito), on light and dark backgrounds.
 PALETTE: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f6fc4", "#8c6d31")

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.sentences import Name
 from sprag.service.faults import refused
 from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
 from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.phrases import Name, Phrase, plural
+from sprag.service.reading.reader import Phrase, plural
 from sprag.service.results.fronts import history
 
 if TYPE_CHECKING:

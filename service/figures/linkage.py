@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.languages import gettext
-from sprag.service.reading.phrases import titled
+from sprag.service.reading.reader import titled
 from sprag.service.reading.wording import symbol
 from sprag.worker.models import machine_shaft
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.figures.figure import NEUTRAL, PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.reading.phrases import Phrase, joined, part_label
+from sprag.service.reading.reader import Phrase, joined, part_label
 from sprag.service.reading.wording import words
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.reading.phrases import Phrase, plural, shown, term
+from sprag.service.reading.reader import Phrase, plural, shown, term
 from sprag.service.results.regimes import MARKS, ORDER
 from sprag.service.results.sweeps import values_text
 

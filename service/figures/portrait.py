@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.reading.phrases import Phrase, part_label, plural, term
+from sprag.service.reading.reader import Phrase, part_label, plural, term
 from sprag.worker import models
 
 if TYPE_CHECKING:

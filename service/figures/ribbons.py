@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.sentences import Name
 from sprag.service.faults import refused
 from sprag.service.figures.figure import Figure, Fill, Line, Panel, Quantity, line_colours
-from sprag.service.reading.phrases import Name, Phrase, joined, plural
+from sprag.service.reading.reader import Phrase, joined, plural
 from sprag.service.results.curves import Map
 from sprag.service.results.sweeps import values_text
 from sprag.service.results.tolerances.written import percent

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.sentences import Name
 from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
 from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.phrases import Name, Phrase, joined, part_label, term
+from sprag.service.reading.reader import Phrase, joined, part_label, term
 from sprag.service.reading.wording import number
 from sprag.service.results.regimes import MARKS
 from sprag.service.results.selection import axis_name

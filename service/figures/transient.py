@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.reading.phrases import Phrase
+from sprag.service.reading.reader import Phrase
 
 if TYPE_CHECKING:
     from sprag.worker.models.transients import Transient

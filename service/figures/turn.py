@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from sprag.service.figures.figure import Figure, Line, Panel, Quantity
 from sprag.service.figures.motion import motion_figure
-from sprag.service.reading.phrases import Phrase
+from sprag.service.reading.reader import Phrase
 
 if TYPE_CHECKING:
     from sprag.worker.models import Presentation, Trajectory

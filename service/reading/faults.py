@@ -12,7 +12,7 @@ from sprag.sentences import Sentence
 from sprag.service.fault_meanings import MEANINGS
 from sprag.service.languages import ENGLISH, current, gettext
 from sprag.service.languages.ranges import with_range
-from sprag.service.reading.phrases import shown
+from sprag.service.reading.reader import shown
 
 if TYPE_CHECKING:
     from sprag.service.faults import Fault

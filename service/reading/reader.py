@@ -1,28 +1,153 @@
-"""How somebody reads quantities: in which units, and by captions or by code names."""
+"""How somebody reads: sentences with quantities and names, in which units, and by captions or by code names.
+
+A `Phrase` is a `Sentence` whose English has numbers and units as in print; `Reading.say` gives either in the reader's
+language, units and words. Its first argument is the text of the catalogue.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Self
 
 from markupsafe import Markup
 
-from sprag.sentences import Sentence, WarningText
+from sprag.sentences import Amount, Clause, Name, Part, Place, Sentence, Typed, WarningText, Whole, filled, whole
+from sprag.service.fault_meanings import WARNING_MEANINGS
 from sprag.service.faults import refused
-from sprag.service.languages import gettext
-from sprag.service.reading.earlier import earlier_warning
+from sprag.service.languages import ENGLISH, _, current, decimal, earlier, gettext, language, ngettext
+from sprag.service.languages.ranges import NUMBER
 from sprag.service.reading.numbers import in_language
-from sprag.service.reading.part_names import lower_first, part_name, run_name
-from sprag.service.reading.phrases import Name, Phrase, said
-from sprag.service.reading.quantities import SI, Units, units_for
+from sprag.service.reading.part_names import lower_first, part_name, run_name, upper_first
+from sprag.service.reading.quantities import KINDS, SI, Units, units_for
 from sprag.service.reading.units import has_unit
 from sprag.service.reading.wording import number, unit_text
+from sprag.worker.models.registry import model_of
 from sprag.worker.models.vocabulary import caption, has_caption, letter
 
 if TYPE_CHECKING:
-    from sprag.sentences import Place
     from sprag.worker.study import Study
+
+
+class Phrase(Sentence):
+    """A sentence for people: its whole numbers and amounts are written as in print, in English too."""
+
+    __slots__ = ()
+
+    @classmethod
+    def composed(cls, text: str, plural: tuple[str, int] | None, parts: Mapping[str, Part]) -> Self:
+        """The same text whoever reads: programs compare it, and addresses have it."""
+        with language(ENGLISH):
+            return super().composed(text, plural, parts)
+
+    @staticmethod
+    def _plain(part: Part) -> str:
+        if isinstance(part, int):
+            return number(part)
+        return _printed(part) if isinstance(part, Amount) and not part.form else str(part)
+
+    def said(self, reading: Reading | None) -> str:
+        """The text in the language, units and words of a reader; without one, in SI units and code names."""
+        return said(self, reading)
+
+
+def plural(one: str, many: str, count: int, /, **parts: Part) -> Phrase:
+    """A phrase for ``count`` things: ``plural("{count} drive", "{count} drives", 3)``; ``count`` is a part of it."""
+    return Phrase.composed(one, (many, count), {"count": count, **parts})
+
+
+def term(code: str) -> Phrase:
+    """The words for the code name of an ending, a flag, a regime, a state or a direction: ``not settled``."""
+    return Phrase(code.replace(".", " ").replace("_", " "))
+
+
+def word(code: str) -> str:
+    """The words of `term` for the reader: ``not settled``."""
+    return shown(term(code))
+
+
+def meanings(sentences: Mapping[str, str]) -> dict[str, str]:
+    """The sentences about code names for the reader."""
+    return {name: gettext(sentence) if sentence else "" for name, sentence in sentences.items()}
+
+
+def titled(code: str) -> str:
+    """The words of `term` for the reader, as a title: ``Not settled``."""
+    text = shown(term(code))
+    return upper_first(text)
+
+
+def model_title(model: str) -> str:
+    """What a model is called: ``Vibration drive``; its name where it has no title."""
+    title = model_of(model).presentation.title
+    return gettext(title) if title else model
+
+
+def part_label(label: str) -> Phrase:
+    """What a line of one part of a machine is called: ``Pendulum 0``, ``Shaft``."""
+    if isinstance(label, Phrase):
+        return label
+    word, _, number_of_part = label.rpartition(" ")
+    if word and number_of_part.isdigit():
+        return Phrase("{part} {number}", part=Phrase(word), number=number_of_part)
+    return Phrase(label)
+
+
+def shown(text: str) -> str:
+    """A text in the reader's language, where it has neither quantities nor names of them."""
+    return said(text, None)
+
+
+def told(text: str) -> str:
+    """As `shown`; a text without values is found among those of earlier releases."""
+    return shown(text) if isinstance(text, Sentence) else earlier.said(text)
+
+
+def said(text: str, reading: Reading | None) -> str:
+    """A text in the language, units and words of a reader; without one, in SI units and code names."""
+    if isinstance(text, WarningText) and text.sentence is not None:
+        text = text.sentence
+    if not isinstance(text, Sentence):
+        return text
+    of_reader = text.text and (gettext(text.text) if text.plural is None else ngettext(text.text, *text.plural))
+    return filled(of_reader, {name: _said(part, reading) for name, part in text.parts.items()})
+
+
+def _said(part: Part, reading: Reading | None) -> str:
+    if isinstance(part, str):
+        return said(part, reading)
+    if isinstance(part, int):
+        return number(part)
+    if isinstance(part, Amount):
+        return _printed(part, reading)
+    if isinstance(part, Clause):
+        return said(part.sentence, reading).removesuffix(".")
+    if isinstance(part, Whole):
+        return whole(said(part.clause, reading))
+    if isinstance(part, Typed):
+        return unit_text(part.text)
+    if reading is None:
+        return str(part)
+    if isinstance(part, Place):
+        return reading.place(part)
+    text = reading.caption(part.name)
+    return lower_first(text) if part.within else text
+
+
+def _printed(amount: Amount, reading: Reading | None = None) -> str:
+    """An amount as in print, in the units of a reader; without one, in its own unit."""
+    value, unit = amount.value, amount.unit
+    if reading is not None:
+        value, unit = reading.value(value, unit), reading.unit(unit)
+    text = number(value, amount.digits)
+    return text if amount.bare else f"{text} {unit_text(unit)}".strip()
+
+
+def joined(separator: str, parts: Iterable[Part]) -> Phrase:
+    """The parts with a separator between them, which is no word."""
+    return Phrase.listed(separator, parts)
+
 
 #: What quantities are called: for people, or as in specs and files.
 CAPTIONS: Final = "captions"
@@ -135,3 +260,42 @@ CLUTCH: Final = Reading("vibration-drive")
 def reading_for(study: Study, spec: Mapping[str, Any], choice: Choice) -> Reading:
     """The reading of a choice; raises SelectionError for units that cannot be shown."""
     return Reading(study.model, units_for(study, spec, choice.units), choice.names)
+
+
+#: Sentences that earlier releases stored in English only: what they say is found in them again, for one release.
+_SI: Final = {kind.unit for kind in KINDS} | {"N*m/rad"}
+_UNITS: Final = sorted(_SI | {unit for kind in KINDS for unit in kind.others}, key=len, reverse=True)
+#: A number with a unit within a sentence.
+_QUANTITY: Final = re.compile(rf"(?<![\w.])({NUMBER}) ({'|'.join(map(re.escape, _UNITS))})(?![\w^*/])")
+_CASES: Final = re.compile(r"\bin ([\d,]+) of ([\d,]+) cases\b")
+#: The place at the beginning of a warning.
+_PLACE: Final = re.compile(r"(/[^:\s]*)(?: \(([^)]*)\))?: ")
+#: The line of a table at the beginning of a warning.
+_LINE: Final = re.compile(r"line (\d+): ")
+
+
+def earlier_warning(text: str, code: str, reading: Reading) -> str:
+    """A warning for people: its place as a caption, its quantities in the reader's units.
+
+    In another language it is the meaning of its code with the numbers. One without a code stays as it is stored.
+    """
+    meaning = next((meaning for known, meaning in WARNING_MEANINGS.items() if known == code), None)
+    place = _PLACE.match(text)
+    beginning = f"{reading.place(Place(place[1], place[2] or ''))}: " if place else ""
+    sentence = text[place.end() :] if place else str(text)
+    if (line := _LINE.match(sentence)) is not None:
+        beginning += f"{_('line {line}', line=line[1])}: "
+        sentence = sentence[line.end() :]
+    if current() == ENGLISH or meaning is None:
+        return beginning + _QUANTITY.sub(lambda found: _quantity(found[1], found[2], reading), sentence)
+    numbers = [_quantity(number, unit, reading) for number, unit in _QUANTITY.findall(sentence)]
+    if (cases := _CASES.search(sentence)) is not None:
+        numbers.append(gettext("in {some} of {all} cases").format(some=cases[1], all=cases[2]))
+    return f"{beginning}{gettext(meaning)}" + (f" ({'; '.join(numbers)})" if numbers else "")
+
+
+def _quantity(number: str, unit: str, reading: Reading) -> str:
+    """A quantity of a sentence as the reader wants it; in a unit that is not SI, in that unit."""
+    if unit in _SI:
+        return reading.quantity(float(number.replace(",", "").replace("\N{MINUS SIGN}", "-")), unit, 6)
+    return f"{decimal(number)} {unit_text(unit)}"

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from sprag.sentences import Amount, Name
 from sprag.service.figures.calibration import calibration_figure
 from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.phrases import Amount, Name, Phrase, joined
+from sprag.service.reading.reader import Phrase, joined
 from sprag.service.report.drives import DrivesPart
 from sprag.service.results.calibration import calibration_of
 from sprag.worker.planning.calibrate.plan import CALIBRATE

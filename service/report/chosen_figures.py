@@ -11,7 +11,7 @@ from sprag.service.figures.pictures.curves import MAX_PICTURE_POINTS, check_size
 from sprag.service.figures.pictures.maps import draw_map
 from sprag.service.figures.read import read_figure, read_map
 from sprag.service.languages import _
-from sprag.service.reading.phrases import lower_first
+from sprag.service.reading.part_names import lower_first
 from sprag.service.reading.reader import Choice, reading_for
 from sprag.service.results.choice import Address, MapQuery, curve_query, map_query
 from sprag.service.results.curve_cases import select

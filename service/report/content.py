@@ -20,9 +20,8 @@ from sprag.service.figures.pictures.sensitivity import MOST_RESULTS
 from sprag.service.languages import _
 from sprag.service.reading.catalogue import axes_json
 from sprag.service.reading.directions import ends_in_words
-from sprag.service.reading.phrases import model_title, shown
 from sprag.service.reading.quantities import TYPED
-from sprag.service.reading.reader import Choice, Reading, reading_for
+from sprag.service.reading.reader import Choice, Reading, model_title, reading_for, shown
 from sprag.service.report.calibration import calibration_part
 from sprag.service.report.chosen_figures import ChosenFigure, chosen_figures
 from sprag.service.report.drives import DrivesPart, drives_part

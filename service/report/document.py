@@ -14,7 +14,8 @@ from sprag.service.figures.pictures.maps import draw_map
 from sprag.service.figures.pictures.sensitivity import draw_sensitivity
 from sprag.service.figures.read import read_figure, read_map
 from sprag.service.languages import N_, _, date_format, pgettext
-from sprag.service.reading.phrases import lower_first, shown, term, titled, upper_first
+from sprag.service.reading.part_names import lower_first, upper_first
+from sprag.service.reading.reader import shown, term, titled
 from sprag.service.reading.wording import number, unit_text
 from sprag.service.report.sketch import sketches
 from sprag.service.results.regimes import left_out

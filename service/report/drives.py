@@ -7,10 +7,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from sprag.sentences import Amount, Name
 from sprag.service.faults import SelectionError
 from sprag.service.figures.ribbons import ribbon_figure
 from sprag.service.languages import decimal
-from sprag.service.reading.phrases import Amount, Name, Phrase, joined, plural
+from sprag.service.reading.reader import Phrase, joined, plural
 from sprag.service.results.defaults import drawn_results
 from sprag.service.results.tolerances.batch import Asked
 from sprag.service.results.tolerances.conditions import first_condition

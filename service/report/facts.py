@@ -9,7 +9,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from sprag.service.languages import _, date_format
-from sprag.service.reading.phrases import model_title
+from sprag.service.reading.reader import model_title
 from sprag.service.reading.wording import number
 
 if TYPE_CHECKING:

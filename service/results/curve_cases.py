@@ -18,9 +18,9 @@ from sprag.sentences import Sentence
 from sprag.service.faults import ParameterFault, SelectionError, refused
 from sprag.service.languages import N_
 from sprag.service.reading.catalogue import unit_of
-from sprag.service.results.curves import Curve, CurveQuery, Curves, Fetch, Line, Map, Selection, not_run
+from sprag.service.results.curves import Curve, CurveQuery, Curves, Fetch, Map, Selection, not_run
 from sprag.service.results.listed_cases import cases_with, left_open, machines
-from sprag.service.results.refined import families, plan_along, refined_curves
+from sprag.service.results.refined import Line, families, plan_along, refined_curves
 from sprag.service.results.refined_maps import draw_refined_map, map_plan
 from sprag.service.results.regimes import kind_columns, kinds_of
 from sprag.service.results.selection import (

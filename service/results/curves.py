@@ -14,12 +14,11 @@ from sprag.service.answers.results import Curve as CurveData
 from sprag.service.answers.results import CurvesData, Jump, MapData, MapPoints, MapResult, ResultMeaning
 from sprag.service.json_text import numbers
 from sprag.service.reading.directions import in_words
-from sprag.service.results.refined import jumps_of
+from sprag.service.results.refined import Line, RefinedMap, jumps_of
 from sprag.worker.codes import PENDING
 from sprag.worker.models import OK, WorkerEnding
 
 if TYPE_CHECKING:
-    from sprag.service.results.refined_maps import RefinedMap
     from sprag.service.storage.studies.records import CaseColumns
     from sprag.worker.models import ResultInfo
     from sprag.worker.planning.refine import Curve as Refined
@@ -44,16 +43,6 @@ class CurveQuery:
     at: tuple[tuple[str, str], ...] = ()
     number: int = 0
     of: tuple[tuple[str, str], ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """The cases of one curve, in order of its points; ``by`` and ``at`` contain the fixed parameters (SI)."""
-
-    by: dict[str, float]
-    at: dict[str, float]
-    x: tuple[float, ...]
-    cases: NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.sentences import Name, Part
 from sprag.service.faults import refused
 from sprag.service.languages import N_
 from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.phrases import Name, Part, Phrase, joined, plural
+from sprag.service.reading.reader import Phrase, joined, plural
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.listed_cases import MOST_CURVES, cases_with, left_open, longest, open_axes, usual_machine
 from sprag.service.results.refined import curve_plan, families

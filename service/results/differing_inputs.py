@@ -11,7 +11,7 @@ from sprag.service.exports.inputs import inputs as every_input
 from sprag.service.languages import N_
 from sprag.service.languages import gettext as _
 from sprag.service.reading.catalogue import shown_values, unit_of
-from sprag.service.reading.phrases import model_title, plural
+from sprag.service.reading.reader import model_title, plural
 from sprag.service.reading.wording import number, unit_text
 from sprag.service.results.shown_inputs import choice_name, in_words, run_settings
 

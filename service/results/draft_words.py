@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.sentences import Amount
 from sprag.service.languages import gettext
 from sprag.service.reading.catalogue import shown_values, unit_of
-from sprag.service.reading.phrases import Amount, Phrase, plural
+from sprag.service.reading.reader import Phrase, plural
 from sprag.service.reading.wording import number
 from sprag.worker.models import NO_PARAMETERS, SETTLED
 

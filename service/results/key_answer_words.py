@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.sentences import Amount, Name
 from sprag.service import exports
 from sprag.service.answers.key import AnswerFacts, AnswerReport, AnswerValue, CurveAnswer, OverallAnswer
 from sprag.service.languages import available, language
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.directions import case_values, in_words
-from sprag.service.reading.phrases import Amount, Name, Phrase, joined, plural, shown, term
+from sprag.service.reading.reader import Phrase, joined, plural, shown, term
 from sprag.service.reading.wording import percent
 from sprag.service.results.selection import axis_name
 from sprag.worker.directions import SWEEP, direction

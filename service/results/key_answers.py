@@ -13,15 +13,16 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from sprag.sentences import Name
 from sprag.service.faults import refused
 from sprag.service.languages import N_
 from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.phrases import Name, Phrase
+from sprag.service.reading.reader import Phrase
 from sprag.service.results.curve_cases import draw, select
-from sprag.service.results.curves import Curve, Line
+from sprag.service.results.curves import Curve
 from sprag.service.results.defaults import drawn_results, main_query, main_results, usual_value
 from sprag.service.results.joined import joined_points
-from sprag.service.results.refined import curve_plan
+from sprag.service.results.refined import Line, curve_plan
 from sprag.service.results.regimes import kind_columns
 from sprag.service.results.selection import require_axis, value_of
 from sprag.worker import models

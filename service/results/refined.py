@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sprag.sentences import Name
 from sprag.service.languages import N_
-from sprag.service.reading.phrases import Name, Phrase, joined, plural
+from sprag.service.reading.reader import Phrase, joined, plural
 from sprag.service.reading.wording import percent
 from sprag.worker import models
 from sprag.worker.planning.refine import Curve as Refined
@@ -20,9 +22,57 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag.service.answers.results import Jump
-    from sprag.service.results.curves import Line
     from sprag.service.storage.studies.records import CaseColumns
     from sprag.worker.study import Study
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """The cases of one curve, in order of its points; ``by`` and ``at`` contain the fixed parameters (SI)."""
+
+    by: dict[str, float]
+    at: dict[str, float]
+    x: tuple[float, ...]
+    cases: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class RefinedMap:
+    """What is known of a refined map beside its squares.
+
+    Attributes
+    ----------
+    asked, error : float
+        The requested error, and the estimated one outside jumps (None: not known yet), relative to the range.
+    jumps_share : float
+        Share of the map that is not interpolated.
+    passed : bool
+        Whether no more points are needed.
+    x, y, values : float64 arrays, shape (points,)
+        The cases that have been run.
+    cases : int64 array, shape (points,)
+    """
+
+    asked: float
+    error: float | None
+    jumps_share: float
+    passed: bool
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    values: NDArray[np.float64]
+    cases: NDArray[np.int64]
+
+    @property
+    def failed(self) -> bool:
+        """Whether cases were run and none of them has a result."""
+        return len(self.values) > 0 and not bool(np.isfinite(self.values).any())
+
+    @property
+    def sentence(self) -> Phrase:
+        """How right the map is, for people."""
+        share = percent(self.jumps_share)
+        outside = Phrase("outside jumps ({share} of the map)", share=share) if self.jumps_share else Phrase("")
+        return reached(self.asked, self.error, outside, passed=self.passed, failed=self.failed)
 
 
 def curve_plan(study: Study) -> RefinePlan | None:

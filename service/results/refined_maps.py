@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -11,10 +10,8 @@ import numpy as np
 from sprag.sentences import Sentence
 from sprag.service.faults import refused
 from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.phrases import Phrase
-from sprag.service.reading.wording import percent
 from sprag.service.results.curves import Fetch, Map, not_run
-from sprag.service.results.refined import reached, refine_plan
+from sprag.service.results.refined import RefinedMap, refine_plan
 from sprag.service.results.selection import LEFT_OPEN, axis_name, held_texts, listed, locate_axes, numeric_results
 from sprag.worker import models
 from sprag.worker.codes import PENDING
@@ -33,45 +30,6 @@ if TYPE_CHECKING:
 MOST_SQUARES: Final = 256
 #: What stands in the place of an ending where a square is interpolated, and where it must not be.
 INTERPOLATED, JUMP = "interpolated", "jump"
-
-
-@dataclass(frozen=True, slots=True)
-class RefinedMap:
-    """What is known of a refined map beside its squares.
-
-    Attributes
-    ----------
-    asked, error : float
-        The requested error, and the estimated one outside jumps (None: not known yet), relative to the range.
-    jumps_share : float
-        Share of the map that is not interpolated.
-    passed : bool
-        Whether no more points are needed.
-    x, y, values : float64 arrays, shape (points,)
-        The cases that have been run.
-    cases : int64 array, shape (points,)
-    """
-
-    asked: float
-    error: float | None
-    jumps_share: float
-    passed: bool
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    values: NDArray[np.float64]
-    cases: NDArray[np.int64]
-
-    @property
-    def failed(self) -> bool:
-        """Whether cases were run and none of them has a result."""
-        return len(self.values) > 0 and not bool(np.isfinite(self.values).any())
-
-    @property
-    def sentence(self) -> Phrase:
-        """How right the map is, for people."""
-        share = percent(self.jumps_share)
-        outside = Phrase("outside jumps ({share} of the map)", share=share) if self.jumps_share else Phrase("")
-        return reached(self.asked, self.error, outside, passed=self.passed, failed=self.failed)
 
 
 def map_plan(study: Study) -> RefinePlan | None:

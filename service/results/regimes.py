@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.service.reading.phrases import Phrase, joined, plural, term
+from sprag.service.reading.reader import Phrase, joined, plural, term
 from sprag.worker.models import REGIME_SENTENCES
 
 if TYPE_CHECKING:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.sentences import Amount
 from sprag.service.languages import N_, decimal
-from sprag.service.reading.phrases import Amount, Phrase, joined, plural
+from sprag.service.reading.reader import Phrase, joined, plural
 from sprag.service.reading.wording import percent
 from sprag.worker.planning.calibrate.plan import CALIBRATE
 from sprag.worker.planning.goals.plan import GOAL

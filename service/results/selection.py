@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.sentences import Amount, Sentence, joined
+from sprag.sentences import Amount, Name, Sentence, joined
 from sprag.service.faults import Fault, ParameterFault, SelectionError, parameter_error, refused, shown
 from sprag.service.languages import N_
 from sprag.service.reading.catalogue import result_of, unit_of, unknown_result
 from sprag.service.reading.numbers import in_language
-from sprag.service.reading.phrases import Name, Phrase, term
+from sprag.service.reading.reader import Phrase, term
 from sprag.service.reading.texts import did_you_mean
 from sprag.service.reading.together import AMBIGUOUS_UNIT, question, with_unit_of_end
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float

@@ -22,7 +22,7 @@ from sprag.service.answers.results import AxisEffect, PairEffect, ResultSensitiv
 from sprag.service.faults import Fault, SelectionError, refused
 from sprag.service.json_text import numbers
 from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.phrases import Phrase, plural
+from sprag.service.reading.reader import Phrase, plural
 from sprag.service.results.curves import Fetch
 from sprag.service.results.regimes import counted, kind_columns, kinds_of, left_out
 from sprag.service.results.selection import axis_name, numeric_results

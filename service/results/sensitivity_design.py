@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.reading.phrases import Name, Phrase
+from sprag.sentences import Name
+from sprag.service.reading.reader import Phrase
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

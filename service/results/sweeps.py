@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.reading.phrases import Amount, Name, Part, Phrase, joined, plural, term
+from sprag.sentences import Amount, Name, Part
+from sprag.service.reading.reader import Phrase, joined, plural, term
 from sprag.service.reading.wording import percent
 from sprag.worker.directions import DOWN, SWEEP, direction
 from sprag.worker.models import JUMPED
@@ -16,7 +17,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag.service.answers.results import Jump
-    from sprag.service.results.curves import Curve, Curves, Line
+    from sprag.service.results.curves import Curve, Curves
+    from sprag.service.results.refined import Line
     from sprag.worker.study import Study
 
 #: Difference of up and down, relative to the range of both, from which on it is reported.

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from sprag.sentences import Sentence, sentence_of
 from sprag.service.languages import N_, gettext, grouped, ngettext
-from sprag.service.reading.phrases import told
+from sprag.service.reading.reader import told
 
 
 class Result(StrEnum):

@@ -10,7 +10,7 @@ import sqlalchemy as sa
 
 from sprag.sentences import Amount, Sentence
 from sprag.service.languages import language, recorded
-from sprag.service.reading.phrases import told
+from sprag.service.reading.reader import told
 from sprag.service.schedules.fields import read_fields
 from sprag.service.schedules.outcomes import Outcome
 from sprag.service.schedules.policies import DueTime

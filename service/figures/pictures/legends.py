@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from sprag.service.figures.figure import BANDS, NOTES, PALETTE, shortened
 from sprag.service.figures.orders import motion_text
 from sprag.service.figures.pictures.text import quantity_label, writable
-from sprag.service.reading.phrases import shown
+from sprag.service.reading.reader import shown
 from sprag.service.results.regimes import MARKS
 
 if TYPE_CHECKING:

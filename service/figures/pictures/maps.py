@@ -18,7 +18,7 @@ from sprag.service.figures.pictures.curves import (
 )
 from sprag.service.figures.pictures.legends import explain_regimes
 from sprag.service.figures.pictures.text import quantity_label
-from sprag.service.reading.phrases import Phrase, plural, shown
+from sprag.service.reading.reader import Phrase, plural, shown
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

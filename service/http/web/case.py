@@ -23,7 +23,7 @@ from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.languages import _
 from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.phrases import meanings, shown
+from sprag.service.reading.reader import meanings, shown
 from sprag.service.reading.wording import number
 from sprag.service.results.defaults import main_results
 from sprag.service.results.regimes import ORDER, motion_sentence

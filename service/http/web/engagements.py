@@ -10,7 +10,7 @@ from sprag.service.http.threads import in_thread
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
-from sprag.service.reading.phrases import meanings
+from sprag.service.reading.reader import meanings
 from sprag.service.views.engagements import require_clutches
 from sprag.worker import models
 from sprag.worker.models.starts import motion_of

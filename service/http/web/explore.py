@@ -26,8 +26,7 @@ from sprag.service.http.work import Attended
 from sprag.service.languages import _
 from sprag.service.reading.limits import span
 from sprag.service.reading.numbers import parse_number
-from sprag.service.reading.phrases import meanings
-from sprag.service.reading.reader import Choice, Reading
+from sprag.service.reading.reader import Choice, Reading, meanings
 from sprag.service.reading.together import with_last_unit
 from sprag.service.results.explore import ROWS, ExploreQuery, explored_json, plan_of, quantities
 from sprag.service.results.selection import own_paths

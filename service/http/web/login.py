@@ -12,7 +12,7 @@ from sprag.service.http.routers import page_router
 from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.way_in import LOGIN_PATH, access_of, kept_form, kept_page, login_page, within
 from sprag.service.languages import _
-from sprag.service.reading.phrases import told
+from sprag.service.reading.reader import told
 
 router = page_router()
 

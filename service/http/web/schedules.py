@@ -29,7 +29,7 @@ from sprag.service.jobs.nights import HOURS, MOST_HOURS, night
 from sprag.service.languages import N_, gettext
 from sprag.service.presets import preset_names
 from sprag.service.reading.faults import allowed_text, fault_text
-from sprag.service.reading.phrases import meanings
+from sprag.service.reading.reader import meanings
 from sprag.service.schedules.fields import ScheduleFields, change_fields
 from sprag.service.schedules.report_to import require_deliverable
 from sprag.service.schedules.trouble import usual_flags

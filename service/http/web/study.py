@@ -33,8 +33,7 @@ from sprag.service.jobs.submission import take_in
 from sprag.service.json_text import timestamp
 from sprag.service.languages import N_, _
 from sprag.service.reading.directions import ends_in_words
-from sprag.service.reading.phrases import meanings
-from sprag.service.reading.reader import Reading, reading_for
+from sprag.service.reading.reader import Reading, meanings, reading_for
 from sprag.service.results.choice import characteristic, map_query, pairs_of
 from sprag.service.results.curve_cases import select
 from sprag.service.results.defaults import caption, drawn_numbers, main_query, no_curves, varying_axes

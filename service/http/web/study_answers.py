@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from sprag.service.faults import Fault
-    from sprag.service.reading.phrases import Phrase
-    from sprag.service.reading.reader import Choice, Reading
+    from sprag.service.reading.reader import Choice, Phrase, Reading
     from sprag.service.results.curves import CurveQuery
     from sprag.service.results.key_answers import CurveAnswers, Found, StudyAnswers
     from sprag.service.views.library import Library

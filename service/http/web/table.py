@@ -18,7 +18,7 @@ from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.reading.catalogue import result_of, unit_of
-from sprag.service.reading.phrases import meanings
+from sprag.service.reading.reader import meanings
 from sprag.service.results.explore import ExploreQuery
 from sprag.service.results.selection import own_paths
 from sprag.service.views.case_pages import CasePage, by_number, case_page

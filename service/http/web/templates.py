@@ -26,8 +26,7 @@ from sprag.service.http.web.explained import explained
 from sprag.service.http.web.script_texts import translated_texts
 from sprag.service.languages import N_
 from sprag.service.reading.faults import allowed_text, fault_text
-from sprag.service.reading.phrases import model_title, shown, titled, told, word
-from sprag.service.reading.reader import CLUTCH, Reading
+from sprag.service.reading.reader import CLUTCH, Reading, model_title, shown, titled, told, word
 from sprag.service.reading.wording import counted, duration, number, symbol, typed_text, unit_text
 from sprag.service.schedules.times import wall_clock
 

@@ -16,7 +16,7 @@ from sprag.service.http.access import COOKIE, Access, Grant
 from sprag.service.http.web.form.values import read_form
 from sprag.service.http.web.problem_page import wants_page
 from sprag.service.http.web.templates import page
-from sprag.service.reading.phrases import told
+from sprag.service.reading.reader import told
 
 if TYPE_CHECKING:
     from starlette.requests import Request

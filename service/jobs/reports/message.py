@@ -17,7 +17,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from sprag.sentences import sentence_of
 from sprag.service.json_text import timestamp, to_bytes
 from sprag.service.languages import ENGLISH, N_, _, current, grouped, language, ngettext
-from sprag.service.reading.phrases import shown, term, told
+from sprag.service.reading.reader import shown, term, told
 from sprag.service.schedules.outcomes import Outcome
 from sprag.service.schedules.times import wall_clock
 

@@ -12,8 +12,9 @@ from sprag.sentences import plural
 from sprag.service.faults import refused
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.results.curve_cases import select
-from sprag.service.results.curves import CurveQuery, Fetch, Line, not_run
+from sprag.service.results.curves import CurveQuery, Fetch, not_run
 from sprag.service.results.defaults import main_query
+from sprag.service.results.refined import Line
 from sprag.service.results.regimes import kind_columns
 from sprag.service.results.selection import axis_name, held_texts, locate_axes
 from sprag.worker import models

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.sentences import Name
 from sprag.service.languages import N_
-from sprag.service.reading.phrases import Name, Phrase, joined
+from sprag.service.reading.reader import Phrase, joined
 from sprag.service.results.tolerances.shares import LEAST_DRIVES, Share, shares
 
 if TYPE_CHECKING:

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from sprag.sentences import Sentence, joined, plural
+from sprag.sentences import Amount, Name, Sentence, joined, plural
 from sprag.service.faults import refused
 from sprag.service.languages import N_
 from sprag.service.reading.catalogue import result_of
 from sprag.service.reading.limits import at_most
 from sprag.service.reading.numbers import in_language
-from sprag.service.reading.phrases import Amount, Name, Phrase, term
+from sprag.service.reading.reader import Phrase, term
 from sprag.service.reading.units import QuantityError, parse_quantity, plain_signs, split_quantity, to_float
 from sprag.service.results.selection import listed, numeric_results, of_name, refuse_mixed_texts
 from sprag.worker import models

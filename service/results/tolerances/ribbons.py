@@ -11,7 +11,8 @@ import numpy as np
 from sprag.sentences import Sentence
 from sprag.service.faults import refused
 from sprag.service.results.curve_cases import most_numbers
-from sprag.service.results.curves import Fetch, Line
+from sprag.service.results.curves import Fetch
+from sprag.service.results.refined import Line
 from sprag.service.results.selection import numeric_results
 from sprag.service.results.tolerances.batch import Asked, Places, Rows, places_of, read
 from sprag.service.results.tolerances.causes import Causes, Matrix, causes_of

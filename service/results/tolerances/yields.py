@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.service.results.curves import Fetch, Line
+from sprag.service.results.curves import Fetch
+from sprag.service.results.refined import Line
 from sprag.service.results.tolerances.batch import Asked, Places, Rows, places_of, read
 from sprag.service.results.tolerances.causes import Causes, variance_causes
 from sprag.service.results.tolerances.conditions import Condition, read_conditions

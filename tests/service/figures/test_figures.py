@@ -15,7 +15,7 @@ from sprag.service.figures.motion import motion_figure, phase_figure
 from sprag.service.figures.pictures.curves import paint_figure, painting
 from sprag.service.figures.portrait import portrait_figure
 from sprag.service.http.web.figures.plotly import plotly_figure
-from sprag.service.reading.phrases import shown as shown_text
+from sprag.service.reading.reader import shown as shown_text
 from sprag.service.results.curve_cases import draw, select
 from sprag.service.results.curves import CurveQuery
 from sprag.service.spec.document import parse_spec

@@ -13,6 +13,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
+from sprag.sentences import Amount, Name
 from sprag.service.exports import read_table
 from sprag.service.faults import SelectionError
 from sprag.service.figures.curves import curves_figure
@@ -20,9 +21,8 @@ from sprag.service.figures.pictures.curves import paint_figure, painting
 from sprag.service.figures.read import read_figure, read_map
 from sprag.service.http.web.figures.maps import map_figure
 from sprag.service.http.web.figures.plotly import plotly_figure
-from sprag.service.reading.phrases import Amount, Name, Phrase
 from sprag.service.reading.quantities import KINDS, UNITS_PATTERN, Units, read_units, typed_units, units_for
-from sprag.service.reading.reader import CODES, Choice, Reading, reading_for
+from sprag.service.reading.reader import CODES, Choice, Phrase, Reading, reading_for
 from sprag.service.reading.wording import unit_text
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import CurveQuery

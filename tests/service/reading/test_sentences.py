@@ -32,9 +32,8 @@ from sprag.service.faults import FaultError, WarningCode
 from sprag.service.http.handlers import as_api_error
 from sprag.service.languages import gettext, language
 from sprag.service.languages.recorded import MANY_STUDIES, NOT_IN_TIME
-from sprag.service.reading.phrases import Phrase, shown, told
 from sprag.service.reading.quantities import Units
-from sprag.service.reading.reader import Reading
+from sprag.service.reading.reader import Phrase, Reading, shown, told
 from sprag.service.storage.errors import StudyNotFoundError
 from sprag.service.storage.stored_sentences import read_warnings, write_warnings
 from sprag.worker.ports import StoreError

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sprag.engine import Ending
-from sprag.sentences import WarningText
+from sprag.sentences import Amount, WarningText
 from sprag.service import languages
 from sprag.service.faults import Fault
 from sprag.service.figures.branch import special_text
@@ -21,8 +21,7 @@ from sprag.service.figures.read import read_figure
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.languages.elsewhere import speak
 from sprag.service.reading.faults import allowed_text, fault_text
-from sprag.service.reading.phrases import Amount, Phrase, joined, part_label, plural, shown, term, titled
-from sprag.service.reading.reader import CODES, Reading
+from sprag.service.reading.reader import CODES, Phrase, Reading, joined, part_label, plural, shown, term, titled
 from sprag.service.reading.wording import typed_text, unit_text
 from sprag.service.results.key_answer_words import curve_named
 from sprag.service.results.tolerances.conditions import read_conditions

@@ -12,7 +12,8 @@ import pytest
 
 from sprag.service.answers import studies
 from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.results.curves import Curve, Line, Map
+from sprag.service.results.curves import Curve, Map
+from sprag.service.results.refined import Line
 from sprag.service.schedules.deadline import (
     FinishError,
     check_run_finish,

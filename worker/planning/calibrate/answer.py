@@ -13,7 +13,8 @@ from sprag.worker.planning.calibrate.fit import quadratic
 
 if TYPE_CHECKING:
     from sprag.worker.planning.calibrate.course import State
-    from sprag.worker.planning.calibrate.planner import CalibratePlanner
+    from sprag.worker.planning.calibrate.plan import CalibratePlan
+    from sprag.worker.planning.calibrate.space import Space
 
 Floats = NDArray[np.float64]
 
@@ -130,9 +131,8 @@ class Answer:
     ribbon_measured: Floats | None
 
 
-def answer(planner: CalibratePlanner) -> Answer | None:
+def answer(plan: CalibratePlan, space: Space, state: State) -> Answer | None:
     """What the rows show that a planner was given; None before the first fit has ended."""
-    state, plan = planner.state, planner.plan
     best = state.best
     if best is None:
         return None
@@ -141,12 +141,12 @@ def answer(planner: CalibratePlanner) -> Answer | None:
     residuals = np.where(failed, np.nan, -data.residuals(best.modelled)[0])
     places = None if state.refits is None else state.refits.places
     enough = places is not None and len(places) >= LEAST_REFITS
-    values = planner.space.values(places) if enough and places is not None else None
+    values = space.values(places) if enough and places is not None else None
     squares = np.where(failed, 0.0, residuals) ** 2
-    directions = _directions(planner, state)
+    directions = _directions(space, state)
     loose = sorted({place for one in directions if one.undetermined for place in one.parameters})
-    around = _likely(planner, state)
-    intervals = None if values is None else _wider(_ends(values), planner.space.values(around))
+    around = _likely(plan, state)
+    intervals = None if values is None else _wider(_ends(values), space.values(around))
     at_bounds = None if places is None or values is None else _touching(_wider(_ends(places), around))
     if intervals is not None and at_bounds is not None:
         # Refits stay where they began along a direction that the data do not determine.
@@ -155,7 +155,7 @@ def answer(planner: CalibratePlanner) -> Answer | None:
             at_bounds[place] = True
     return Answer(
         complete=state.phase == ENDED,
-        values=planner.space.values(best.places[0]),
+        values=space.values(best.places[0]),
         intervals=intervals,
         at_bounds=at_bounds,
         deviations=None if values is None else values.std(axis=0, ddof=1),
@@ -169,7 +169,7 @@ def answer(planner: CalibratePlanner) -> Answer | None:
         freedom=plan.freedom - int(failed.sum()),
         refits=0 if places is None else len(places),
         directions=directions,
-        next=_next(planner, state, values, sigma),
+        next=_next(plan, state, values, sigma),
         others=state.others if state.curve is not None else None,
         curve=state.curve,
         ribbon=_ribbon(state.curves),
@@ -183,7 +183,7 @@ def _ends(samples: Floats) -> Floats:
     return ends
 
 
-def _likely(planner: CalibratePlanner, state: State) -> Floats:
+def _likely(plan: CalibratePlan, state: State) -> Floats:
     """Places of all sets that were run and are within a 95 % interval of the likelihood, shape (sets, p).
 
     Half the change of chi-square that it allows is added to the least cost: 3.84 for one parameter, or the square of
@@ -191,7 +191,7 @@ def _likely(planner: CalibratePlanner, state: State) -> Floats:
     """
     from scipy.special import stdtrit  # takes as long to load as all of the service's own code
 
-    best, plan = state.best, planner.plan
+    best = state.best
     assert best is not None
     if plan.loss != "linear":
         return best.places
@@ -220,12 +220,12 @@ def _correlations(values: Floats) -> Floats:
         return np.atleast_2d(np.corrcoef(values, rowvar=False))
 
 
-def _directions(planner: CalibratePlanner, state: State) -> list[Direction]:
+def _directions(space: Space, state: State) -> list[Direction]:
     """Directions that the data do not determine, then those of collinear parameters."""
     best = state.best
     assert best is not None
     curvature = quadratic(state.data, best.modelled, best.derivatives)[1][0]
-    slopes = planner.space.slopes(best.places[0])
+    slopes = space.slopes(best.places[0])
     eigenvalues, vectors = np.linalg.eigh(curvature)
     found: list[Direction] = []
     for eigenvalue, vector in zip(eigenvalues, vectors.T, strict=True):
@@ -257,14 +257,13 @@ def _direction(weights: Floats, changes: Floats, *, undetermined: bool) -> Direc
     return Direction(tuple(parts), tuple(float(sign * changes[j]) for j in parts), undetermined)
 
 
-def _next(planner: CalibratePlanner, state: State, values: Floats | None, sigma: Floats) -> NextPoint | None:
+def _next(plan: CalibratePlan, state: State, values: Floats | None, sigma: Floats) -> NextPoint | None:
     """The condition at which the refits differ most, in standard deviations of a measurement there."""
     if values is None or state.refits is None or state.curves is None or state.others is None:
         return None
-    plan = planner.plan
     if not len(state.others):
         return None
-    modelled, spread = state.curves, _sigma_at(planner, state.others, sigma)
+    modelled, spread = state.curves, _sigma_at(plan, state.others, sigma)
     usable = np.asarray(np.isfinite(modelled).all(axis=(0, 2)) & np.isfinite(spread).all(axis=1))
     if not usable.any():
         return None
@@ -287,9 +286,8 @@ def _next(planner: CalibratePlanner, state: State, values: Floats | None, sigma:
     )
 
 
-def _sigma_at(planner: CalibratePlanner, others: Floats, sigma: Floats) -> Floats:
+def _sigma_at(plan: CalibratePlan, others: Floats, sigma: Floats) -> Floats:
     """Standard deviation of a measurement at other conditions, as of the nearest measured one: (others, results)."""
-    plan = planner.plan
     conditions, columns = plan.places
     width = np.ptp(plan.at, axis=0)
     width = np.where(width > 0.0, width, 1.0)

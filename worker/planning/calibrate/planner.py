@@ -85,7 +85,7 @@ class CalibratePlanner:
         """The next round, or at the end the answer as `stored.to_json` writes it; asking changes nothing."""
         summary = self.summary()
         if self._request is None:
-            found = answer(self)
+            found = answer(self.plan, self.space, self.state)
             refits = self.state.refits
             converged = 0 if refits is None else int(np.count_nonzero(refits.converged))
             summary |= {"answer": None if found is None else to_json(found), "converged": converged}

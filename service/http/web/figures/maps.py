@@ -18,7 +18,7 @@ from sprag.service.http.web.figures.plotly import (
 )
 from sprag.service.json_text import numbers
 from sprag.service.languages import gettext
-from sprag.service.reading.phrases import shown
+from sprag.service.reading.reader import shown
 from sprag.service.reading.wording import unit_text
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag.service.results.curves import Map
-    from sprag.service.results.refined_maps import RefinedMap
+    from sprag.service.results.refined import RefinedMap
 
 
 def map_figure(drawn: Map, contour: bool) -> Data:

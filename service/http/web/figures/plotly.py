@@ -13,7 +13,7 @@ from sprag.service.figures.orders import motion_text
 from sprag.service.http.web.figures.thinning import thin
 from sprag.service.json_text import numbers
 from sprag.service.languages import decimal, gettext
-from sprag.service.reading.phrases import shown
+from sprag.service.reading.reader import shown
 from sprag.service.reading.wording import unit_text
 from sprag.service.results.regimes import MARKS
 

@@ -19,7 +19,7 @@ from sprag.service.http.web.form.entries import (
 from sprag.service.http.web.form.machine import BASE, Entry, entries, form_of, rows_of
 from sprag.service.languages import N_, _, gettext
 from sprag.service.reading.faults import allowed_text, fault_text
-from sprag.service.reading.phrases import lower_first
+from sprag.service.reading.part_names import lower_first
 from sprag.service.reading.printed import could_be_several
 from sprag.service.reading.together import with_last_unit
 from sprag.service.reading.units import QuantityError, parse_quantity

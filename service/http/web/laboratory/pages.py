@@ -26,8 +26,7 @@ from sprag.service.http.web.laboratory.setting import held_settings, laboratory_
 from sprag.service.http.web.laboratory.sliders import position
 from sprag.service.http.web.templates import fragment, page
 from sprag.service.http.work import Attended, Work
-from sprag.service.reading.phrases import meanings, shown, term
-from sprag.service.reading.reader import Reading, reading_for
+from sprag.service.reading.reader import Reading, meanings, reading_for, shown, term
 from sprag.service.reading.wording import number
 from sprag.service.results.regimes import motion_sentence
 from sprag.service.views.trajectory import trajectory_csv
