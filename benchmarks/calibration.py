@@ -102,7 +102,7 @@ def main() -> None:
         begin, engine = time.process_time(), drive.seconds
         true, planner = one_set(number, drive, chosen.refits, known=not chosen.unknown_sigma)
         planning += time.process_time() - begin - (drive.seconds - engine)
-        found = answer(planner)
+        found = answer(planner.plan, planner.space, planner.state)
         if found is None or found.intervals is None:
             print(f"set {number}: no intervals")
             continue

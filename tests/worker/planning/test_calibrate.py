@@ -116,7 +116,7 @@ def test_intervals_stay_around_the_values_where_outliers_are_on_one_side(loss: A
     y = _measured(noise=0.01)
     y[[4, 12]] -= [0.5, 0.9]
     planner = calibrated(plan_of(WIDE, X, {"y": y}, np.full(len(X), 0.01), refits=100, loss=loss), _rise)[0]
-    found = answer(planner)
+    found = answer(planner.plan, planner.space, planner.state)
     assert found is not None
     assert planner.summary()["chi_square"] == pytest.approx(found.chi_square), "not the sum of the loss"
     assert found.intervals is not None
@@ -206,7 +206,7 @@ def test_cases_that_are_run_again_and_differ_do_not_break_a_calibration() -> Non
         again.tell(Rows(rows.points, ok, rows.values))
     while len(points := again.ask().points):
         again.tell(rows_of(plan, points, _rise))
-    found, expected = answer(again), answer(planner)
+    found, expected = answer(again.plan, again.space, again.state), answer(planner.plan, planner.space, planner.state)
     assert found is not None
     assert expected is not None
     assert found.values == pytest.approx(expected.values, rel=1e-6)
@@ -250,7 +250,7 @@ def test_a_fit_that_stays_bad_leaves_room_for_the_intervals() -> None:
     y = _measured() + 0.5 * np.sin(40.0 * X)
     plan = plan_of(WIDE, X, {"y": y}, np.full(len(X), 1e-3), refits=200)
     planner, rounds = calibrated(plan, _rise)
-    found = answer(planner)
+    found = answer(planner.plan, planner.space, planner.state)
     assert found is not None
     assert found.complete
     assert found.intervals is not None

@@ -52,7 +52,7 @@ def test_certified_values_are_reached(name: str) -> None:
 
     x, y = np.array(problem["x"]), np.array(problem["y"])
     planner, _ = calibrated(plan_of([(a, b) for a, b in ends.tolist()], x, {"y": y}, refits=0), form)
-    found = answer(planner)
+    found = answer(planner.plan, planner.space, planner.state)
     assert found is not None
     digits = -np.log10(np.abs(found.values / certified - 1.0))
     assert digits.min() > DIGITS
