@@ -39,7 +39,8 @@ def _measured(form: Form = _rise, noise: float = 0.03, seed: int = 1) -> Floats:
 
 
 def _answer(plan: CalibratePlan, form: Form) -> Answer:
-    found = answer(calibrated(plan, form)[0])
+    planner = calibrated(plan, form)[0]
+    found = answer(planner.plan, planner.space, planner.state)
     assert found is not None
     assert found.complete
     return found
