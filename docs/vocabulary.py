@@ -15,8 +15,8 @@ from sprag.service.http.problems import PROBLEM_TYPES
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.laboratory.setting import machines
 from sprag.service.presets import preset_names
-from sprag.service.reading.reader import part_label
 from sprag.service.reading.quantities import KINDS
+from sprag.service.reading.reader import part_label
 from sprag.service.schedules.outcomes import Result
 from sprag.service.spec.machine.shaft_parts import MECHANISM_CHOICES
 from sprag.service.spec.saved_views import PAGES
