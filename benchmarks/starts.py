@@ -31,7 +31,7 @@ from benchmarks.workloads import CASES, W1
 from sprag.engine.run import SettledRun
 from sprag.engine.vibration_drive.start_results import started_infos
 from sprag.engine.vibration_drive.starts import StartedBatch, settle_starts, started_columns
-from sprag.service.spec.starts import drawn
+from sprag.service.spec.kinds.starts import drawn
 
 Ints = NDArray[np.int64]
 

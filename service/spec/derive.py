@@ -39,24 +39,21 @@ HELP: Final = (
     "units and of functions; `*` stands for every pendulum or step"
 )
 EXAMPLE: Final = {"pendulums.*.inertia": "1.1 * pendulums.*.mass * pendulums.*.arm^2 + 2e-4 kg*m^2"}
+#: JSON Schema of `derive`.
+DERIVE: Final[dict[str, Any]] = {
+    "type": "object",
+    "maxProperties": MAX_DERIVED,
+    "additionalProperties": {"type": "string", "minLength": 1, "maxLength": MAX_LENGTH},
+    "default": {},
+    "description": HELP,
+    "examples": [EXAMPLE],
+}
 _CONSTANT: Final = "constants."
 #: A `*` between two parts of a path.
 _STARRED: Final = re.compile(r"[a-z_]\.\*\.[a-z]")
 _MISSING: Final = object()
 #: Points of the ranges of a study that chooses its own cases at which a formula is tried: corners, and as many others.
 _CORNERS: Final = 4096
-
-
-def derive_schema() -> dict[str, Any]:
-    """JSON Schema of `derive`."""
-    return {
-        "type": "object",
-        "maxProperties": MAX_DERIVED,
-        "additionalProperties": {"type": "string", "minLength": 1, "maxLength": MAX_LENGTH},
-        "default": {},
-        "description": HELP,
-        "examples": [EXAMPLE],
-    }
 
 
 def read_machine(report: Report, part: SpecPart, found: Mapping[str, Any]) -> Machine:

@@ -7,32 +7,28 @@ Its parts are the modules beside it (`text`, `units`, `run`, `warnings`, the `re
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.sentences import Sentence
 from sprag.service.reading.limits import characters, quoted
 from sprag.service.reading.texts import did_you_mean
-from sprag.service.spec.axes.design import read_design
-from sprag.service.spec.axes.sweep import read_sweep, with_sweep
-from sprag.service.spec.derive import check_derived, layout, read_machine
-from sprag.service.spec.draws.tolerances import read_tolerances, warn_of_invalid_drives, with_drives
-from sprag.service.spec.fields import TOLERANCE_FIELDS
+from sprag.service.spec.derive import DERIVE, check_derived, layout, read_machine
+from sprag.service.spec.described import Record
+from sprag.service.spec.kinds.draft import Draft
+from sprag.service.spec.kinds.registry import CASES, WITH_CASES
+from sprag.service.spec.kinds.tolerances import warn_of_invalid_drives
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.node import Node
-from sprag.service.spec.plan.outline import Outline, chooses, first_round, read_outline
 from sprag.service.spec.report import Report, SpecError
-from sprag.service.spec.starts import read_starts
 from sprag.service.spec.text import Format, load_spec
 from sprag.worker import models
 from sprag.worker.limits import MAX_NAME_LENGTH
 from sprag.worker.study import Study
 
 if TYPE_CHECKING:
-    from sprag.service.spec.machine.machine import Machine
     from sprag.worker.models import ClutchFit
-    from sprag.worker.study import Combine
 
 __all__ = ["VERSION", "ParsedSpec", "SpecError", "format_of", "load_spec", "parse_spec"]
 
@@ -41,10 +37,27 @@ VERSION: Final = 1
 #: Name of a study that gives none.
 UNNAMED: Final = "untitled"
 
-FIELDS: Final = (
-    "sprag", "model", "name", "base", "derive", "run", "axes", "combine", "exclude", "refine", "goal", "calibrate",
-    "starts", *TOLERANCE_FIELDS,
-)  # fmt: skip
+#: The whole spec; its base and run depend on the model.
+SPEC: Final = Record(
+    {
+        "sprag": {"const": VERSION, "description": "version of the spec"},
+        "model": {"type": "string", "description": "what is simulated"},
+        "name": {
+            "type": "string",
+            "minLength": 1,
+            "maxLength": MAX_NAME_LENGTH,
+            "default": UNNAMED,
+            "description": "name of the study",
+        },
+        "base": {"type": "object", "description": "the machine that every case begins from"},
+        "derive": DERIVE,
+        "run": {"type": "object"},
+        **CASES.fields,
+        **{name: field for kind in WITH_CASES for name, field in kind.fields.items()},
+    },
+    "a study: a machine, a run, and what varies",
+    required=("sprag", "model", "base"),
+)
 
 
 @dataclass(frozen=True)
@@ -84,7 +97,7 @@ def parse_spec(data: object) -> ParsedSpec:
     """
     report = Report(data)
     spec = Node(report, "", data)
-    if not spec.has(FIELDS):
+    if not SPEC.read(spec):
         raise report.error()
     found = spec.value
     _read_version(report, found)
@@ -95,36 +108,19 @@ def parse_spec(data: object) -> ParsedSpec:
         raise report.error()
     part = part_of(model)
     report.machine = machine = read_machine(report, part, found)
-    swept = read_sweep(spec)
-    outline: Outline | None = None
-    combine: Combine = "zip"
-    if chooses(found):
-        outline = read_outline(spec)
-        axes = None if outline is None else outline.axes
-    else:
-        axes, combine = read_design(spec)
+    draft = Draft(spec, model, name)
+    steps = [CASES.read(draft)]
+    axes, combine = draft.axes, draft.combine
     if machine.derive and axes is not None and not report.found:
-        check_derived(report, found["derive"], machine, layout(machine, axes, combine), ranges=outline is not None)
-    spread = read_tolerances(spec, axes)
-    if outline is not None and outline.with_drives is None and "tolerances" in found:
-        report.fault(
-            "/tolerances",
-            "conflict",
-            "cannot be combined with `refine` or `calibrate`",
-            allowed="`goal`, or plain axes",
-        )
-    run = part.read_run(spec["run"], axes, combine)
-    run |= read_starts(spec, axes, run)
+        check_derived(report, found["derive"], machine, layout(machine, axes, combine), ranges=bool(draft.kind))
+    draft.run = part.read_run(spec["run"], axes, combine)
+    steps += [kind.read(draft) for kind in WITH_CASES]
     part.check(report, machine, axes or (), combine)
     report.raise_if_any()
-    study = Study(model, name, _in_order(machine), run, structure=machine.structure, derive=machine.derive)
-    given = replace(study, axes=axes or (), combine=combine)
-    study = given if outline is None else first_round(spec, study, outline, spread)
-    if swept is not None:
-        study = with_sweep(study, *swept)
-    if spread is not None and outline is None:
-        study = with_drives(report, study, spread)
-        warn_of_invalid_drives(report, study)
+    for finish in filter(None, steps):
+        finish()
+    study = draft.study()
+    warn_of_invalid_drives(report, study)
     part.warn(report, study)
     return ParsedSpec(study, tuple(report.warnings), machine.fits, dict(found))
 
@@ -167,8 +163,3 @@ def _read_model(report: Report, found: Mapping[str, Any]) -> str | None:
         allowed=quoted(known),
     )
     return None
-
-
-def _in_order(machine: Machine) -> dict[str, float]:
-    """The base with sorted paths, so that equal machines are stored identically."""
-    return {path: machine.values[path] + 0.0 for path in sorted(machine.values)}

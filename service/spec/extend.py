@@ -13,11 +13,11 @@ from sprag.service.faults import Fault
 from sprag.service.reading.texts import quantity_text
 from sprag.service.spec.axes.axes import AXIS, axis_values
 from sprag.service.spec.axes.design import ANYTHING
-from sprag.service.spec.axes.sweep import sweep_of
 from sprag.service.spec.derive import read_machine
 from sprag.service.spec.described import Listed, Record
 from sprag.service.spec.document import ParsedSpec, parse_spec
 from sprag.service.spec.fields import TOLERANCE_FIELDS, WHICH_CASES
+from sprag.service.spec.kinds.sweep import sweep_of
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report, SpecError, join

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag.service.spec.axes.axes import SWEPT
-from sprag.service.spec.axes.sweep import sweep_of
 from sprag.service.spec.fields import WHICH_CASES
+from sprag.service.spec.kinds.sweep import sweep_of
 from sprag.worker.directions import DIRECTIONS, DOWN
 from sprag.worker.limits import MAX_NAME_LENGTH, NARROW_STEPS
 

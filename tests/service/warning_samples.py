@@ -19,10 +19,10 @@ from sprag.worker import models
 from sprag.worker.chunking import Chunking
 from tests.service import refined_study, swept_study
 from tests.service.results.test_sensitivity import fetching
-from tests.service.spec.draws.test_tolerances import with_tolerances
+from tests.service.spec.kinds import test_goal
+from tests.service.spec.kinds.test_tolerances import with_tolerances
 from tests.service.spec.machine.test_shaft import GAS, LINEAR
 from tests.service.spec.machine.test_shaft import changed as press
-from tests.service.spec.plan import test_goal
 from tests.service.spec_sample import parsed
 
 _STEP = {"quantity": "force", "over": "stroke", "steps": [{"from": 0.2, "to": 0.8, "value": 100}]}

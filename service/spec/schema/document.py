@@ -6,49 +6,19 @@ the run, sizes of grids, clutch laws) are checked by `sprag.service.spec.documen
 
 from __future__ import annotations
 
-from sprag.service.spec.axes.design import AXES, COMBINE
-from sprag.service.spec.axes.exclude import EXCLUDE
-from sprag.service.spec.derive import derive_schema
 from sprag.service.spec.described import schema_of
-from sprag.service.spec.document import UNNAMED, VERSION
-from sprag.service.spec.draws.tolerances import SPREAD
+from sprag.service.spec.document import SPEC
 from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.plan import outline
-from sprag.service.spec.schema.quantity import Schema, object_schema, without_numbers
-from sprag.service.spec.starts import STARTS
+from sprag.service.spec.schema.quantity import Schema, without_numbers
 from sprag.worker import models
-from sprag.worker.limits import MAX_NAME_LENGTH
 
 
 def spec_schema() -> Schema:
     """JSON Schema of a whole spec, self-contained (no references), unknown fields refused."""
-    schema = object_schema(
-        {
-            "sprag": {"const": VERSION, "description": "version of the spec"},
-            "model": {"enum": list(models.model_names()), "description": "what is simulated"},
-            "name": {
-                "type": "string",
-                "minLength": 1,
-                "maxLength": MAX_NAME_LENGTH,
-                "default": UNNAMED,
-                "description": "name of the study",
-            },
-            "base": {"type": "object", "description": "the machine that every case begins from"},
-            "run": {"type": "object"},
-            "axes": {**AXES.schema(), "default": []},
-            "combine": COMBINE.schema(),
-            "exclude": EXCLUDE,
-            **{name: record.schema() for name, record in outline.FIELDS.items()},
-            "derive": derive_schema(),
-            "starts": STARTS.schema(),
-            **{name: schema_of(field) for name, field in SPREAD.items()},
-        },
-        required=("sprag", "model", "base"),
-        description="a study: a machine, a run, and what varies",
-    )
-    # Base and run depend on the model.
     branches = [_of_model(model, derived=derived) for model in models.model_names() for derived in (False, True)]
-    return {**schema, "allOf": branches}
+    schema = SPEC.schema()
+    model = {"enum": list(models.model_names()), "description": schema["properties"]["model"]["description"]}
+    return {**schema, "properties": {**schema["properties"], "model": model}, "allOf": branches}
 
 
 def _of_model(model: str, *, derived: bool) -> Schema:

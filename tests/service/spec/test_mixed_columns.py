@@ -14,8 +14,8 @@ from sprag.service.languages import language
 from sprag.service.spec.components import read_components
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.stored import accepted
+from tests.service.spec.kinds.test_calibrate import read
 from tests.service.spec.machine.test_shaft import changed as shaft_changed
-from tests.service.spec.plan.test_calibrate import read
 from tests.service.spec_sample import changed, parsed, problems
 
 LOAD = "shaft.load"

@@ -15,7 +15,7 @@ from sprag.service.reading.reader import Reading
 from sprag.service.reading.units import examples
 from sprag.service.reading.wording import number, words
 from sprag.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN, Described
-from sprag.service.spec.plan import goal, refine
+from sprag.service.spec.kinds import goal, refine
 from sprag.worker import models
 from sprag.worker.models import Parameter
 

@@ -21,7 +21,7 @@ from sprag.service.http.web.form.entries import (
 from sprag.service.http.web.form.parts import PARTS, filled
 from sprag.service.languages import N_, _
 from sprag.service.reading.together import with_last_unit
-from sprag.service.spec.plan.goal import GOAL
+from sprag.service.spec.kinds.goal import GOAL
 
 #: What a search asks for in a form that was not about one.
 GOAL_DEFAULTS: Final[Values] = {

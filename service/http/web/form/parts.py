@@ -10,7 +10,7 @@ from typing import Final
 from sprag.service.http.web.form.entries import Values, count_in
 from sprag.service.http.web.form.machine import BASE, form_of
 from sprag.service.http.web.form.tolerances import OWN
-from sprag.service.spec.plan.goal import GOAL
+from sprag.service.spec.kinds.goal import GOAL
 from sprag.worker.limits import MAX_AXES
 from sprag.worker.models.form import Rows
 

@@ -36,7 +36,7 @@ from sprag.service.http.web.form.tolerances import field_of_tolerance, tolerance
 from sprag.service.reading.together import with_last_unit
 from sprag.service.spec.axes.axes import SWEPT
 from sprag.service.spec.derive import formulas_of, with_values
-from sprag.service.spec.plan import refine
+from sprag.service.spec.kinds import refine
 from sprag.service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
 from sprag.worker import models
 from sprag.worker.models import SETTLED

@@ -13,7 +13,7 @@ from sprag.service.http.web.form.machine import entries
 from sprag.service.languages import _
 from sprag.service.reading.wording import words
 from sprag.service.spec.draws.described import DISTRIBUTION
-from sprag.service.spec.draws.tolerances import DRAWS
+from sprag.service.spec.kinds.tolerances import DRAWS
 
 #: Fields of a spec that this part of the form shows.
 FIELDS: Final = ("tolerances", "drives", "seed", "draws")

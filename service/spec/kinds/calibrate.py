@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from sprag.sentences import Sentence, plural
 from sprag.service.spec.axes.axes import PATHS, check_paths
 from sprag.service.spec.described import Described, Listed, Record, choice, named
-from sprag.service.spec.draws.tolerances import expanded
+from sprag.service.spec.kinds.draft import Kind
+from sprag.service.spec.kinds.fields import read_ends, read_path_of
+from sprag.service.spec.kinds.measured_points import MeasuredTable, read_results, read_table
+from sprag.service.spec.kinds.tolerances import expanded
 from sprag.service.spec.node import Node
-from sprag.service.spec.plan.fields import read_ends, read_path_of
-from sprag.service.spec.plan.measured_points import MeasuredTable, read_results, read_table
 from sprag.service.spec.schema.quantity import QUANTITY
 from sprag.worker.planning.calibrate.plan import LOSSES, MOST_MEASURED, MOST_UNKNOWN, REFITS, CalibratePlan, Unknown
+
+if TYPE_CHECKING:
+    from sprag.service.spec.kinds.draft import Draft, Finish
 
 _CSV: Final = (
     "text of a CSV file: a column for each parameter that was set, for each measured result and, behind it, for its "
@@ -38,30 +41,31 @@ CALIBRATE: Final = Record(
 )
 
 
-@dataclass(frozen=True)
-class Calibration:
-    """What a spec says of a calibration, as far as it can be read without the results of the study."""
-
-    node: Node
-    unknown: tuple[Unknown, ...]
-    table: MeasuredTable
-    loss: Any
-    refits: int
-    seed: int
-
-
-def read_calibration(node: Node) -> Calibration | None:
-    """The field `calibrate`; None, and the faults recorded, where it is invalid."""
+def _read(draft: Draft) -> Finish | None:
+    node = draft.spec["calibrate"]
     if not CALIBRATE.read(node, null=False):
         return None
     unknown = _read_unknown(node)
-    table = read_table(node["measured"]["csv"]) if _MEASURED.read(node["measured"]) else None
+    csv = node["measured"]["csv"]
+    table = read_table(csv) if _MEASURED.read(node["measured"]) else None
     other = CALIBRATE.values(node)
     for index, one in enumerate(unknown or ()):
         for path in set(one.paths) & set(table.paths if table else ()):
             node["unknown"][index]["path"].refuse("conflict", "is a column of the measured points", path,
                                                   allowed="either unknown, or set in the measurement")  # fmt: skip
-    return None if not node.sound or not unknown or table is None else Calibration(node, unknown, table, **other)
+    if not node.sound or not unknown or table is None:
+        return None
+    columns = zip(table.paths, zip(*table.conditions, strict=True), strict=True)
+    draft.vary([*((one.paths, (one.low, one.high)) for one in unknown), *(((path,), own) for path, own in columns)])
+
+    def make_plan() -> None:
+        draft.plan = _read_plan(csv, unknown, table, **other)
+
+    return make_plan
+
+
+#: The values of parameters from measured points.
+CALIBRATION: Final = Kind({"calibrate": CALIBRATE}, _read)
 
 
 def _read_unknown(calibrate: Node) -> tuple[Unknown, ...] | None:
@@ -87,13 +91,14 @@ def _expanded(node: Node) -> object:
     return [each for own in every for each in own] if changed else path
 
 
-def read_plan(calibration: Calibration) -> dict[str, Any] | None:
+def _read_plan(
+    node: Node, unknown: tuple[Unknown, ...], table: MeasuredTable, loss: Any, refits: int, seed: int
+) -> dict[str, Any] | None:
     """The plan as plain JSON data; None, and the faults recorded, where the measured results are invalid."""
-    node, table = calibration.node["measured"]["csv"], calibration.table
     measured = read_results(node, table)
     if measured is None:
         return None
-    count, least = sum(len(one.values) for one in measured), len(calibration.unknown) + 1
+    count, least = sum(len(one.values) for one in measured), len(unknown) + 1
     if not least <= count <= MOST_MEASURED:
         node.refuse(
             "out-of-range", plural("has {count} measured value", "has {count} measured values", count), count,
@@ -103,10 +108,7 @@ def read_plan(calibration: Calibration) -> dict[str, Any] | None:
         )  # fmt: skip
         return None
     try:
-        return CalibratePlan(
-            calibration.unknown, table.paths, table.conditions, measured,
-            calibration.loss, calibration.refits, calibration.seed,
-        ).to_json()  # fmt: skip
+        return CalibratePlan(unknown, table.paths, table.conditions, measured, loss, refits, seed).to_json()
     except ValueError as error:
         node.refuse("too-many", str(error), None, allowed="fewer different points or unknown parameters")
         return None

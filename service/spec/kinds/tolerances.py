@@ -6,7 +6,8 @@ import math
 import re
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -22,7 +23,7 @@ from sprag.service.spec.draws.described import DISTRIBUTION, FIELDS, read_measur
 from sprag.service.spec.draws.distributions import Distribution
 from sprag.service.spec.draws.unit import correlated, unit_sample
 from sprag.service.spec.fields import TOLERANCE_FIELDS
-from sprag.service.spec.report import Report
+from sprag.service.spec.kinds.draft import Kind
 from sprag.worker.derived import blocks, involved
 from sprag.worker.limits import MAX_AXIS_VALUES, MAX_CASES, MAX_DRIVES, MAX_TOLERANCES
 from sprag.worker.models.parameters import in_range, parameter_of
@@ -34,7 +35,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from sprag.service.spec.kinds.draft import Draft, Finish
     from sprag.service.spec.node import Node
+    from sprag.service.spec.report import Report
     from sprag.worker.models import Parameter
     from sprag.worker.study import Study
 
@@ -86,7 +89,21 @@ class _Nominal:
     varies: bool
 
 
-def read_tolerances(spec: Node, axes: Sequence[Axis] | None) -> Spread | None:
+def _read(draft: Draft) -> Finish | None:
+    draft.spread = _read_spread(draft.spec, draft.axes)
+    node = draft.spec["tolerances"]
+    if node.given and draft.kind in {"refine", "calibrate"} and draft.axes is not None:
+        node.refuse("conflict", "cannot be combined with `refine` or `calibrate`", None,
+                    allowed="`goal`, or plain axes")  # fmt: skip
+    # A search draws the drives of each design itself.
+    return None if draft.spread is None or draft.kind else partial(_run_drives, draft, draft.spread)
+
+
+#: Studies of drives as they are built.
+DRIVES: Final = Kind(SPREAD, _read)
+
+
+def _read_spread(spec: Node, axes: Sequence[Axis] | None) -> Spread | None:
     """The tolerances of a spec and the draws of its drives; None without, or, with the faults recorded, if invalid.
 
     ``axes`` are those of the study without drives (of a study that chooses its own cases, the ends of what it may
@@ -126,33 +143,37 @@ def read_tolerances(spec: Node, axes: Sequence[Axis] | None) -> Spread | None:
     return Spread([one.tolerance for one in drawn], np.stack(columns, axis=1), about)
 
 
-def with_drives(report: Report, study: Study, spread: Spread) -> Study:
-    """``study``, whose cases are listed or a grid, with each case in every drive; SpecError where it is too large."""
+def _run_drives(draft: Draft, spread: Spread) -> None:
+    """Run each case in every drive; SpecError where there are too many."""
+    axes, places = draft.axes or (), draft.cases
+    if not axes:
+        draft.combine = "grid"
     drives = np.arange(spread.drives + 1, dtype=np.float64)
-    combine, cases = study.combine if study.axes else "grid", study.cases * drives.size
-    numbers = cases * (len(study.axes) + 1)
-    if combine == "zip" and numbers > MAX_AXIS_VALUES:
-        most = MAX_AXIS_VALUES // (study.cases * (len(study.axes) + 1)) - 1
+    cases = places * drives.size
+    if draft.combine == "zip" and cases * (len(axes) + 1) > MAX_AXIS_VALUES:
+        most = MAX_AXIS_VALUES // (places * (len(axes) + 1)) - 1
         allowed = Sentence("at most {drives} drives of this table; a plain grid may have more", drives=most)
-    elif cases > MAX_CASES or sum(map(len, study.axes)) + drives.size > MAX_AXIS_VALUES:
-        allowed = Sentence("at most {drives} drives", drives=MAX_CASES // study.cases - 1)
-    elif combine == "grid":
-        return replace(study, axes=(*study.axes, Axis((DRIVE,), drives)), combine=combine, spread=spread)
+    elif cases > MAX_CASES or sum(map(len, axes)) + drives.size > MAX_AXIS_VALUES:
+        allowed = Sentence("at most {drives} drives", drives=MAX_CASES // places - 1)
+    elif draft.combine == "grid":
+        draft.axes = (*axes, Axis((DRIVE,), drives))
+        return
     else:
-        axes = [Axis(axis.paths, np.repeat(axis.array, drives.size)) for axis in study.axes]
-        own = Axis((DRIVE,), np.tile(drives, study.cases))
-        return replace(study, axes=(*axes, own), spread=spread)
+        repeated = [Axis(axis.paths, np.repeat(axis.array, drives.size)) for axis in axes]
+        draft.axes = (*repeated, Axis((DRIVE,), np.tile(drives, places)))
+        return
     message = Sentence(
         "asks for {cases} cases: {places} with the nominal drive and {drives} drawn ones each",
-        cases=cases, places=study.cases, drives=spread.drives,
+        cases=cases, places=places, drives=spread.drives,
     )  # fmt: skip
-    report.fault("/drives", "too-many", message, spread.drives, allowed=allowed)
-    raise report.error()
+    node = draft.spec["drives"]
+    node.refuse("too-many", message, spread.drives, allowed=allowed)
+    node.report.raise_if_any()
 
 
 def warn_of_invalid_drives(report: Report, study: Study) -> None:
     """Warn of derived parameters that are out of range in some drives: those drives fail."""
-    for path in study.derive if study.spread is not None else ():
+    for path in study.derive if study.spread is not None and study.plan is None else ():
         part, entry = involved(study, [path]), parameter_of(study, path)
         if entry is None or part.spread is None:
             continue

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -13,8 +13,9 @@ from sprag.service.reading.catalogue import range_sentence
 from sprag.service.reading.limits import at_most
 from sprag.service.spec.axes.axes import varied_values
 from sprag.service.spec.described import Described, Record, named
-from sprag.service.spec.draws.tolerances import expanded
 from sprag.service.spec.draws.unit import unit_sample
+from sprag.service.spec.kinds.draft import Kind
+from sprag.service.spec.kinds.tolerances import expanded
 from sprag.service.spec.lists import refuse_mixed
 from sprag.service.spec.schema.quantity import QUANTITY
 from sprag.worker.limits import MAX_START_RANGES, MAX_STARTS
@@ -22,6 +23,7 @@ from sprag.worker.models import START_STATES, is_settled
 from sprag.worker.models.vibration_drive.start_states import LOCKED, is_initial
 
 if TYPE_CHECKING:
+    from sprag.service.spec.kinds.draft import Draft
     from sprag.service.spec.node import Node
     from sprag.worker.models import Parameter
     from sprag.worker.study import Axis
@@ -53,22 +55,23 @@ STARTS: Final = Record(
 Ranges = dict[str, list[float]]
 
 
-def read_starts(spec: Node, axes: tuple[Axis, ...] | None, run: Mapping[str, Any]) -> dict[str, Any]:
-    """The part of a study's run that its starts are: ``{"starts": ...}``, SI, with the values of every start.
-
-    Empty without starts, or, with the faults recorded, where they are invalid.
-    """
-    node = spec["starts"]
+def _read(draft: Draft) -> None:
+    """Read the starts into the run of the study: in SI, with the values of every start."""
+    node = draft.spec["starts"]
     if not node.given or not STARTS.read(node, null=False):
-        return {}
+        return
     settings, ranges = STARTS.values(node), _read_ranges(node["ranges"])
-    _check_locked(node["ranges"], ranges, axes or ())
-    if not is_settled(run):
+    _check_locked(node["ranges"], ranges, draft.axes or ())
+    if not is_settled(draft.run):
         node.refuse("conflict", "needs runs until the motion is settled", None,
                     allowed="neither `duration` nor `window`")  # fmt: skip
-    if not node.sound or not ranges:
-        return {}
-    return {"starts": {**settings, "ranges": ranges, "values": drawn(ranges, settings["count"], settings["seed"])}}
+    if node.sound and ranges:
+        values = drawn(ranges, settings["count"], settings["seed"])
+        draft.run["starts"] = {**settings, "ranges": ranges, "values": values}
+
+
+#: Studies of coexisting regimes.
+MANY_STARTS: Final = Kind({"starts": STARTS}, _read)
 
 
 def drawn(ranges: Mapping[str, list[float]], count: int, seed: int) -> dict[str, list[float]]:

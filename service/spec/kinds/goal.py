@@ -11,9 +11,17 @@ from sprag.service.reading.texts import did_you_mean
 from sprag.service.spec.axes.axes import PATHS, check_paths, expand
 from sprag.service.spec.axes.values import plan_values
 from sprag.service.spec.described import Described, Listed, Record, Variants, choice
+from sprag.service.spec.kinds.draft import Kind
+from sprag.service.spec.kinds.fields import (
+    RESULT,
+    read_ends,
+    read_numeric_result,
+    read_path_of,
+    read_result,
+    read_value,
+)
+from sprag.service.spec.kinds.robust import QUANTILE, check_drives, read_quantile, refuse_beside_yield
 from sprag.service.spec.lists import refuse_mixed
-from sprag.service.spec.plan.fields import RESULT, read_ends, read_numeric_result, read_path_of, read_result, read_value
-from sprag.service.spec.plan.robust import QUANTILE, check_drives, read_quantile, refuse_beside_yield
 from sprag.service.spec.schema.quantity import QUANTITY
 from sprag.service.spec.shares import in_percent
 from sprag.worker.limits import MAX_PLANNED_CASES
@@ -21,6 +29,7 @@ from sprag.worker.limits import MAX_PLANNED_CASES
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from sprag.service.spec.kinds.draft import Draft, Finish
     from sprag.service.spec.node import Node
     from sprag.worker.models import ResultInfo
 
@@ -90,6 +99,27 @@ GOAL: Final = Record(
 )  # fmt: skip
 
 Variables = list[dict[str, Any]]
+
+
+def _read(draft: Draft) -> Finish | None:
+    node = draft.spec["goal"]
+    if not GOAL.read(node, null=False):
+        return None
+    variables = read_variables(node)
+    points = read_points(node, variables)
+    if variables is None or points is None:
+        return None
+    ends = [(tuple(v["paths"]), v.get("values") or (v["low"], v["high"])) for v in variables]
+    draft.vary([*ends, *(((path,), [point[path] for point in points]) for path in (points[0] if points else ()))])
+
+    def make_plan() -> None:
+        draft.plan = read_goal(node, variables, points, 0 if draft.spread is None else draft.spread.drives)
+
+    return make_plan
+
+
+#: Searches for the best designs.
+SEARCH: Final = Kind({"goal": GOAL}, _read)
 
 
 def read_variables(goal: Node) -> Variables | None:

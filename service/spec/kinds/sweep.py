@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from sprag.sentences import Sentence
 from sprag.service.languages import N_
 from sprag.service.reading.limits import at_most_cases
 from sprag.service.spec.axes.axes import SWEPT
+from sprag.service.spec.kinds.draft import Kind
 from sprag.service.spec.node import Node
-from sprag.service.spec.plan.outline import chooses
 from sprag.worker import models
 from sprag.worker.directions import DOWN, SWEEP, UP
 from sprag.worker.limits import MAX_CASES
@@ -19,14 +19,16 @@ from sprag.worker.models.vibration_drive.start_states import is_initial
 from sprag.worker.study import Axis
 
 if TYPE_CHECKING:
+    from sprag.service.spec.kinds.draft import Draft, Finish
     from sprag.worker.study import Study
 
 _DIRECTIONS: Final = {"up": (UP,), "down": (DOWN,), "both": (UP, DOWN)}
 _PLAIN: Final = N_("one axis of a plain grid")
 
 
-def read_sweep(spec: Node) -> tuple[int, Node] | None:
-    """Which axis of a spec is swept, and its field; None where none is, or where faults are recorded."""
+def _read(draft: Draft) -> Finish | None:
+    """Read which axis of a spec is swept, and how."""
+    spec = draft.spec
     axes, found = spec["axes"], spec.value
     items = axes.parts() if isinstance(axes.value, list) else []
     marked = [k for k, item in enumerate(items) if _marks(item.value)]
@@ -40,7 +42,7 @@ def read_sweep(spec: Node) -> tuple[int, Node] | None:
     for other in marked[1:]:
         items[other].refuse("repeated", "is a second swept axis", None, allowed="`sweep` on at most one axis")
     conflicts = {
-        Sentence("`refine`, `goal` or `calibrate`, or an adaptive axis"): chooses(found),
+        Sentence("`refine`, `goal` or `calibrate`, or an adaptive axis"): bool(draft.kind),
         "`tolerances`": "tolerances" in found,
         "`starts`": "starts" in found,
         "`exclude`": "exclude" in found,
@@ -53,7 +55,11 @@ def read_sweep(spec: Node) -> tuple[int, Node] | None:
         message = Sentence("`sweep` cannot be combined with {what}", what=what)
         node.refuse("conflict", message, None, allowed=_PLAIN)
     way = SWEPT.read(item) if own else None
-    return (marked[0], node) if way is not None and axes.sound else None
+    return partial(_sweep, draft, marked[0], node) if way is not None and axes.sound else None
+
+
+#: Studies whose cases go on from their neighbours on an axis; the axis has the field.
+SWEEPS: Final = Kind({}, _read)
 
 
 def _marks(item: object) -> bool:
@@ -64,10 +70,11 @@ def _marks(item: object) -> bool:
     return SWEPT.name in item or (isinstance(inside, list) and any(_marks(one) for one in inside))
 
 
-def with_sweep(study: Study, index: int, node: Node) -> Study:
-    """The grid ``study`` swept along an axis, whose field is ``node``; SpecError where it cannot be."""
-    axis, directions = study.axes[index], _DIRECTIONS[node.value]
-    if not models.can_sweep(study.model, study.run):
+def _sweep(draft: Draft, index: int, node: Node) -> None:
+    """Sweep the grid along an axis, whose field is ``node``; SpecError where it cannot be."""
+    axes = draft.axes or ()
+    axis, directions = axes[index], _DIRECTIONS[node.value]
+    if not models.can_sweep(draft.model, draft.run):
         node.refuse("not-used", "needs the settled motion of a vibration drive",
                     allowed='model "vibration-drive" with `"until": "settled"` in `run`')  # fmt: skip
     initial = [path for path in axis.paths if is_initial(path)]
@@ -78,12 +85,12 @@ def with_sweep(study: Study, index: int, node: Node) -> Study:
         node.refuse("conflict", message, allowed="`sweep` on another axis")
     if len(axis) < 2:
         node.refuse("nothing-varies", "is swept over one value", allowed="an axis of 2 values or more")
-    if study.cases * len(directions) > MAX_CASES:
-        message = Sentence("asks for {cases} cases in both directions", cases=study.cases * len(directions))
+    if draft.cases * len(directions) > MAX_CASES:
+        message = Sentence("asks for {cases} cases in both directions", cases=draft.cases * len(directions))
         node.refuse("too-many", message, allowed=at_most_cases(MAX_CASES))
     node.report.raise_if_any()
-    own = Axis((SWEEP,), [float(one) for one in directions])
-    return replace(study, axes=(*study.axes, own), combine="grid", sweep=axis.paths[0])
+    draft.axes = (*axes, Axis((SWEEP,), [float(one) for one in directions]))
+    draft.sweep = axis.paths[0]
 
 
 def sweep_of(study: Study) -> dict[str, str]:

@@ -10,7 +10,8 @@ from sprag.sentences import Sentence, plural
 from sprag.service.spec.axes.axes import ADAPTIVE, axis_values, check_paths
 from sprag.service.spec.axes.design import AXES
 from sprag.service.spec.described import Described, Listed, Record
-from sprag.service.spec.plan.fields import RESULT, read_ends, read_numeric_result, read_path_of
+from sprag.service.spec.kinds.draft import Kind
+from sprag.service.spec.kinds.fields import RESULT, read_ends, read_numeric_result, read_path_of
 from sprag.worker.limits import MAX_PLANNED_CASES
 from sprag.worker.models import regime_info
 from sprag.worker.planning.refine_plan import AdaptiveAxis, FixedAxis, RefinePlan
@@ -18,6 +19,7 @@ from sprag.worker.planning.refine_plan import AdaptiveAxis, FixedAxis, RefinePla
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from sprag.service.spec.kinds.draft import Draft, Finish
     from sprag.service.spec.node import Node
 
 #: Largest error that can be asked for, and the smallest.
@@ -60,7 +62,25 @@ def is_adaptive(item: object) -> bool:
     return isinstance(item, Mapping) and "adaptive" in item
 
 
-def read_refined_axes(spec: Node) -> RefinedAxes | None:
+def _read(draft: Draft) -> Finish | None:
+    axes = _read_axes(draft.spec)
+    if axes is None:
+        return None
+    fixed, adaptive = axes
+    draft.vary([*((axis.paths, axis.values) for axis in fixed), *((a.paths, (a.low, a.high)) for a in adaptive)])
+
+    def make_plan() -> None:
+        plan = _read_plan(draft.spec["refine"], axes)
+        draft.plan = None if plan is None else plan.to_json()
+
+    return make_plan
+
+
+#: Curves and maps of a given accuracy.
+REFINEMENT: Final = Kind({"refine": REFINE}, _read)
+
+
+def _read_axes(spec: Node) -> RefinedAxes | None:
     """The axes of a refined study: those with values, and one or two adaptive ones.
 
     None, and the faults recorded, where they are invalid.
@@ -107,13 +127,13 @@ def _adaptive(item: Node) -> AdaptiveAxis | None:
     return None if ends is None else AdaptiveAxis(paths, *ends)
 
 
-def read_refine(node: Node, axes: RefinedAxes) -> RefinePlan | None:
+def _read_plan(node: Node, axes: RefinedAxes) -> RefinePlan | None:
     """The plan of a refined study; None, and the faults recorded, where it is invalid.
 
     Parameters
     ----------
     node : the field `refine` of the spec, when the results of the study are known
-    axes : as `read_refined_axes` gives them
+    axes : as `_read_axes` gives them
     """
     if not REFINE.read(node):
         return None

@@ -11,8 +11,8 @@ import pytest
 from sprag.service.http.web.form.fields import refine_fields
 from sprag.service.jobs.preview import preview_json
 from sprag.service.spec.extend import parse_extended
+from sprag.service.spec.kinds.refine import REFINE as RECORD
 from sprag.service.spec.longer import longer_spec
-from sprag.service.spec.plan.refine import REFINE as RECORD
 from sprag.service.spec.report import SpecError
 from sprag.worker.chunking import Chunking
 from sprag.worker.planning import most_cases, planner_of
