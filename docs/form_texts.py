@@ -7,6 +7,8 @@ from collections.abc import Iterable, Iterator
 from sprag.service.reading.wording import words
 from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN
 from sprag.service.spec.draws.described import DISTRIBUTION
+from sprag.service.spec.kinds.goal import GOAL
+from sprag.service.spec.kinds.refine import REFINE
 from sprag.service.spec.kinds.tolerances import DRAWS
 from sprag.service.spec.machine.shaft import MEAN_SPEED_IS
 from sprag.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, FLYWHEEL, MOTOR, STAGE
@@ -18,8 +20,6 @@ from sprag.service.spec.machine.shaft_parts import (
     OPERATION_CHOICES,
     PHI_C,
 )
-from sprag.service.spec.kinds.goal import GOAL
-from sprag.service.spec.kinds.refine import REFINE
 from sprag.worker import models
 from sprag.worker.models.form import Block, Form, FormChoice, FormField
 from sprag.worker.models.laboratory import Laboratory

@@ -20,7 +20,7 @@ from sprag.service.reading.numbers import parse_number, settled
 from sprag.service.reading.printed import could_be_several, could_be_values
 from sprag.service.reading.together import AMBIGUOUS_UNIT, questions
 from sprag.service.reading.units import QuantityError
-from sprag.service.spec.csv_text import in_cell, read_csv, refuse_mixed_column, unescape
+from sprag.service.spec.csv_text import Column, in_cell, read_csv, refuse_mixed_column, unescape
 from sprag.service.spec.described import Record
 from sprag.service.spec.labels import LINES_ALLOWED, printable_lines
 from sprag.service.spec.node import Node, exact
@@ -221,7 +221,7 @@ def _read_csv(node: Node) -> list[tuple[str, Component]]:
     for place, (name, unit) in enumerate(headings):
         parameter = parameters.get(name)
         if parameter is not None and not unit:
-            refuse_mixed_column(node, rows[1:], (place, name), parameter.unit)
+            refuse_mixed_column(node, rows[1:], Column(name, "", place), parameter.unit)
     if node.report.found:
         return []
     made = []

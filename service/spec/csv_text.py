@@ -6,20 +6,26 @@ Numbers may have decimal commas: always where semicolons separate the columns, o
 from __future__ import annotations
 
 import csv
+import math
 import re
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from sprag.sentences import Sentence, joined, plural
 from sprag.service.languages import N_
+from sprag.service.reading.catalogue import range_sentence
 from sprag.service.reading.limits import at_most
-from sprag.service.reading.numbers import WITHOUT_DOUBT, assumption, of_line, question
+from sprag.service.reading.numbers import WITHOUT_DOUBT, assumption, of_line, parse_number, question
+from sprag.service.reading.texts import shorten_text
 from sprag.service.reading.together import AMBIGUOUS_UNIT, questions
+from sprag.service.reading.units import QuantityError, to_float
+from sprag.service.spec.node import exact
 from sprag.service.spec.table_text import MAX_HEADING, CsvRow, Split, settled_table, split, with_units
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from sprag.service.spec.node import Node
+    from sprag.worker.models import Parameter
 
 #: Beginnings of text that a spreadsheet would interpret as a formula.
 _FORMULA_STARTS: Final = ("=", "+", "-", "@", "\t", "\r")
@@ -114,24 +120,68 @@ def has_units(text: str) -> bool:
     return _WITH_UNIT.search(text) is not None
 
 
-def refuse_mixed_column(node: Node, rows: Sequence[CsvRow], column: tuple[int, str], unit: str) -> bool:
+class Column(NamedTuple):
+    """A column: its name, its unit ("" where it gives none) and its place."""
+
+    name: str
+    unit: str
+    place: int
+
+    def __str__(self) -> str:
+        return self.name + (f" [{self.unit}]" if self.unit else "")
+
+    def cell(self, row: CsvRow) -> str:
+        """What a row has in this column."""
+        return row.cells[self.place].strip()
+
+    def quantity(self, cell: str) -> str | float:
+        """A cell as a quantity: a number in the unit of the column (SI where there is none), or a text with its own."""
+        if not cell:
+            raise QuantityError("empty", "is empty")
+        number = parse_number(cell)
+        return cell if number is None else f"{cell} {self.unit}" if self.unit else number
+
+
+def read_column(node: Node, rows: Sequence[CsvRow], column: Column, parameter: Parameter) -> list[float]:
+    """The values of a parameter (SI); fewer, or NaN, and the faults recorded, where they are invalid."""
+    values: list[float] = []
+    if not column.unit and refuse_mixed_column(node, rows, column, parameter.unit):
+        return values
+    for row in rows:
+        try:
+            values.append(to_float(exact(column.quantity(column.cell(row)), parameter)) + 0.0)
+        except QuantityError as error:
+            refuse_cell(node, row, column, error, range_sentence(parameter), parameter.unit)
+            values.append(math.nan)
+        if node.report.full:
+            break
+    return values
+
+
+def refuse_cell(node: Node, row: CsvRow, column: Column, error: QuantityError, allowed: str, unit: str) -> None:
+    """Record a fault of a cell, which is shown with the unit of its column."""
+    cell = column.cell(row)
+    written = f"{cell} {column.unit}" if column.unit and parse_number(cell) is not None else cell
+    message = in_cell(row.line, error.message, shorten_text(str(column)))
+    node.refuse(error.code, message, written, allowed=allowed, unit=unit)
+
+
+def refuse_mixed_column(node: Node, rows: Sequence[CsvRow], column: Column, unit: str) -> bool:
     """Record a fault where bare numbers of a column stand beside quantities in units of another scale.
 
-    ``column`` is its place and its heading, which has no unit, so that a bare number would be in ``unit`` (SI). The
-    value of the fault is the heading, because a unit in it is the answer for all cells.
+    The heading has no unit, so that a bare number would be in ``unit`` (SI). It is the value of the fault, because a
+    unit in it is the answer for all cells.
     """
-    place, heading = column
-    cells = [row.cells[place].strip() for row in rows]
+    cells = [column.cell(row) for row in rows]
     if not any(map(has_units, cells)):
         return False
     values = list(dict.fromkeys(cells))
     asked = next(iter(questions(values, [unit] * len(values))), None)
     if asked is None:
         return False
-    line = rows[cells.index(values[asked.place])].line
+    line, heading = rows[cells.index(values[asked.place])].line, column.name
     allowed = Sentence("a unit in the heading, as in {heading} [{unit}], or in each cell", heading=heading, unit=unit)
-    message = in_cell(line, asked.message, heading)
-    node.refuse(AMBIGUOUS_UNIT, message, heading, allowed=allowed, unit=unit)
+    node.refuse(AMBIGUOUS_UNIT, in_cell(line, asked.message, heading), heading, allowed=allowed, unit=unit)
     return True
 
 

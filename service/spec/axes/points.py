@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
-from sprag.service.reading.catalogue import range_sentence
-from sprag.service.reading.numbers import parse_number
 from sprag.service.reading.texts import shorten_text
-from sprag.service.reading.units import QuantityError, to_float
 from sprag.service.spec.axes.axes import read_paths
 from sprag.service.spec.axes.blocks import Block
-from sprag.service.spec.csv_text import in_cell, read_csv, refuse_mixed_column
+from sprag.service.spec.csv_text import Column, read_column, read_csv
 from sprag.service.spec.described import Record
-from sprag.service.spec.node import Node, exact
-from sprag.service.spec.table_text import CsvRow, heading_of
+from sprag.service.spec.node import Node
+from sprag.service.spec.table_text import heading_of
 from sprag.worker.limits import MAX_AXIS_VALUES, MAX_COLUMNS
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from sprag.worker.models import Parameter
 
 POINTS: Final = Record(
     {
@@ -45,19 +37,14 @@ def read_points(item: Node) -> Block | None:
     rows = read_csv(node, (MAX_AXIS_VALUES, MAX_COLUMNS), example)
     if rows is None:
         return None
-    headings = [_read_heading(node, cell) for cell in rows[0].cells]
-    known = [heading for heading in headings if heading is not None]
-    if len(known) < len(headings):
+    columns = [_read_heading(node, cell, place) for place, cell in enumerate(rows[0].cells)]
+    known = [column for column in columns if column is not None]
+    if len(known) < len(columns):
         return None
-    mixed = [
-        refuse_mixed_column(node, rows[1:], (place, str(heading)), heading.parameter.unit)
-        for place, heading in enumerate(known)
-        if not heading.unit
-    ]
-    values = None if any(mixed) else _read_cells(node, rows[1:], known)
-    if values is None:
+    parameters, paths = node.machine.parameters, tuple(column.name for column in known)
+    values = [np.array(read_column(node, rows[1:], column, parameters[column.name])) for column in known]
+    if not node.sound:
         return None
-    paths = tuple(heading.parameter.path for heading in known)
     if len(set(paths)) < len(paths):
         node.refuse("repeated", "names the same path twice", [shorten_text(path) for path in paths])
         return None
@@ -65,54 +52,11 @@ def read_points(item: Node) -> Block | None:
     return Block(item.pointer, paths, len(lines), lambda: dict(zip(paths, values, strict=True)), lines)
 
 
-class _Heading(NamedTuple):
-    """The heading of a column; ``unit`` is "" where it gives none."""
-
-    parameter: Parameter
-    unit: str
-
-    def __str__(self) -> str:
-        return self.parameter.path + (f" [{self.unit}]" if self.unit else "")
-
-
-def _read_heading(node: Node, cell: str) -> _Heading | None:
+def _read_heading(node: Node, cell: str, place: int) -> Column | None:
     heading = heading_of(cell)
     if heading is None:
         node.refuse("invalid-path", "has a heading that names no parameter", cell,
                     allowed="a path, its unit in brackets")  # fmt: skip
         return None
-    name, unit = heading
-    paths = read_paths(Node(node.report, node.pointer, name))
-    return None if paths is None else _Heading(node.machine.parameters[paths[0]], unit)
-
-
-def _read_cells(node: Node, rows: list[CsvRow], headings: list[_Heading]) -> list[NDArray[np.float64]] | None:
-    columns = [np.empty(len(rows)) for _ in headings]
-    before = node.report.found
-    for number, (line, row) in enumerate(rows):
-        for column, cell, heading in zip(columns, row, headings, strict=True):
-            try:
-                column[number] = _read_cell(cell.strip(), heading)
-            except QuantityError as error:
-                written = f"{cell.strip()} {heading.unit}" if heading.unit and _is_number(cell) else cell.strip()
-                node.refuse(
-                    error.code, in_cell(line, error.message, shorten_text(str(heading))), written,
-                    allowed=range_sentence(heading.parameter), unit=heading.parameter.unit,
-                )  # fmt: skip
-        if node.report.full:
-            break
-    return None if node.report.found > before else [column + 0.0 for column in columns]
-
-
-def _read_cell(cell: str, heading: _Heading) -> float:
-    """Read a cell: a number in the unit of its column (SI where there is none), or a text with its own unit."""
-    if not cell:
-        raise QuantityError("empty", "is empty")
-    number = parse_number(cell)
-    if number is None:
-        return to_float(exact(cell, heading.parameter))
-    return to_float(exact(f"{cell} {heading.unit}" if heading.unit else number, heading.parameter))
-
-
-def _is_number(cell: str) -> bool:
-    return parse_number(cell) is not None
+    named = read_paths(Node(node.report, node.pointer, heading[0]))
+    return None if named is None else Column(*heading, place)

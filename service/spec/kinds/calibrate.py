@@ -46,8 +46,8 @@ def _read(draft: Draft) -> Finish | None:
     if not CALIBRATE.read(node, null=False):
         return None
     unknown = _read_unknown(node)
-    csv = node["measured"]["csv"]
-    table = read_table(csv) if _MEASURED.read(node["measured"]) else None
+    measured = node["measured"]
+    table = read_table(measured["csv"]) if _MEASURED.read(measured) else None
     other = CALIBRATE.values(node)
     for index, one in enumerate(unknown or ()):
         for path in set(one.paths) & set(table.paths if table else ()):
@@ -59,7 +59,7 @@ def _read(draft: Draft) -> Finish | None:
     draft.vary([*((one.paths, (one.low, one.high)) for one in unknown), *(((path,), own) for path, own in columns)])
 
     def make_plan() -> None:
-        draft.plan = _read_plan(csv, unknown, table, **other)
+        draft.plan = _read_plan(measured["csv"], unknown, table, **other)
 
     return make_plan
 

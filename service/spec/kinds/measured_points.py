@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from sprag.sentences import Sentence, Typed
 from sprag.service.languages import N_
-from sprag.service.reading.catalogue import range_sentence, result_of
+from sprag.service.reading.catalogue import result_of
 from sprag.service.reading.numbers import parse_number
 from sprag.service.reading.texts import did_you_mean, shorten_text
-from sprag.service.reading.units import QuantityError, parse_quantity, to_float
-from sprag.service.spec.csv_text import in_cell, read_csv, refuse_mixed_column
-from sprag.service.spec.node import Node, exact
+from sprag.service.reading.units import QuantityError, parse_quantity
+from sprag.service.spec.csv_text import Column, read_column, read_csv, refuse_cell, refuse_mixed_column
+from sprag.service.spec.node import Node
 from sprag.service.spec.table_text import CsvRow, heading_of
 from sprag.worker.planning.calibrate.plan import MOST_MEASURED, Measured
 
@@ -27,17 +27,6 @@ SIGMA: Final = "sigma"
 #: Columns at most.
 MOST_COLUMNS: Final = 32
 _EXAMPLE: Final = N_("as in shaft.load [N*m],shaft.speed.mean [rad/s],sigma")
-
-
-class Column(NamedTuple):
-    """A column: its name, its unit ("" where it gives none) and its position."""
-
-    name: str
-    unit: str
-    place: int
-
-    def __str__(self) -> str:
-        return self.name + (f" [{self.unit}]" if self.unit else "")
 
 
 @dataclass(frozen=True)
@@ -71,7 +60,6 @@ def read_table(node: Node) -> MeasuredTable | None:
     rows = read_csv(node, (MOST_MEASURED, MOST_COLUMNS), example)
     if rows is None:
         return None
-    before = node.report.found
     columns = _read_headings(node, rows[0])
     paths = [column for column in columns if column.name in machine.parameters]
     others = [column for column in columns if column.name not in machine.parameters]
@@ -81,13 +69,13 @@ def read_table(node: Node) -> MeasuredTable | None:
                 "conflict", "has a column of a derived parameter", column.name, allowed="no formula in `derive`"
             )
     results = _paired(node, others)
-    if node.report.found > before:
+    if not node.sound:
         return None
-    for column in paths:
-        _check_unit(node, column, machine.parameters[column.name].unit)
-    if node.report.found > before:
+    before = node.report.found
+    fits = [_check_unit(node, column, machine.parameters[column.name].unit) for column in paths]
+    if not all(fits):
         return None
-    values = [_conditions(node, rows[1:], column) for column in paths]
+    values = [read_column(node, rows[1:], column, machine.parameters[column.name]) for column in paths]
     if node.report.found > before:
         return None
     points = list(zip(*values, strict=True)) if values else [()] * (len(rows) - 1)
@@ -139,30 +127,12 @@ def _paired(node: Node, columns: Sequence[Column]) -> tuple[tuple[Column, Column
 def _check_unit(node: Node, column: Column, unit: str) -> bool:
     """Whether the unit of a heading fits; a fault recorded, once for the whole column, where it does not."""
     try:
-        _number("1", column.unit, unit)
+        _number("1", column, unit)
     except QuantityError as error:
         message = Sentence("column {column}: {message}", column=shorten_text(str(column)), message=error.message)
         node.refuse(error.code, message, column.unit, unit=unit)
         return False
     return True
-
-
-def _conditions(node: Node, rows: Sequence[CsvRow], column: Column) -> list[float]:
-    """The values of a parameter; NaN, and a fault recorded, for those that are invalid."""
-    entry = node.machine.parameters[column.name]
-    values: list[float] = []
-    if not column.unit and refuse_mixed_column(node, rows, (column.place, column.name), entry.unit):
-        return values
-    for row in rows:
-        cell = row.cells[column.place].strip()
-        try:
-            values.append(to_float(exact(_quantity(cell, column.unit), entry)) + 0.0)
-        except QuantityError as error:
-            _fault(node, row, column, error, range_sentence(entry), entry.unit)
-            values.append(math.nan)
-        if node.report.full:
-            break
-    return values
 
 
 def read_results(node: Node, table: MeasuredTable) -> tuple[Measured, ...] | None:
@@ -184,9 +154,9 @@ def read_results(node: Node, table: MeasuredTable) -> tuple[Measured, ...] | Non
             continue
         if not _check_unit(node, column, info.unit):
             continue
-        if not column.unit and refuse_mixed_column(node, table.rows, (column.place, column.name), info.unit):
+        if not column.unit and refuse_mixed_column(node, table.rows, column, info.unit):
             continue
-        rows = [(row, at) for row, at in zip(table.rows, table.at, strict=True) if row.cells[column.place].strip()]
+        rows = [(row, at) for row, at in zip(table.rows, table.at, strict=True) if column.cell(row)]
         values = [_value(node, row, column, info.unit) for row, _ in rows]
         if not rows:
             node.refuse(
@@ -197,7 +167,7 @@ def read_results(node: Node, table: MeasuredTable) -> tuple[Measured, ...] | Non
             )
         deviations: list[float] = []
         if sigma is not None and not (sigma.unit or column.unit):
-            refuse_mixed_column(node, table.rows, (sigma.place, sigma.name), info.unit)
+            refuse_mixed_column(node, table.rows, sigma, info.unit)
         if sigma is not None:
             pairs = zip(rows, values, strict=True)
             deviations = [_deviation(node, row, sigma, value, (column.unit, info.unit)) for (row, _), value in pairs]
@@ -207,9 +177,9 @@ def read_results(node: Node, table: MeasuredTable) -> tuple[Measured, ...] | Non
 
 def _value(node: Node, row: CsvRow, column: Column, unit: str) -> float:
     try:
-        return _number(row.cells[column.place].strip(), column.unit, unit) + 0.0
+        return _number(column.cell(row), column, unit) + 0.0
     except QuantityError as error:
-        _fault(node, row, column, error, Sentence("a number of {unit}", unit=Typed(unit)), unit)
+        refuse_cell(node, row, column, error, Sentence("a number of {unit}", unit=Typed(unit)), unit)
         return math.nan
 
 
@@ -219,7 +189,7 @@ def _deviation(node: Node, row: CsvRow, column: Column, value: float, units: tup
     A number without a unit is in that of the column of its result, ``units[0]``, or else in SI, ``units[1]``.
     """
     written, unit = units
-    cell = row.cells[column.place].strip()
+    cell = column.cell(row)
     share = re.fullmatch(r"(.*?)\s*%", f"{cell} {column.unit}" if parse_number(cell) is not None else cell)
     try:
         if share is not None:
@@ -228,33 +198,18 @@ def _deviation(node: Node, row: CsvRow, column: Column, value: float, units: tup
                 raise QuantityError("not-a-number", "is not a number")
             deviation = abs(value) * number / 100.0
         else:
-            deviation = parse_quantity(_quantity(cell, column.unit or written), unit)
+            deviation = parse_quantity(column._replace(unit=column.unit or written).quantity(cell), unit)
         if not 0.0 < deviation < math.inf and math.isfinite(value):
             raise QuantityError("out-of-range", "is not a standard deviation greater than 0")
         return deviation
     except QuantityError as error:
         such = Sentence("greater than 0, in {unit}, or as a share [%] of the value", unit=Typed(unit))
-        _fault(node, row, column, error, such, unit)
+        refuse_cell(node, row, column, error, such, unit)
         return math.nan
 
 
-def _number(cell: str, written: str, unit: str) -> float:
+def _number(cell: str, column: Column, unit: str) -> float:
     """A cell in SI; a number of no unit may be in percent."""
-    if unit == "1" and (share := re.fullmatch(r"(.*?)\s*%", f"{cell} {written}" if written else cell)):
-        return parse_quantity(_quantity(share[1], ""), unit) / 100.0
-    return parse_quantity(_quantity(cell, written), unit)
-
-
-def _quantity(cell: str, unit: str) -> str | float:
-    """A cell as a quantity: a number in the unit of its column (SI where there is none), or a text with its own."""
-    if not cell:
-        raise QuantityError("empty", "is empty")
-    number = parse_number(cell)
-    return cell if number is None else f"{cell} {unit}" if unit else number
-
-
-def _fault(node: Node, row: CsvRow, column: Column, error: QuantityError, allowed: str, unit: str) -> None:
-    cell = row.cells[column.place].strip()
-    written = f"{cell} {column.unit}" if column.unit and parse_number(cell) is not None else cell
-    message = in_cell(row.line, error.message, shorten_text(str(column)))
-    node.refuse(error.code, message, written, allowed=allowed, unit=unit)
+    if unit == "1" and (share := re.fullmatch(r"(.*?)\s*%", f"{cell} {column.unit}" if column.unit else cell)):
+        return parse_quantity(column._replace(unit="").quantity(share[1]), unit) / 100.0
+    return parse_quantity(column.quantity(cell), unit)

@@ -30,25 +30,6 @@ if TYPE_CHECKING:
 #: Field of the base that a service replaces by the initial values that go on from the end of a case.
 START: Final = "start"
 _PENDULUMS: Final = "pendulums"
-_CATALOGUE: Final = tuple(
-    entry for entry in parameter_catalogue(VIBRATION_DRIVE) if not entry.path.startswith("clutch.")
-)
-
-
-def _sections() -> dict[str, Field]:
-    """The parts of the base that have numbers: a number, an object of them, or the list of pendulums."""
-    sections: dict[str, Field] = {}
-    for name in dict.fromkeys(entry.path.split(".")[0] for entry in _CATALOGUE):
-        entries = {entry.path.split(".")[-1]: entry for entry in _CATALOGUE if entry.path.split(".")[0] == name}
-        clutch: dict[str, Field] = {"clutch": CLUTCH} if name == _PENDULUMS else {}
-        record = Record({**entries, **clutch}, required=required_of(entries))
-        sections[name] = entries.get(name, record)
-        if clutch:
-            sections[name] = Listed("pendulums", 1, MAX_PENDULUMS, item=record)
-    return sections
-
-
-_SECTIONS: Final = _sections()
 #: A start from the end of a case of a study of the same service.
 START_AT: Final = Record(
     {
@@ -59,14 +40,30 @@ START_AT: Final = Record(
     "begin in the state in which a case of another study ends; the service replaces it by initial values",
     required=("study", "case"),
 )
-DRIVE: Final = Record(
-    {**_SECTIONS, "clutch": CLUTCH, START: START_AT},
-    "the machine that every case begins from",
-    required=[name for name in _SECTIONS if any(e.default is None for e in _CATALOGUE if e.path.split(".")[0] == name)],
-)
 _WHERE_STARTS = "submission to that service, or `sprag run --db` with its database"
 _PENDULUM_PATH = re.compile(r"pendulums\.([0-9]{1,9})\.(.+)")
 _CLUTCH_PATH = re.compile(r"(?:pendulums\.[0-9]{1,9}\.)?clutch\.(.+)")
+
+
+def _catalogue() -> list[Parameter]:
+    """The parameters of a drive without those of its clutch."""
+    return [entry for entry in parameter_catalogue(VIBRATION_DRIVE) if not entry.path.startswith("clutch.")]
+
+
+def drive_record() -> Record:
+    """The base: numbers, objects of them, the list of pendulums, and the clutch."""
+    fields: dict[str, Field] = {}
+    required: list[str] = []
+    catalogue = _catalogue()
+    for name in dict.fromkeys(entry.path.split(".")[0] for entry in catalogue):
+        entries = {entry.path.split(".")[-1]: entry for entry in catalogue if entry.path.split(".")[0] == name}
+        needed = required_of(entries)
+        required += [name] if needed else []
+        clutch: dict[str, Field] = {"clutch": CLUTCH} if name == _PENDULUMS else {}
+        record = Record({**entries, **clutch}, required=needed)
+        fields[name] = Listed("pendulums", 1, MAX_PENDULUMS, item=record) if clutch else entries.get(name, record)
+    whole = {**fields, "clutch": CLUTCH, START: START_AT}
+    return Record(whole, "the machine that every case begins from", required)
 
 
 @dataclass
@@ -129,18 +126,18 @@ class Drive(Machine):
 
 def read_drive(base: Node) -> Drive:
     """Read the machine of a spec; faults are recorded."""
-    machine = Drive()
-    if not DRIVE.read(base):
+    machine, record = Drive(), drive_record()
+    if not record.read(base):
         _assume_everything(machine)
         return machine
     if START in base:
         base[START].refuse(
             "not-used", "refers to a study of a service, which replaces it by initial values", allowed=_WHERE_STARTS
         )
-    for name, section in _SECTIONS.items():
+    for name, section in record.fields.items():
         if isinstance(section, Listed):
             _read_pendulums(base[name], section, machine)
-        elif isinstance(section, Record):
+        elif isinstance(section, Record) and name != START:
             _read_section(base[name], section, name, machine)
         elif isinstance(section, Parameter):
             number = base[name].otherwise(section.default).number(section)
@@ -215,7 +212,7 @@ def _add(machine: Drive, clutch: Clutch | None) -> None:
 
 def _assume_everything(machine: Drive) -> None:
     """Let axes name any parameter a machine could have, so that an unreadable base causes no further faults there."""
-    for entry in _CATALOGUE:
+    for entry in _catalogue():
         for index in range(MAX_PENDULUMS if ".N." in entry.path else 1):
             path = entry.path.replace(".N.", f".{index}.")
             machine.parameters.setdefault(path, placed(entry, path))

@@ -16,7 +16,7 @@ from sprag.service.spec.derive import case_table, layout
 from sprag.service.spec.described import Field, Record
 from sprag.service.spec.machine.choices import Choice, drive_choices, shaft_choices
 from sprag.service.spec.machine.clutch import check_laws
-from sprag.service.spec.machine.drive import DRIVE, Drive, read_drive
+from sprag.service.spec.machine.drive import Drive, drive_record, read_drive
 from sprag.service.spec.machine.machine import read_plain
 from sprag.service.spec.machine.shaft import SHAFT, check_shaft, read_shaft
 from sprag.service.spec.machine.start_states import check_starts
@@ -69,7 +69,7 @@ class SpecPart:
     """
 
     read_base: Callable[[Node], Machine]
-    base: Field
+    base: Callable[[], Field]
     check_base: Callable[[Report, Machine], None] = _nothing
     read_run: Callable[[Node, Axes | None, Combine], dict[str, Any]] = _no_run
     run: Field = _NO_RUN
@@ -113,7 +113,7 @@ def _shaft_run(run: Node, *_: object) -> dict[str, Any]:
 _PARTS = {
     models.VIBRATION_DRIVE: SpecPart(
         read_base=read_drive,
-        base=DRIVE,
+        base=drive_record,
         read_run=_drive_run,
         run=RUN,
         check=_drive_check,
@@ -122,7 +122,7 @@ _PARTS = {
     ),
     models.MACHINE_SHAFT: SpecPart(
         read_base=read_shaft,
-        base=SHAFT,
+        base=lambda: SHAFT,
         check_base=check_shaft,
         read_run=_shaft_run,
         run=Record({}, "nothing: a machine shaft is solved for its whole cycle"),
@@ -137,4 +137,4 @@ def part_of(model: str) -> SpecPart:
     if model in _PARTS:
         return _PARTS[model]
     catalogue = models.parameter_catalogue(model)
-    return SpecPart(partial(read_plain, catalogue=catalogue), plain_schema(catalogue))
+    return SpecPart(partial(read_plain, catalogue=catalogue), partial(plain_schema, catalogue))

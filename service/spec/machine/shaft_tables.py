@@ -9,7 +9,7 @@ from sprag.sentences import Sentence, Typed
 from sprag.service.reading.catalogue import range_sentence
 from sprag.service.reading.numbers import is_ambiguous, parse_number
 from sprag.service.reading.units import AmbiguousCommaError, QuantityError, has_unit, parse_exact, to_float
-from sprag.service.spec.csv_text import in_cell, read_csv, refuse_mixed_column
+from sprag.service.spec.csv_text import Column, in_cell, read_csv, refuse_mixed_column
 from sprag.service.spec.node import Node, exact
 from sprag.service.spec.table_text import heading_of
 from sprag.worker.models import Parameter, machine_shaft
@@ -63,7 +63,7 @@ def read_csv_rows(node: Node, *columns: Parameter) -> list[list[float]]:
             node.refuse(error.code, message, unit, unit=column.unit)
     for place, (unit, column) in enumerate(zip(units, columns, strict=True)):
         if not unit:
-            refuse_mixed_column(node, rows[1:], (place, rows[0].cells[place].strip()), column.unit)
+            refuse_mixed_column(node, rows[1:], Column(rows[0].cells[place].strip(), "", place), column.unit)
     if node.report.found > before:
         return []
     found: list[list[float]] = []

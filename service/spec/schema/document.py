@@ -24,7 +24,7 @@ def spec_schema() -> Schema:
 def _of_model(model: str, *, derived: bool) -> Schema:
     """What holds for the specs of a model, with or without derived parameters."""
     part = part_of(model)
-    base = schema_of(part.base)
+    base = schema_of(part.base())
     return {
         "if": {
             "properties": {"model": {"const": model}},

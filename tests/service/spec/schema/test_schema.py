@@ -119,7 +119,7 @@ def test_it_accepts_what_the_reader_accepts(validator: Any, changes: dict[str, A
 
 def test_it_follows_the_catalogue() -> None:
     for model in model_names():
-        text = json.dumps(schema_of(part_of(model).base))
+        text = json.dumps(schema_of(part_of(model).base()))
         for entry in parameter_catalogue(model):
             if not entry.path.startswith(("clutch.", "constants.")):
                 assert f'"{entry.path.split(".")[-1]}"' in text
