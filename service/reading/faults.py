@@ -13,6 +13,7 @@ from sprag.service.fault_meanings import MEANINGS
 from sprag.service.languages import ENGLISH, current, gettext
 from sprag.service.languages.ranges import with_range
 from sprag.service.reading.reader import shown
+from sprag.service.reading.wording import unit_text
 
 if TYPE_CHECKING:
     from sprag.service.faults import Fault
@@ -42,3 +43,20 @@ def translated(text: str) -> str:
     if current() == ENGLISH:
         return text
     return shown(text) if isinstance(text, Sentence) else gettext(text)
+
+
+def message(item: Fault) -> str:
+    """A fault as a sentence beside its field."""
+    parts = [fault_text(item)]
+    if item.value is not None and not isinstance(item.value, list | dict):
+        parts.append(gettext("got {value}", value=plainly(item.value)))
+    if item.allowed:
+        parts.append(gettext("allowed: {allowed}", allowed=unit_text(allowed_text(item.allowed))))
+    elif item.unit and item.unit != "1":
+        parts.append(gettext("in {unit}", unit=unit_text(item.unit)))
+    return "; ".join(parts)
+
+
+def plainly(value: object) -> object:
+    """A value as a user would write it: a whole number without decimals."""
+    return int(value) if isinstance(value, float) and value.is_integer() and abs(value) < 1e15 else value

@@ -13,13 +13,13 @@ from sprag.service.http.context import Context, Ctx
 from sprag.service.http.problems import api_error
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
-from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.entries import Faults, Values
 from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.jobs import checks
 from sprag.service.json_text import to_bytes
+from sprag.service.reading.faults import message
 from sprag.service.reading.units import examples
 from sprag.service.reading.wording import words
 from sprag.service.spec.components import (

@@ -18,12 +18,12 @@ from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.web.figures.linked import BELOW, GRID, HEIGHT, TOP, Linked, linked
 from sprag.service.http.web.figures.studies import figure_of
-from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.page import spec_in_form
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.languages import _
+from sprag.service.reading.faults import message
 from sprag.service.reading.limits import span
 from sprag.service.reading.numbers import parse_number
 from sprag.service.reading.reader import Choice, Reading, meanings

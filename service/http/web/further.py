@@ -14,13 +14,13 @@ from sprag.service.faults import FaultError, parameter_error
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
-from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.entries import Faults, Values, items_of, list_of
 from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.study import shown_study
 from sprag.service.http.work import Attended
 from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
+from sprag.service.reading.faults import message
 from sprag.service.reading.numbers import assumption, parse_number, settle
 from sprag.worker.limits import MAX_PRIORITY
 

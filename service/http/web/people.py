@@ -12,8 +12,8 @@ from sprag.service.faults import FaultError
 from sprag.service.http.context import Ctx
 from sprag.service.http.people import Action, Actor, Since, Target, Until, user_json
 from sprag.service.http.routers import page_router
-from sprag.service.http.web.form.check import message
 from sprag.service.http.web.templates import page
+from sprag.service.reading.faults import message
 from sprag.service.storage.people.audit import AuditPage, audit_filter
 
 router = page_router()

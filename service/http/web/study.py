@@ -21,7 +21,7 @@ from sprag.service.http.problems import ApiError
 from sprag.service.http.reading import CHOICE, address_pairs, file_pairs
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
-from sprag.service.http.web.form.check import fits_of, has_measured_clutch
+from sprag.service.http.web.figures.fits import fits_of, has_measured_clutch
 from sprag.service.http.web.form.values import changed_meanwhile
 from sprag.service.http.web.held import fixed_choices
 from sprag.service.http.web.saved_views import report_figures, saved_here, view_actions

@@ -19,7 +19,6 @@ from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.views import preset_of
 from sprag.service.http.web import saved_views
-from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.entries import Faults
 from sprag.service.http.web.form.values import Form, RepeatedForm
 from sprag.service.http.web.study import shown_study
@@ -27,6 +26,7 @@ from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.languages import N_
 from sprag.service.presets import preset_names
+from sprag.service.reading.faults import message
 from sprag.service.spec.labels import StudyChange, read_change, tags_of
 from sprag.service.spec.report import SpecError
 from sprag.service.storage.errors import ChangedMeanwhileError, StoreError

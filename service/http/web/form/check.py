@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 from sprag.sentences import Place, WarningText
 from sprag.service.faults import Fault
 from sprag.service.figures.linkage import Drawing, drawings
-from sprag.service.http.web.figures.fit import FitChart, fit_chart
+from sprag.service.http.web.figures.fits import FitChart, fit_at
 from sprag.service.http.web.form.columns import COLUMNS
 from sprag.service.http.web.form.entries import Faults, items_of, list_of, range_of
 from sprag.service.http.web.form.machine import model_name, places
@@ -18,22 +18,16 @@ from sprag.service.http.web.form.machine_spec import step_of
 from sprag.service.http.web.form.spec import WAYS, field_of, spec_of
 from sprag.service.jobs.preview import preview_json
 from sprag.service.languages import _, gettext
-from sprag.service.reading.faults import allowed_text, fault_text
+from sprag.service.reading.faults import message
 from sprag.service.reading.numbers import assumption, in_language, settle, settled
 from sprag.service.reading.quantities import TYPED
 from sprag.service.reading.reader import CLUTCH, Choice, Reading, reading_for
-from sprag.service.reading.units import QuantityError, parse_quantity
-from sprag.service.reading.wording import duration, unit_text
+from sprag.service.reading.units import parse_quantity
+from sprag.service.reading.wording import duration
 from sprag.service.results.draft_words import draft_words
-from sprag.service.results.fits import fit_json
 from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
-from sprag.service.spec.derive import with_values
 from sprag.service.spec.document import ParsedSpec, SpecError, load_spec, parse_spec
-from sprag.service.spec.machine.clutch import read_clutch
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
-from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report
-from sprag.service.spec.stored import accepted
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -156,7 +150,8 @@ def check_form(
     found.notes += _points(values)
     for pointer in places(values, "measured"):
         found.notes += _assumed(values.get(f"{pointer}/data", ""))
-        _fit(found, pointer)
+        fit = fit_at(found.spec, None if found.parsed is None else found.parsed.study, pointer)
+        found.fits |= {} if fit is None else {pointer: fit}
     return found
 
 
@@ -211,80 +206,4 @@ def check_text(
         return found
     found.spec = found.parsed.spec
     found.preview = preview_json(found.parsed, chunking, known(found.parsed.study), left)
-    return found
-
-
-def message(item: Fault) -> str:
-    """A fault as a sentence beside its field."""
-    parts = [fault_text(item)]
-    if item.value is not None and not isinstance(item.value, list | dict):
-        parts.append(gettext("got {value}", value=plainly(item.value)))
-    if item.allowed:
-        parts.append(gettext("allowed: {allowed}", allowed=unit_text(allowed_text(item.allowed))))
-    elif item.unit and item.unit != "1":
-        parts.append(gettext("in {unit}", unit=unit_text(item.unit)))
-    return "; ".join(parts)
-
-
-def plainly(value: object) -> object:
-    """A value as a user would write it: a whole number without decimals."""
-    return int(value) if isinstance(value, float) and value.is_integer() and abs(value) < 1e15 else value
-
-
-def backlashes(spec: Mapping[str, Any], pointer: str) -> list[float]:
-    """Backlash (rad) of every pendulum that has the clutch at ``pointer``, as far as they can be read."""
-    pendulums = spec["base"].get("pendulums", [])
-    own = pointer.split("/")
-    chosen = [pendulums[int(own[3])]] if len(own) > 4 else pendulums
-    found = []
-    for item in chosen:
-        try:
-            found.append(parse_quantity(item.get("backlash", 0.0), "rad"))
-        except QuantityError:
-            continue
-    return found
-
-
-def clutch_at(spec: Mapping[str, Any], pointer: str) -> dict[str, Any]:
-    """The clutch at a JSON Pointer of a spec."""
-    parts = pointer.split("/")
-    base = spec["base"]
-    found: dict[str, Any] = base["clutch"] if len(parts) == 3 else base["pendulums"][int(parts[3])]["clutch"]
-    return found
-
-
-def _with_derived(spec: Mapping[str, Any], study: Study) -> dict[str, Any]:
-    """The spec with the values of derived parameters in its base."""
-    return {**spec, "base": with_values(spec["base"], {path: study.base[path] for path in study.derive})}
-
-
-def _fit(found: Checked, pointer: str) -> None:
-    clutch = clutch_at(found.spec, pointer)
-    if not clutch.get("data") or "accuracy" not in clutch:
-        return
-    known = backlashes(found.spec if found.parsed is None else _with_derived(found.spec, found.parsed.study), pointer)
-    prefix = pointer.removeprefix("/base/").replace("/", ".") + "."
-    read = read_clutch(Node(Report(), pointer, clutch), prefix, known)
-    if read is not None and read.fit is not None:
-        found.fits[pointer] = (fit_json(read.fit), fit_chart(read.fit, clutch, known[0] if known else 0.0))
-
-
-def has_measured_clutch(spec: Mapping[str, Any]) -> bool:
-    """Whether any clutch of a spec is given as measured data."""
-    base = spec.get("base", {})
-    pendulums = base.get("pendulums")
-    clutches = [base.get("clutch"), *(item.get("clutch") for item in pendulums or () if isinstance(item, dict))]
-    return any(isinstance(clutch, dict) and "data" in clutch for clutch in clutches)
-
-
-def fits_of(spec: dict[str, Any], study: Study) -> dict[str, tuple[ClutchFitReport, FitChart]]:
-    """Report and picture of each clutch law that the spec of a ``study`` gives as measured data, by JSON Pointer."""
-    # The fit is not stored, because it follows from the spec exactly.
-    found = {}
-    spec = accepted(spec, study)
-    alone = {key: value for key, value in spec.items() if key in ("sprag", "model", "name", "base", "derive", "run")}
-    parsed = parse_spec(alone)
-    for pointer, fit in parsed.fits.items():
-        known = backlashes(_with_derived(spec, parsed.study), pointer)
-        found[pointer] = (fit_json(fit), fit_chart(fit, clutch_at(spec, pointer), known[0] if known else 0.0))
     return found

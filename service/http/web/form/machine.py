@@ -15,18 +15,10 @@ from sprag.service.http.web.form.entries import count_in
 from sprag.service.http.web.form.fields import FORM_MODEL, Choice, Field, Groups, described, field_for, label_of
 from sprag.service.languages import _
 from sprag.service.reading.wording import words
-from sprag.service.spec.described import FIT, Described
+from sprag.service.spec.described import Described, Listed
 from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.machine.shaft import MEAN_SPEED_IS
-from sprag.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, STAGE
-from sprag.service.spec.machine.shaft_parts import (
-    INDICATOR_OVER,
-    INTERPOLATION,
-    MECHANISM_CHOICES,
-    OPERATION_CHOICES,
-    PHI_C,
-    RECORDED_AT,
-)
+from sprag.service.spec.machine.shaft_drive import STAGE
+from sprag.service.spec.machine.shaft_parts import INTERPOLATION
 from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report
 from sprag.worker import models
@@ -37,18 +29,7 @@ from sprag.worker.models.parameters import general_path, model_parameter
 BASE: Final = "/base"
 #: What the form of a model says of a field instead of its catalogue.
 _GIVEN: Final = ("label", "symbol", "mark", "unit", "range", "default", "example", "required")
-_TABLES: Final = ("drive.torque", "drive.motor", "mechanism", "operation", "operation.indicator")
-#: What the base of a spec has besides the numbers of its model's catalogue.
-_DESCRIBED: Final[Mapping[str, Described | Parameter]] = {
-    **{f"clutch.{name}": entry for name, entry in FIT.items()},
-    **{entry.name: entry for entry in (MEAN_SPEED_IS, BALANCE, BALANCE_SIDE, PHI_C)},
-    "drive.stages.K.kind": STAGE,
-    **{f"{table}.interpolation": INTERPOLATION for table in _TABLES},
-    **{f"mechanism.{kind}.{name}": entry for kind, own in MECHANISM_CHOICES.items() for name, entry in own.items()},
-    **{f"operation.{name}": entry for name, entry in OPERATION_CHOICES.items()},
-    "operation.indicator.over": INDICATOR_OVER,
-    **dict.fromkeys(("operation.recorded_at", "operation.indicator.recorded_at"), RECORDED_AT),
-}
+_OF_DRIVES: Final = {"kind": STAGE, "interpolation": INTERPOLATION}
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,7 +219,7 @@ class _Machine:
     def _field(self, item: data.FormField, place: str) -> Entry:
         name = f"{place}/{item.name}"
         path = name.removeprefix(f"{BASE}/").replace("/", ".")
-        entry = None if item.kind else model_parameter(self.model, path) or _DESCRIBED.get(_general(path))
+        entry = None if item.kind else model_parameter(self.model, path) or _described(self.model, path)
         if entry is None:
             own = _own(name, item.label, item.help)
         elif isinstance(entry, Parameter):
@@ -305,6 +286,17 @@ def _numbers(model: str, prefix: str) -> list[str]:
         if names:
             return names
     return []
+
+
+def _described(model: str, path: str) -> Described | Parameter | None:
+    """What the spec says about an entry of the base that is no number of the catalogue."""
+    found: object = part_of(model).base
+    if path.startswith("drive."):  # the description of a drive is its JSON Schema
+        return _OF_DRIVES.get(path.rpartition(".")[2])
+    for key in path.split("."):
+        ways = [way for way in getattr(found, "ways", [found]) if key in getattr(way, "fields", ())]
+        found = found.item if isinstance(found, Listed) else ways[0].fields.get(key) if ways else None
+    return found if isinstance(found, Described | Parameter) else None
 
 
 def _general(path: str) -> str:

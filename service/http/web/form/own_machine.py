@@ -13,8 +13,8 @@ from sprag.sentences import Sentence
 from sprag.service.faults import Fault
 from sprag.service.http.problems import ApiError
 from sprag.service.http.views import preset_of
-from sprag.service.http.web.form.check import message
 from sprag.service.languages import N_
+from sprag.service.reading.faults import message
 from sprag.service.spec.derive import with_values
 from sprag.service.spec.design import design_spec
 from sprag.service.spec.document import parse_spec

@@ -24,7 +24,7 @@ from sprag.service.http.threads import in_thread
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form import study_check
 from sprag.service.http.web.form.cases import kinds, methods
-from sprag.service.http.web.form.check import Checked, message
+from sprag.service.http.web.form.check import Checked
 from sprag.service.http.web.form.columns import take_columns
 from sprag.service.http.web.form.components import component_groups, rows_with_components, take_component
 from sprag.service.http.web.form.entries import Values
@@ -51,6 +51,7 @@ from sprag.service.http.work import Attended, Work
 from sprag.service.jobs.submission import Submission, take_in
 from sprag.service.languages import gettext
 from sprag.service.presets import preset_names
+from sprag.service.reading.faults import message
 from sprag.service.reading.reader import Reading
 from sprag.service.spec.design import design_spec
 from sprag.service.spec.document import UNNAMED

@@ -14,11 +14,11 @@ from sprag.service.figures.linkage import Drawing, drawings
 from sprag.service.http.problems import ApiError
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.figures.shaft import overridden
-from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.entries import plain
 from sprag.service.http.web.form.own_machine import OWN, case_page, machine_of, read_machine
 from sprag.service.http.web.laboratory.sliders import Slider, faults_by_field, is_own, sliders_of, unit_of
 from sprag.service.presets import preset_names
+from sprag.service.reading.faults import message
 from sprag.service.reading.limits import span
 from sprag.service.reading.quantities import TYPED
 from sprag.service.reading.reader import Choice, reading_for

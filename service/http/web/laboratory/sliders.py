@@ -7,9 +7,9 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.machine import group_of, row_of
 from sprag.service.languages import _
+from sprag.service.reading.faults import message
 from sprag.service.reading.numbers import in_language, parse_number
 from sprag.service.reading.quantities import read_units
 from sprag.service.reading.units import QuantityError, has_unit, parse_quantity, split_quantity

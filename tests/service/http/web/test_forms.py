@@ -15,13 +15,14 @@ from hypothesis.extra.numpy import arrays
 from sprag.service.faults import Fault
 from sprag.service.http.web.figures.motion import motion_figures
 from sprag.service.http.web.figures.thinning import thin
-from sprag.service.http.web.form.check import check_form, check_text, message
+from sprag.service.http.web.form.check import check_form, check_text
 from sprag.service.http.web.form.entries import plain
 from sprag.service.http.web.form.page import empty
 from sprag.service.http.web.form.parts import reshape, share
 from sprag.service.http.web.form.spec import field_of, spec_of, values_of
 from sprag.service.http.web.templates import duration, fragment, time_left
 from sprag.service.presets import preset_names, preset_text
+from sprag.service.reading.faults import message
 from sprag.service.reading.reader import Reading
 from sprag.service.reading.wording import number, symbol, unit_text
 from sprag.service.spec.document import format_of, load_spec, parse_spec
