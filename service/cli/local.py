@@ -213,7 +213,6 @@ def run(
     as_json: JsonFlag = False,
 ) -> None:
     """Run a study here, without a service: rows or a report to standard output or FILE, progress on standard error."""
-    from sprag.service.results.rounds import sentence
     from sprag.service.results.unaffected import Unaffected
 
     finish, written = _finish(finish_by), table_format(form, file, as_json)
@@ -242,10 +241,7 @@ def run(
         endings = progress.endings
     say(*warning_lines(unaffecting))
     seconds = time.monotonic() - start
-    say(", ".join(_done(record, seconds, kept=db is not None)))
-    if progress.rounds is not None:
-        say(sentence(progress.rounds, progress.state))
-    say(*ending_lines(endings))
+    say(", ".join(_done(record, seconds, kept=db is not None)), *_rounds(progress), *ending_lines(endings))
     if as_json and to_file(file):
         numbers = {"cases": record.cases, "done": record.done, "ok": record.ok, "reused": record.reused}
         study_id = record.id if db is not None else None
@@ -256,6 +252,14 @@ def run(
         say(told(record.reason or ""))
     if record.ok != record.cases:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
+
+
+def _rounds(progress: Progress) -> Iterator[str]:
+    """What is known of a study that chooses its own cases."""
+    from sprag.service.results.rounds import sentence
+
+    if progress.rounds is not None:
+        yield sentence(progress.rounds, progress.state)
 
 
 def _done(record: StudyRecord, seconds: float, *, kept: bool) -> Iterator[str]:

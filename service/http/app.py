@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Iterator, Sequence
 from contextlib import asynccontextmanager
 from datetime import timedelta
+from functools import partial
 from importlib.metadata import version
-from typing import Any
+from typing import Any, Final
 
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
@@ -196,6 +197,17 @@ ROUTED = (
 )
 
 
+_ABOUT: Final[dict[str, Any]] = {
+    "title": "Sprag",
+    "summary": "Parameter studies of vibration drives with freewheel clutches and of machine shafts",
+    "description": DESCRIPTION,
+    "version": version("sprag"),
+    "openapi_tags": TAGS,
+    **dict.fromkeys(("openapi_url", "docs_url", "redoc_url")),
+    "redirect_slashes": False,
+}
+
+
 class Application(FastAPI):
     """FastAPI with the guard as outermost layer, outside its own error pages."""
 
@@ -230,6 +242,35 @@ class Application(FastAPI):
         return self.openapi_schema
 
 
+@asynccontextmanager
+async def _running(
+    context: Context, access: Access, owned: Sequence[Computes | Store], running: FastAPI
+) -> AsyncIterator[None]:
+    """What runs beside the requests of an application, which closes what it owns at its end, in this order."""
+    store, reports = context.store, context.settings.reports
+    preparing = None
+    if isinstance(context.checker, ProcessComputer) and context.checker in owned:
+        context.checker.start()
+        preparing = asyncio.create_task(_make_ready(context.checker, context))
+    reading = asyncio.create_task(keep_reading_ahead(context))
+    housekeeping = Housekeeping(store, access.note_uses, Watchdog(store).look)
+    housekeeping.start()
+    reporter = Reporter(store, reports)
+    if reports.wanted:
+        reporter.start()
+    yield
+    reading.cancel()
+    if preparing is not None:
+        preparing.cancel()
+    if isinstance(running, Application) and running.drain is not None:
+        await running.drain.idle()
+    await run_in_threadpool(housekeeping.stop)
+    await run_in_threadpool(reporter.stop)
+    context.files.close()
+    for part in owned:
+        part.close()
+
+
 def create_app(
     settings: Settings | None = None,
     *,
@@ -260,36 +301,8 @@ def create_app(
     used_computer, used_checker = computer or _computer(settings), checker or _checker(settings)
     used_writer = writer or checker or _writer()
 
-    @asynccontextmanager
-    async def lifespan(running: FastAPI) -> AsyncIterator[None]:
-        preparing = None
-        if isinstance(used_checker, ProcessComputer) and checker is None:
-            used_checker.start()
-            preparing = asyncio.create_task(_make_ready(used_checker, context))
-        reading = asyncio.create_task(keep_reading_ahead(context))
-        housekeeping = Housekeeping(used_store, access.note_uses, Watchdog(used_store).look)
-        housekeeping.start()
-        reporter = Reporter(used_store, settings.reports)
-        if settings.reports.wanted:
-            reporter.start()
-        yield
-        reading.cancel()
-        if preparing is not None:
-            preparing.cancel()
-        if isinstance(running, Application) and running.drain is not None:
-            await running.drain.idle()
-        await run_in_threadpool(housekeeping.stop)
-        await run_in_threadpool(reporter.stop)
-        context.files.close()
-        if computer is None:
-            used_computer.close()
-        if checker is None:
-            used_checker.close()
-        if writer is None and checker is None:
-            used_writer.close()
-        if own_store:
-            used_store.close()
-
+    given = (used_computer, computer), (used_checker, checker), (used_writer, writer or checker), (used_store, store)
+    owned: list[Computes | Store] = [part for part, outer in given if outer is None]
     context = Context(
         settings,
         used_store,
@@ -305,21 +318,7 @@ def create_app(
         Queue("files", context.file_shares),
     )
     metrics = Metrics(used_store, OperationCollector(settings, used_store, queues))
-    app = Application(
-        settings,
-        access,
-        metrics,
-        title="Sprag",
-        summary="Parameter studies of vibration drives with freewheel clutches and of machine shafts",
-        description=DESCRIPTION,
-        version=version("sprag"),
-        openapi_tags=TAGS,
-        openapi_url=None,
-        docs_url=None,
-        redoc_url=None,
-        redirect_slashes=False,
-        lifespan=lifespan,
-    )
+    app = Application(settings, access, metrics, **_ABOUT, lifespan=partial(_running, context, access, owned))
     app.state.access = access
     app.state.metrics = metrics
     app.state.readiness = readiness = Readiness(used_store)

@@ -195,6 +195,7 @@ def _of_result(
     every = study.indices(range(study.cases))
     columns = np.stack([axis.array[every[at]] for axis, at in zip(varying, positions, strict=True)], axis=1)
     notes: list[str] = []
+    method: Method
     if missing:
         notes.append(
             plural(
@@ -203,11 +204,38 @@ def _of_result(
                 missing,
             )
         )
-    method: Method = "none"
-    indices, pairs = nothing(len(varying))
     if not cases:
         notes = [Phrase("no case has this result")]
-    elif study.combine == "grid" and not missing:
+    method, indices, pairs = (
+        _shares(study, varying, y, columns, sample, notes) if cases else ("none", *nothing(len(varying)))
+    )
+    if mean is not None and variance is not None and variance <= (1e-13 * mean) ** 2:
+        notes.append(Phrase("the result is the same in every case"))
+        indices, pairs = nothing(len(varying))
+    drawn = sample is not None
+    effects = tuple(
+        Effect(axis.paths, unit_of(study, axis.paths[0]), *_main_effect(axis, column[known], values, drawn=drawn), own)
+        for axis, column, own in zip(varying, columns.T, indices, strict=True)
+    )
+    remarks = (*kinds, *notes)
+    return Sensitivity(info, method, cases, missing, mean, variance, effects, tuple(pairs), remarks)
+
+
+def _shares(
+    study: Study,
+    varying: list[Axis],
+    y: Numbers,
+    columns: Numbers,
+    sample: Mapping[str, Any] | None,
+    notes: list[str],
+) -> tuple[Method, list[Indices], list[Pair]]:
+    """The indices by the method that the cases of the study allow; why there are none is noted."""
+    known = np.isfinite(y)
+    whole = bool(known.all())
+    positions = [study.axes.index(axis) for axis in varying]
+    method: Method = "none"
+    indices, pairs = nothing(len(varying))
+    if study.combine == "grid" and whole:
         method = "grid"
         indices, pairs = grid_indices(y.reshape(study.shape), positions)
     elif sample is not None and len(varying) == len(study.axes):
@@ -221,22 +249,13 @@ def _of_result(
         notes.append(scarce)
     elif study.combine == "zip" and is_sample(columns[known]):
         method = "rbd-fast"
-        indices, pairs = sample_indices(columns[known], values, notes)
-    elif not missing and is_factorial(columns):
+        indices, pairs = sample_indices(columns[known], y[known], notes)
+    elif whole and is_factorial(columns):
         method = "grid"
         indices, pairs = grid_indices(factorial_table(columns, y), list(range(len(varying))))
     else:
         notes.append(why_no_shares(columns, known, [axis_name(study, axis.paths[0]) for axis in varying]))
-    if mean is not None and variance is not None and variance <= (1e-13 * mean) ** 2:
-        notes.append(Phrase("the result is the same in every case"))
-        indices, pairs = nothing(len(varying))
-    drawn = sample is not None
-    effects = tuple(
-        Effect(axis.paths, unit_of(study, axis.paths[0]), *_main_effect(axis, column[known], values, drawn=drawn), own)
-        for axis, column, own in zip(varying, columns.T, indices, strict=True)
-    )
-    remarks = (*kinds, *notes)
-    return Sensitivity(info, method, cases, missing, mean, variance, effects, tuple(pairs), remarks)
+    return method, indices, pairs
 
 
 def _main_effect(axis: Axis, column: Numbers, y: Numbers, *, drawn: bool) -> tuple[Numbers, Numbers]:

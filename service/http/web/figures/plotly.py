@@ -110,13 +110,32 @@ def plotly_figure(figure: Figure) -> Data:
         over = {"xref": axes["xaxis"], "yref": f"{axes['yaxis']} domain"}
         shapes += [_band(band) | over for band in panel.bands]
         shapes += [] if figure.at is None else [_at(figure.at) | over]
-    for column in range(first):
+    traces += _strips(figure, first, rows, strip / inner if strip else 0.0, layout)
+    if shapes:
+        layout["shapes"] = shapes
+    if figure.banded:
+        traces.append(_band_entry())
+    return {"data": traces, "layout": layout, **({"below": figure.below} if figure.below else {}), **_kind(figure)}
+
+
+def _kind(figure: Figure) -> Data:
+    """What the page does with a figure: it zooms into a motion over time, and opens the cases of points."""
+    if figure.motion and figure.x.unit == "s":
+        return {"zoom": True}
+    cases = any(line.cases is not None for panel in figure.panels for line in panel.lines)
+    return {"cases": True} if cases else {}
+
+
+def _strips(figure: Figure, columns: int, rows: int, share: float, layout: Data) -> list[Data]:
+    """The states below the panels of each column, on ``share`` of the height; their axes go into the layout."""
+    traces: list[Data] = []
+    for column in range(columns):
         suffix = _suffix(column)
         axes = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
         traces += [trace | axes for trace in _states(figure, listed=column == 0)]
         layout[f"xaxis{suffix}"] = _x_axis(figure, rows * figure.columns + column, axes["yaxis"])
         layout[f"yaxis{suffix}"] = {
-            "domain": [0.0, strip / inner],
+            "domain": [0.0, share],
             "anchor": axes["xaxis"],
             "type": "category",
             "ticks": "",
@@ -125,14 +144,7 @@ def plotly_figure(figure: Figure) -> Data:
             "showgrid": False,
         }
         layout |= {"barmode": "overlay", "bargap": 0.25}
-    if shapes:
-        layout["shapes"] = shapes
-    if figure.banded:
-        traces.append(_band_entry())
-    over_time = figure.motion and figure.x.unit == "s"
-    cases = any(line.cases is not None for panel in figure.panels for line in panel.lines)
-    kind = {"zoom": True} if over_time else {"cases": True} if cases else {}
-    return {"data": traces, "layout": layout, **({"below": figure.below} if figure.below else {}), **kind}
+    return traces
 
 
 def separators() -> Data:
