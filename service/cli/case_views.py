@@ -37,7 +37,7 @@ from sprag.service.cli.remote import connection
 from sprag.service.faults import Fault, FaultError
 from sprag.service.languages import N_, _
 from sprag.service.views.case_questions import CASE_VIEWS, TRANSIENT
-from sprag.service.views.setting import About, Asked, settings_of
+from sprag.service.views.setting import NamedSetting, ViewInfo, settings_of
 
 if TYPE_CHECKING:
     from sprag.service.views.case_view import CaseView
@@ -57,7 +57,7 @@ _EachCase = Annotated[
 ]
 
 
-def command(about: About) -> Callable[..., None]:
+def command(about: ViewInfo) -> Callable[..., None]:
     """The command of a view."""
     asked = settings_of(about.question)
     counted = any(one.option == "--points" for one in asked)  # which then are no file of cases
@@ -126,7 +126,7 @@ _COMPLETED: dict[str, Callable[..., Any]] = {
 }  # fmt: skip
 
 
-def option(asked: Asked) -> Any:
+def option(asked: NamedSetting) -> Any:
     """A setting as an option."""
     setting = asked.setting
     meaning = f"{setting.meaning[0].upper()}{setting.meaning[1:]}."
@@ -148,7 +148,7 @@ def option(asked: Asked) -> Any:
     ]
 
 
-def query_of(asked: Sequence[Asked], settings: Mapping[str, Any]) -> list[tuple[str, str]]:
+def query_of(asked: Sequence[NamedSetting], settings: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Settings as the query of the view's address, without those that are as the service has them anyway."""
     query: list[tuple[str, str]] = []
     for one in asked:
@@ -166,7 +166,7 @@ def _check_start(study: Study, start: int | None) -> None:
 
 
 @contextmanager
-def naming_options(study: Study, asked: Sequence[Asked], lacks: str) -> Iterator[None]:
+def naming_options(study: Study, asked: Sequence[NamedSetting], lacks: str) -> Iterator[None]:
     """Name the options of a command instead of the settings of a view; WrongInputError for each fault."""
     try:
         yield
@@ -194,10 +194,10 @@ def _write(
     from sprag.service.views.case_view import drawn, see, written
 
     with output(file) as write:
-        seen = see(study, case, view, chosen, start)
-        content = drawn(view, seen, form) if form in PICTURES else written(view, seen, form)
+        answer = see(study, case, view, chosen, start)
+        content = drawn(view, answer, form) if form in PICTURES else written(view, answer, form)
         write(content if content.endswith(b"\n") or form in PICTURES else content + b"\n")
-    said = view.said(seen)
+    said = view.said(answer)
     if said is None:
         return
     say(*said.lines)

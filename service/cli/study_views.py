@@ -45,7 +45,7 @@ from sprag.service.views.setting import settings_of
 from sprag.worker.limits import MAX_DESIGNS, MAX_SELECTED
 
 if TYPE_CHECKING:
-    from sprag.service.views.setting import About, Asked
+    from sprag.service.views.setting import NamedSetting, ViewInfo
 
 #: Formats of their files.
 _FORMATS: Final = ("csv", *PICTURES)
@@ -59,7 +59,7 @@ class Command:
     """
 
     name: str
-    about: About
+    about: ViewInfo
     show: Callable[[dict[str, Any], str], None]
     limits: Callable[[], tuple[int, int]] | None = None
 
@@ -156,7 +156,9 @@ def _probability(text: str) -> float:
 
 
 @contextmanager
-def _remote(text: str, server: str, token: str | None, about: About, asked: tuple[Asked, ...]) -> Iterator[_Source]:
+def _remote(
+    text: str, server: str, token: str | None, about: ViewInfo, asked: tuple[NamedSetting, ...]
+) -> Iterator[_Source]:
     """The view of a study of a running service."""
     from sprag.service.client.wire import study_path
 
@@ -176,7 +178,7 @@ def _remote(text: str, server: str, token: str | None, about: About, asked: tupl
 
 
 @contextmanager
-def _local(path: str, about: About, asked: tuple[Asked, ...]) -> Iterator[_Source]:
+def _local(path: str, about: ViewInfo, asked: tuple[NamedSetting, ...]) -> Iterator[_Source]:
     """The view of the study of a spec, which is run here first."""
     from sprag.service.reading.quantities import SI
     from sprag.service.reading.reader import CAPTIONS, Choice

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from fastapi import Query
 
-from sprag.service.views.setting import Asked, settings_of
+from sprag.service.views.setting import NamedSetting, settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Collection, Iterable
@@ -43,7 +43,7 @@ def asking(
     return asked
 
 
-def _parameter(asked: Asked) -> Parameter:
+def _parameter(asked: NamedSetting) -> Parameter:
     setting = asked.setting
     limits = {"ge": setting.low, "le": setting.high, "min_length": setting.least, "max_length": setting.longest}
     query = Query(

@@ -17,7 +17,7 @@ from sprag.service.storage.studies.records import CaseColumns
 from sprag.service.views import study_view
 from sprag.service.views.curves import completed_query
 from sprag.service.views.study_questions import ANSWERS, AnswersQuestion
-from sprag.service.views.study_view import Found, StudyView
+from sprag.service.views.study_view import StudyAnswer, StudyView
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ class AnswersView(StudyView[AnswersQuestion, AnswersChoice, StudyAnswers]):
 
     about = ANSWERS
     content = "Answers, as JSON, a table or a picture."
-    answer = m.AnswerReport
+    shape = m.AnswerReport
 
     def choose(self, study: Study, question: AnswersQuestion) -> AnswersChoice:
         """The curves where some are chosen, and the working point."""
@@ -80,25 +80,27 @@ class AnswersView(StudyView[AnswersQuestion, AnswersChoice, StudyAnswers]):
         """The answers."""
         return answers_of(library, study_id, chosen.query, chosen.point)
 
-    def json(self, found: Found[AnswersChoice, StudyAnswers]) -> m.AnswerReport:
+    def json(self, answer: StudyAnswer[AnswersChoice, StudyAnswers]) -> m.AnswerReport:
         """The answers as JSON data."""
-        return report(found.study_id, found.study, found.made)
+        return report(answer.study_id, answer.study, answer.result)
 
-    def csv(self, found: Found[AnswersChoice, StudyAnswers], reading: Reading) -> bytes:
+    def csv(self, answer: StudyAnswer[AnswersChoice, StudyAnswers], reading: Reading) -> bytes:
         """A row for each answer."""
-        return answers_csv(found.study, found.made, reading)
+        return answers_csv(answer.study, answer.result, reading)
 
-    def figure(self, found: Found[AnswersChoice, StudyAnswers], columns: int = 2) -> Figure | None:
+    def figure(self, answer: StudyAnswer[AnswersChoice, StudyAnswers], columns: int = 2) -> Figure | None:
         """The curves of the main results with their answers marked; None where the cases lie on no curve."""
-        if found.made.drawn is None:
+        if answer.result.drawn is None:
             return None
-        study = found.study
-        curve = curve_named([curve_name(one, study) for one in found.made.curves], found.chosen.curve)
-        return answers_figure(found.made, columns, chosen=curve)
+        study = answer.study
+        curve = curve_named([curve_name(one, study) for one in answer.result.curves], answer.chosen.curve)
+        return answers_figure(answer.result, columns, chosen=curve)
 
-    def picture(self, found: Found[AnswersChoice, StudyAnswers], reading: Reading, title: str, form: Picture) -> bytes:
+    def picture(
+        self, answer: StudyAnswer[AnswersChoice, StudyAnswers], reading: Reading, title: str, form: Picture
+    ) -> bytes:
         """Where there is a curve, and not too many."""
-        if found.made.drawn is None:
+        if answer.result.drawn is None:
             raise refused("format", "not-used", "there is no curve to draw", form, allowed="json or csv")
-        require_drawable([found.made.drawn])
-        return super().picture(found, reading, title, form)
+        require_drawable([answer.result.drawn])
+        return super().picture(answer, reading, title, form)

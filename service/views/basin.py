@@ -20,7 +20,7 @@ from sprag.service.reading.units import QuantityError, parse_quantity, split_qua
 from sprag.service.results.selection import ends_of_range
 from sprag.service.results.start_states import refuse_impossible
 from sprag.service.views.case_questions import BASIN, BasinQuestion
-from sprag.service.views.case_view import CaseView, Seen
+from sprag.service.views.case_view import CaseAnswer, CaseView
 from sprag.worker import models
 from sprag.worker.models import Basin
 from sprag.worker.models.common import case_machine
@@ -171,7 +171,7 @@ class BasinView(CaseView[BasinQuestion, BasinQuery, Basin]):
 
     about = BASIN
     content = "The grid as JSON or CSV, or a picture."
-    answer = BasinData
+    shape = BasinData
     lacks = N_("has no motion that settles")
 
     def choose(self, study: Study, case: int, question: BasinQuestion) -> BasinQuery:
@@ -183,22 +183,22 @@ class BasinView(CaseView[BasinQuestion, BasinQuery, Basin]):
         """Run the case from every start."""
         return models.run_basin(study, case, chosen.paths, *chosen.axes())
 
-    def json(self, seen: Seen[BasinQuery, Basin]) -> BasinData:
+    def json(self, answer: CaseAnswer[BasinQuery, Basin]) -> BasinData:
         """The grid as JSON data."""
-        return basin_json(seen.study, seen.chosen, seen.made)
+        return basin_json(answer.study, answer.chosen, answer.result)
 
-    def csv(self, seen: Seen[BasinQuery, Basin]) -> bytes:
+    def csv(self, answer: CaseAnswer[BasinQuery, Basin]) -> bytes:
         """A row for each start: both initial values, the number of the regime, and its mean speed."""
-        across, along = np.meshgrid(seen.made.x, seen.made.y)
-        members, speeds = seen.made.members.reshape(-1), seen.made.values[:, seen.made.names.index(_SPEED)]
+        across, along = np.meshgrid(answer.result.x, answer.result.y)
+        members, speeds = answer.result.members.reshape(-1), answer.result.values[:, answer.result.names.index(_SPEED)]
         columns: list[list[Any]] = [
             across.reshape(-1).tolist(),
             along.reshape(-1).tolist(),
             members.tolist(),
             [float(speeds[member]) if member >= 0 else None for member in members],
         ]
-        return table_csv([*seen.chosen.paths, "regime.number", _SPEED], columns)
+        return table_csv([*answer.chosen.paths, "regime.number", _SPEED], columns)
 
-    def figure(self, seen: Seen[BasinQuery, Basin], columns: int = 2, rows: Any = None) -> Figure:
+    def figure(self, answer: CaseAnswer[BasinQuery, Basin], columns: int = 2, rows: Any = None) -> Figure:
         """Points in the plane of both initial values, a colour for each regime."""
-        return basin_figure(seen.made, seen.chosen.paths, units_of(seen.study, seen.chosen))
+        return basin_figure(answer.result, answer.chosen.paths, units_of(answer.study, answer.chosen))

@@ -20,7 +20,7 @@ from sprag.service.reading.directions import case_values
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.service.results.selection import ends_of_range
 from sprag.service.views.case_questions import BRANCH, BranchQuestion
-from sprag.service.views.case_view import CaseView, Said, Seen
+from sprag.service.views.case_view import CaseAnswer, CaseView, Said
 from sprag.service.views.portrait import require_strobes
 from sprag.worker import models
 from sprag.worker.directions import SWEEP
@@ -231,7 +231,7 @@ class BranchView(CaseView[BranchQuestion, tuple[Along, str], CaseBranch]):
 
     about = BRANCH
     content = "The branch as JSON, its points as CSV, or a picture."
-    answer = Branch
+    shape = Branch
     lacks = N_("has no motion that settles")
 
     def choose(self, study: Study, case: int, question: BranchQuestion) -> tuple[Along, str]:
@@ -242,13 +242,13 @@ class BranchView(CaseView[BranchQuestion, tuple[Along, str], CaseBranch]):
         """Follow the branch."""
         return run_branch(study, case, chosen[0])
 
-    def json(self, seen: Seen[tuple[Along, str], CaseBranch]) -> Branch:
+    def json(self, answer: CaseAnswer[tuple[Along, str], CaseBranch]) -> Branch:
         """The branch as JSON data."""
-        return branch_json(seen.made, seen.study, seen.case, seen.chosen[0])
+        return branch_json(answer.result, answer.study, answer.case, answer.chosen[0])
 
-    def csv(self, seen: Seen[tuple[Along, str], CaseBranch]) -> bytes:
+    def csv(self, answer: CaseAnswer[tuple[Along, str], CaseBranch]) -> bytes:
         """The points of the branch."""
-        return branch_csv(seen.made, seen.chosen[0])
+        return branch_csv(answer.result, answer.chosen[0])
 
     def rows(self, store: Store, study_id: str, study: Study, case: int, chosen: tuple[Along, str]) -> OwnCases:
         """The finished cases of the study that differ from this one in the parameter only."""
@@ -260,21 +260,21 @@ class BranchView(CaseView[BranchQuestion, tuple[Along, str], CaseBranch]):
         return OwnCases(x[kept], y[kept], cases[kept])
 
     def figure(
-        self, seen: Seen[tuple[Along, str], CaseBranch], columns: int = 2, rows: OwnCases | None = None
+        self, answer: CaseAnswer[tuple[Along, str], CaseBranch], columns: int = 2, rows: OwnCases | None = None
     ) -> Figure:
         """One result over the parameter, with the study's own cases beside it."""
-        return branch_figure(seen.made, seen.study, *seen.chosen, rows)
+        return branch_figure(answer.result, answer.study, *answer.chosen, rows)
 
-    def said(self, seen: Seen[tuple[Along, str], CaseBranch]) -> Said:
+    def said(self, answer: CaseAnswer[tuple[Along, str], CaseBranch]) -> Said:
         """How far the branch goes, and what is special on it."""
-        data = {"points": len(seen.made.parameters), "specials": len(seen.made.specials)}
-        if seen.made.note:
-            why = _("case {case} has no branch: {why}", case=seen.case, why=_(seen.made.note))
+        data = {"points": len(answer.result.parameters), "specials": len(answer.result.specials)}
+        if answer.result.note:
+            why = _("case {case} has no branch: {why}", case=answer.case, why=_(answer.result.note))
             return Said([why], data, ok=False)
         sentence = _(
             "case {case}: {count} orbits of order {order}; from {first} to {last}",
-            case=seen.case, count=len(seen.made.parameters), order=seen.made.order,
-            first=_(seen.made.ends[0]), last=_(seen.made.ends[1]),
+            case=answer.case, count=len(answer.result.parameters), order=answer.result.order,
+            first=_(answer.result.ends[0]), last=_(answer.result.ends[1]),
         )  # fmt: skip
-        unit = unit_of(seen.study, seen.chosen[0].paths[0])
-        return Said([sentence, *(special_text(special, unit) for special in seen.made.specials)], data)
+        unit = unit_of(answer.study, answer.chosen[0].paths[0])
+        return Said([sentence, *(special_text(special, unit) for special in answer.result.specials)], data)

@@ -8,7 +8,7 @@ from sprag.service.answers.calibration import CalibrationReport
 from sprag.service.figures.calibration import calibration_figure
 from sprag.service.results.calibration import Calibration, calibration_csv, calibration_json, plan_of
 from sprag.service.views.study_questions import CALIBRATION, CalibrationQuestion
-from sprag.service.views.study_view import Found, StudyView
+from sprag.service.views.study_view import StudyAnswer, StudyView
 
 if TYPE_CHECKING:
     from sprag.service.figures.figure import Figure
@@ -22,7 +22,7 @@ class CalibrationView(StudyView[CalibrationQuestion, None, Calibration]):
 
     about = CALIBRATION
     content = "The calibration, as JSON, a table of the measured values or a picture."
-    answer = CalibrationReport
+    shape = CalibrationReport
 
     def choose(self, study: Study, question: CalibrationQuestion) -> None:
         """Nothing; FaultError where the study is no calibration."""
@@ -32,17 +32,17 @@ class CalibrationView(StudyView[CalibrationQuestion, None, Calibration]):
         """The calibration."""
         return library.calibrations.of(study_id)
 
-    def json(self, found: Found[None, Calibration]) -> CalibrationReport:
+    def json(self, answer: StudyAnswer[None, Calibration]) -> CalibrationReport:
         """The calibration as JSON data."""
-        return calibration_json(found.study_id, found.made)
+        return calibration_json(answer.study_id, answer.result)
 
-    def csv(self, found: Found[None, Calibration], reading: Reading) -> bytes:
+    def csv(self, answer: StudyAnswer[None, Calibration], reading: Reading) -> bytes:
         """The measured points beside the fit."""
-        return calibration_csv(found.made)
+        return calibration_csv(answer.result)
 
-    def figure(self, found: Found[None, Calibration], columns: int = 2) -> Figure:
+    def figure(self, answer: StudyAnswer[None, Calibration], columns: int = 2) -> Figure:
         """The measured points on the fitted curves, and the residuals."""
-        return calibration_figure(found.made, columns)
+        return calibration_figure(answer.result, columns)
 
 
 def calibration_report(library: Library, study_id: str) -> CalibrationReport:

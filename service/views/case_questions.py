@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Final
 
-from sprag.service.views.setting import About, Setting
+from sprag.service.views.setting import Setting, ViewInfo
 from sprag.worker.limits import (
     MAX_BASIN_POINTS,
     MAX_DIAGRAM_STROBES,
@@ -202,45 +202,45 @@ class TransientQuestion:
     ] = 1000
 
 
-TRAJECTORY: Final = About(
+TRAJECTORY: Final = ViewInfo(
     "trajectory",
     TrajectoryQuestion,
     "Compute every variable, torque, power and state of one case over time, or over the angle.",
     pictures=False,
 )
-ENGAGEMENTS: Final = About(
+ENGAGEMENTS: Final = ViewInfo(
     "engagements",
     EngagementsQuestion,
     "Compute every engagement of the clutches of one case, and the means of its periods.",
     pictures=False,
 )
-STROBES: Final = About(
+STROBES: Final = ViewInfo(
     "strobes",
     StrobesQuestion,
     "Compute the state of one case at the end of each excitation period, and its orbit.",
 )
-BRANCH: Final = About(
+BRANCH: Final = ViewInfo(
     "branch",
     BranchQuestion,
     "Follow the periodic motion of one case along a parameter: stable and unstable orbits, folds, doublings, grazings.",
 )
-DIAGRAM: Final = About(
+DIAGRAM: Final = ViewInfo(
     "diagram",
     DiagramQuestion,
     "Compute a bifurcation diagram: the strobes of the settled motions of one case along a parameter.",
 )
-SECTION: Final = About(
+SECTION: Final = ViewInfo(
     "section",
     SectionQuestion,
     "Compute a Poincare section: the strobes of the settled motion of one case at a phase of the excitation.",
 )
-BASIN: Final = About(
+BASIN: Final = ViewInfo(
     "basin",
     BasinQuestion,
     "Compute a basin: the regime to which one case comes from each start of a grid of two initial values.",
     starts=False,
 )
-TRANSIENT: Final = About(
+TRANSIENT: Final = ViewInfo(
     "transient",
     TransientQuestion,
     "Compute the run-up from rest of a machine shaft, a step of its load, or its coasting, over time.",

@@ -24,23 +24,23 @@ if TYPE_CHECKING:
     from sprag.service.figures.figure import Figure
     from sprag.service.figures.pictures.curves import Picture
     from sprag.service.storage.store import Store
-    from sprag.service.views.setting import About
+    from sprag.service.views.setting import ViewInfo
     from sprag.worker.models import KernelShape
     from sprag.worker.study import Study
 
 Question = TypeVar("Question")
 Chosen = TypeVar("Chosen")
-Made = TypeVar("Made")
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, slots=True)
-class Seen(Generic[Chosen, Made]):
+class CaseAnswer(Generic[Chosen, Result]):
     """A view of a case: of which study and case, what was chosen, and what was computed."""
 
     study: Study
     case: int
     chosen: Chosen
-    made: Made
+    result: Result
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,51 +62,51 @@ class Said:
     ok: bool = True
 
 
-class CaseView(ABC, Generic[Question, Chosen, Made]):
+class CaseView(ABC, Generic[Question, Chosen, Result]):
     """A view of a case.
 
     Attributes
     ----------
-    about : About
+    about : ViewInfo
         Its name, its question, and what it is.
     content : str
         What its files have, a sentence for the API.
-    answer : type
-        The shape of its JSON.
+    shape : type
+        That of its JSON.
     lacks : str
         What is said of a machine that has no such view.
     """
 
-    about: ClassVar[About]
+    about: ClassVar[ViewInfo]
     content: ClassVar[str]
-    answer: ClassVar[Any]
+    shape: ClassVar[Any]
     lacks: ClassVar[str] = ""
 
     @abstractmethod
     def choose(self, study: Study, case: int, question: Question) -> Chosen:
         """What a question means for a case; FaultError about a setting, or where the case has no such view."""
 
-    def shapes(self, study: Study) -> tuple[KernelShape, ...]:
+    def kernels(self, study: Study) -> tuple[KernelShape, ...]:
         """The kernels that the computation needs."""
         return (models.shape_of(study),)
 
     @abstractmethod
-    def compute(self, study: Study, case: int, chosen: Chosen) -> Made:
+    def compute(self, study: Study, case: int, chosen: Chosen) -> Result:
         """Run the case for the view. In a process that computes."""
 
     @abstractmethod
-    def json(self, seen: Seen[Chosen, Made]) -> Mapping[str, Any]:
+    def json(self, answer: CaseAnswer[Chosen, Result]) -> Mapping[str, Any]:
         """The view as JSON data."""
 
     @abstractmethod
-    def csv(self, seen: Seen[Chosen, Made]) -> bytes:
+    def csv(self, answer: CaseAnswer[Chosen, Result]) -> bytes:
         """The view as a table."""
 
     def rows(self, store: Store, study_id: str, study: Study, case: int, chosen: Chosen) -> Any:
         """What its figure shows of the rows of the study; None: nothing, so that it never changes."""
         return None
 
-    def figure(self, seen: Seen[Chosen, Made], columns: int = 2, rows: Any = None) -> Figure:
+    def figure(self, answer: CaseAnswer[Chosen, Result], columns: int = 2, rows: Any = None) -> Figure:
         """The view as a described figure, with so many panels in a row."""
         raise NotImplementedError  # those without pictures
 
@@ -114,19 +114,19 @@ class CaseView(ABC, Generic[Question, Chosen, Made]):
         """The last part of the name of its file."""
         return self.about.name
 
-    def said(self, seen: Seen[Chosen, Made]) -> Said | None:
+    def said(self, answer: CaseAnswer[Chosen, Result]) -> Said | None:
         """What a command says beside the file; None: nothing."""
         return None
 
 
-def see(study: Study, case: int, view: CaseView[Any, Any, Any], chosen: Any, start: int | None) -> Seen[Any, Any]:
+def see(study: Study, case: int, view: CaseView[Any, Any, Any], chosen: Any, start: int | None) -> CaseAnswer[Any, Any]:
     """Compute the view of a case, or of one of its starts. For a process that computes."""
-    return Seen(study, case, chosen, view.compute(*motion_of(study, case, start), chosen))
+    return CaseAnswer(study, case, chosen, view.compute(*motion_of(study, case, start), chosen))
 
 
-def written(view: CaseView[Any, Any, Any], seen: Seen[Any, Any], form: Literal["json", "csv"]) -> bytes:
+def written(view: CaseView[Any, Any, Any], answer: CaseAnswer[Any, Any], form: Literal["json", "csv"]) -> bytes:
     """The view in one of its two forms for programs."""
-    return view.csv(seen) if form == "csv" else to_bytes(view.json(seen))
+    return view.csv(answer) if form == "csv" else to_bytes(view.json(answer))
 
 
 def case_file(
@@ -136,7 +136,7 @@ def case_file(
     return written(view, see(study, case, view, chosen, start), form)
 
 
-def drawn(view: CaseView[Any, Any, Any], seen: Seen[Any, Any], form: Picture) -> bytes:
+def drawn(view: CaseView[Any, Any, Any], answer: CaseAnswer[Any, Any], form: Picture) -> bytes:
     """The view as a picture, in SI units."""
-    figure = read_figure(view.figure(seen), Reading(seen.study.model))
-    return draw_figure(figure, f"{seen.study.name}, case {seen.case}", form)
+    figure = read_figure(view.figure(answer), Reading(answer.study.model))
+    return draw_figure(figure, f"{answer.study.name}, case {answer.case}", form)

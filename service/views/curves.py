@@ -23,7 +23,7 @@ from sprag.service.results.regimes import kind_columns
 from sprag.service.results.stored_curves import drawn_curves, stored_curves, stored_map
 from sprag.service.views import study_view
 from sprag.service.views.study_questions import CURVES, MAP, CurvesQuestion, MapQuestion
-from sprag.service.views.study_view import Found, StudyView
+from sprag.service.views.study_view import StudyAnswer, StudyView
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ class CurvesView(StudyView[CurvesQuestion, CurveQuery, Curves]):
 
     about = CURVES
     content = "Curves, as JSON, a table or a picture."
-    answer = m.Curves
+    shape = m.Curves
 
     def choose(self, study: Study, question: CurvesQuestion) -> CurveQuery:
         """The query, with the axes held at their usual value if that is wanted."""
@@ -93,17 +93,17 @@ class CurvesView(StudyView[CurvesQuestion, CurveQuery, Curves]):
         """The curves; those that are drawn have the points of refined curves between their cases."""
         return (drawn_curves if drawn else stored_curves)(library.store, study_id, chosen)
 
-    def json(self, found: Found[CurveQuery, Curves]) -> dict[str, Any]:
+    def json(self, answer: StudyAnswer[CurveQuery, Curves]) -> dict[str, Any]:
         """The curves as JSON data."""
-        return {"study": found.study_id, **found.made.to_json()}
+        return {"study": answer.study_id, **answer.result.to_json()}
 
-    def csv(self, found: Found[CurveQuery, Curves], reading: Reading) -> bytes:
+    def csv(self, answer: StudyAnswer[CurveQuery, Curves], reading: Reading) -> bytes:
         """Every point of every curve as one row: fixed parameters, case, x, results, regime and its order, ending.
 
         Of refined curves also the results that are not interpolated up to the next point, of a sweep whether the motion
         jumps between this point and the next.
         """
-        curves = found.made
+        curves = answer.result
         names = kind_columns(curves.selection.regime)
         columns: dict[str, list[Any]] = {}
         for curve in curves.curves:
@@ -125,14 +125,16 @@ class CurvesView(StudyView[CurvesQuestion, CurveQuery, Curves]):
         units = {**curves.selection.units, **{info.name: info.unit for info in curves.selection.results}}
         return exports.read_table(columns, units, reading.units)
 
-    def figure(self, found: Found[CurveQuery, Curves], columns: int = 2) -> Figure:
+    def figure(self, answer: StudyAnswer[CurveQuery, Curves], columns: int = 2) -> Figure:
         """A panel for each result."""
-        return curves_figure([("", found.made)], columns)
+        return curves_figure([("", answer.result)], columns)
 
-    def picture(self, found: Found[CurveQuery, Curves], reading: Reading, title: str, form: pictures.Picture) -> bytes:
+    def picture(
+        self, answer: StudyAnswer[CurveQuery, Curves], reading: Reading, title: str, form: pictures.Picture
+    ) -> bytes:
         """Not too many curves and points."""
-        pictures.require_drawable([found.made])
-        return super().picture(found, reading, title, form)
+        pictures.require_drawable([answer.result])
+        return super().picture(answer, reading, title, form)
 
 
 def _jumped(curve: Curve) -> dict[str, list[Any]]:
@@ -158,7 +160,7 @@ class MapView(StudyView[MapQuestion, tuple[CurveQuery, bool], Map]):
 
     about = MAP
     content = "A map, as JSON, a table or a picture."
-    answer = m.Map
+    shape = m.Map
 
     def choose(self, study: Study, question: MapQuestion) -> tuple[CurveQuery, bool]:
         """The query, and the kind of picture."""
@@ -173,18 +175,18 @@ class MapView(StudyView[MapQuestion, tuple[CurveQuery, bool], Map]):
         """The map."""
         return stored_map(library.store, study_id, chosen[0])
 
-    def json(self, found: Found[tuple[CurveQuery, bool], Map]) -> dict[str, Any]:
+    def json(self, answer: StudyAnswer[tuple[CurveQuery, bool], Map]) -> dict[str, Any]:
         """The map as JSON data."""
-        return {"study": found.study_id, **found.made.to_json()}
+        return {"study": answer.study_id, **answer.result.to_json()}
 
-    def csv(self, found: Found[tuple[CurveQuery, bool], Map], reading: Reading) -> bytes:
+    def csv(self, answer: StudyAnswer[tuple[CurveQuery, bool], Map], reading: Reading) -> bytes:
         """Every point of the map as one row: fixed parameters, y, x, case, result, regime and its order, flags, ending.
 
         The squares of a refined map are no cases: they have neither regimes nor flags.
         """
-        drawn = found.made
+        drawn = answer.result
         across, points = len(drawn.x_values), drawn.values.size
-        kinds = kind_columns(models.regime_info(models.study_results(found.study)))
+        kinds = kind_columns(models.regime_info(models.study_results(answer.study)))
         flags = [""] * points if drawn.flags is None else list(chain.from_iterable(drawn.flags))
         columns: dict[str, list[Any]] = {
             **{path: [value] * points for path, value in drawn.at.items()},
@@ -205,7 +207,7 @@ class MapView(StudyView[MapQuestion, tuple[CurveQuery, bool], Map]):
         return exports.read_table(columns, units, reading.units)
 
     def picture(
-        self, found: Found[tuple[CurveQuery, bool], Map], reading: Reading, title: str, form: pictures.Picture
+        self, answer: StudyAnswer[tuple[CurveQuery, bool], Map], reading: Reading, title: str, form: pictures.Picture
     ) -> bytes:
         """Colours, or lines of equal value."""
-        return draw_map(read_map(found.made, reading), title, form, contours=found.chosen[1])
+        return draw_map(read_map(answer.result, reading), title, form, contours=answer.chosen[1])

@@ -20,7 +20,7 @@ from sprag.service.results.tolerances.yields import Yield, yields
 from sprag.service.views import study_view
 from sprag.service.views.curves import pairs
 from sprag.service.views.study_questions import RIBBON, YIELD, RibbonQuestion, YieldQuestion
-from sprag.service.views.study_view import Found, StudyView
+from sprag.service.views.study_view import StudyAnswer, StudyView
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class RibbonView(StudyView[RibbonQuestion, RibbonQuery, Ribbon]):
 
     about = RIBBON
     content = "Quantiles over the drives, as JSON, a table or a picture."
-    answer = m.RibbonReport
+    shape = m.RibbonReport
 
     def choose(self, study: Study, question: RibbonQuestion) -> RibbonQuery:
         """The query; a fault for several quantiles of a map."""
@@ -80,23 +80,23 @@ class RibbonView(StudyView[RibbonQuestion, RibbonQuery, Ribbon]):
         fetch = partial(library.store.rows.for_cases, study_id)
         return ribbon(study, infos, chosen.y or drawn_results(study, infos), chosen.asked, chosen.quantiles, fetch)
 
-    def json(self, found: Found[RibbonQuery, Ribbon]) -> m.RibbonReport:
+    def json(self, answer: StudyAnswer[RibbonQuery, Ribbon]) -> m.RibbonReport:
         """The ribbons as JSON data."""
-        return ribbon_json(found.study_id, found.made)
+        return ribbon_json(answer.study_id, answer.result)
 
-    def csv(self, found: Found[RibbonQuery, Ribbon], reading: Reading) -> bytes:
+    def csv(self, answer: StudyAnswer[RibbonQuery, Ribbon], reading: Reading) -> bytes:
         """A row for each place and quantile."""
-        return ribbon_csv(found.made)
+        return ribbon_csv(answer.result)
 
-    def figure(self, found: Found[RibbonQuery, Ribbon], columns: int = 2) -> Figure:
+    def figure(self, answer: StudyAnswer[RibbonQuery, Ribbon], columns: int = 2) -> Figure:
         """The quantiles over the places."""
-        return ribbon_figure(found.made)
+        return ribbon_figure(answer.result)
 
-    def picture(self, found: Found[RibbonQuery, Ribbon], reading: Reading, title: str, form: Picture) -> bytes:
+    def picture(self, answer: StudyAnswer[RibbonQuery, Ribbon], reading: Reading, title: str, form: Picture) -> bytes:
         """The ribbons, or a map of the first quantile."""
-        if not found.chosen.mapped:
-            return super().picture(found, reading, title, form)
-        return draw_map(read_map(ribbon_map(found.made, found.chosen.quantiles[0]), reading), title, form)
+        if not answer.chosen.mapped:
+            return super().picture(answer, reading, title, form)
+        return draw_map(read_map(ribbon_map(answer.result, answer.chosen.quantiles[0]), reading), title, form)
 
 
 class YieldView(StudyView[YieldQuestion, YieldQuery, Yield]):
@@ -104,7 +104,7 @@ class YieldView(StudyView[YieldQuestion, YieldQuery, Yield]):
 
     about = YIELD
     content = "Yields, as JSON, a table or a picture."
-    answer = m.YieldReport
+    shape = m.YieldReport
 
     def choose(self, study: Study, question: YieldQuestion) -> YieldQuery:
         """The query."""
@@ -120,23 +120,23 @@ class YieldView(StudyView[YieldQuestion, YieldQuery, Yield]):
         fetch = partial(library.store.rows.for_cases, study_id)
         return yields(study, models.study_results(study), chosen.conditions, chosen.asked, chosen.worst, fetch)
 
-    def json(self, found: Found[YieldQuery, Yield]) -> m.YieldReport:
+    def json(self, answer: StudyAnswer[YieldQuery, Yield]) -> m.YieldReport:
         """The yields as JSON data."""
-        return yield_json(found.study_id, found.made)
+        return yield_json(answer.study_id, answer.result)
 
-    def csv(self, found: Found[YieldQuery, Yield], reading: Reading) -> bytes:
+    def csv(self, answer: StudyAnswer[YieldQuery, Yield], reading: Reading) -> bytes:
         """A row for each place."""
-        return yield_csv(found.made)
+        return yield_csv(answer.result)
 
-    def figure(self, found: Found[YieldQuery, Yield], columns: int = 2) -> Figure:
+    def figure(self, answer: StudyAnswer[YieldQuery, Yield], columns: int = 2) -> Figure:
         """The yield over the places."""
-        return yield_figure(found.made)
+        return yield_figure(answer.result)
 
-    def picture(self, found: Found[YieldQuery, Yield], reading: Reading, title: str, form: Picture) -> bytes:
+    def picture(self, answer: StudyAnswer[YieldQuery, Yield], reading: Reading, title: str, form: Picture) -> bytes:
         """The yields over the places, or as a map."""
-        if not found.chosen.mapped:
-            return super().picture(found, reading, title, form)
-        return draw_map(read_map(yield_map(found.made), reading), title, form)
+        if not answer.chosen.mapped:
+            return super().picture(answer, reading, title, form)
+        return draw_map(read_map(yield_map(answer.result), reading), title, form)
 
 
 def both(
@@ -145,6 +145,6 @@ def both(
     """The answers with ribbons and yields, for a page."""
     ribbon, reached = RibbonView(), YieldView()
     return (
-        ribbon.json(Found(library, study_id, ribbons, ribbon.find(library, study_id, ribbons))),
-        reached.json(Found(library, study_id, wanted, reached.find(library, study_id, wanted))),
+        ribbon.json(StudyAnswer(library, study_id, ribbons, ribbon.find(library, study_id, ribbons))),
+        reached.json(StudyAnswer(library, study_id, wanted, reached.find(library, study_id, wanted))),
     )

@@ -12,7 +12,7 @@ from sprag.service.faults import FaultError, choice_of
 from sprag.service.languages import N_, _, decimal
 from sprag.service.reading.directions import case_values
 from sprag.service.views.case_questions import ENGAGEMENTS, EngagementsQuestion
-from sprag.service.views.case_view import CaseView, Said, Seen
+from sprag.service.views.case_view import CaseAnswer, CaseView, Said
 from sprag.worker import models
 from sprag.worker.models import Engagements
 
@@ -66,7 +66,7 @@ class EngagementsView(CaseView[EngagementsQuestion, str, Engagements]):
 
     about = ENGAGEMENTS
     content = "Both tables as JSON, or one of them as CSV."
-    answer = EngagementTables
+    shape = EngagementTables
     lacks = N_("has no clutches, so that nothing engages")
 
     def choose(self, study: Study, case: int, question: EngagementsQuestion) -> str:
@@ -78,23 +78,25 @@ class EngagementsView(CaseView[EngagementsQuestion, str, Engagements]):
         """Run the case."""
         return models.run_engagements(study, case)
 
-    def json(self, seen: Seen[str, Engagements]) -> EngagementTables:
+    def json(self, answer: CaseAnswer[str, Engagements]) -> EngagementTables:
         """Both tables as JSON data."""
-        return engagements_json(seen.made, seen.case, case_values(seen.study, seen.case))
+        return engagements_json(answer.result, answer.case, case_values(answer.study, answer.case))
 
-    def csv(self, seen: Seen[str, Engagements]) -> bytes:
+    def csv(self, answer: CaseAnswer[str, Engagements]) -> bytes:
         """One of the tables."""
-        return engagements_csv(seen.made, seen.chosen)
+        return engagements_csv(answer.result, answer.chosen)
 
     def file_name(self, chosen: str) -> str:
         """The name of the table."""
         return chosen
 
-    def said(self, seen: Seen[str, Engagements]) -> Said:
+    def said(self, answer: CaseAnswer[str, Engagements]) -> Said:
         """How many engagements there are, or why the case did not end ok."""
-        first, last = (decimal(f"{time:g}") for time in (seen.made.start, seen.made.end))
-        text = _("{count} engagements from {first} s to {last} s", count=len(seen.made.rows), first=first, last=last)
-        ok = seen.made.ending == models.OK
-        meaning = text if ok else _(models.ENDING_SENTENCES[seen.made.ending])
-        data = {"ending": seen.made.ending, "engagements": len(seen.made.rows)}
-        return Said([_("case {case}: {text}", case=seen.case, text=meaning)], data, ok)
+        first, last = (decimal(f"{time:g}") for time in (answer.result.start, answer.result.end))
+        text = _(
+            "{count} engagements from {first} s to {last} s", count=len(answer.result.rows), first=first, last=last
+        )
+        ok = answer.result.ending == models.OK
+        meaning = text if ok else _(models.ENDING_SENTENCES[answer.result.ending])
+        data = {"ending": answer.result.ending, "engagements": len(answer.result.rows)}
+        return Said([_("case {case}: {text}", case=answer.case, text=meaning)], data, ok)

@@ -12,7 +12,7 @@ from sprag.service.spec.design import points_spec
 from sprag.service.spec.stored import accepted
 from sprag.service.views import study_view
 from sprag.service.views.study_questions import EXPLORE, CasesQuestion, ExploreQuestion, SelectionQuestion
-from sprag.service.views.study_view import Found, StudyView
+from sprag.service.views.study_view import StudyAnswer, StudyView
 
 if TYPE_CHECKING:
     from sprag.service.figures.figure import Figure
@@ -60,7 +60,7 @@ class ExploreView(StudyView[ExploreQuestion, Chosen, Explored]):
 
     about = EXPLORE
     content = "A selection of cases, as JSON, a table or a picture."
-    answer = m.Exploration
+    shape = m.Exploration
     file = "selection"
     selects = True
 
@@ -77,14 +77,14 @@ class ExploreView(StudyView[ExploreQuestion, Chosen, Explored]):
         """The selected cases."""
         return explored(library, study_id, chosen[0])
 
-    def json(self, found: Found[Chosen, Explored]) -> m.Exploration:
+    def json(self, answer: StudyAnswer[Chosen, Explored]) -> m.Exploration:
         """The selection as JSON data."""
-        return explored_json(found.study_id, found.made)
+        return explored_json(answer.study_id, answer.result)
 
-    def csv(self, found: Found[Chosen, Explored], reading: Reading) -> bytes:
+    def csv(self, answer: StudyAnswer[Chosen, Explored], reading: Reading) -> bytes:
         """The first rows."""
-        return explored_csv(found.study, found.made, reading)
+        return explored_csv(answer.study, answer.result, reading)
 
-    def figure(self, found: Found[Chosen, Explored], columns: int = 2) -> Figure:
+    def figure(self, answer: StudyAnswer[Chosen, Explored], columns: int = 2) -> Figure:
         """Two quantities of all cases."""
-        return explore_figure(found.made, *found.chosen[1])
+        return explore_figure(answer.result, *answer.chosen[1])

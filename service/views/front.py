@@ -10,7 +10,7 @@ from sprag.service.figures.pictures.curves import MAX_PICTURE_POINTS, Picture, c
 from sprag.service.results.fronts import Designs, front_csv, front_json, goal_of
 from sprag.service.views import study_view
 from sprag.service.views.study_questions import FRONT, FrontQuestion
-from sprag.service.views.study_view import Found, StudyView
+from sprag.service.views.study_view import StudyAnswer, StudyView
 
 if TYPE_CHECKING:
     from sprag.service.figures.figure import Figure
@@ -24,7 +24,7 @@ class FrontView(StudyView[FrontQuestion, FrontQuestion, Designs]):
 
     about = FRONT
     content = "Designs, as JSON, a table or a picture."
-    answer = m.FrontReport
+    shape = m.FrontReport
     selects = True
 
     def choose(self, study: Study, question: FrontQuestion) -> FrontQuestion:
@@ -40,19 +40,21 @@ class FrontView(StudyView[FrontQuestion, FrontQuestion, Designs]):
         """The ranked designs."""
         return library.fronts.of(study_id, exact=chosen.exact)
 
-    def json(self, found: Found[FrontQuestion, Designs]) -> m.FrontReport:
+    def json(self, answer: StudyAnswer[FrontQuestion, Designs]) -> m.FrontReport:
         """The designs as JSON data."""
-        return front_json(found.study_id, found.made, found.chosen.limit)
+        return front_json(answer.study_id, answer.result, answer.chosen.limit)
 
-    def csv(self, found: Found[FrontQuestion, Designs], reading: Reading) -> bytes:
+    def csv(self, answer: StudyAnswer[FrontQuestion, Designs], reading: Reading) -> bytes:
         """A row for each design."""
-        return front_csv(found.made, found.chosen.limit)
+        return front_csv(answer.result, answer.chosen.limit)
 
-    def figure(self, found: Found[FrontQuestion, Designs], columns: int = 2) -> Figure:
+    def figure(self, answer: StudyAnswer[FrontQuestion, Designs], columns: int = 2) -> Figure:
         """The designs over two quantities."""
-        return front_figure(found.made, found.chosen.x, found.chosen.y)
+        return front_figure(answer.result, answer.chosen.x, answer.chosen.y)
 
-    def picture(self, found: Found[FrontQuestion, Designs], reading: Reading, title: str, form: Picture) -> bytes:
+    def picture(
+        self, answer: StudyAnswer[FrontQuestion, Designs], reading: Reading, title: str, form: Picture
+    ) -> bytes:
         """Not too many designs."""
-        check_size("designs", len(found.made.numbers), MAX_PICTURE_POINTS)
-        return super().picture(found, reading, title, form)
+        check_size("designs", len(answer.result.numbers), MAX_PICTURE_POINTS)
+        return super().picture(answer, reading, title, form)

@@ -10,7 +10,7 @@ from sprag.service.figures.portrait import portrait_figure
 from sprag.service.languages import N_
 from sprag.service.reading.directions import case_values
 from sprag.service.views.case_questions import STROBES, StrobesQuestion
-from sprag.service.views.case_view import CaseView, Seen
+from sprag.service.views.case_view import CaseAnswer, CaseView
 from sprag.service.views.setting import choices_of
 from sprag.service.views.trajectory import timed_values, trajectory_csv
 from sprag.worker import models
@@ -47,7 +47,7 @@ class StrobesView(CaseView[StrobesQuestion, str, Portrait]):
 
     about = STROBES
     content = "Strobes and orbit as JSON, one of them as CSV, or a picture."
-    answer = PortraitData
+    shape = PortraitData
     lacks = N_("has no motion that settles")
 
     def choose(self, study: Study, case: int, question: StrobesQuestion) -> str:
@@ -59,17 +59,17 @@ class StrobesView(CaseView[StrobesQuestion, str, Portrait]):
         """Run the case."""
         return models.run_portrait(study, case)
 
-    def json(self, seen: Seen[str, Portrait]) -> PortraitData:
+    def json(self, answer: CaseAnswer[str, Portrait]) -> PortraitData:
         """Strobes and orbit as JSON data."""
-        return portrait_json(seen.made, seen.case, case_values(seen.study, seen.case))
+        return portrait_json(answer.result, answer.case, case_values(answer.study, answer.case))
 
-    def csv(self, seen: Seen[str, Portrait]) -> bytes:
+    def csv(self, answer: CaseAnswer[str, Portrait]) -> bytes:
         """One of the tables."""
-        return trajectory_csv(seen.made.strobes if seen.chosen == "strobes" else seen.made.orbit)
+        return trajectory_csv(answer.result.strobes if answer.chosen == "strobes" else answer.result.orbit)
 
-    def figure(self, seen: Seen[str, Portrait], columns: int = 2, rows: Any = None) -> Figure:
+    def figure(self, answer: CaseAnswer[str, Portrait], columns: int = 2, rows: Any = None) -> Figure:
         """Orbit and strobes, beside the strobes period by period."""
-        return portrait_figure(seen.made, models.presentation_of(seen.study), columns)
+        return portrait_figure(answer.result, models.presentation_of(answer.study), columns)
 
     def file_name(self, chosen: str) -> str:
         """The name of the table."""

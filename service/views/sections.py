@@ -20,7 +20,7 @@ from sprag.service.reading.units import QuantityError, parse_quantity, split_qua
 from sprag.service.results.start_states import refuse_impossible
 from sprag.service.views.branch import range_of
 from sprag.service.views.case_questions import DIAGRAM, SECTION, DiagramQuestion, SectionQuestion
-from sprag.service.views.case_view import CaseView, Seen
+from sprag.service.views.case_view import CaseAnswer, CaseView
 from sprag.service.views.portrait import require_strobes
 from sprag.worker.models.abilities import run_sections
 from sprag.worker.models.common import case_machine
@@ -129,7 +129,7 @@ class DiagramView(CaseView[DiagramQuestion, tuple[Sampling, str], CaseSections])
 
     about = DIAGRAM
     content = "The strobes as JSON or CSV, or a picture."
-    answer = Sections
+    shape = Sections
     lacks = N_("has no motion that settles")
 
     def choose(self, study: Study, case: int, question: DiagramQuestion) -> tuple[Sampling, str]:
@@ -142,17 +142,19 @@ class DiagramView(CaseView[DiagramQuestion, tuple[Sampling, str], CaseSections])
         """Settle the case for each value of the parameter."""
         return run_sections(study, case, chosen[0])
 
-    def json(self, seen: Seen[tuple[Sampling, str], CaseSections]) -> Sections:
+    def json(self, answer: CaseAnswer[tuple[Sampling, str], CaseSections]) -> Sections:
         """The strobes as JSON data."""
-        return sections_json(seen.made, seen.study, seen.case, seen.chosen[0], section=False)
+        return sections_json(answer.result, answer.study, answer.case, answer.chosen[0], section=False)
 
-    def csv(self, seen: Seen[tuple[Sampling, str], CaseSections]) -> bytes:
+    def csv(self, answer: CaseAnswer[tuple[Sampling, str], CaseSections]) -> bytes:
         """A row for each strobe."""
-        return sections_csv(seen.made, seen.chosen[0], section=False)
+        return sections_csv(answer.result, answer.chosen[0], section=False)
 
-    def figure(self, seen: Seen[tuple[Sampling, str], CaseSections], columns: int = 2, rows: Any = None) -> Figure:
+    def figure(
+        self, answer: CaseAnswer[tuple[Sampling, str], CaseSections], columns: int = 2, rows: Any = None
+    ) -> Figure:
         """One variable at the strobes over the parameter."""
-        return diagram_figure(seen.made, seen.study, *seen.chosen)
+        return diagram_figure(answer.result, answer.study, *answer.chosen)
 
 
 class SectionView(CaseView[SectionQuestion, Sampling, CaseSections]):
@@ -160,7 +162,7 @@ class SectionView(CaseView[SectionQuestion, Sampling, CaseSections]):
 
     about = SECTION
     content = "The strobes as JSON or CSV, or a picture."
-    answer = Sections
+    shape = Sections
     lacks = N_("has no motion that settles")
 
     def choose(self, study: Study, case: int, question: SectionQuestion) -> Sampling:
@@ -171,14 +173,14 @@ class SectionView(CaseView[SectionQuestion, Sampling, CaseSections]):
         """Settle the case."""
         return run_sections(study, case, chosen)
 
-    def json(self, seen: Seen[Sampling, CaseSections]) -> Sections:
+    def json(self, answer: CaseAnswer[Sampling, CaseSections]) -> Sections:
         """The strobes as JSON data."""
-        return sections_json(seen.made, seen.study, seen.case, seen.chosen, section=True)
+        return sections_json(answer.result, answer.study, answer.case, answer.chosen, section=True)
 
-    def csv(self, seen: Seen[Sampling, CaseSections]) -> bytes:
+    def csv(self, answer: CaseAnswer[Sampling, CaseSections]) -> bytes:
         """A row for each strobe."""
-        return sections_csv(seen.made, seen.chosen, section=True)
+        return sections_csv(answer.result, answer.chosen, section=True)
 
-    def figure(self, seen: Seen[Sampling, CaseSections], columns: int = 2, rows: Any = None) -> Figure:
+    def figure(self, answer: CaseAnswer[Sampling, CaseSections], columns: int = 2, rows: Any = None) -> Figure:
         """The strobes in the plane of angle and speed of each pendulum."""
-        return section_figure(seen.made, seen.study, seen.chosen)
+        return section_figure(answer.result, answer.study, answer.chosen)

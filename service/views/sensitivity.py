@@ -13,7 +13,7 @@ from sprag.service.figures.pictures.sensitivity import draw_sensitivity
 from sprag.service.results.sensitivity import Sensitivity, sensitivity
 from sprag.service.results.sensitivity_indices import Indices
 from sprag.service.views.study_questions import SENSITIVITY, SensitivityQuestion
-from sprag.service.views.study_view import Found, StudyView
+from sprag.service.views.study_view import StudyAnswer, StudyView
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -30,7 +30,7 @@ class SensitivityView(StudyView[SensitivityQuestion, tuple[str, ...], list[Sensi
 
     about = SENSITIVITY
     content = "Effects, as JSON, a table of indices or a picture."
-    answer = m.SensitivityReport
+    shape = m.SensitivityReport
 
     def choose(self, study: Study, question: SensitivityQuestion) -> tuple[str, ...]:
         """The names of the results."""
@@ -44,21 +44,21 @@ class SensitivityView(StudyView[SensitivityQuestion, tuple[str, ...], list[Sensi
         fetch = partial(store.rows.for_cases, study_id)
         return sensitivity(store.studies.study(study_id), store.studies.spec(study_id), list(chosen), fetch)
 
-    def json(self, found: Found[tuple[str, ...], list[Sensitivity]]) -> Mapping[str, Any]:
+    def json(self, answer: StudyAnswer[tuple[str, ...], list[Sensitivity]]) -> Mapping[str, Any]:
         """The sensitivities as JSON data, with warnings of parameters without effect."""
-        record = found.library.store.studies.get(found.study_id)
-        warnings = warned(found.library.unaffected.of(found.library.store, record))
-        return {"study": found.study_id, "results": [item.to_json() for item in found.made], **warnings}
+        record = answer.library.store.studies.get(answer.study_id)
+        warnings = warned(answer.library.unaffected.of(answer.library.store, record))
+        return {"study": answer.study_id, "results": [item.to_json() for item in answer.result], **warnings}
 
-    def csv(self, found: Found[tuple[str, ...], list[Sensitivity]], reading: Reading) -> bytes:
+    def csv(self, answer: StudyAnswer[tuple[str, ...], list[Sensitivity]], reading: Reading) -> bytes:
         """The indices."""
-        return indices_csv(found.made, reading)
+        return indices_csv(answer.result, reading)
 
     def picture(
-        self, found: Found[tuple[str, ...], list[Sensitivity]], reading: Reading, title: str, form: Picture
+        self, answer: StudyAnswer[tuple[str, ...], list[Sensitivity]], reading: Reading, title: str, form: Picture
     ) -> bytes:
         """Bars and lines."""
-        return draw_sensitivity(found.made, title, reading, form)
+        return draw_sensitivity(answer.result, title, reading, form)
 
 
 def sensitivities_shown(library: Library, study_id: str, names: Sequence[str]) -> list[m.ResultSensitivity]:

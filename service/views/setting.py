@@ -56,7 +56,7 @@ class Setting:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class NamedSetting:
     """A setting as the fronts make it: its name, its type, its default (``...``: required), and its description."""
 
     name: str
@@ -75,11 +75,11 @@ class Asked:
         return self.setting.option or f"--{self.alias.replace('_', '-')}"
 
 
-def settings_of(question: type) -> tuple[Asked, ...]:
+def settings_of(question: type) -> tuple[NamedSetting, ...]:
     """The settings of a question in their order."""
     hints = get_type_hints(question, include_extras=True)
     return tuple(
-        Asked(
+        NamedSetting(
             field.name,
             hints[field.name].__origin__,
             ... if field.default is MISSING else field.default,
@@ -100,7 +100,7 @@ def question_of(question: type[Question], texts: Mapping[str, str]) -> Question:
     return question(**{asked.name: _value(asked, text) for asked, text in given.items() if text})
 
 
-def _value(asked: Asked, text: str) -> str | int:
+def _value(asked: NamedSetting, text: str) -> str | int:
     if asked.type is not int:
         return text
     low, high = asked.setting.low or 0, asked.setting.high or 0
@@ -110,7 +110,7 @@ def _value(asked: Asked, text: str) -> str | int:
 
 
 @dataclass(frozen=True, slots=True)
-class About:
+class ViewInfo:
     """A view as every front knows it, without the engine.
 
     Attributes

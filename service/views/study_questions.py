@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal
 
 from annotated_types import Interval
 
-from sprag.service.views.setting import About, Setting
+from sprag.service.views.setting import Setting, ViewInfo
 from sprag.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, REGIME_CODES
 from sprag.worker.limits import (
     MAX_DESIGNS,
@@ -330,7 +330,7 @@ class SelectQuestion(SelectionQuestion):
     limit: Annotated[int, Setting("most cases", examples=(10,), low=1, high=MAX_POINTS_SELECTED, metavar="N")] = 50
 
 
-CURVES: Final = About(
+CURVES: Final = ViewInfo(
     "curves",
     CurvesQuestion,
     "Results against one axis. An axis of several values that is neither x nor "
@@ -338,38 +338,38 @@ CURVES: Final = About(
     "Without `x` or `y` they are the curves that the page of the study shows first. Refined curves tell their error "
     "and their jumps.",
 )
-MAP: Final = About("map", MapQuestion, "One result over two axes.")
-ANSWERS: Final = About(
+MAP: Final = ViewInfo("map", MapQuestion, "One result over two axes.")
+ANSWERS: Final = ViewInfo(
     "answers",
     AnswersQuestion,
     "The main answers of a study: no-load speed, largest power, best efficiency, stall torque, a working point.",
 )
-EXPLORE: Final = About(
+EXPLORE: Final = ViewInfo(
     "explore",
     ExploreQuestion,
     "Cases within ranges of parameters and results, sorted over all rows, with a histogram of each quantity.",
 )
-RIBBON: Final = About(
+RIBBON: Final = ViewInfo(
     "ribbon",
     RibbonQuestion,
     "Quantiles of results over the drives along an axis, with 95 % intervals, the nominal drive, and the causes.",
 )
-YIELD: Final = About(
+YIELD: Final = ViewInfo(
     "yield",
     YieldQuestion,
     "The share of drives that reach conditions, at each place and at all places, its causes, and the worst drives.",
 )
-FRONT: Final = About(
+FRONT: Final = ViewInfo(
     "front",
     FrontQuestion,
     "The designs of a study with a goal, the best first: variables, goals, limits, ranks, and the search's history.",
 )
-CALIBRATION: Final = About(
+CALIBRATION: Final = ViewInfo(
     "calibration",
     CalibrationQuestion,
     "The results of a calibration: values with intervals, correlations, residuals, the next point to measure.",
 )
-SENSITIVITY: Final = About(
+SENSITIVITY: Final = ViewInfo(
     "sensitivity",
     SensitivityQuestion,
     "Main effects of every axis on results, and shares of their variance (Sobol indices) or elementary effects.",

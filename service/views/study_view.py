@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from sprag.service.figures.pictures.curves import Picture
     from sprag.service.reading.reader import Choice, Reading
     from sprag.service.views.library import Library
-    from sprag.service.views.setting import About
+    from sprag.service.views.setting import ViewInfo
     from sprag.worker.study import Study
 
 #: Numbers of a view that the service itself reads and writes, in about ten milliseconds; more belong in another
@@ -30,17 +30,17 @@ FEW: Final = 20_000
 
 Question = TypeVar("Question")
 Chosen = TypeVar("Chosen")
-Made = TypeVar("Made")
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, slots=True)
-class Found(Generic[Chosen, Made]):
+class StudyAnswer(Generic[Chosen, Result]):
     """A view of a study: of which study, what was chosen, and what was found."""
 
     library: Library
     study_id: str
     chosen: Chosen
-    made: Made
+    result: Result
 
     @property
     def study(self) -> Study:
@@ -48,26 +48,26 @@ class Found(Generic[Chosen, Made]):
         return self.library.store.studies.study(self.study_id)
 
 
-class StudyView(ABC, Generic[Question, Chosen, Made]):
+class StudyView(ABC, Generic[Question, Chosen, Result]):
     """A view of a study.
 
     Attributes
     ----------
-    about : About
+    about : ViewInfo
         Its name, its question, and what it is.
     content : str
         What its files have, a sentence for the API.
-    answer : type
-        The shape of its JSON.
+    shape : type
+        That of its JSON.
     file : str
         The last part of the name of its file, where that is not its name.
     selects : bool
         Whether dragging in its figure selects what is drawn there.
     """
 
-    about: ClassVar[About]
+    about: ClassVar[ViewInfo]
     content: ClassVar[str]
-    answer: ClassVar[Any]
+    shape: ClassVar[Any]
     file: ClassVar[str] = ""
     selects: ClassVar[bool] = False
 
@@ -80,24 +80,24 @@ class StudyView(ABC, Generic[Question, Chosen, Made]):
         return False
 
     @abstractmethod
-    def find(self, library: Library, study_id: str, chosen: Chosen, *, drawn: bool = False) -> Made:
+    def find(self, library: Library, study_id: str, chosen: Chosen, *, drawn: bool = False) -> Result:
         """Find it in the rows of the study, as numbers or to be ``drawn``."""
 
     @abstractmethod
-    def json(self, found: Found[Chosen, Made]) -> Mapping[str, Any]:
+    def json(self, answer: StudyAnswer[Chosen, Result]) -> Mapping[str, Any]:
         """The view as JSON data."""
 
     @abstractmethod
-    def csv(self, found: Found[Chosen, Made], reading: Reading) -> bytes:
+    def csv(self, answer: StudyAnswer[Chosen, Result], reading: Reading) -> bytes:
         """The view as a table, in a reader's units."""
 
-    def figure(self, found: Found[Chosen, Made], columns: int = 2) -> Figure | None:
+    def figure(self, answer: StudyAnswer[Chosen, Result], columns: int = 2) -> Figure | None:
         """The view as a described figure with so many panels in a row; None where there is nothing to draw."""
         raise NotImplementedError  # those that are pictures of another kind
 
-    def picture(self, found: Found[Chosen, Made], reading: Reading, title: str, form: Picture) -> bytes:
+    def picture(self, answer: StudyAnswer[Chosen, Result], reading: Reading, title: str, form: Picture) -> bytes:
         """The view as a picture; SelectionError where there is more than one can show."""
-        figure = self.figure(found)
+        figure = self.figure(answer)
         assert figure is not None
         return draw_figure(read_figure(figure, reading), title, form)
 
@@ -106,8 +106,9 @@ def study_file(
     library: Library, study_id: str, view: StudyView[Any, Any, Any], chosen: Any, choice: Choice, title: str, form: str
 ) -> bytes:
     """Find the view of a study and write it as JSON, as CSV, or as a picture."""
-    found = Found(library, study_id, chosen, view.find(library, study_id, chosen, drawn=form not in ("json", "csv")))
+    drawn = form not in ("json", "csv")
+    answer = StudyAnswer(library, study_id, chosen, view.find(library, study_id, chosen, drawn=drawn))
     if form == "json":
-        return to_bytes(view.json(found))
+        return to_bytes(view.json(answer))
     reading = reading_of(library.store, study_id, choice)
-    return view.csv(found, reading) if form == "csv" else view.picture(found, reading, title, form)  # type: ignore[arg-type]
+    return view.csv(answer, reading) if form == "csv" else view.picture(answer, reading, title, form)  # type: ignore[arg-type]

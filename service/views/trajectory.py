@@ -17,7 +17,7 @@ from sprag.service.reading.quantities import Units
 from sprag.service.reading.units import PERIOD_NAMES, QuantityError, parse_quantity, split_quantity, to_float
 from sprag.service.results.selection import ends_of_range
 from sprag.service.views.case_questions import TRAJECTORY, TrajectoryQuestion
-from sprag.service.views.case_view import CaseView, Said, Seen
+from sprag.service.views.case_view import CaseAnswer, CaseView, Said
 from sprag.worker import models
 from sprag.worker.models import Trajectory
 
@@ -112,7 +112,7 @@ class TrajectoryView(CaseView[TrajectoryQuestion, tuple[float, float, int], Traj
 
     about = TRAJECTORY
     content = "Instantaneous values, as JSON or CSV."
-    answer = TrajectoryData | AngleTable
+    shape = TrajectoryData | AngleTable
 
     def choose(self, study: Study, case: int, question: TrajectoryQuestion) -> tuple[float, float, int]:
         """First and last place, and their number."""
@@ -122,25 +122,27 @@ class TrajectoryView(CaseView[TrajectoryQuestion, tuple[float, float, int], Traj
         """Run the case."""
         return models.run_trajectory(study, case, *chosen)
 
-    def json(self, seen: Seen[tuple[float, float, int], Trajectory]) -> AngleTable | TrajectoryData:
+    def json(self, answer: CaseAnswer[tuple[float, float, int], Trajectory]) -> AngleTable | TrajectoryData:
         """The values as JSON data."""
-        return trajectory_json(seen.made, seen.case, case_values(seen.study, seen.case))
+        return trajectory_json(answer.result, answer.case, case_values(answer.study, answer.case))
 
-    def csv(self, seen: Seen[tuple[float, float, int], Trajectory]) -> bytes:
+    def csv(self, answer: CaseAnswer[tuple[float, float, int], Trajectory]) -> bytes:
         """A row for each place."""
-        return trajectory_csv(seen.made)
+        return trajectory_csv(answer.result)
 
     def file_name(self, chosen: tuple[float, float, int]) -> str:
         """None: the file is the motion itself."""
         return ""
 
-    def said(self, seen: Seen[tuple[float, float, int], Trajectory]) -> Said:
+    def said(self, answer: CaseAnswer[tuple[float, float, int], Trajectory]) -> Said:
         """How many places there are, or why there are none."""
-        way = _("{count} points in time") if seen.made.along == "time" else _("{count} points over the angle")
-        text = way.format(count=seen.chosen[2])
-        if not len(seen.made.values):
-            text = _("no points: {why}", why=_(models.ENDING_SENTENCES[seen.made.ending]))
-        sentence = _("case {case}: {text}", case=seen.case, text=f"{seen.made.ending}, {text}")
+        way = _("{count} points in time") if answer.result.along == "time" else _("{count} points over the angle")
+        text = way.format(count=answer.chosen[2])
+        if not len(answer.result.values):
+            text = _("no points: {why}", why=_(models.ENDING_SENTENCES[answer.result.ending]))
+        sentence = _("case {case}: {text}", case=answer.case, text=f"{answer.result.ending}, {text}")
         return Said(
-            [sentence], {"ending": seen.made.ending, "points": len(seen.made.values)}, seen.made.ending == models.OK
+            [sentence],
+            {"ending": answer.result.ending, "points": len(answer.result.values)},
+            answer.result.ending == models.OK,
         )

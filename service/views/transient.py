@@ -15,7 +15,7 @@ from sprag.service.reading.numbers import in_language
 from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.service.reading.wording import number, unit_text
 from sprag.service.views.case_questions import TRANSIENT, TransientQuestion
-from sprag.service.views.case_view import CaseView, Said, Seen
+from sprag.service.views.case_view import CaseAnswer, CaseView, Said
 from sprag.service.views.trajectory import timed_values, trajectory_csv
 from sprag.worker import models
 from sprag.worker.limits import MIN_TRAJECTORY_POINTS
@@ -158,7 +158,7 @@ class TransientView(CaseView[TransientQuestion, tuple[Course, int], Transient]):
 
     about = TRANSIENT
     content = "The transient as JSON, its values over time as CSV, or a picture."
-    answer = TransientData
+    shape = TransientData
     lacks = N_("has no transients")
 
     def choose(self, study: Study, case: int, question: TransientQuestion) -> tuple[Course, int]:
@@ -166,36 +166,38 @@ class TransientView(CaseView[TransientQuestion, tuple[Course, int], Transient]):
         given = {name: getattr(question, name) for name in _RANGES}
         return course_of(study, case, question.kind, given), question.points
 
-    def shapes(self, study: Study) -> tuple[KernelShape, ...]:
+    def kernels(self, study: Study) -> tuple[KernelShape, ...]:
         """That of transients is compiled apart."""
-        return shape_of_transients(study), *super().shapes(study)
+        return shape_of_transients(study), *super().kernels(study)
 
     def compute(self, study: Study, case: int, chosen: tuple[Course, int]) -> Transient:
         """Run the transient."""
         return run_transient(study, case, *chosen)
 
-    def json(self, seen: Seen[tuple[Course, int], Transient]) -> TransientData:
+    def json(self, answer: CaseAnswer[tuple[Course, int], Transient]) -> TransientData:
         """The transient as JSON data."""
-        return transient_json(seen.made, seen.study, seen.case, seen.chosen[0])
+        return transient_json(answer.result, answer.study, answer.case, answer.chosen[0])
 
-    def csv(self, seen: Seen[tuple[Course, int], Transient]) -> bytes:
+    def csv(self, answer: CaseAnswer[tuple[Course, int], Transient]) -> bytes:
         """Its values over time."""
-        return trajectory_csv(seen.made.motion)
+        return trajectory_csv(answer.result.motion)
 
-    def figure(self, seen: Seen[tuple[Course, int], Transient], columns: int = 2, rows: object = None) -> Figure:
+    def figure(
+        self, answer: CaseAnswer[tuple[Course, int], Transient], columns: int = 2, rows: object = None
+    ) -> Figure:
         """Speed, torques and energy over time."""
-        return transient_figure(seen.made)
+        return transient_figure(answer.result)
 
     def file_name(self, chosen: tuple[Course, int]) -> str:
         """The name of its kind."""
         return chosen[0].kind
 
-    def said(self, seen: Seen[tuple[Course, int], Transient]) -> Said:
+    def said(self, answer: CaseAnswer[tuple[Course, int], Transient]) -> Said:
         """Its end and its cause, and the results."""
-        lines = [_("case {case}: {text}", case=seen.case, text=f"{seen.made.outcome}. {_(seen.made.cause)}")]
+        lines = [_("case {case}: {text}", case=answer.case, text=f"{answer.result.outcome}. {_(answer.result.cause)}")]
         for name, unit, meaning in RESULTS:
-            if math.isfinite(seen.made.results[name]):
-                value = f"{number(seen.made.results[name], 6)} {unit_text(unit)}".rstrip()
+            if math.isfinite(answer.result.results[name]):
+                value = f"{number(answer.result.results[name], 6)} {unit_text(unit)}".rstrip()
                 lines.append(f"  {name} = {value}  ({_(meaning)})")
-        data = {"outcome": seen.made.outcome, "cause": seen.made.cause, "results": results_json(seen.made)}
-        return Said(lines, data, seen.made.outcome == completed(seen.chosen[0]))
+        data = {"outcome": answer.result.outcome, "cause": answer.result.cause, "results": results_json(answer.result)}
+        return Said(lines, data, answer.result.outcome == completed(answer.chosen[0]))

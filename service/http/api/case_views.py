@@ -34,13 +34,13 @@ def _add(view: CaseView[Any, Any, Any]) -> None:
     ) -> Response:  # fmt: skip
         written: Any = chosen if about.pictures else choose_format(work.request, form, TABLE_FORMATS)
         study, asked = await work.case_of(study_id, case, partial(view.choose, case=case, question=question), which)
-        for shape in view.shapes(study):
-            await work.load(shape)
+        for kernel in view.kernels(study):
+            await work.load(kernel)
         if written in TABLE_FORMATS:
             content = await work.compute(case_file, study, case, view, asked, written, which)
             return table(content, written, "-".join(filter(None, (study_id, "case", str(case), view.file_name(asked)))))
-        seen = await work.compute(see, study, case, view, asked, which)
-        figure = read_figure(view.figure(seen), Reading(study.model))
+        answer = await work.compute(see, study, case, view, asked, which)
+        figure = read_figure(view.figure(answer), Reading(study.model))
         return await picture(draw_figure, written, figure, f"{study.name}, case {case}").response(work)
 
     about = view.about
@@ -53,7 +53,7 @@ def _add(view: CaseView[Any, Any, Any]) -> None:
         f"/{{case:case}}/{about.name}",
         name=f"get_{about.name}",
         description=about.summary,
-        response_model=view.answer,
+        response_model=view.shape,
         responses=responses,
     )(asking(answer, about.question, without))
 

@@ -49,7 +49,7 @@ def _add(view: StudyView[Any, Any, Any]) -> None:
         f"/{name}",
         name=f"get_{_NAMES.get(name, name)}",
         description=view.about.summary,
-        response_model=view.answer,
+        response_model=view.shape,
         responses={**files(view.content, DRAWN_FORMATS.values()), **problems(*PROBLEMS), **not_modified()},
     )(asking(answer, view.about.question))
 

@@ -54,7 +54,7 @@ MOST_POINTS: Final = 1_000
 
 
 @dataclass(frozen=True, slots=True)
-class ExploreView:
+class ExplorePage:
     """What the page shows: the answer of the API for the choices of the address, and these.
 
     ``typed`` has what stands in the fields of text, by parameter of the address.
@@ -128,7 +128,7 @@ def _with_unit_of_end(ends: dict[str, str]) -> dict[str, str]:
     return found
 
 
-def explore_view(library: Library, study_id: str, given: Sequence[tuple[str, str]], choice: Choice) -> ExploreView:
+def explore_view(library: Library, study_id: str, given: Sequence[tuple[str, str]], choice: Choice) -> ExplorePage:
     """The page of a study; where its address asks for what there is not, the rest of it, with what is wrong."""
     params = QueryParams(list(given))
     query, faults = read_choice(
@@ -141,10 +141,10 @@ def explore_view(library: Library, study_id: str, given: Sequence[tuple[str, str
         faults, axes = (*faults, *error.faults), chosen_pair(found, "", "")
     answer = explored_json(study_id, found)
     typed = {"limit": params.get("limit") or str(query.limit), **dict(_ranges(params))}
-    return ExploreView(query, answer, axes, linked(found, answer["quantities"], axes), faults, typed)
+    return ExplorePage(query, answer, axes, linked(found, answer["quantities"], axes), faults, typed)
 
 
-def _field_names(view: ExploreView, reading: Reading) -> dict[str, str]:
+def _field_names(view: ExplorePage, reading: Reading) -> dict[str, str]:
     """What the fields are called in which something is wrong, by parameter of the address."""
     named = {"limit": _("Rows")}
     for item in view.found["quantities"]:
@@ -169,7 +169,7 @@ def _many(context: Context, study_id: str) -> bool:
     return context.store.studies.study(study_id).cases > FEW
 
 
-def _page(context: Context, study_id: str, view: ExploreView, given: Sequence[tuple[str, str]]) -> Response:
+def _page(context: Context, study_id: str, view: ExplorePage, given: Sequence[tuple[str, str]]) -> Response:
     study = context.store.studies.study(study_id)
     infos, query = models.study_results(study), view.query
     kept = [(key, value) for key, value in given if value.strip() and key != "sort"]

@@ -25,7 +25,7 @@ from sprag.service.http.web.figures.fits import fits_of, has_measured_clutch
 from sprag.service.http.web.form.values import changed_meanwhile
 from sprag.service.http.web.held import fixed_choices
 from sprag.service.http.web.saved_views import report_figures, saved_here, view_actions
-from sprag.service.http.web.study_answers import AnswersView, answers_view
+from sprag.service.http.web.study_answers import AnswersOnPage, answers_view
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended, Work
 from sprag.service.jobs import checks
@@ -160,7 +160,7 @@ def _study_page(
     context: Context,
     study_id: str,
     fits: Mapping[str, tuple[ClutchFitReport, FitChart]],
-    view: AnswersView,
+    view: AnswersOnPage,
     usual: CurveQuery | None,
     extension: Mapping[str, Any],
 ) -> Response:
@@ -203,7 +203,7 @@ def _study_page(
     )
 
 
-def _status(view: AnswersView, extension: Mapping[str, Any]) -> int:
+def _status(view: AnswersOnPage, extension: Mapping[str, Any]) -> int:
     """The status of the page: whether one of its forms is refused, or its labels were changed meanwhile."""
     if extension["untaken"] or view.faults or extension["wrong"]:
         return 422
@@ -233,7 +233,7 @@ def _drawable(points: int) -> bool:
 
 
 def _main_figure(
-    study: Study, study_id: str, query: CurveQuery | None, view: AnswersView, reading: Reading
+    study: Study, study_id: str, query: CurveQuery | None, view: AnswersOnPage, reading: Reading
 ) -> dict[str, Any]:
     """The addresses of the figure on the page, of its picture and of the page where others are chosen; its caption."""
     chosen, in_file = address_pairs(CHOICE.get()), file_pairs()
@@ -274,7 +274,7 @@ def _main_figure(
 
 
 def _chosen_figure(
-    study: Study, study_id: str, query: CurveQuery, view: AnswersView, reading: Reading
+    study: Study, study_id: str, query: CurveQuery, view: AnswersOnPage, reading: Reading
 ) -> dict[str, Any]:
     """The curves of a query, or the map of a study that refines one, as of `_main_figure`."""
     chosen, in_file = address_pairs(CHOICE.get()), file_pairs()

@@ -62,7 +62,7 @@ class FamilyRow:
 
 
 @dataclass(frozen=True, slots=True)
-class AnswersView:
+class AnswersOnPage:
     """What the page shows of the answers of a study.
 
     Attributes
@@ -115,7 +115,7 @@ def answers_choice(study: Study, given: QueryParams, usual: CurveQuery | None) -
 
 def answers_view(
     library: Library, study_id: str, given: Sequence[tuple[str, str]], usual: CurveQuery | None, choice: Choice
-) -> AnswersView:
+) -> AnswersOnPage:
     """The answers of a study as the page shows them; those of the ``usual`` curves where others cannot be shown."""
     study, params = library.store.studies.study(study_id), QueryParams(list(given))
     faults: tuple[Fault, ...] = ()
@@ -149,17 +149,17 @@ def _view(
     curve: str,
     reading: Reading,
     choice: Choice,
-) -> AnswersView:
+) -> AnswersOnPage:
     names = [curve_name(one, study) for one in found.curves]
     asked_for = curve_named(names, curve)
     chosen = _usual_curve(study, found) if asked_for is None else asked_for
     one = found.curves[chosen] if found.curves else None
     overall = [_tile(item, found.unit, reading, study) for item in found.overall if item.value is not None]
     if one is None:
-        return AnswersView(faults, overall=overall)
+        return AnswersOnPage(faults, overall=overall)
     tiles, here = ([_tile(item, found.unit, reading) for item in part] for part in (one.answers, one.working_point))
     if found.query is None:
-        return AnswersView(faults, tiles=tiles or here, here=here if tiles else [])
+        return AnswersOnPage(faults, tiles=tiles or here, here=here if tiles else [])
     pairs = pairs_of(found.query)
     asked = [pair for pair in pairs if pair[0] != "y"]
     shown = [("point", point)] if point and not faults else []
@@ -171,7 +171,7 @@ def _view(
     named = [("curve", names[chosen]), ("columns", "2")]
     in_file = [*address_pairs(choice), *language_pairs()]
     picture = f"{address}/answers?{urlencode([*asked, *shown, ('format', 'svg'), *in_file])}"
-    return AnswersView(
+    return AnswersOnPage(
         faults,
         found.query,
         point or usual,

@@ -53,8 +53,8 @@ def _add(view: CaseView[Any, Any, Any]) -> None:
         rows = await in_thread(view.rows, work.context.store, study_id, study, case, asked)
 
         async def make() -> Response:
-            for shape in view.shapes(study):
-                await work.load(shape)
+            for kernel in view.kernels(study):
+                await work.load(kernel)
             reading = await in_thread(reading_of, work.context.store, study_id, choice)
             shown = study, case, view, asked, which, columns, rows, reading
             return json_response(await work.compute(case_figure, *shown))
