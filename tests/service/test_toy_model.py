@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from sprag.engine import Ending
 from sprag.engine.catalogue import Parameter, ResultInfo
 from sprag.engine.outcome import Trajectory
+from sprag.service.client import Client
 from sprag.service.formats import MEDIA_TYPES
 from sprag.service.http.web.form.fields import FORM_MODEL
 from sprag.service.http.web.form.machine import blocks
@@ -32,10 +34,15 @@ from sprag.worker.models.model import Model
 from sprag.worker.models.presentation import Presentation
 from sprag.worker.models.registry import model_of
 from sprag.worker.study import Study
+from tests.service.conftest import PortalTransport
 from tests.service.http.web.controls import Controls
 from tests.service.registered import create_table, registered
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from anyio.from_thread import BlockingPortal
+
     from tests.service.conftest import Service
 
 NAME = "damped-oscillator"
@@ -314,6 +321,30 @@ def test_its_cases_are_reused(finished: tuple[Service, str]) -> None:
     service, _ = finished
     preview = service.http.post("/api/v1/studies:preview", json=SPEC | {"name": "again"}).json()
     assert (preview["cases"], preview["reusable"]) == (12, 12)
+
+
+def test_commands_and_the_client_know_it(
+    finished: tuple[Service, str], sprag: Callable[..., Any], portal: BlockingPortal, tmp_path: Path
+) -> None:
+    service, study_id = finished
+    spec = tmp_path / "toy.json"
+    spec.write_text(json.dumps(SPEC))
+    assert sprag("validate", spec).code == 0
+    assert sprag("preview", spec, "--json").data["cases"] == 12
+    motion = sprag("trajectory", spec, "--case", 7, "--points", 5)
+    assert motion.code == 0
+    assert motion.out.splitlines()[0].split(",")[1] == "displacement"
+    wrong = tmp_path / "wrong.json"
+    wrong.write_text(json.dumps(SPEC | {"base": {"body": {"mass": 1, "spring_rate": -2}}}))
+    assert "/base/body/spring_rate" in sprag("validate", wrong, "--json").out
+    values = expected(service.store.studies.study(study_id))
+    with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
+        study = client.study(study_id)
+        table = study.table()
+        np.testing.assert_array_equal(table["displacement.end"], values)
+        assert table.attrs["units"]["displacement.end"] == "m"
+        drawn = study.curves("body.spring_rate", "displacement.end", by="body.mass").to_pandas()
+        assert len(drawn) == 12
 
 
 #: The mass follows from the spring; its values are those of some cases of `SPEC`.
