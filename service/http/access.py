@@ -13,7 +13,6 @@ import hmac
 import secrets
 import time
 from collections.abc import Mapping
-from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Final
@@ -89,8 +88,6 @@ class Grant:
 
 #: The grant of everybody where no token is needed.
 OPEN: Final = Grant("", "", Role.ADMINISTRATOR)
-#: The grant of the current request; None outside a request or where it is unknown.
-ASKING: ContextVar[Grant | None] = ContextVar("asking", default=None)
 
 
 class Access:

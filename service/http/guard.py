@@ -16,10 +16,10 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from sprag.sentences import Sentence
 from sprag.service.actor import Actor, Role, act_as
 from sprag.service.faults import ParameterFault, shown
-from sprag.service.http.access import ASKING, OPEN, Access, Grant, token_in
+from sprag.service.http.access import OPEN, Access, Grant, token_in
+from sprag.service.http.current import knowing
 from sprag.service.http.problems import ApiError, problem_response
 from sprag.service.http.roles import LOOKING
-from sprag.service.http.threads import CHANGING
 from sprag.service.http.web.problem_page import problem_page
 from sprag.service.http.web.way_in import LOGIN_PATH, way_in
 from sprag.service.logs import note_caller
@@ -96,16 +96,12 @@ class Guard:
         if scope["method"] == "HEAD":
             # HEAD is allowed wherever GET is; the server then sends no body.
             scope = {**scope, "method": "GET", "sprag.head": True}
-        asking = ASKING.set(scope["sprag.grant"])
-        changing = CHANGING.set(scope["method"] not in SAFE_METHODS and scope["path"] not in LOOKING)
+        grant, changing = scope["sprag.grant"], scope["method"] not in SAFE_METHODS and scope["path"] not in LOOKING
         try:
-            with act_as(self._note(scope)), self._counted(scope["sprag.grant"]):
+            with knowing(grant=grant, changing=changing), act_as(self._note(scope)), self._counted(grant):
                 await self._app(scope, _limited(receive), _with_headers(send))
         except _TooManyError as error:
             await problem_response(error)(scope, receive, _with_headers(send))
-        finally:
-            CHANGING.reset(changing)
-            ASKING.reset(asking)
 
     @contextmanager
     def _counted(self, grant: Grant | None) -> Iterator[None]:

@@ -7,16 +7,15 @@ the service: to links in JSON (`here`), to attributes of pages (`web.templates`)
 from __future__ import annotations
 
 import re
-from contextvars import ContextVar
 from typing import TYPE_CHECKING, Final
 
 from starlette.datastructures import MutableHeaders
 
+from sprag.service.http.current import current, knowing
+
 if TYPE_CHECKING:
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-#: The prefix of the service that answers the current request; "" where it has none.
-PREFIX: ContextVar[str] = ContextVar("prefix", default="")
 #: Targets of a Link header, and the path of a cookie.
 _TARGET: Final = re.compile(r"(?<=<)/(?!/)[^>]*(?=>)")
 _COOKIE_PATH: Final = re.compile(r"(?<=; path=)/(?=;|$)", re.IGNORECASE)
@@ -27,7 +26,7 @@ def here(address: str) -> str:
 
     Addresses of other services, relative ones, and those that have the prefix already stay as they are.
     """
-    prefix = PREFIX.get()
+    prefix = current().prefix
     if not prefix or not address.startswith("/") or address.startswith("//"):
         return address
     return address if f"{address}/".startswith((f"{prefix}/", f"{prefix}?")) else prefix + address
@@ -59,11 +58,8 @@ class Prefixed:
                 self._complete(MutableHeaders(scope=message))
             await send(message)
 
-        token = PREFIX.set(self._prefix)
-        try:
+        with knowing(prefix=self._prefix):
             await self._app(scope, receive, prefixed)
-        finally:
-            PREFIX.reset(token)
 
     def _complete(self, headers: MutableHeaders) -> None:
         """Add the prefix to the addresses in the headers."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextvars import ContextVar
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Final
 from urllib.parse import quote, unquote, urlencode, urlsplit
@@ -10,6 +9,7 @@ from urllib.parse import quote, unquote, urlencode, urlsplit
 from fastapi import Depends, Query, Request
 
 from sprag.service.faults import SelectionError
+from sprag.service.http.current import current, learn
 from sprag.service.http.language import language_pairs
 from sprag.service.reading.quantities import SI, TYPED, UNITS_PATTERN, read_units
 from sprag.service.reading.reader import CAPTIONS, CODES, Choice
@@ -19,10 +19,6 @@ if TYPE_CHECKING:
 
 UNITS_COOKIE: Final = "sprag_units"
 NAMES_COOKIE: Final = "sprag_names"
-#: The choice of the current request for a page.
-CHOICE: ContextVar[Choice] = ContextVar("choice", default=Choice(TYPED))  # noqa: B039 - frozen
-#: Address of the page that is made; "" for one that answers a form.
-PAGE: ContextVar[str] = ContextVar("page", default="")
 _YEAR: Final = 365 * 24 * 3600
 
 
@@ -36,10 +32,11 @@ async def page_choice(request: Request) -> Choice:
         names = CODES if kept.get(NAMES_COOKIE) == CODES else CAPTIONS
     read_units(units)
     choice = Choice(units or TYPED, names or CAPTIONS)
-    CHOICE.set(choice)
+    learn(choice=choice)
     if request.method == "GET":  # the address of a page that answers a form may have no page of its own
         # What the address says would hide what is chosen next.
-        PAGE.set(str(request.url.remove_query_params(["units", "names", "language"]).replace(scheme="", netloc="")))
+        own = request.url.remove_query_params(["units", "names", "language"])
+        learn(page=str(own.replace(scheme="", netloc="")))
     return choice
 
 
@@ -98,12 +95,12 @@ def address_pairs(choice: Choice) -> list[tuple[str, str]]:
 
 def file_pairs() -> list[tuple[str, str]]:
     """The choice of the page that is made, and its language, as parameters of the addresses of its files."""
-    return [*address_pairs(CHOICE.get()), *language_pairs()]
+    return [*address_pairs(current().choice), *language_pairs()]
 
 
 def read_as() -> str:
     """The choice of the page that is made, as the rest of an address of a figure that has a query already."""
-    return f"&{urlencode(address_pairs(CHOICE.get()))}"
+    return f"&{urlencode(address_pairs(current().choice))}"
 
 
 def file_read_as() -> str:
@@ -113,8 +110,8 @@ def file_read_as() -> str:
 
 def page_query() -> str:
     """The query of the address of the page that is made, with the choice of how it is read."""
-    own = urlsplit(PAGE.get()).query
-    return "&".join(filter(None, (own, urlencode(address_pairs(CHOICE.get())) if own else "")))
+    own = urlsplit(current().page).query
+    return "&".join(filter(None, (own, urlencode(address_pairs(current().choice)) if own else "")))
 
 
 def keep(response: Response, choice: Choice) -> None:

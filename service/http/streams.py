@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Final
 
 from starlette.responses import Response, StreamingResponse
 
-from sprag.service.http.access import ASKING, OPEN
+from sprag.service.http.access import OPEN
+from sprag.service.http.current import current
 from sprag.service.http.problems import ApiError
 from sprag.service.json_text import to_bytes
 from sprag.service.storage.errors import StoreError
@@ -43,7 +44,7 @@ async def event_stream(
         detail = f"{MAX_STREAMS} streams of events are open already."
         raise ApiError("unavailable", detail, headers={"Retry-After": "10"})
     async with AsyncExitStack() as place:
-        grant = ASKING.get() or OPEN
+        grant = current().grant or OPEN
         if grant is not OPEN:
             await place.enter_async_context(context.stream_shares.take(grant.share))
         await place.enter_async_context(context.streams)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import math
-from contextvars import ContextVar
 from enum import StrEnum
 from functools import partial, wraps
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -13,7 +12,9 @@ import anyio
 from anyio.lowlevel import RunVar
 from fastapi.routing import APIRoute
 
+from sprag.service.http.current import current, knowing
 from sprag.service.http.problems import ApiError
+from sprag.service.storage.database.session import Moment
 from sprag.worker.limits import LOCK_SECONDS, WRITING_THREADS
 
 if TYPE_CHECKING:
@@ -46,8 +47,6 @@ _NUMBERS: Final = {
     Threads.PIECES: 1,
     Threads.ANSWERS: 2,
 }
-#: Whether the current request changes something.
-CHANGING: ContextVar[bool] = ContextVar("changing", default=False)
 
 # Semaphores and limiters belong to an event loop, and tests have several.
 _PLACES: RunVar[dict[Threads, asyncio.Semaphore]] = RunVar("sprag_places")
@@ -61,9 +60,10 @@ async def in_thread(function: Callable[..., R], *args: Any, threads: Threads | N
     write lock of the database.
     """
     call = partial(function, *args, **options)
-    kind = threads or (Threads.WRITE if CHANGING.get() else Threads.READ)
+    kind = threads or (Threads.WRITE if current().changing else Threads.READ)
     if kind is Threads.READ:
-        return await anyio.to_thread.run_sync(call)
+        moment = current().moment
+        return await anyio.to_thread.run_sync(call if moment is None else partial(_joined, moment, call))
     place = _places()[kind]
     if kind is Threads.WRITE:
         try:
@@ -105,16 +105,41 @@ async def iterated(pieces: Iterable[bytes], threads: Threads = Threads.FILES) ->
         yield piece
 
 
+def _joined(moment: Moment, call: Callable[[], R]) -> R:
+    with moment.joined():
+        return call()
+
+
+async def end_moment() -> None:
+    """End the moment in which the current request reads; what it reads next is of another one."""
+    if moment := current().moment:
+        await anyio.to_thread.run_sync(moment.end)
+
+
 class ThreadedRoute(APIRoute):
-    """A route whose plain functions run `in_thread`."""
+    """A route whose plain functions run `in_thread`; what it reads without changing anything is of one moment."""
 
     def __init__(self, path: str, endpoint: Callable[..., Any], **options: Any) -> None:
-        super().__init__(path, endpoint if asyncio.iscoroutinefunction(endpoint) else _threaded(endpoint), **options)
+        super().__init__(path, _in_one_moment(endpoint), **options)
 
 
-def _threaded(endpoint: Callable[..., Any]) -> Callable[..., Any]:
+def _in_one_moment(endpoint: Callable[..., Any]) -> Callable[..., Any]:
+    @wraps(endpoint)
+    def here(*args: Any, **options: Any) -> Any:
+        try:
+            return endpoint(*args, **options)
+        finally:
+            if moment := current().moment:
+                moment.end()
+
+    answer = endpoint if asyncio.iscoroutinefunction(endpoint) else partial(in_thread, here)
+
     @wraps(endpoint)
     async def run(*args: Any, **options: Any) -> Any:
-        return await in_thread(partial(endpoint, *args, **options))
+        with knowing(moment=None if current().changing else Moment()):
+            try:
+                return await answer(*args, **options)
+            finally:
+                await end_moment()
 
     return run

@@ -15,10 +15,11 @@ from sprag.service.http.access import OPEN
 from sprag.service.http.context import study_with
 from sprag.service.http.respond import streamed
 from sprag.service.http.shares import turn
-from sprag.service.http.threads import in_thread
+from sprag.service.http.threads import end_moment, in_thread
 from sprag.service.languages.elsewhere import speak
 from sprag.service.results.start_states import check_start
 from sprag.service.spec.machine.shaft_check import NotCompiledError
+from sprag.service.storage.database.session import in_one_moment
 from sprag.worker import models
 from sprag.worker.limits import FILE_WAIT_SECONDS
 
@@ -65,7 +66,9 @@ class Work:
         context = self.context
         quota = self._grant.checks
         most = (context.settings.user_checks if quota is None else quota) if self._grant.user is not None else 0
-        return await self._attended(self._in_turn(context.check_shares, context.checker, most, function, *args))
+        return await self._attended(
+            self._in_turn(context.check_shares, context.checker, most, in_one_moment, function, *args)
+        )
 
     async def compute(self, function: Callable[[*Args], R], *args: *Args) -> R:
         """The value of a function of the engine."""
@@ -142,6 +145,7 @@ class Work:
 
     async def _attended(self, work: Coroutine[Any, Any, R]) -> R:
         """The value of ``work``, which is cancelled when the client disconnects."""
+        await end_moment()  # it may take long
         doing, leaving = asyncio.ensure_future(work), asyncio.ensure_future(self._left())
         try:
             await asyncio.wait((doing, leaving), return_when=asyncio.FIRST_COMPLETED)

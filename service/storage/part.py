@@ -5,14 +5,15 @@ from __future__ import annotations
 import time
 from datetime import UTC, datetime, timedelta
 from functools import wraps
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, Final, ParamSpec, TypeVar
 
 import sqlalchemy as sa
 
 from sprag.service.storage.database.reserve import spend, spend_share
+from sprag.service.storage.database.session import READ
 from sprag.service.storage.errors import DatabaseFullError, StudyNotFoundError
 from sprag.service.storage.stored_sentences import written
-from sprag.service.storage.tables import CHUNKS, STUDIES
+from sprag.service.storage.tables import CHUNKS, RECORD_COLUMNS, STUDIES
 from sprag.worker.states import ChunkState, StudyEvent, StudyState, follow
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ def optional_moment(micros: int | None) -> datetime | None:
     return None if micros is None else moment(micros)
 
 
+_RECORD: Final = {column.key for column in RECORD_COLUMNS}
 #: Seconds without a heartbeat after which the worker counts as gone: several times the interval of heartbeats.
 SILENT_SECONDS = 60.0
 #: The largest number that an integer column holds on every server.
@@ -97,12 +99,23 @@ class Part:
 
 
 def row_of(connection: sa.Connection, study_id: str, *columns: sa.ColumnElement[Any]) -> sa.Row[Any]:
-    """Columns of the study of that id; raises StudyNotFoundError."""
+    """Columns of the study of that id; raises StudyNotFoundError.
+
+    In a `Moment` the row is read once, and once more with the long texts of the study.
+    """
+    rows: dict[tuple[str, bool], sa.Row[Any]] | None = connection.get_execution_options().get(READ)
+    whole = not {column.key for column in columns} <= _RECORD
+    if rows is not None:
+        if kept := rows.get((study_id, True)) or rows.get((study_id, whole)):
+            return kept
+        columns = tuple(STUDIES.c) if whole else RECORD_COLUMNS
     row = connection.execute(
         sa.select(*columns).where(STUDIES.c.id == study_id, STUDIES.c.deleted_at.is_(None))
     ).one_or_none()
     if row is None:
         raise StudyNotFoundError(study_id)
+    if rows is not None:
+        rows[study_id, whole] = row
     return row
 
 

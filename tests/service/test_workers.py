@@ -125,7 +125,7 @@ def test_a_difference_says_from_which_dispatcher(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     connected(workers)
-    monkeypatch.setattr(service.store.dispatchers.all, "presence", fakes.Present())
+    monkeypatch.setattr(service.store.dispatchers, "presence", fakes.Present())
     service.store.work.take_over("head:7")
     monkeypatch.setattr(fingerprint, "digest", lambda: "another")
     monkeypatch.setattr(fingerprint, "own", partial(dict, fingerprint.own(), Python="2.7"))

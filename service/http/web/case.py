@@ -11,8 +11,9 @@ from starlette.responses import RedirectResponse, Response
 from sprag.service.faults import FaultError
 from sprag.service.figures.pictures.curves import draw_motion
 from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, study_with
+from sprag.service.http.current import current
 from sprag.service.http.drawing import Columns, picture, unchanging
-from sprag.service.http.reading import CHOICE, FileChoice, address_pairs
+from sprag.service.http.reading import FileChoice, address_pairs
 from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
@@ -125,7 +126,7 @@ def case_page(
     except FaultError as error:
         faults = error.faults
     start = [] if which is None else [("start", str(which))]
-    chosen = address_pairs(CHOICE.get())
+    chosen = address_pairs(current().choice)
     query = urlencode([("from", repr(span[0])), ("to", repr(span[1])), *start]) if span else ""
     own = f"/studies/{study_id}/cases/{case}"
     infos = models.study_results(study)

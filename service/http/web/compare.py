@@ -20,8 +20,9 @@ from sprag.service.figures.read import read_figure
 from sprag.service.formats import MEDIA_TYPES
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx
+from sprag.service.http.current import current
 from sprag.service.http.drawing import Drawing, attached, picture, tag_of, unless_known
-from sprag.service.http.reading import CHOICE, FileChoice, address_pairs
+from sprag.service.http.reading import FileChoice, address_pairs
 from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.figures.plotly import plotly_figure
@@ -184,7 +185,7 @@ def compare_page(context: Ctx, request: Request) -> Response:
                 held_at.append(select(study, models.study_results(study), chosen.query(position)).held)
         except SelectionError as error:
             faults = error.faults
-    choice = CHOICE.get()
+    choice = current().choice
     reading = None if chosen is None else reading_of(context.store, chosen.records[0].id, choice)
     query = "" if chosen is None else urlencode([*chosen.pairs(), *address_pairs(choice)])
     return page(

@@ -13,7 +13,8 @@ from sprag.sentences import plural
 from sprag.service.faults import SelectionError, refused
 from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
-from sprag.service.http.reading import CHOICE, FileChoice, file_read_as, read_as
+from sprag.service.http.current import current
+from sprag.service.http.reading import FileChoice, file_read_as, read_as
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.web.figures.studies import figure_of
@@ -52,7 +53,7 @@ async def drives_page(context: Ctx, work: Attended, request: Request, study_id: 
     study = await in_thread(context.store.studies.study, study_id)
     if study.spread is None or study.plan is not None:
         return RedirectResponse(f"/studies/{study_id}", status_code=303)
-    reading = await in_thread(reading_of, context.store, study_id, CHOICE.get())
+    reading = await in_thread(reading_of, context.store, study_id, current().choice)
     given = with_held(request.query_params, study, reading)
     faults: tuple[Any, ...] = ()
     found: tuple[RibbonReport, YieldReport] | None = None

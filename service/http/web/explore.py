@@ -13,7 +13,8 @@ from sprag.service.faults import ParameterFault, SelectionError, shown
 from sprag.service.figures.explore import chosen_pair
 from sprag.service.http import views
 from sprag.service.http.context import Context, StudyId
-from sprag.service.http.reading import CHOICE, FileChoice, address_pairs, file_pairs
+from sprag.service.http.current import current
+from sprag.service.http.reading import FileChoice, address_pairs, file_pairs
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.web.figures.linked import BELOW, GRID, HEIGHT, TOP, Linked, linked
@@ -159,7 +160,7 @@ async def explore_page(work: Attended, study_id: StudyId) -> Response:
     """Cases within ranges; every choice is in the address."""
     context, given = work.context, work.request.query_params.multi_items()
     many = await in_thread(_many, context, study_id)
-    asked = (context.library, study_id, given, CHOICE.get())
+    asked = (context.library, study_id, given, current().choice)
     view = await (work.check(explore_view, *asked) if many else in_thread(explore_view, *asked))
     return await in_thread(_page, context, study_id, view, given)
 
@@ -179,7 +180,7 @@ def _page(context: Context, study_id: str, view: ExplorePage, given: Sequence[tu
     kinds = {"ending": query.ending, "regime": query.regime, "flag": query.flag}
     asked += [(key, value) for key, value in kinds.items() if value]
     asked.append(("sort", query.sort))
-    chosen, in_file = address_pairs(CHOICE.get()), file_pairs()
+    chosen, in_file = address_pairs(current().choice), file_pairs()
     drawn = [*asked, ("limit", str(query.limit)), ("x", view.axes[0]), ("y", view.axes[1])]
     frame = study_frame(context, study_id)
     return page(
@@ -222,7 +223,7 @@ def halves(text: str) -> list[str]:
 @router.get("/studies/{study_id:study}/explore/new")
 async def new_study_of_selection(work: Attended, study_id: StudyId) -> Response:
     """The form for a study of the first selected cases."""
-    context, given, choice = work.context, work.request.query_params, CHOICE.get()
+    context, given, choice = work.context, work.request.query_params, current().choice
 
     def asked() -> ExploreQuery:
         study = context.store.studies.study(study_id)

@@ -10,8 +10,8 @@ from starlette.responses import Response
 
 from sprag.service import languages
 from sprag.service.http import streams
-from sprag.service.http.access import ASKING
 from sprag.service.http.context import Context, Ctx
+from sprag.service.http.current import current
 from sprag.service.http.looks import Seen
 from sprag.service.http.problems import ApiError
 from sprag.service.http.routers import page_router
@@ -76,6 +76,6 @@ async def live(
         return Seen(hashlib.blake2b(listed_now, digest_size=8).hexdigest(), {})
 
     await in_thread(look, threads=Threads.STREAMS)  # refuses what the address asks wrongly
-    grant = ASKING.get()
+    grant = current().grant
     key = name, request.url.query, languages.current(), None if grant is None else grant.share
     return await event_stream(context, key, look, last_event_id, streams.LIST_SECONDS)

@@ -12,8 +12,9 @@ from sprag.service.faults import SelectionError
 from sprag.service.figures.pictures import curves as pictures
 from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
+from sprag.service.http.current import current
 from sprag.service.http.drawing import Columns
-from sprag.service.http.reading import CHOICE, FileChoice, address_pairs, file_pairs
+from sprag.service.http.reading import FileChoice, address_pairs, file_pairs
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.figures.studies import figure_of
 from sprag.service.http.web.held import fixed_choices, with_held
@@ -75,7 +76,7 @@ def curves_page(context: Ctx, request: Request, study_id: StudyId) -> Response:
         faults = error.faults
     shown = query or curve_query(study, infos, Address())
     assert shown is not None
-    figure = urlencode([*pairs_of(shown), *address_pairs(CHOICE.get())])
+    figure = urlencode([*pairs_of(shown), *address_pairs(current().choice)])
     files = urlencode([*pairs_of(shown), *file_pairs()])
     alt = _("{y} against {x}", y=", ".join(map(reading.caption, shown.y)), x=reading.within(shown.x))
     return page(
@@ -124,7 +125,7 @@ def map_page(
         faults = error.faults
     shown = query or map_query(study, infos, Address())
     assert shown is not None
-    pairs = [*pairs_of(shown), *address_pairs(CHOICE.get())]
+    pairs = [*pairs_of(shown), *address_pairs(current().choice)]
     kind = kind if kind in KINDS else "heatmap"
     query_text = urlencode([*pairs, ("kind", kind)])
     files = urlencode([*pairs_of(shown), *file_pairs(), ("kind", kind)])

@@ -12,8 +12,9 @@ from starlette.responses import RedirectResponse, Response
 from sprag.service.faults import SelectionError, choice_of
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx
+from sprag.service.http.current import current
 from sprag.service.http.language import language_pairs
-from sprag.service.http.reading import CHOICE, address_pairs, page_query
+from sprag.service.http.reading import address_pairs, page_query
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.form.values import Form
 from sprag.service.jobs.saved_views import change_view, save_view
@@ -94,7 +95,7 @@ def _figure(study: Study, study_id: str, saved: SavedView) -> ReportFigure:
         return ReportFigure(saved, fault=str(error))
     given = Address(saved.view.query)
     own = [(name, value) for name in _READING if (value := given.get(name))]
-    own += [pair for pair in address_pairs(CHOICE.get()) if pair[0] not in dict(own)]
+    own += [pair for pair in address_pairs(current().choice) if pair[0] not in dict(own)]
     kind = [("kind", given.get("kind") or "heatmap")] if isinstance(query, MapQuery) else []
     shown, columns = [*pairs_of(query), *kind, *own], "" if kind else "&columns=2"
     picture = urlencode([*shown, *language_pairs(), ("format", "svg")])

@@ -17,8 +17,9 @@ from sprag.service.faults import SelectionError
 from sprag.service.figures.pictures import curves as pictures
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx, StudyId
+from sprag.service.http.current import current
 from sprag.service.http.problems import ApiError
-from sprag.service.http.reading import CHOICE, address_pairs, file_pairs
+from sprag.service.http.reading import address_pairs, file_pairs
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.web.figures.fits import fits_of, has_measured_clutch
@@ -80,7 +81,7 @@ def study_frame(context: Context, study_id: str) -> dict[str, Any]:
     """The common part of all pages about a study: the study as in the API, its actions, the related pages."""
     (record, progress), study = context.store.studies.look(study_id), context.store.studies.study(study_id)
     # Counting kinds takes time in proportion to the rows, so only the page that shows them does it.
-    spec, choice = context.store.studies.spec(study_id), CHOICE.get()
+    spec, choice = context.store.studies.spec(study_id), current().choice
     shown = views.detail(record, progress, study, spec, Kinds({}, {}), ())
     varying = len(varying_axes(study))
     grid = study.combine == "grid" and varying > 1
@@ -141,7 +142,7 @@ async def shown_study(
         else {}
     )
     usual, many = await in_thread(_usual_curves, context, study_id)
-    asked = (context.library, study_id, work.request.query_params.multi_items(), usual, CHOICE.get())
+    asked = (context.library, study_id, work.request.query_params.multi_items(), usual, current().choice)
     view = await (work.check(answers_view, *asked) if many else in_thread(answers_view, *asked))
     extension = {"further": further or {}, "wrong": wrong or {}, "labels": labels or {}, "untaken": untaken or {}}
     if labels and not untaken:
@@ -236,7 +237,7 @@ def _main_figure(
     study: Study, study_id: str, query: CurveQuery | None, view: AnswersOnPage, reading: Reading
 ) -> dict[str, Any]:
     """The addresses of the figure on the page, of its picture and of the page where others are chosen; its caption."""
-    chosen, in_file = address_pairs(CHOICE.get()), file_pairs()
+    chosen, in_file = address_pairs(current().choice), file_pairs()
     own = urlencode(chosen)
     picture = f"format=svg&{urlencode(in_file)}"
     if _has_goal(study):

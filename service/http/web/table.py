@@ -10,7 +10,7 @@ from starlette.responses import Response
 
 from sprag.service.faults import FaultError
 from sprag.service.http.context import Context, StudyId
-from sprag.service.http.reading import CHOICE
+from sprag.service.http.current import current
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.web.held import fixed_choices, with_held
@@ -50,7 +50,7 @@ async def cases_page(
     """Cases with the selected results, sorted and filtered."""
     context = work.context
     study = await in_thread(context.store.studies.study, study_id)
-    reading = await in_thread(reading_of, context.store, study_id, CHOICE.get())
+    reading = await in_thread(reading_of, context.store, study_id, current().choice)
     given = with_held(work.request.query_params, study, reading)
     at = tuple(
         (path.strip(), value.strip())

@@ -18,10 +18,9 @@ from starlette.responses import Response
 from sprag.sentences import Sentence, WarningText
 from sprag.service import languages
 from sprag.service.actor import Role
-from sprag.service.http.access import ASKING
+from sprag.service.http.current import current
 from sprag.service.http.language import language_pairs
-from sprag.service.http.prefix import PREFIX, here
-from sprag.service.http.reading import PAGE
+from sprag.service.http.prefix import here
 from sprag.service.http.web.explained import explained
 from sprag.service.http.web.script_texts import translated_texts
 from sprag.service.languages import N_
@@ -134,12 +133,12 @@ def _templates() -> Environment:
         "here": here,
     }
     environment.globals["here"] = here
-    environment.globals["prefix_of_urls"] = PREFIX.get
+    environment.globals["prefix_of_urls"] = lambda: current().prefix
     environment.globals["language"] = languages.current
     environment.globals["languages"] = languages.titles
     environment.globals["in_language"] = _in_language
     environment.globals["script_texts"] = translated_texts
-    environment.globals["page_address"] = PAGE.get
+    environment.globals["page_address"] = lambda: current().page
     environment.globals["read_only"] = _read_only
     environment.globals["units_back"] = _units_back
     environment.globals["explained"] = explained
@@ -160,18 +159,18 @@ def cell(value: float | str | None, digits: int = 5) -> str:
 
 def _units_back() -> str:
     """The way back from the page of units to the page that is made, for its address."""
-    return f"?{urlencode({'back': PAGE.get()})}" if PAGE.get() not in {"", "/"} else ""
+    return f"?{urlencode({'back': current().page})}" if current().page not in {"", "/"} else ""
 
 
 def _read_only() -> str:
     """Who asks for the page, where that is a viewer; "" for anybody who may change something."""
-    grant = ASKING.get()
+    grant = current().grant
     return grant.label if grant is not None and grant.role is Role.VIEWER else ""
 
 
 def _administers() -> bool:
     """Whether an administrator asks for the page."""
-    grant = ASKING.get()
+    grant = current().grant
     return grant is not None and grant.role is Role.ADMINISTRATOR
 
 

@@ -6,11 +6,11 @@ from __future__ import annotations
 
 import math
 import re
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from pathlib import Path
-from threading import Condition
+from threading import Condition, Lock, local
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, TypeVarTuple
 
 import sqlalchemy as sa
 from sqlalchemy.engine import URL, make_url
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from sprag.service.storage.database.server_lock import ServerLock
     from sprag.worker.ports import News
 
+Args = TypeVarTuple("Args")
+R = TypeVar("R")
+
 #: Seconds a connection waits for another writer before it gives up.
 BUSY_SECONDS = 30.0
 POOL_CONNECTIONS = 8
@@ -34,6 +37,8 @@ POOL_CONNECTIONS = 8
 #: Options of a connection: the statement that begins a transaction, and the seconds that a file waits for its lock.
 _BEGIN = "sprag_begin"
 _WAIT = "sprag_wait"
+#: Of a connection in a `Moment`: the rows of studies that were read, each once.
+READ = "sprag_read"
 
 
 def _without_password(url: str) -> str:
@@ -48,6 +53,56 @@ def file_of(url: str) -> Path | None:
     except (sa.exc.ArgumentError, ValueError):
         return None
     return Path(place.database) if place.get_backend_name() == "sqlite" and place.database else None
+
+
+_JOINED = local()
+
+
+class Moment:
+    """A state of the database that several reads see: the first of them begins a transaction, which stays until `end`.
+
+    They may be in several threads, one after the other. After its end it begins anew.
+    """
+
+    def __init__(self) -> None:
+        self._turn = Lock()
+        self._transaction = ExitStack()
+        self._connections: dict[Session, sa.Connection] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._connections)
+
+    @contextmanager
+    def joined(self) -> Iterator[None]:
+        """Let this thread's reads inside be of this moment."""
+        with self._turn:
+            _JOINED.moment = self
+            try:
+                yield
+            finally:
+                _JOINED.moment = None
+
+    def connection(self, session: Session) -> sa.Connection:
+        """The connection to a database, for `Session.read`."""
+        if session not in self._connections:
+            connection = self._transaction.enter_context(session.transaction())
+            self._connections[session] = connection.execution_options(**{READ: {}})
+        return self._connections[session]
+
+    def end(self) -> None:
+        """End the transactions."""
+        self._connections.clear()
+        self._transaction.close()
+
+
+def in_one_moment(function: Callable[[*Args], R], *args: *Args) -> R:
+    """The value of a function all of whose reads are of one moment."""
+    moment = Moment()
+    try:
+        with moment.joined():
+            return function(*args)
+    finally:
+        moment.end()
 
 
 class Session:
@@ -141,9 +196,20 @@ class Session:
 
     @contextmanager
     def read(self) -> Iterator[sa.Connection]:
-        """A short read transaction: all reads see the same state."""
-        with self._transaction(self._reader, "read", perf_counter()) as connection:
-            yield connection
+        """A short read transaction: all reads see the same state, and inside a `Moment` that of its first one."""
+        moment: Moment | None = getattr(_JOINED, "moment", None)
+        if moment is None:
+            with self.transaction() as connection:
+                yield connection
+            return
+        try:
+            yield moment.connection(self)
+        except sa.exc.DBAPIError as error:
+            raise self._explained(error) from error
+
+    def transaction(self) -> AbstractContextManager[sa.Connection]:
+        """A read transaction of its own."""
+        return self._transaction(self._reader, "read", perf_counter())
 
     @contextmanager
     def write(self) -> Iterator[sa.Connection]:

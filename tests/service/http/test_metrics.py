@@ -55,7 +55,7 @@ def test_the_time_of_cases_falls_into_its_buckets(service: Service, monkeypatch:
 
     now = service.store.clock.now()
     work = [FinishedWork(now, 1.0, 10), FinishedWork(now, 4.0, 2)]  # 0.1 s and 2 s each
-    monkeypatch.setattr(service.store.figures.current, "finished_since", lambda _: work)
+    monkeypatch.setattr(service.store.figures, "finished_since", lambda _: work)
     found = samples(service)
     buckets = {s.labels["le"]: s.value for s in found if s.name == "sprag_case_seconds_bucket"}
     assert (buckets["0.03"], buckets["0.1"], buckets["1.0"], buckets["3.0"], buckets["+Inf"]) == (0, 10, 10, 12, 12)

@@ -16,7 +16,8 @@ from pydantic import SecretStr, ValidationError
 
 from sprag.service.client import Client
 from sprag.service.http.app import create_app
-from sprag.service.http.prefix import PREFIX, here
+from sprag.service.http.current import knowing
+from sprag.service.http.prefix import here
 from sprag.service.http.web.templates import _TRANSLATED, Addresses, _templates
 from sprag.service.presets import preset_names, preset_text
 from sprag.service.settings import Settings, UnsafeSettingsError
@@ -201,14 +202,11 @@ def test_the_client_works_below_a_prefix(below: tuple[Service, OnlyBelow], porta
 
 def test_addresses_get_the_prefix_once() -> None:
     assert here("/studies") == "/studies"
-    token = PREFIX.set("/a/b")
-    try:
+    with knowing(prefix="/a/b"):
         assert [here(text) for text in ("/", "/x?y=/z", "/a/bc")] == ["/a/b/", "/a/b/x?y=/z", "/a/b/a/bc"]
         for as_it_is in ("/a/b", "/a/b?x", "/a/b/c", "x", "//h/x", "#x"):
             assert here(as_it_is) == as_it_is
         assert here("http://elsewhere/x") == "http://elsewhere/x"
-    finally:
-        PREFIX.reset(token)
 
 
 @pytest.mark.parametrize("wrong", ["sprag", "/sprag/", "/", "//x", "/a b", "/ä", "/" + 200 * "x"])

@@ -16,8 +16,8 @@ from starlette.responses import RedirectResponse, Response
 from sprag.sentences import Place, Sentence
 from sprag.service.faults import FaultError
 from sprag.service.http.context import Context, Ctx, study_with
+from sprag.service.http.current import current
 from sprag.service.http.problems import ApiError, api_error
-from sprag.service.http.reading import CHOICE
 from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
@@ -213,7 +213,7 @@ async def check(context: Ctx, work: Attended, request: Request, values: Form) ->
 
 async def look_over(context: Context, work: Work, values: Mapping[str, str]) -> Checked:
     """Check a form, given by fields or as text."""
-    return await work.check(study_check.form, context.library, values, context.store.clock.now(), CHOICE.get())
+    return await work.check(study_check.form, context.library, values, context.store.clock.now(), current().choice)
 
 
 def form_page(

@@ -11,9 +11,9 @@ from starlette.responses import Response
 from sprag.sentences import Sentence
 from sprag.service.figures.pictures.curves import draw_figure, draw_motion
 from sprag.service.figures.read import read_figure
+from sprag.service.http.current import current
 from sprag.service.http.drawing import picture, table
 from sprag.service.http.problems import ApiError
-from sprag.service.http.reading import CHOICE
 from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
@@ -106,7 +106,7 @@ def _laboratories() -> list[tuple[str, str, str]]:
 async def _chosen(work: Work) -> tuple[Setting, list[Setting]]:
     """The setting of an address, and those that it holds."""
     given, model = work.request.query_params, _model(work)
-    chosen = await work.check(setting, model, dict(given), CHOICE.get())
+    chosen = await work.check(setting, model, dict(given), current().choice)
     queries = [query for query in given.getlist("held") if query]
     return chosen, await work.check(held_settings, model, queries) if queries else []
 
@@ -124,7 +124,7 @@ async def _case(work: Work, chosen: Setting, held: list[Setting], columns: int =
 
 def _reading(chosen: Setting) -> Reading:
     """How the reader of the page reads the machine."""
-    return reading_for(chosen.study, chosen.spec, CHOICE.get())
+    return reading_for(chosen.study, chosen.spec, current().choice)
 
 
 def _query(chosen: Setting, held: list[Setting]) -> str:

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Final
 from markdown_it import MarkdownIt
 from markupsafe import Markup
 
-from sprag.service.http.prefix import PREFIX, here
+from sprag.service.http.current import current
+from sprag.service.http.prefix import here
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -43,7 +44,7 @@ class ManualPage:
 
 def manual_page(name: str) -> ManualPage:
     """The page of that name, one of `PAGES`."""
-    return _page(name, PREFIX.get())
+    return _page(name, current().prefix)
 
 
 def titles() -> dict[str, str]:

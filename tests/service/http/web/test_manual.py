@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from sprag.service.http.prefix import PREFIX
+from sprag.service.http.current import knowing
 from sprag.service.http.web.manual import PAGES, manual_page, titles
 from sprag.worker import models
 
@@ -86,11 +86,8 @@ def test_a_page_has_the_text_of_its_file(service: Service) -> None:
 
 
 def test_a_service_at_a_path_of_its_own_has_it_in_the_links() -> None:
-    token = PREFIX.set("/sprag")
-    try:
+    with knowing(prefix="/sprag"):
         assert 'href="/sprag/docs/theory#settled-motion"' in str(manual_page("guide").html)
-    finally:
-        PREFIX.reset(token)
 
 
 @pytest.mark.parametrize("model", [models.VIBRATION_DRIVE, models.MACHINE_SHAFT])
