@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import pandas as pd
 
 from sprag.engine import ENGINE_VERSION, Ending, Run, Span
-from sprag.engine.catalogue import Parameter
+from sprag.engine.catalogue import Parameter, ResultInfo
 from sprag.engine.endings import ENDINGS
 from sprag.engine.vibration_drive import simulate as _vibration_drive
 from sprag.engine.vibration_drive.cases import pendulum_count
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ENGINE_VERSION", "Ending", "Run", "Span", "simulate"]
 
+VIBRATION_DRIVE: Final = "vibration-drive"
 #: Parameters of a clutch law, common or of one pendulum; the ranges are those of a spec.
 _CLUTCH: Final = (
     Parameter("clutch.coefficients.K", "c_k", "N*m/rad^K", -1e30, 1e30, False, None, "clutch polynomial"),
@@ -42,8 +43,14 @@ _PATTERNS: Final = [
 ]
 
 
-def simulate(cases: Mapping[str, ArrayLike] | pd.DataFrame, run: Run | None = None) -> pd.DataFrame:
-    """Run cases of the vibration drive in this process.
+def simulate(
+    cases: Mapping[str, ArrayLike] | pd.DataFrame,
+    run: Run | None = None,
+    *,
+    model: str = VIBRATION_DRIVE,
+    base: Mapping[str, Any] | None = None,
+) -> pd.DataFrame:
+    """Run cases of a model in this process.
 
     Parameters
     ----------
@@ -51,7 +58,11 @@ def simulate(cases: Mapping[str, ArrayLike] | pd.DataFrame, run: Run | None = No
         Paths of parameters (docs/reference.md) to numbers or arrays of shape (cases,), in SI units, frequency in Hz,
         angles in rad. Parameters without a default are required.
     run : Run, optional
-        Duration, window, tolerance; by default 60 periods, of which the last third is evaluated.
+        Duration, window, tolerance of a vibration drive; by default 60 periods, of which the last third is evaluated.
+    model : str
+        Name of the model, as in a spec.
+    base : mapping, optional
+        The machine of another model, as `base` of a spec: what ``cases`` do not give, such as the kind of a mechanism.
 
     Returns
     -------
@@ -63,19 +74,41 @@ def simulate(cases: Mapping[str, ArrayLike] | pd.DataFrame, run: Run | None = No
     ------
     ValueError
         Where a path is unknown or missing, a value out of range, or the arrays differ in length.
+    SpecError
+        Where the machine of another model is invalid.
     """
     index = cases.index if isinstance(cases, pd.DataFrame) else None
     columns = {str(path): np.asarray(values, dtype=np.float64) for path, values in cases.items()}
     count = _count(columns) if index is None else len(index)
+    if model != VIBRATION_DRIVE:
+        return _of_model(model, base or {}, columns, count, index)
     for path, values in columns.items():
         _check(path, values)
     batch = _vibration_drive.simulate(columns, run or Run(), cases=count)
     infos = result_infos(pendulum_count(columns))
     table: dict[str, Any] = {"ending": [ENDINGS[code].value for code in batch.endings.tolist()]}
     table |= {info.name: batch.values[:, number] for number, info in enumerate(infos)}
+    return _framed(table, infos, index)
+
+
+def _framed(table: dict[str, Any], infos: Sequence[ResultInfo], index: pd.Index | None) -> pd.DataFrame:
     frame = pd.DataFrame(table, index=index)
     frame.attrs["units"] = {info.name: info.unit for info in infos}
     return frame
+
+
+def _of_model(
+    model: str, base: Mapping[str, Any], columns: Mapping[str, np.ndarray], count: int, index: pd.Index | None
+) -> pd.DataFrame:
+    """Cases of any model, as those of a study of them."""
+    from sprag.service.spec.document import parse_spec
+    from sprag.worker import models
+
+    axes = [{"path": path, "values": np.broadcast_to(values, count).tolist()} for path, values in columns.items()]
+    study = parse_spec({"sprag": 1, "model": model, "base": base, "axes": axes, "combine": "zip"}).study
+    rows, infos = models.run_chunk(study, 0, study.cases), models.study_results(study)
+    table: dict[str, Any] = {"ending": list(rows.endings)}
+    return _framed(table | {info.name: rows.values[:, k] for k, info in enumerate(infos)}, infos, index)
 
 
 def _count(columns: Mapping[str, np.ndarray]) -> int:

@@ -16,6 +16,7 @@ import pytest
 
 import sprag
 from sprag.engine.vibration_drive.simulate import simulate as plain_simulate
+from sprag.service.http.views import preset_of
 from tests.engine.vibration_drive.drive import drive, periods
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -133,6 +134,20 @@ def test_the_engine_takes_arrays_and_frames() -> None:
     np.testing.assert_array_equal(again["shaft.speed.mean"], results["shaft.speed.mean"])
     assert len(sprag.engine.simulate(drive(1), run)) == 1
     assert len(sprag.engine.simulate(frame.iloc[:0], run)) == 0
+
+
+def test_the_library_runs_cases_of_any_model() -> None:
+    press = preset_of("press")["spec"]
+    inertias = np.array([15.0, 30.0])
+    frame = pd.DataFrame({"drive.inertia": inertias}, index=["a", "b"])
+    results = sprag.simulate(frame, model="machine-shaft", base=press["base"])
+    table = sprag.run(press | {"axes": [{"path": "drive.inertia", "values": inertias}]}, processes=0)
+    np.testing.assert_array_equal(results["irregularity"], table["irregularity"])
+    assert results.index.tolist() == ["a", "b"]
+    assert results["ending"].tolist() == ["ok", "ok"]
+    assert results.attrs["units"]["omega.mean"] == "rad/s"
+    with pytest.raises(sprag.SpecError, match="/base/drive: is required"):
+        sprag.simulate({"drive.inertia": 1.0}, model="machine-shaft")
 
 
 @pytest.mark.parametrize(
