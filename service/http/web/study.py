@@ -278,7 +278,7 @@ def _chosen_figure(
     study: Study, study_id: str, query: CurveQuery, view: AnswersOnPage, reading: Reading
 ) -> dict[str, Any]:
     """The curves of a query, or the map of a study that refines one, as of `_main_figure`."""
-    chosen, in_file = address_pairs(CHOICE.get()), file_pairs()
+    chosen, in_file = address_pairs(current().choice), file_pairs()
     mapped = map_query(study, models.study_results(study), QueryParams()) if map_plan(study) is not None else None
     if mapped is not None:
         kind, pairs, more = "map", pairs_of(mapped), ("kind", "heatmap")
