@@ -15,6 +15,7 @@ _SERVICE: Final = Path(__file__).resolve().parents[1] / "service"
 _MESSAGE: Final = {
     **dict.fromkeys(("fault", "Fault", "ParameterFault", "refused", "parameter_error"), 2),
     **dict.fromkeys(("refuse", "FinishError", "FormulaError", "QuantityError", "TimingError"), 1),
+    "mistake": 0,
     "check_size": 0,  # what there is too much of
 }
 #: Those that take what is allowed without a keyword.

@@ -56,11 +56,7 @@ def read_csv(node: Node, most: tuple[int, int], example: str, texts: Collection[
     """
     text = node.value
     if not isinstance(text, str):
-        node.refuse(
-            "required" if text is None else "wrong-type",
-            "is required" if text is None else "must be the text of a CSV file",
-            allowed=example,
-        )
+        node.mistake("must be the text of a CSV file", allowed=example)
         return None
     try:
         table = split(text)

@@ -51,21 +51,17 @@ DERIVE: Final[dict[str, Any]] = {
 _CONSTANT: Final = "constants."
 #: A `*` between two parts of a path.
 _STARRED: Final = re.compile(r"[a-z_]\.\*\.[a-z]")
-_MISSING: Final = object()
 #: Points of the ranges of a study that chooses its own cases at which a formula is tried: corners, and as many others.
 _CORNERS: Final = 4096
 
 
-def read_machine(report: Report, part: SpecPart, found: Mapping[str, Any]) -> Machine:
-    """Read `base` and `derive` of a spec; faults are recorded in ``report``."""
-    base, before = found.get("base"), report.found
-    given = _read_given(report, found.get("derive", {}), base)
-    if not given:
-        machine = part.read_base(Node(report, "/base", base))
-    else:
-        machine = _read_derived(report, part, str(found["model"]), base, given)
-    if report.found == before:
-        part.check_base(report, machine)
+def read_machine(spec: Node, part: SpecPart) -> Machine:
+    """Read `base` and `derive` of a spec; faults are recorded."""
+    base, before = spec["base"], spec.report.found
+    given = _read_given(spec)
+    machine = _read_derived(spec, part, given) if given else part.read_base(base)
+    if spec.report.found == before:
+        part.check_base(spec.report, machine)
     return machine
 
 
@@ -80,55 +76,54 @@ def _matches(key: str, path: str) -> bool:
     return key.count(".") == path.count(".") and all(mine in ("*", own) for mine, own in parts)
 
 
-def _read_given(report: Report, data: object, base: object) -> dict[str, tuple[str, str]]:
-    """Path -> (pointer, text) of every formula, those with ``*`` once for each item of their list."""
+def _read_given(spec: Node) -> dict[str, Node]:
+    """Path -> formula, those with ``*`` once for each item of their list."""
+    node, base = spec["derive"], spec["base"]
     allowed = Sentence("an object of at most {count} paths with their formulas", count=str(MAX_DERIVED))
-    if not isinstance(data, Mapping):
-        report.fault("/derive", "wrong-type", "must be an object", data, allowed=allowed)
+    if node.given and not isinstance(node.value, Mapping):
+        node.refuse("wrong-type", "must be an object", allowed=allowed)
         return {}
-    found: dict[str, tuple[str, str]] = {}
-    for key, text in data.items():
-        pointer = join("/derive", key)
-        if not isinstance(text, str):
+    found: dict[str, Node] = {}
+    for key in node.value or ():
+        formula = node[key]
+        if not isinstance(formula.value, str):
             such = Sentence(
                 "such as '{formula}'; in TOML the path is in quotation marks", formula=next(iter(EXAMPLE.values()))
             )
-            report.fault(pointer, "wrong-type", "must be a formula, as text", text, allowed=such)
+            formula.refuse("wrong-type", "must be a formula, as text", allowed=such)
             continue
-        for path, own in _expanded(report, pointer, key, text, base):
+        for path, text in _expanded(formula, key, base):
             if path in found:
                 message = Sentence("derives {path} a second time", path=path)
-                report.fault(pointer, "repeated", message, text, allowed="one formula for each")
+                formula.refuse("repeated", message, allowed="one formula for each")
                 continue
-            given = _at(base, path)
-            if given is not _MISSING:
-                report.fault(
-                    pointer,
-                    "conflict",
-                    Sentence("{path} is derived and cannot be given in `base` too", path=path),
-                    given,
-                    allowed="either a formula in `derive`, or a number in `base`",
-                )
+            given = base.below(path).value
+            if given is not None:
+                message = Sentence("{path} is derived and cannot be given in `base` too", path=path)
+                formula.refuse("conflict", message, given,
+                               allowed="either a formula in `derive`, or a number in `base`")  # fmt: skip
             # An axis of that path has a fault of its own, which is reported at once.
             if not isinstance(given, Mapping | list):
-                found[path] = pointer, own
+                found[path] = Node(spec.report, formula.pointer, text)
             if len(found) > MAX_DERIVED:
-                report.fault("/derive", "too-many", "derives too many parameters", allowed=allowed)
+                node.refuse("too-many", "derives too many parameters", None, allowed=allowed)
                 return {}
     return found
 
 
-def _expanded(report: Report, pointer: str, key: str, text: str, base: object) -> Iterator[tuple[str, str]]:
+def _expanded(formula: Node, key: str, base: Node) -> Iterator[tuple[str, str]]:
     """The paths and formulas of one entry."""
+    text = formula.value
     if "*" not in key.split("."):
         yield key, text
         return
     prefix = key.partition(".*")[0]
-    items = _at(base, prefix)
+    items = base.below(prefix).value
     if not isinstance(items, list) or key.split(".").count("*") > 1:
-        message = Sentence("`base` has no list at {path}{hint}", path=prefix, hint=did_you_mean(prefix, _lists(base)))
-        report.fault(
-            pointer, "invalid-path", message, key,
+        hint = did_you_mean(prefix, _lists(base.value))
+        message = Sentence("`base` has no list at {path}{hint}", path=prefix, hint=hint)
+        formula.refuse(
+            "invalid-path", message, key,
             allowed="`*` once, for the number of a pendulum or a step, as in 'pendulums.*.inertia'",
         )  # fmt: skip
         return
@@ -145,23 +140,9 @@ def _lists(base: object) -> Iterator[str]:
                 yield path
 
 
-def _at(base: object, path: str) -> Any:
-    """What `base` gives at a path; ``_MISSING`` where it gives nothing, or null."""
-    place: Any = base
-    for key in path.split("."):
-        if isinstance(place, Mapping) and key in place:
-            place = place[key]
-        elif isinstance(place, list) and key.isdecimal() and len(key) < 9 and int(key) < len(place):
-            place = place[int(key)]
-        else:
-            return _MISSING
-    return _MISSING if place is None else place
-
-
 def formulas_of(spec: Mapping[str, Any]) -> dict[str, str]:
     """The formulas of a valid spec as the user wrote them, by path."""
-    given = _read_given(Report(), spec.get("derive", {}), spec.get("base"))
-    return {path: text for path, (_, text) in given.items()}
+    return {path: formula.value for path, formula in _read_given(Node(Report(), "", spec)).items()}
 
 
 def with_values(base: object, values: Mapping[str, float | str]) -> Any:
@@ -172,7 +153,7 @@ def with_values(base: object, values: Mapping[str, float | str]) -> Any:
         if rest and "." not in rest and isinstance(filled, dict):
             filled.setdefault(first, {})
         above, _, key = path.rpartition(".")
-        place = _at(filled, above) if above else filled
+        place = Node(Report(), "", filled).below(above).value if above else filled
         if isinstance(place, dict):
             place[key] = value
         elif isinstance(place, list) and key.isdecimal() and len(key) < 9 and int(key) <= len(place):
@@ -180,35 +161,32 @@ def with_values(base: object, values: Mapping[str, float | str]) -> Any:
     return filled
 
 
-def _read_derived(
-    report: Report, part: SpecPart, model: str, base: object, given: Mapping[str, tuple[str, str]]
-) -> Machine:
+def _read_derived(spec: Node, part: SpecPart, given: Mapping[str, Node]) -> Machine:
     """Read a machine with derived parameters."""
-    before = report.found
+    report, base = spec.report, spec.value.get("base")
+    before, model = report.found, str(spec.value["model"])
     entries = {path: model_parameter(model, _catalogue_path(path)) for path in given}
     numbers = {path: _any_number(entry) for path, entry in entries.items() if entry is not None}
     filled = with_values(base, numbers)
     first = Report({"base": filled})
     machine = part.read_base(Node(first, "/base", filled))
     report.adopt(first)
-    unknown = [path for path in given if path not in machine.parameters and not machine.assumed(path)]
-    for path in unknown:
-        report.fault(given[path][0], "invalid-path", machine.why_not(path), path, allowed="the path of a number")
+    for path, formula in given.items():
+        if path not in machine.parameters and not machine.assumed(path):
+            formula.refuse("invalid-path", machine.why_not(path), path, allowed="the path of a number")
     # Values of the first reading are those of `base`, except for the derived paths.
     formulas = _read_formulas(report, machine, {path: given[path] for path in given if path in machine.parameters})
     machine.derive = {path: formulas[path].text for path in sorted(formulas)}
-    if report.found > before or not _is_ordered(report, formulas, given):
+    if report.found > before or not _is_ordered(formulas, given):
         return machine
     columns = evaluate(machine.derive, machine.values, {}, 1)
     values = {path: float(column[0]) for path, column in columns.items()}
     for path, value in values.items():
         entry = machine.parameters[path]
         if not entry.accepts(value):
-            report.fault(
-                given[path][0], "out-of-range",
-                Sentence("gives {path} a value out of range with the numbers of `base`", path=path),
-                quantity_text(value, entry.unit), allowed=range_sentence(entry), unit=entry.unit,
-            )  # fmt: skip
+            message = Sentence("gives {path} a value out of range with the numbers of `base`", path=path)
+            shown = quantity_text(value, entry.unit)
+            given[path].refuse("out-of-range", message, shown, allowed=range_sentence(entry), unit=entry.unit)
     if report.found > before:
         return machine
     derive = machine.derive
@@ -228,21 +206,21 @@ def _any_number(entry: Parameter) -> float:
     return next(value for value in usual if value is not None and math.isfinite(value) and entry.accepts(value))
 
 
-def _read_formulas(report: Report, machine: Machine, given: Mapping[str, tuple[str, str]]) -> dict[str, Formula]:
+def _read_formulas(report: Report, machine: Machine, given: Mapping[str, Node]) -> dict[str, Formula]:
     units = {path: entry.unit for path, entry in machine.parameters.items()}
     found: dict[str, Formula] = {}
-    for path, (pointer, text) in given.items():
+    for path, node in given.items():
         try:
-            formula = read_formula(text, units, units[path])
+            formula = read_formula(node.value, units, units[path])
         except UnknownNameError as error:
-            starred = _STARRED.search(text) is not None
+            starred = _STARRED.search(node.value) is not None
             why = Sentence("`*` in a formula needs one in its path") if starred else machine.why_not(error.name)
             message = Sentence("{what}: {why}", what=error.message, why=why)
-            report.fault(pointer, "invalid-path", message, text, allowed="paths of numbers, and functions")
+            node.refuse("invalid-path", message, allowed="paths of numbers, and functions")
             continue
         except FormulaError as error:
             entry = machine.parameters[path]
-            report.fault(pointer, error.code, error.message, text, allowed=range_sentence(entry), unit=entry.unit)
+            node.refuse(error.code, error.message, allowed=range_sentence(entry), unit=entry.unit)
             continue
         if formula.angular:
             sentence = Sentence(
@@ -252,20 +230,17 @@ def _read_formulas(report: Report, machine: Machine, given: Mapping[str, tuple[s
             report.warn("angular-frequency", Place("/derive", path), sentence)
         for name in sorted(formula.uses - machine.values.keys() - given.keys()):
             if not report.found:
-                report.fault(
-                    pointer, "required", Sentence("uses {path}, which has no value in `base`", path=name), text
-                )
+                node.refuse("required", Sentence("uses {path}, which has no value in `base`", path=name))
         found[path] = formula
     return found
 
 
-def _is_ordered(report: Report, formulas: Mapping[str, Formula], given: Mapping[str, tuple[str, str]]) -> bool:
+def _is_ordered(formulas: Mapping[str, Formula], given: Mapping[str, Node]) -> bool:
     try:
         evaluation_order({path: formula.uses for path, formula in formulas.items()})
     except CircularError as error:
-        pointer = given[error.paths[0]][0]
         message = Sentence("needs its own value: {circle}", circle=str(error))
-        report.fault(pointer, "circular", message, allowed="formulas without a circle")
+        given[error.paths[0]].refuse("circular", message, None, allowed="formulas without a circle")
         return False
     return True
 

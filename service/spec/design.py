@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.spec.derive import with_values
-from sprag.service.spec.fields import TOLERANCE_FIELDS, WHICH_CASES
-from sprag.worker.limits import MAX_NAME_LENGTH
+from sprag.service.spec.fields import TOLERANCE_FIELDS, renamed, without_cases
 from sprag.worker.models import NO_PARAMETERS
 from sprag.worker.models.parameters import parameter_of
 from sprag.worker.spread import DRIVE
@@ -39,13 +38,9 @@ def design_spec(spec: Mapping[str, Any], study: Study, case: int, along: str | N
     values = {path: value for path, value in study.case_parameters(case).items() if path not in apart}
     # The nominal drive of a design keeps its tolerances; a drawn drive has its own values in the base.
     nominal = not study.case_parameters(case).get(DRIVE)
-    kept = {
-        key: value for key, value in spec.items() if key not in WHICH_CASES or (nominal and key in TOLERANCE_FIELDS)
-    }
-    name, suffix = spec.get("name", ""), f", design of case {case}"
     made = {
-        **kept,
-        "name": name[: MAX_NAME_LENGTH - len(suffix)] + suffix,
+        **without_cases(spec, TOLERANCE_FIELDS if nominal else ()),
+        "name": renamed(spec.get("name", ""), f", design of case {case}"),
         "base": with_values(spec["base"], {path: _text(study, path, value) for path, value in values.items()}),
     }
     if along is not None:
@@ -69,10 +64,8 @@ def points_spec(spec: Mapping[str, Any], study: Study, cases: Sequence[int]) -> 
     heads = [path if (unit := unit_of(study, path)) == "1" else f"{path} [{unit}]" for path in paths]
     rows = zip(*(columns[path].tolist() for path in paths), strict=True)
     lines = dict.fromkeys(",".join(map(repr, row)) for row in rows)
-    kept = {key: value for key, value in spec.items() if key not in WHICH_CASES}
-    name, suffix = spec.get("name", ""), f", {len(lines)} of its cases"
-    points = {"points": "\n".join([",".join(heads), *lines])}
-    return {**kept, "name": name[: MAX_NAME_LENGTH - len(suffix)] + suffix, "axes": [points]}
+    name = renamed(spec.get("name", ""), f", {len(lines)} of its cases")
+    return {**without_cases(spec), "name": name, "axes": [{"points": "\n".join([",".join(heads), *lines])}]}
 
 
 def _text(study: Study, path: str, value: float) -> float | str:

@@ -6,7 +6,6 @@ Its parts are the modules beside it (`text`, `units`, `run`, `warnings`, the `re
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
@@ -99,20 +98,18 @@ def parse_spec(data: object) -> ParsedSpec:
     spec = Node(report, "", data)
     if not SPEC.read(spec):
         raise report.error()
-    found = spec.value
-    _read_version(report, found)
-    name = _read_name(report, found.get("name", UNNAMED))
+    _read_version(spec["sprag"])
+    name, model = _read_name(spec["name"]), _read_model(spec["model"])
     # The spec of an unknown model cannot be read further.
-    model = _read_model(report, found)
     if model is None:
         raise report.error()
     part = part_of(model)
-    report.machine = machine = read_machine(report, part, found)
+    report.machine = machine = read_machine(spec, part)
     draft = Draft(spec, model, name)
     steps = [CASES.read(draft)]
     axes, combine = draft.axes, draft.combine
     if machine.derive and axes is not None and not report.found:
-        check_derived(report, found["derive"], machine, layout(machine, axes, combine), ranges=bool(draft.kind))
+        check_derived(report, spec.value["derive"], machine, layout(machine, axes, combine), ranges=bool(draft.kind))
     draft.run = part.read_run(spec["run"], axes, combine)
     steps += [kind.read(draft) for kind in WITH_CASES]
     part.check(report, machine, axes or (), combine)
@@ -122,44 +119,32 @@ def parse_spec(data: object) -> ParsedSpec:
     study = draft.study()
     warn_of_invalid_drives(report, study)
     part.warn(report, study)
-    return ParsedSpec(study, tuple(report.warnings), machine.fits, dict(found))
+    return ParsedSpec(study, tuple(report.warnings), machine.fits, dict(spec.value))
 
 
-def _read_version(report: Report, found: Mapping[str, Any]) -> None:
-    version = found.get("sprag")
-    if version is None or isinstance(version, bool) or version != VERSION or not isinstance(version, int):
-        report.fault(
-            "/sprag",
-            "required" if version is None else "unsupported-version",
-            "is required: the version of the spec" if version is None else "is not a supported spec version",
-            version,
-            allowed=str(VERSION),
-        )
+def _read_version(node: Node) -> None:
+    version = node.value
+    if version is None:
+        node.refuse("required", "is required: the version of the spec", allowed=str(VERSION))
+    elif isinstance(version, bool) or version != VERSION or not isinstance(version, int):
+        node.refuse("unsupported-version", "is not a supported spec version", allowed=str(VERSION))
 
 
-def _read_name(report: Report, value: object) -> str:
+def _read_name(node: Node) -> str:
+    value = node.otherwise(UNNAMED).value
     if isinstance(value, str) and 0 < len(value.strip()) <= len(value) <= MAX_NAME_LENGTH and value.isprintable():
         return value.strip()
-    report.fault(
-        "/name",
-        "invalid-text",
-        "must be a printable text in one line",
-        value,
-        allowed=characters(1, MAX_NAME_LENGTH),
-    )
+    node.refuse("invalid-text", "must be a printable text in one line", allowed=characters(1, MAX_NAME_LENGTH))
     return UNNAMED
 
 
-def _read_model(report: Report, found: Mapping[str, Any]) -> str | None:
-    model, known = found.get("model"), models.model_names()
+def _read_model(node: Node) -> str | None:
+    model, known = node.value, models.model_names()
     if isinstance(model, str) and model in known:
         return model
-    hint = did_you_mean(model, known) if isinstance(model, str) else Sentence("")
-    report.fault(
-        "/model",
-        "required" if model is None else "unknown-name",
-        "is required" if model is None else Sentence("is not a known model{hint}", hint=hint),
-        model,
-        allowed=quoted(known),
-    )
+    if model is None:
+        node.refuse("required", "is required", allowed=quoted(known))
+    else:
+        hint = did_you_mean(model, known) if isinstance(model, str) else Sentence("")
+        node.refuse("unknown-name", Sentence("is not a known model{hint}", hint=hint), allowed=quoted(known))
     return None

@@ -16,11 +16,11 @@ from sprag.service.spec.axes.design import ANYTHING
 from sprag.service.spec.derive import read_machine
 from sprag.service.spec.described import Listed, Record
 from sprag.service.spec.document import ParsedSpec, parse_spec
-from sprag.service.spec.fields import TOLERANCE_FIELDS, WHICH_CASES
+from sprag.service.spec.fields import TOLERANCE_FIELDS, without_cases
 from sprag.service.spec.kinds.sweep import sweep_of
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report, SpecError, join
+from sprag.service.spec.report import Report, SpecError
 from sprag.worker.directions import SWEEP
 from sprag.worker.limits import MAX_AXES
 from sprag.worker.study import without_drives
@@ -84,35 +84,11 @@ def extended_spec(
     SpecError
         With every fault of ``addition``; pointers refer to it.
     """
-    report = Report(addition) if report is None else report
-    EXTENSION.read(Node(report, "", addition))
-    report.raise_if_any()
-    assert isinstance(addition, Mapping)
-    found = dict(addition)
-    given = [name for name in ("axes", "cases") if name in found]
-    if len(given) != 1:
-        report.fault("", "exactly-one", "needs either `axes` or `cases`", given, allowed="one of axes, cases")
-        raise report.error()
-    if study.plan is not None:
-        report.fault(
-            "", "conflict", "the study chooses its own cases", given,
-            allowed="a new study with another error, other results or other goals: it reuses the cases of this one",
-        )  # fmt: skip
-        raise report.error()
-    if study.sweep is not None and given == ["cases"]:
-        report.fault(
-            "/cases", "conflict", "cannot be added to a sweep, whose cases depend on each other", allowed="`axes`"
-        )
-        raise report.error()
-    items = found[given[0]]
-    if not isinstance(items, list) or not items:
-        report.fault(
-            f"/{given[0]}", "wrong-type", "must be a list", items, allowed="1 item or more, as in the axes of a spec"
-        )
-        raise report.error()
+    root = Node(Report(addition) if report is None else report, "", addition)
+    items, field = _read_addition(root, study)
     # The tolerances stay: every further place is run with the same drives.
-    kept = {key: value for key, value in spec.items() if key not in WHICH_CASES or key in TOLERANCE_FIELDS}
-    kept["name"] = found.get("name", study.name)
+    kept = without_cases(spec, TOLERANCE_FIELDS)
+    kept["name"] = root["name"].otherwise(study.name).value
     places = without_drives(study)
     own: list[dict[str, Any]] = [
         {
@@ -123,17 +99,38 @@ def extended_spec(
         for axis in places.axes
         if axis.paths != (SWEEP,)
     ]
-    if given == ["cases"]:
+    if field == "cases":
         first = [{"combine": study.combine, "axes": own}] if own else []
-        return {**kept, "combine": "union", "axes": [*first, *items]}
+        return {**kept, "combine": "union", "axes": [*first, *(item.value for item in items)]}
     if study.combine != "grid":
-        report.fault("/axes", "conflict", "the axes of this study are zipped", allowed="`cases` instead")
-        raise report.error()
-    report.machine = read_machine(Report(), part_of(study.model), spec)
-    for index, item in enumerate(items):
-        _add(Node(report, join("/axes", index), item), places, own)
-    report.raise_if_any()
+        root["axes"].refuse("conflict", "the axes of this study are zipped", None, allowed="`cases` instead")
+        raise root.report.error()
+    root.report.machine = read_machine(Node(Report(), "", spec), part_of(study.model))
+    for item in items:
+        _add(item, places, own)
+    root.report.raise_if_any()
     return {**kept, "combine": "grid", "axes": own}
+
+
+def _read_addition(root: Node, study: Study) -> tuple[list[Node], str]:
+    """What is added to a study, and the field that gives it; SpecError where nothing can be added."""
+    EXTENSION.read(root)
+    root.report.raise_if_any()
+    given = [name for name in ("axes", "cases") if name in root]
+    node = root[given[0] if given else "axes"]
+    if len(given) != 1:
+        root.refuse("exactly-one", "needs either `axes` or `cases`", given, allowed="one of axes, cases")
+    elif study.plan is not None:
+        root.refuse(
+            "conflict", "the study chooses its own cases", given,
+            allowed="a new study with another error, other results or other goals: it reuses the cases of this one",
+        )  # fmt: skip
+    elif study.sweep is not None and given == ["cases"]:
+        node.refuse("conflict", "cannot be added to a sweep, whose cases depend on each other", None, allowed="`axes`")
+    elif not isinstance(node.value, list) or not node.value:
+        node.refuse("wrong-type", "must be a list", allowed="1 item or more, as in the axes of a spec")
+    root.report.raise_if_any()
+    return node.parts(), given[0]
 
 
 def _add(item: Node, study: Study, axes: list[dict[str, Any]]) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.spec.axes.blocks import as_axes, chosen, first_rows
-from sprag.service.spec.fields import WHICH_CASES
+from sprag.service.spec.fields import renamed, without_cases
 from sprag.service.spec.run import SETTLED_FIELDS, TIMED_FIELDS
-from sprag.worker.limits import MAX_NAME_LENGTH, MAX_RUN_PERIODS, MAX_SETTLED_PERIODS
+from sprag.worker.limits import MAX_RUN_PERIODS, MAX_SETTLED_PERIODS
 from sprag.worker.models import SETTLED, is_settled
 from sprag.worker.spread import DRIVE
 from sprag.worker.study import Axis
@@ -38,7 +38,6 @@ def longer_spec(
     cases : numbers of cases, at least one
     at_most : by default `TIMES` times as many as the study allows
     """
-    kept = {key: value for key, value in spec.items() if key not in WHICH_CASES}
     if is_settled(study.run):
         most = min(TIMES * study.run["at_most"], MAX_SETTLED_PERIODS) if at_most is None else at_most
         run = {key: value for key, value in spec.get("run", {}).items() if key not in TIMED_FIELDS}
@@ -48,15 +47,9 @@ def longer_spec(
         run = {key: value for key, value in spec.get("run", {}).items() if key not in times}
         run |= _longer_run(study, at_most)
     if study.sweep is not None:  # every case depends on those before it in its line
-        return {**spec, "name": study.name[: MAX_NAME_LENGTH - len(_SUFFIX)] + _SUFFIX, "run": run}
+        return {**spec, "name": renamed(study.name, _SUFFIX), "run": run}
     axes = [{"path": list(axis.paths), "values": axis.array.tolist()} for axis in _listed(study, cases)]
-    return {
-        **kept,
-        "name": study.name[: MAX_NAME_LENGTH - len(_SUFFIX)] + _SUFFIX,
-        "run": run,
-        "combine": "zip",
-        "axes": axes,
-    }
+    return {**without_cases(spec), "name": renamed(study.name, _SUFFIX), "run": run, "combine": "zip", "axes": axes}
 
 
 def _listed(study: Study, cases: NDArray[np.int64]) -> tuple[Axis, ...]:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag.service.spec.axes.axes import SWEPT
-from sprag.service.spec.fields import WHICH_CASES
+from sprag.service.spec.fields import renamed, without_cases
 from sprag.service.spec.kinds.sweep import sweep_of
 from sprag.worker.directions import DIRECTIONS, DOWN
-from sprag.worker.limits import MAX_NAME_LENGTH, NARROW_STEPS
+from sprag.worker.limits import NARROW_STEPS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -72,7 +72,6 @@ def narrowed_spec(
     steps : into how many the steps before these cases are split
     fixed : axes of which only one value is swept again, with its position
     """
-    kept = {key: value for key, value in spec.items() if key not in WHICH_CASES}
     jumps, swept, last = jumped_over(study, cases), swept_axis(study), len(study.axes) - 1
     axes = []
     for position, axis in enumerate(study.axes[:-1]):
@@ -84,5 +83,4 @@ def narrowed_spec(
         axes.append(own)
     one = {SWEPT.name: DIRECTIONS[int(study.axes[last].value(fixed[last]))]} if last in fixed else sweep_of(study)
     axes[swept] |= one
-    name = study.name[: MAX_NAME_LENGTH - len(_SUFFIX)] + _SUFFIX
-    return {**kept, "name": name, "combine": "grid", "axes": axes}
+    return {**without_cases(spec), "name": renamed(study.name, _SUFFIX), "combine": "grid", "axes": axes}

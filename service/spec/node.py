@@ -75,7 +75,7 @@ class Node:
         """The value at a path of fields and numbers of items with dots between them."""
         node = self
         for key in path.split("."):
-            node = node[int(key) if isinstance(node.value, list) and key.isdecimal() else key]
+            node = node[int(key) if isinstance(node.value, list) and key.isdecimal() and len(key) < 9 else key]
         return node
 
     def parts(self) -> list[Node]:
@@ -93,6 +93,11 @@ class Node:
         """Record a fault of this value, as `Report.fault`; ``value`` is what it shows instead of it."""
         shown = self.value if value is _ITSELF else value
         self.report.fault(self.pointer, code, message, shown, allowed=allowed, unit=unit)
+
+    def mistake(self, message: str, *, allowed: str | None = None) -> None:
+        """Record that something else is given, or, where nothing is, that it is required."""
+        missing = self.value is None
+        self.refuse("required" if missing else "wrong-type", "is required" if missing else message, allowed=allowed)
 
     def exact(self, parameter: Parameter) -> Fraction | None:
         """The exact SI number of a quantity in ``parameter``'s range."""
@@ -209,9 +214,9 @@ class Node:
         if isinstance(self.value, Mapping):
             self.report.unknown_fields(self.pointer, self.value, known)
             return True
-        missing = self.value is None and (null or not self.given)
-        self.refuse(
-            "required" if missing else "wrong-type", "is required" if missing else "must be an object",
-            allowed=Sentence("an object with the fields {names}", names=", ".join(known)),
-        )  # fmt: skip
+        allowed = Sentence("an object with the fields {names}", names=", ".join(known))
+        if self.given and not null and self.value is None:
+            self.refuse("wrong-type", "must be an object", allowed=allowed)
+        else:
+            self.mistake("must be an object", allowed=allowed)
         return False

@@ -22,7 +22,7 @@ from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.reader import Reading
-from sprag.service.spec.fields import WHICH_CASES
+from sprag.service.spec.fields import without_cases
 from sprag.service.spec.stored import accepted
 from sprag.worker import models
 from sprag.worker.limits import MAX_NAME_LENGTH
@@ -67,7 +67,7 @@ def _submit(context: Context, made: Submission) -> Response:
 
 def calibration_spec(spec: Mapping[str, Any], values: Mapping[str, str]) -> dict[str, Any]:
     """The spec of a calibration of the machine of ``spec``, with the fields of the page."""
-    kept = {key: value for key, value in spec.items() if key not in WHICH_CASES}
+    kept = without_cases(spec)
     unknown = [
         {"path": path, **range_of({name: values.get(f"{name}{row}", "") for name in ("from", "to")}, "")}
         for row in range(ROWS)

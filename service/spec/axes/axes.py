@@ -148,9 +148,7 @@ def read_paths(node: Node) -> tuple[str, ...] | None:
         such = Sentence(
             "a path such as 'excitation.frequency', or a list of 1 to {high} of them", high=str(MAX_TIED_PATHS)
         )
-        missing = node.value is None
-        node.refuse("required" if missing else "wrong-type", "is required" if missing else "must name what varies",
-                    allowed=such)  # fmt: skip
+        node.mistake("must name what varies", allowed=such)
         return None
     known: list[Parameter] = []
     for item in items:

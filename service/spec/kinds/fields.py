@@ -55,11 +55,8 @@ def read_result(node: Node) -> ResultInfo | None:
     infos = node.report.results
     some = next((info.name for info in infos if info.kind == "real"), "")
     allowed = Sentence("the name of a result of this study, such as '{name}'", name=some)
-    if node.value is None:
-        node.refuse("required", "is required", allowed=allowed)
-        return None
     if not isinstance(node.value, str):
-        node.refuse("wrong-type", "must be the name of a result", allowed=allowed)
+        node.mistake("must be the name of a result", allowed=allowed)
         return None
     info = result_of(infos, node.value)
     if info is None:

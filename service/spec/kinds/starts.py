@@ -85,12 +85,7 @@ def drawn(ranges: Mapping[str, list[float]], count: int, seed: int) -> dict[str,
 
 def _read_ranges(node: Node) -> Ranges:
     if not isinstance(node.value, Mapping) or not node.value:
-        missing = node.value is None
-        node.refuse(
-            "required" if missing else "wrong-type",
-            "is required" if missing else "must be an object with a range or more",
-            allowed=_ALLOWED,
-        )
+        node.mistake("must be an object with a range or more", allowed=_ALLOWED)
         return {}
     machine = node.machine
     initial = {path: entry for path, entry in machine.parameters.items() if _can_vary(path)}

@@ -225,9 +225,7 @@ def _read_paths(node: Node) -> list[str] | None:
     names = [item for item in items if isinstance(item, str)]
     allowed = N_("a path such as 'pendulums.*.backlash', or a list of paths; `*` stands for every pendulum or step")
     if not items or len(names) < len(items):
-        missing = node.value is None
-        node.refuse("required" if missing else "wrong-type", "is required" if missing else "must be a path, as text",
-                    allowed=allowed)  # fmt: skip
+        node.mistake("must be a path, as text", allowed=allowed)
         return None
     paths: list[str] = []
     for item in names:

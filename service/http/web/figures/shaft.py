@@ -9,7 +9,7 @@ from sprag.service.figures.motion import motion_figure
 from sprag.service.figures.read import read_figure
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.json_text import numbers
-from sprag.service.spec.fields import WHICH_CASES
+from sprag.service.spec.fields import without_cases
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -69,4 +69,4 @@ def overridden(spec: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, 
         for key in parents:
             place = place[int(key)] if isinstance(place, list) else place.setdefault(key, {})
         place[int(name) if isinstance(place, list) else name] = value
-    return {**{key: value for key, value in spec.items() if key not in WHICH_CASES}, "base": base}
+    return {**without_cases(spec), "base": base}

@@ -18,7 +18,7 @@ from sprag.service.reading.faults import message
 from sprag.service.spec.derive import with_values
 from sprag.service.spec.design import design_spec
 from sprag.service.spec.document import parse_spec
-from sprag.service.spec.fields import WHICH_CASES
+from sprag.service.spec.fields import WHICH_CASES, without_cases
 from sprag.service.spec.report import SpecError
 from sprag.service.spec.stored import accepted
 from sprag.worker import models
@@ -50,7 +50,7 @@ def single_machine(spec: Mapping[str, Any]) -> dict[str, Any]:
         path: value for path, value in middle.items()
         if path not in models.NO_PARAMETERS and not _gives(spec["base"], path)
     }  # fmt: skip
-    kept = {key: value for key, value in spec.items() if key not in WHICH_CASES}
+    kept = without_cases(spec)
     parsed = parse_spec({**kept, "base": with_values(spec["base"], given)})
     study = parsed.study
     base = with_values(parsed.spec["base"], {path: study.base[path] for path in study.derive})
