@@ -10,17 +10,15 @@ from sprag.service.http.web.form.entries import (
     Faults,
     Values,
     list_of,
-    path_values,
-    paths_of,
     plain,
-    range_of,
     text_of,
     unclear,
 )
-from sprag.service.http.web.form.parts import PARTS, filled
+from sprag.service.http.web.form.parts import PARTS
+from sprag.service.http.web.form.rows import field_of_row, filled, items_of_part, values_of_part
 from sprag.service.languages import N_, _
 from sprag.service.spec.axes.exclude import LIMITS
-from sprag.service.spec.axes.sample import SAMPLE, SCALE
+from sprag.service.spec.axes.sample import SAMPLE
 
 #: Field with the points, as the text of a CSV file.
 POINTS: Final = "/points"
@@ -59,26 +57,15 @@ def kinds() -> list[tuple[str, str]]:
 def blocks_of(values: Mapping[str, str]) -> dict[str, dict[str, Any]]:
     """The sample and the points of a form, by their names in a spec; those that are not filled in are left out."""
     found: dict[str, dict[str, Any]] = {}
-    rows = filled(values, "ranges")
+    ranges = items_of_part(values, "ranges")
     numbers = {name: plain(text) for name in _NUMBERS if (text := values.get(f"{_SAMPLE}/{name}", "").strip())}
-    if rows or "count" in numbers:
+    if ranges or "count" in numbers:
         second = {"second_order": True} if values.get(f"{_SAMPLE}/second_order") == "on" else {}
-        ranges = [_range(values, index) for index in rows]
         method = values.get(f"{_SAMPLE}/sample", SAMPLE.described["sample"].values[0])
         found["sample"] = {"sample": method, **numbers, **second, "ranges": ranges}
     if values.get(POINTS, "").strip():
         found["points"] = {"points": values[POINTS].replace("\r\n", "\n")}
     return found
-
-
-def _range(values: Mapping[str, str], index: int) -> dict[str, Any]:
-    pointer = f"{PARTS['ranges'].pointer}/{index}"
-    scale = values.get(f"{pointer}/scale", "")
-    return {
-        "path": paths_of(values, pointer),
-        **range_of(values, f"{pointer}/"),
-        **({"scale": scale} if scale == "log" else {}),
-    }
 
 
 def exclusions_of(values: Mapping[str, str]) -> list[dict[str, Any]]:
@@ -118,12 +105,10 @@ def field_of_block(place: int, rest: str, values: Mapping[str, str]) -> str:
     names = list(blocks_of(values))
     if place >= len(names) or names[place] == "points":
         return POINTS
-    match = re.match(r"ranges/(\d+)(?:/([a-z]+))?", rest)
+    match = re.match(r"ranges/(\d+)(?:/(.*))?", rest)
     if match is None:
         return f"{_SAMPLE}/{rest if rest in SAMPLE.described else 'count'}"
-    rows, inner = filled(values, "ranges"), match[2] or "from"
-    index = rows[int(match[1])] if int(match[1]) < len(rows) else 0
-    return f"{PARTS['ranges'].pointer}/{index}/{inner if inner in {'path', 'to'} else 'from'}"
+    return field_of_row("ranges", int(match[1]), match[2] or "", values)
 
 
 def field_of_exclusion(pointer: str, values: Mapping[str, str]) -> str:
@@ -162,15 +147,9 @@ def case_values(blocks: Sequence[Mapping[str, Any]], conditions: Sequence[Mappin
 
 
 def _sample_values(block: Mapping[str, Any]) -> Values:
-    ranges = block.get("ranges", ())
-    known = {"path", "from", "to", SCALE.name}
-    if not set(block) <= {*SAMPLE.described, "ranges"} or not all(set(item) <= known for item in ranges):
+    if not set(block) <= {*SAMPLE.described, "ranges"}:
         raise ValueError("the form has no fields for all of this sample")
-    values: Values = {f"{_SAMPLE}/sample": str(block["sample"]), "ranges": str(len(ranges))}
+    values: Values = {f"{_SAMPLE}/sample": str(block["sample"])}
     values |= {f"{_SAMPLE}/{name}": text_of(block[name]) for name in _NUMBERS if name in block}
     values |= {f"{_SAMPLE}/second_order": "on"} if block.get("second_order") else {}
-    for index, item in enumerate(ranges):
-        row = f"{PARTS['ranges'].pointer}/{index}"
-        values |= path_values(row, item["path"]) | {f"{row}/{name}": text_of(item[name]) for name in ("from", "to")}
-        values[f"{row}/scale"] = str(item.get(SCALE.name, ""))
-    return values
+    return values | values_of_part("ranges", block.get("ranges", ()))

@@ -15,7 +15,8 @@ from sprag.service.http.web.form.columns import COLUMNS
 from sprag.service.http.web.form.entries import Faults, items_of, list_of, range_of
 from sprag.service.http.web.form.machine import model_name, places
 from sprag.service.http.web.form.machine_spec import step_of
-from sprag.service.http.web.form.spec import WAYS, field_of, spec_of
+from sprag.service.http.web.form.rows import WAYS
+from sprag.service.http.web.form.spec import field_of, spec_of
 from sprag.service.jobs.preview import preview_json
 from sprag.service.languages import _, gettext
 from sprag.service.reading.faults import message

@@ -290,7 +290,7 @@ def _numbers(model: str, prefix: str) -> list[str]:
 
 def _described(model: str, path: str) -> Described | Parameter | None:
     """What the spec says about an entry of the base that is no number of the catalogue."""
-    found: object = part_of(model).base
+    found: object = part_of(model).base()
     if path.startswith("drive."):  # the description of a drive is its JSON Schema
         return _OF_DRIVES.get(path.rpartition(".")[2])
     for key in path.split("."):

@@ -37,11 +37,12 @@ from sprag.service.http.web.form.fields import (
     run_fields,
     search_fields,
 )
-from sprag.service.http.web.form.goal import GOAL_DEFAULTS, LIMITS
+from sprag.service.http.web.form.goal import GOAL_DEFAULTS
 from sprag.service.http.web.form.machine import BASE, blocks, choices_of, entries, form_of, model_name
 from sprag.service.http.web.form.machine_spec import base_of, values_of_base
 from sprag.service.http.web.form.own_machine import laboratory_address
 from sprag.service.http.web.form.parts import count_of, parts_of, reshape, share, unshared
+from sprag.service.http.web.form.rows import LIMITS
 from sprag.service.http.web.form.spec import REFINE_DEFAULTS, is_search, values_of
 from sprag.service.http.web.form.tolerances import OWN, distributions, drive_fields, own_name, with_batch
 from sprag.service.http.web.form.undo import history_of, remember, undo

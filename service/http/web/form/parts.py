@@ -23,14 +23,14 @@ class Part:
     ----------
     pointer : JSON Pointer of the list; the fields of row 0 begin with ``{pointer}/0/``
     most : largest number of rows
-    entries : fields of which at least one has a text in a row that is filled in
+    entries : fields of which at least one has a text in a row that is filled in, where `rows` does not say it
     new : initial values of a new row
     rows : of a list of the machine, what its model says about it
     """
 
     pointer: str
     most: int
-    entries: tuple[str, ...]
+    entries: tuple[str, ...] = ()
     new: Values = field(default_factory=dict)
     rows: Rows | None = None
 
@@ -43,38 +43,28 @@ _MOST_CONDITIONS: Final = 20
 
 #: By the name of the field with the number of rows.
 PARTS: Final = {
-    "axes": Part("/axes", MAX_AXES, ("path", "tied", "values", "from", "to", "count", "step"), {"way": "linspace"}),
-    "vary": Part("/goal/vary", GOAL.listed["vary"].high, ("path", "tied", "values", "from", "to"), {"way": "from"}),
-    "best": Part("/goal/best", GOAL.listed["best"].high, ("result",), {"toward": "max"}),
-    "subject_to": Part("/goal/subject_to", GOAL.listed["subject_to"].high, ("result", "value"), {"kind": "at_most"}),
+    "axes": Part("/axes", MAX_AXES, new={"way": "linspace"}),
+    "vary": Part("/goal/vary", GOAL.listed["vary"].high, new={"way": "from"}),
+    "best": Part("/goal/best", GOAL.listed["best"].high, new={"toward": "max"}),
+    "subject_to": Part("/goal/subject_to", GOAL.listed["subject_to"].high, new={"kind": "at_most"}),
     "at": Part("/goal/at", MAX_AXES, ("path", "values")),
-    "ranges": Part("/sample/ranges", MAX_AXES, ("path", "tied", "from", "to")),
+    "ranges": Part("/sample/ranges", MAX_AXES),
     "exclude": Part("/exclude", _MOST_CONDITIONS, ("path", "value", "and/path", "and/value")),
-    "correlations": Part("/correlations", _MOST_CORRELATIONS, ("between/0", "between/1", "coefficient")),
+    "correlations": Part("/correlations", _MOST_CORRELATIONS),
 }
 
 
 def parts_of(values: Mapping[str, str]) -> dict[str, Part]:
     """Every list of a form, by the name of the field with the number of its rows."""
     lists = form_of(values).lists
-    return PARTS | {rows.name: Part(f"{BASE}/{rows.at}", rows.most, (), rows=rows) for rows in lists}
+    return PARTS | {rows.name: Part(f"{BASE}/{rows.at}", rows.most, rows=rows) for rows in lists}
 
 
 def count_of(values: Mapping[str, str], name: str) -> int:
     """Number of rows of a part; 0 where the form has no such list."""
-    part = parts_of(values).get(name, Part("", 0, ()))
+    part = parts_of(values).get(name, Part("", 0))
     least = part.rows.least if part.rows else 0
     return count_in(values, name, least, least, part.most)
-
-
-def filled(values: Mapping[str, str], name: str) -> list[int]:
-    """The rows of a part that are filled in."""
-    part = PARTS[name]
-    return [
-        index
-        for index in range(count_of(values, name))
-        if any(values.get(f"{part.pointer}/{index}/{entry}", "").strip() for entry in part.entries)
-    ]
 
 
 def reshape(values: Values, wanted: str) -> None:

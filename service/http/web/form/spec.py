@@ -14,41 +14,26 @@ from sprag.service.http.web.form.cases import (
     field_of_exclusion,
     repeated_limits,
 )
-from sprag.service.http.web.form.correlations import correlation_values, correlations_of, field_of_correlation
 from sprag.service.http.web.form.entries import (
     Faults,
     Values,
-    list_of,
-    list_text,
     names_of,
-    path_values,
-    paths_of,
     plain,
-    range_of,
     text_of,
 )
 from sprag.service.http.web.form.goal import GOAL_DEFAULTS, field_of_goal, goal_of, goal_values
 from sprag.service.http.web.form.machine import form_of, model_name
 from sprag.service.http.web.form.machine_spec import base_of, field_of_base, values_of_base
-from sprag.service.http.web.form.parts import count_of
+from sprag.service.http.web.form.rows import field_of_row, filled, items_of_part, values_of_part
 from sprag.service.http.web.form.tolerances import FIELDS as TOLERANT
-from sprag.service.http.web.form.tolerances import field_of_tolerance, tolerance_values, tolerances_of
+from sprag.service.http.web.form.tolerances import field_of_tolerance, tolerance_values, tolerances_of, with_batch
 from sprag.service.reading.together import with_last_unit
-from sprag.service.spec.axes.axes import SWEPT
 from sprag.service.spec.derive import formulas_of, with_values
 from sprag.service.spec.kinds import refine
 from sprag.service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
 from sprag.worker import models
 from sprag.worker.models import SETTLED
 
-#: Fields of an axis for each way of giving its values.
-WAYS: Final = {
-    "values": ("values",),
-    "linspace": ("from", "to", "count"),
-    "geomspace": ("from", "to", "count"),
-    "range": ("from", "to", "step"),
-    "adaptive": ("from", "to"),
-}
 #: What is asked of a refinement in a form that was not about one.
 REFINE_DEFAULTS: Final[Values] = {
     "/refine/results": "shaft.speed.mean; efficiency",
@@ -91,11 +76,12 @@ def spec_of(values: Mapping[str, str]) -> tuple[dict[str, Any], Faults]:
         spec["derive"] = derive
     if form_of(values).with_run:
         spec["run"] = _run(values)
-    spec |= tolerances_of(values) | correlations_of(values)
+    spec |= tolerances_of(values)
+    if with_batch(values) and (correlations := items_of_part(values, "correlations")):
+        spec["correlations"] = correlations
     if is_search(values):
         return spec | {"goal": goal_of(values, faults)}, faults
-    axes = [_axis(values, index) for index in range(count_of(values, "axes"))]
-    spec["axes"] = [axis for axis in axes if axis is not None] + list(blocks_of(values).values())
+    spec["axes"] = [*items_of_part(values, "axes"), *blocks_of(values).values()]
     if conditions := exclusions_of(values):
         spec["exclude"] = conditions
         faults |= repeated_limits(values)
@@ -150,21 +136,6 @@ def _run(values: Mapping[str, str]) -> dict[str, Any]:
     return run
 
 
-def _axis(values: Mapping[str, str], index: int) -> dict[str, Any] | None:
-    """One axis; None for one in which nothing is filled in."""
-    pointer = f"/axes/{index}"
-    path = paths_of(values, pointer)
-    way = values.get(f"{pointer}/way", "values")
-    names = WAYS.get(way, ("values",))
-    texts = [values.get(f"{pointer}/{name}", "").strip() for name in names]
-    if not path and not any(texts):
-        return None
-    axis: dict[str, Any] = {"path": path}
-    axis[way] = list_of(texts[0]) if way == "values" else list(range_of(values, f"{pointer}/", names).values())
-    swept = values.get(f"{pointer}/{SWEPT.name}", "")
-    return axis | ({SWEPT.name: swept} if swept else {})
-
-
 def field_of(pointer: str, values: Mapping[str, str]) -> str:
     """The field beside which a fault at ``pointer`` of the spec is shown; "" for the whole form."""
     if pointer.startswith("/derive/"):
@@ -175,28 +146,17 @@ def field_of(pointer: str, values: Mapping[str, str]) -> str:
         return field_of_goal(pointer, values)
     if pointer.startswith("/tolerances"):
         return field_of_tolerance(pointer, values)
-    if pointer.startswith("/correlations"):
-        return field_of_correlation(pointer, values)
     if pointer.startswith("/base"):
         return field_of_base(pointer, values)
     if pointer.startswith("/exclude"):
         return field_of_exclusion(pointer, values)
-    match = re.fullmatch(r"/axes/(\d+)(?:/(.*))?", pointer)
+    match = re.fullmatch(r"/(axes|correlations)/(\d+)(?:/(.*))?", pointer)
     if match:
-        # Axes that are not filled in are not in the spec.
-        filled = [index for index in range(count_of(values, "axes")) if _axis(values, index) is not None]
-        if int(match[1]) >= len(filled) and blocks_of(values):
-            return field_of_block(int(match[1]) - len(filled), match[2] or "", values)
-        index = filled[int(match[1])] if int(match[1]) < len(filled) else int(match[1])
-        rest = match[2] or "path"
-        if rest == SWEPT.name:
-            return f"/axes/{index}/{rest}"
-        way, _, item = rest.partition("/")
-        names = WAYS.get(way)
-        if names is None:
-            return f"/axes/{index}/path"
-        inside = item if item.isdigit() and int(item) < len(names) else "0"
-        return f"/axes/{index}/{names[0] if way == 'values' else names[int(inside)]}"
+        name, place, rest = match[1], int(match[2]), match[3] or ""
+        behind = place - len(filled(values, name))
+        if name == "axes" and behind >= 0 and blocks_of(values):
+            return field_of_block(behind, rest, values)
+        return field_of_row(name, place, rest, values)
     return "/run/window/0" if pointer == "/run/window" else pointer
 
 
@@ -210,7 +170,7 @@ def values_of(spec: Mapping[str, Any]) -> Values:
         raise ValueError("the form has no fields for all of this spec")
     axes = [axis for axis in spec.get("axes", ()) if isinstance(axis, Mapping) and not {"sample", "points"} & set(axis)]
     blocks = list(spec.get("axes", ()))[len(axes) :]
-    if not all(map(_plain_axis, axes)) or not all({"sample", "points"} & set(block) for block in blocks):
+    if not all({"sample", "points"} & set(block) for block in blocks):
         raise ValueError("the form has no fields for all of these axes")
     values["/combine"] = str(spec.get("combine", "grid"))
     formulas = {path: f"{FORMULA} {text}" for path, text in formulas_of(spec).items()}
@@ -221,12 +181,8 @@ def values_of(spec: Mapping[str, Any]) -> Values:
     values |= goal_values(spec["goal"]) if "goal" in spec else GOAL_DEFAULTS
     for key, content in spec.get("refine", {}).items():
         values[f"/refine/{key}"] = "; ".join(content) if key == "results" else text_of(content)
-    values |= tolerance_values(spec, values) | correlation_values(spec)
-    values |= case_values(blocks, spec.get("exclude", ()))
-    values["axes"] = str(len(axes))
-    for index, axis in enumerate(axes):
-        values |= _axis_values(f"/axes/{index}", axis)
-    return values
+    values |= tolerance_values(spec, values) | values_of_part("correlations", spec.get("correlations", ()))
+    return values | case_values(blocks, spec.get("exclude", ())) | values_of_part("axes", axes)
 
 
 def _run_values(run: Mapping[str, Any]) -> Values:
@@ -239,17 +195,3 @@ def _run_values(run: Mapping[str, Any]) -> Values:
         else:
             values[f"/run/{key}"] = text_of(content)
     return values
-
-
-def _plain_axis(axis: Mapping[str, Any]) -> bool:
-    """Whether an axis gives its values in one of the form's ways."""
-    return any(set(axis) - {SWEPT.name} == {"path", way} for way in WAYS)
-
-
-def _axis_values(pointer: str, axis: Mapping[str, Any]) -> Values:
-    way = next(name for name in WAYS if name in axis)
-    found = {**path_values(pointer, axis["path"]), f"{pointer}/way": way}
-    found |= {f"{pointer}/{SWEPT.name}": str(axis[SWEPT.name])} if SWEPT.name in axis else {}
-    if way == "values":
-        return found | {f"{pointer}/values": list_text(axis[way])}
-    return found | {f"{pointer}/{name}": text_of(item) for name, item in zip(WAYS[way], axis[way], strict=True)}
