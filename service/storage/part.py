@@ -119,6 +119,14 @@ def row_of(connection: sa.Connection, study_id: str, *columns: sa.ColumnElement[
     return row
 
 
+def lock_row(connection: sa.Connection, study_id: str) -> None:
+    """Let no other transaction change the row of a study before the end of this one.
+
+    Rows of its cases may be stored meanwhile: they refer to it.
+    """
+    connection.execute(sa.select(STUDIES.c.number).where(STUDIES.c.id == study_id).with_for_update(key_share=True))
+
+
 def change_row(connection: sa.Connection, number: int, *only: sa.ColumnElement[bool], **values: object) -> None:
     """Put ``values`` into the row of a study where all of ``only`` hold; its revision tells readers of it."""
     if "reason" in values:

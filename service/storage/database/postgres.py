@@ -1,7 +1,8 @@
 """PostgreSQL instead of SQLite: its URL, connections and transactions, its lock, and notifications of changes.
 
 Each writer holds an advisory lock for the length of its transaction. So the store has one writer at a time on a server
-too, and reasoning about SQLite's immediate transactions remains valid.
+too, and reasoning about SQLite's immediate transactions remains valid. What people write about a study, heartbeats and
+uses of tokens lock only the rows that they change (`Session.write_own`): they do not wait until rows are stored.
 """
 
 from __future__ import annotations

@@ -222,8 +222,7 @@ class Session:
         with self._turn:
             if not self._turn.wait_for(lambda: self._refusing or not self._writing, BUSY_SECONDS):
                 raise busy(self.location)
-            if self._refusing:
-                raise EndingError("the service is shutting down; nothing was written")
+            self._require_admitted()
             self._writing = True
         try:
             writer = self._writer.execution_options(**{_WAIT: max(until - perf_counter(), 0.0)})
@@ -233,6 +232,24 @@ class Session:
             with self._turn:
                 self._writing = False
                 self._turn.notify()
+
+    @contextmanager
+    def write_own(self) -> Iterator[sa.Connection]:
+        """A write transaction for rows that it locks itself: on a server it waits for no other writer.
+
+        For a file it is a `write`.
+        """
+        if not self.on_server:
+            with self.write() as connection:
+                yield connection
+            return
+        self._require_admitted()
+        with self._transaction(self._engine, "write", perf_counter()) as connection:
+            yield connection
+
+    def _require_admitted(self) -> None:
+        if self._refusing:
+            raise EndingError("the service is shutting down; nothing was written")
 
     def refuse_writes(self) -> None:
         """Refuse writes from now on: waiting ones get EndingError. The current one continues."""

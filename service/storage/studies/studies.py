@@ -35,6 +35,7 @@ from sprag.service.storage.part import (
     announce,
     change_row,
     lift_deadline,
+    lock_row,
     makes_room,
     micros_of,
     moment,
@@ -427,7 +428,8 @@ class Studies(Part):
         change is meant for; ChangedMeanwhileError for any other.
         """
         c = STUDIES.c
-        with self.session.write() as connection:
+        with self.session.write_own() as connection:
+            lock_row(connection, study_id)
             row = row_of(connection, study_id, c.number, c.owner, c.name, c.notes, c.tags, c.search, c.archived_at)
             require_own("study", study_id, row.owner)
             require_edition("study", study_id, self._study_record(connection, study_id).etag, read)
@@ -472,6 +474,7 @@ class Studies(Part):
         # One that can be restored takes room as well, until it is deleted for good.
         there = c.deleted_at.is_(None) | (sa.literal(at_once) & (c.purge_at > now))
         with self.session.write() as connection:
+            lock_row(connection, study_id)
             row = connection.execute(sa.select(*RECORD_COLUMNS).where(c.id == study_id, there)).one_or_none()
             if row is None:
                 raise StudyNotFoundError(study_id)

@@ -367,7 +367,8 @@ class Work(Part):
         """Insert the rows of claimed chunks, mark them done, and count."""
         if not finished:
             return
-        kinds = _kinds(connection, {item.chunk.study for item in finished})
+        studies = connection.execute(_KINDS, {"numbers": sorted({item.chunk.study for item in finished})}).all()
+        kinds = {row.number: (row.model, row.variant) for row in studies}
         digests = self._insert(connection, finished, kinds)
         gains = {number: _Gain() for number in kinds}
         hosts: dict[Key, set[str]] = {}
@@ -386,6 +387,10 @@ class Work(Part):
                 digests[key_of(chunk)] = self._digests.digest_in(connection, chunk)
         self._mark_done(connection, finished, hosts, digests)
         add_endings(connection, {number: gain.endings for number, gain in gains.items()})
+        # Their rows are locked last: who changes what they are called need not wait for the rows of cases.
+        for row in studies:
+            if row.fingerprint != fingerprint.digest():
+                mark_origin(connection, row.number)
         for number, gain in gains.items():
             more = {"more_done": gain.cases, "more_ok": gain.endings[models.OK], "more_reused": gain.reused}
             connection.execute(_GAINED, {"of": number, **more})
@@ -489,15 +494,6 @@ class Work(Part):
             change_row(connection, number, cases=study.cases, study=text, digest=digest)
         self._reuse.forget(number)
         return chunks
-
-
-def _kinds(connection: sa.Connection, numbers: Iterable[int]) -> dict[int, tuple[str, str]]:
-    """Model and variant of studies, which are marked with the origin of the rows that they get."""
-    rows = connection.execute(_KINDS, {"numbers": sorted(numbers)}).all()
-    for row in rows:
-        if row.fingerprint != fingerprint.digest():
-            mark_origin(connection, row.number)
-    return {row.number: (row.model, row.variant) for row in rows}
 
 
 def _why_failed(connection: sa.Connection, number: int, cases: int) -> str:

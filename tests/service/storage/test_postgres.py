@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,11 +24,14 @@ from sprag.service.http.app import chunking, create_app
 from sprag.service.jobs import dispatching
 from sprag.service.jobs.dispatching import WorkerSettings, run_dispatcher
 from sprag.service.settings import Settings
+from sprag.service.spec.labels import StudyChange
 from sprag.service.storage.database import postgres as storage
 from sprag.service.storage.database import session as session_module
 from sprag.service.storage.database.server_lock import ServerLock
 from sprag.service.storage.database.session import Session
-from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, SchemaError
+from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, SchemaError, StudyNotFoundError
+from sprag.service.storage.part import lock_row
+from sprag.service.storage.people.scopes import TokenScope
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import HEAD_REVISION, STUDIES, all_tables
 from sprag.worker import models
@@ -172,6 +176,66 @@ def test_one_writer_at_a_time_and_readers_of_one_moment(postgres_url: str, monke
             assert connection.execute(count).scalar_one() == 0
             other.studies.create({}, fakes.study(3))
             assert connection.execute(count).scalar_one() == 0
+
+
+def test_what_people_write_and_heartbeats_do_not_wait_for_rows(
+    postgres_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(session_module, "BUSY_SECONDS", 0.5)
+    size = 20_000
+    with Store.open(postgres_url, chunking=Chunking(cases=size)) as store, Store.open(postgres_url) as other:
+        study = fakes.study(size)
+        record, waiting = store.studies.create({}, study), store.studies.create({}, fakes.study(3))
+        store.dispatchers.presence = other.dispatchers.presence = fakes.Present()
+        epoch, second = store.work.take_over("test"), other.work.take_over("second")
+        (_, token) = store.people.create_token("a", TokenScope.READ)
+        (chunk,) = store.work.claim(epoch, store.work.open_chunks(record.number))
+        copied, go_on = threading.Event(), threading.Event()
+        insert = store.session.insert_blocks
+
+        def slowly(*given: Any) -> None:
+            insert(*given)
+            copied.set()
+            assert go_on.wait(60)
+
+        monkeypatch.setattr(store.session, "insert_blocks", slowly)
+        storing = threading.Thread(target=store.work.commit, args=(epoch, chunk, fakes.result(0, size)))
+        storing.start()
+        assert copied.wait(60)
+        for service in (store, other):
+            for study_id in (record.id, waiting.id):
+                service.studies.change(study_id, StudyChange(name=f"renamed {study_id}"))
+            service.work.heartbeat(second, {})
+            service.people.note_uses({token.id: 1})
+        with refused(DatabaseBusyError, "database-busy"):
+            other.studies.pause(waiting.id)
+        go_on.set()
+        storing.join()
+        ended = store.studies.get(record.id)
+        assert (ended.name, ended.done) == (f"renamed {record.id}", size)
+        assert store.studies.study(record.id) == replace(study, name=ended.name)
+
+
+def test_a_study_that_is_deleted_meanwhile_is_not_changed(postgres_url: str) -> None:
+    with Store.open(postgres_url) as store, Store.open(postgres_url) as other:
+        record = store.studies.create({}, fakes.study(3))
+        store.studies.cancel(record.id)
+        store.work.settle(store.work.take_over("test"), record.number)
+        refusals: list[StudyNotFoundError] = []
+
+        def rename() -> None:
+            with pytest.raises(StudyNotFoundError) as caught:
+                other.studies.change(record.id, StudyChange(name="late"))
+            refusals.append(caught.value)
+
+        changing = threading.Thread(target=rename)
+        with store.session.write() as connection:
+            lock_row(connection, record.id)
+            changing.start()
+            time.sleep(0.2)
+            connection.execute(sa.update(STUDIES).where(STUDIES.c.id == record.id).values(deleted_at=1))
+        changing.join()
+        assert refusals
 
 
 def test_dispatchers_know_of_each_other_by_their_connections(postgres_url: str) -> None:
