@@ -9,7 +9,6 @@ from sprag.service.spec.components import Component
 from sprag.service.storage.errors import ComponentNotFoundError, NotOwnerError, TooManyComponentsError
 from sprag.service.storage.people.audit import AuditFilter
 from sprag.service.storage.store import Store
-from sprag.worker.limits import MAX_COMPONENTS
 
 SPRING = Component("spring", "F-120", "store 3", {"spring_rate": "9 Н/мм"})
 CLUTCH = Component("clutch", "FW 20", "", {"coefficients": "0; 200"})
@@ -50,9 +49,10 @@ def test_a_component_of_another_user_is_not_changed(store: Store) -> None:
     assert [record.component for record in store.components.all()] == [SPRING]  # all or none
 
 
-def test_the_catalogue_has_a_limit(store: Store) -> None:
-    many = [Component("spring", f"F-{number}", "", {"spring_rate": "1 N/mm"}) for number in range(MAX_COMPONENTS)]
+def test_the_catalogue_has_a_limit(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sprag.service.storage.components.MAX_COMPONENTS", 20)
+    many = [Component("spring", f"F-{number}", "", {"spring_rate": "1 N/mm"}) for number in range(20)]
     store.components.put(many)
     with pytest.raises(TooManyComponentsError):
         store.components.put([CLUTCH])
-    assert len(store.components.all()) == MAX_COMPONENTS
+    assert len(store.components.all()) == 20

@@ -39,21 +39,26 @@ NAMES = re.compile(
 )
 
 
-@pytest.fixture
-def pseudo(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """A language that wraps each text of the catalogues in brackets."""
+@pytest.fixture(scope="module")
+def bracketed() -> Iterator[Catalogue]:
+    """A catalogue that wraps each text in brackets; the command line that is made of it serves all tests."""
     ours = languages.catalogue("uk")
     entries = {
         key: entry if key.context else Entry(tuple(_wrapped(key.text) for _ in entry.forms), entry.many)
         for key, entry in ours.entries.items()
     }
-    made = Catalogue(ours.header, entries)
+    command_line.cache_clear()
+    yield Catalogue(ours.header, entries)
+    command_line.cache_clear()
+
+
+@pytest.fixture
+def pseudo(bracketed: Catalogue, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A language that wraps each text of the catalogues in brackets."""
+    ours = languages.catalogue("uk")
     monkeypatch.setattr(languages, "available", lambda: ("en", "uk", "xx"))
-    monkeypatch.setattr(languages, "catalogue", lambda code: made if code == "xx" else ours)
+    monkeypatch.setattr(languages, "catalogue", lambda code: bracketed if code == "xx" else ours)
     monkeypatch.setenv("SPRAG_LANGUAGE", "xx")
-    command_line.cache_clear()
-    yield
-    command_line.cache_clear()
 
 
 def _wrapped(text: str) -> str:

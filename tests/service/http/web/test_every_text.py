@@ -93,13 +93,13 @@ def around(text: str) -> str:
 @pytest.fixture
 def bracketed(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A language in which each text of the catalogues is in brackets, whose inside may hold bracketed texts, too."""
-    keep = {"decimal mark", "date"}
+    keep, known_texts = {"decimal mark", "date"}, texts()
     entries = {
         key: Entry((key.text if key.context in keep or not _WORD.search(key.text) else around(key.text),) * count, many)
-        for key, many in texts().items()
+        for key, many in known_texts.items()
         for count in [2 if many else 1]
     }
-    entries |= {key: Entry((around(key.text), around(many)), many) for key, many in texts().items() if many}
+    entries |= {key: Entry((around(key.text), around(many)), many) for key, many in known_texts.items() if many}
     entries[Key("English", "name of this language")] = Entry(("Bracketed",))
     made_up = Catalogue("Plural-Forms: nplurals=2; plural=(n != 1);\n", entries)
     real, known = languages.catalogue, languages.available()
