@@ -218,7 +218,9 @@ class Fault:
         return f"{where}: {self.message}" + (f" ({'; '.join(details)})" if details else "")
 
     def to_json(self) -> dict[str, Any]:
-        """The fault as JSON data."""
+        """The fault as JSON data; ``sentences`` has those of its texts that have values in them, to be translated."""
+        texts = {"message": self.message, "allowed": self.allowed}
+        sentences = {name: text.to_json() for name, text in texts.items() if isinstance(text, Sentence) and text.parts}
         return {
             self.place: self.where,
             "code": self.code,
@@ -226,6 +228,7 @@ class Fault:
             "value": self.value,
             "allowed": self.allowed,
             "unit": self.unit,
+            **({"sentences": sentences} if sentences else {}),
         }
 
 

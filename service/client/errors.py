@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, cast, get_args
 
+from sprag.sentences import sentence_of
 from sprag.service.faults import Code, Fault, FaultError, Kind, ParameterFault, shown
 
 
@@ -91,8 +92,16 @@ def _fault(error: Mapping[str, Any]) -> Fault:
     code = cast("Code", error["code"] if error.get("code") in get_args(Code) else "invalid-text")
     made = ParameterFault if error.get("parameter") is not None else Fault
     where = error.get("parameter", error.get("pointer"))
-    parts = (str(error.get("message", "is wrong")), error.get("value"), error.get("allowed"), error.get("unit"))
-    return made(where, code, *parts)
+    message = _sentence(error, "message") or str(error.get("message", "is wrong"))
+    return made(where, code, message, error.get("value"), _sentence(error, "allowed"), error.get("unit"))
+
+
+def _sentence(error: Mapping[str, Any], name: str) -> str | None:
+    """A text of a fault with its values, where the service tells them."""
+    try:
+        return sentence_of(error["sentences"][name])
+    except (KeyError, TypeError, ValueError, AttributeError):
+        return cast("str | None", error.get(name))
 
 
 class StudyTimeoutError(ServiceError):

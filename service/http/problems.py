@@ -170,6 +170,9 @@ class FaultModel(BaseModel):
     value: Any = Field(default=None, description="what was received, shortened")
     allowed: str | None = Field(default=None, description="what is allowed: a range, or the possible values")
     unit: str | None = Field(default=None, description="SI unit of the value")
+    sentences: dict[str, dict[str, Any]] | None = Field(
+        default=None, description="`message` and `allowed` with their values apart, for who translates them"
+    )
 
 
 class Problem(BaseModel):

@@ -1,7 +1,7 @@
 """Faults in the reader's language.
 
-What a fault says is a phrase with its values, or a text of the catalogue. One that is neither, such as that of a
-running service, which is English, is told by the meaning of its code (`sprag.service.fault_meanings`).
+What a fault says is a sentence with its values, or a text of the catalogue. One that is neither is told by the meaning
+of its code (`sprag.service.fault_meanings`).
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from sprag.sentences import Sentence
 from sprag.service.fault_meanings import MEANINGS
 from sprag.service.languages import ENGLISH, current, gettext
-from sprag.service.languages.ranges import with_range
 from sprag.service.reading.reader import shown
 from sprag.service.reading.wording import unit_text
 
@@ -34,8 +33,7 @@ def is_translated(fault: Fault) -> bool:
 
 def allowed_text(allowed: str | None) -> str:
     """What a fault says is allowed; names of choices are the same in all languages."""
-    said = translated(allowed or "")
-    return said if said != allowed else with_range(said)
+    return translated(allowed or "")
 
 
 def translated(text: str) -> str:

@@ -17,7 +17,6 @@ from sprag.sentences import Amount, Clause, Name, Part, Place, Sentence, Typed, 
 from sprag.service.fault_meanings import WARNING_MEANINGS
 from sprag.service.faults import refused
 from sprag.service.languages import ENGLISH, _, current, decimal, earlier, gettext, language, ngettext
-from sprag.service.languages.ranges import NUMBER
 from sprag.service.reading.numbers import in_language
 from sprag.service.reading.part_names import lower_first, part_name, run_name, upper_first
 from sprag.service.reading.quantities import KINDS, SI, Units, units_for
@@ -265,8 +264,10 @@ def reading_for(study: Study, spec: Mapping[str, Any], choice: Choice) -> Readin
 #: Sentences that earlier releases stored in English only: what they say is found in them again, for one release.
 _SI: Final = {kind.unit for kind in KINDS} | {"N*m/rad"}
 _UNITS: Final = sorted(_SI | {unit for kind in KINDS for unit in kind.others}, key=len, reverse=True)
+#: A number in a sentence.
+_NUMBER: Final = r"[-−+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?"
 #: A number with a unit within a sentence.
-_QUANTITY: Final = re.compile(rf"(?<![\w.])({NUMBER}) ({'|'.join(map(re.escape, _UNITS))})(?![\w^*/])")
+_QUANTITY: Final = re.compile(rf"(?<![\w.])({_NUMBER}) ({'|'.join(map(re.escape, _UNITS))})(?![\w^*/])")
 _CASES: Final = re.compile(r"\bin ([\d,]+) of ([\d,]+) cases\b")
 #: The place at the beginning of a warning.
 _PLACE: Final = re.compile(r"(/[^:\s]*)(?: \(([^)]*)\))?: ")

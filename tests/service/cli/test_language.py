@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -17,10 +18,10 @@ from anyio.from_thread import BlockingPortal
 from sprag.service import client as clients
 from sprag.service import languages
 from sprag.service.cli.app import command_line
-from sprag.service.cli.console import ExitCode, WrongInputError, confirmed, duration_text, warning_lines
+from sprag.service.cli.console import ExitCode, WrongInputError, confirmed, duration_text, fault_line, warning_lines
 from sprag.service.cli.following import show_study
 from sprag.service.cli.language import chosen, refusal
-from sprag.service.client import Client
+from sprag.service.client import Client, RefusedError
 from sprag.service.fault_meanings import MEANINGS, WARNING_MEANINGS
 from sprag.service.faults import Fault
 from sprag.service.languages.catalogue import Catalogue, Entry
@@ -349,7 +350,7 @@ def test_a_fault_without_a_translation_is_told_by_its_code() -> None:
     with languages.language("uk"):
         meaning = languages.gettext(MEANINGS["out-of-range"]).removesuffix(".")
         assert list(failure.lines())[1:] == [
-            f"  /base/shaft/load: {meaning} (задано -1.5; дозволено: від 0 до 1e9; одиниця Н·м)",
+            f"  /base/shaft/load: {meaning} (задано -1.5; дозволено: 0 to 1e9; одиниця Н·м)",
             "    must not be so small",
         ]
         own = WrongInputError("invalid-parameter", "x", [Fault("--case", "unknown-name", "there is no such case", 7)])
@@ -372,3 +373,19 @@ def test_exit_codes_and_durations_in_ukrainian() -> None:
     with languages.language("uk"):
         assert ExitCode.NOT_ALL_OK.sentence == "деякі випадки не завершилися ok"
         assert [duration_text(s) for s in (0.42, 12.0, 200.0, 7500.0)] == ["0,4 с", "12 с", "3 хв 20 с", "2 год 05 хв"]
+
+
+def test_a_refusal_of_a_service_keeps_the_values_of_its_sentences(service: Service) -> None:
+    spec = {**SPEC, "base": {**SPEC["base"], "shaft": {**SPEC["base"]["shaft"], "load": "-2 N*m"}}}
+    answer = service.http.post("/api/v1/studies", json=spec)
+    fault = next(fault for fault in RefusedError(answer.status_code, answer.json()).faults if fault.allowed)
+    with languages.language("uk"):
+        line = fault_line(fault)
+    assert "дозволено: >= 0 Н·м" in line or "дозволено: від " in line
+    assert not re.search(r"[a-z]{4,} [a-z]{2,}", line.partition(": ")[2])
+    again = json.loads(json.dumps(answer.json()))
+    for error in again["errors"]:
+        error["sentences"] = {"message": {"text": 3}, "allowed": []}
+    assert [str(fault) for fault in RefusedError(422, again).faults] == [
+        str(fault) for fault in RefusedError(422, answer.json()).faults
+    ]
