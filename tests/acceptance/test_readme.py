@@ -119,6 +119,24 @@ def test_every_command_of_the_two_pages_does_what_it_says(tmp_path: Path, demons
     assert (tmp_path / "motion.csv").read_text().startswith("time,")
 
 
+def test_the_python_of_the_first_study_prints_its_curve(tmp_path: Path, demonstration: Demonstration) -> None:
+    shutil.copytree(EXAMPLES, tmp_path / "examples")
+    (program,) = re.findall(r"^```python\n(.*?)^```$", FIRST_STUDY, re.DOTALL | re.MULTILINE)
+    done = subprocess.run(
+        [sys.executable, "-c", program.replace(PRINTED, demonstration.address)],
+        cwd=tmp_path,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        timeout=SECONDS,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    heading, *rows = done.stdout.splitlines()
+    assert {"shaft.load", "shaft.speed.mean", "efficiency"} <= set(heading.split())
+    assert len(rows) > 3
+
+
 def test_the_demonstration_shows_its_curve_and_serves_until_it_is_interrupted(demonstration: Demonstration) -> None:
     address, folder = demonstration.address, demonstration.folder
     assert httpx.get(f"{address}/livez", timeout=SECONDS).status_code == 200
