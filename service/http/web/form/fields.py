@@ -32,14 +32,14 @@ class Field:
 
     name: str
     label: str
-    symbol: str
-    mark: str
-    unit: str
-    help: str
-    range: str
-    required: bool
-    default: str
-    example: str
+    help: str = ""
+    symbol: str = ""
+    mark: str = ""
+    unit: str = ""
+    range: str = ""
+    required: bool = False
+    default: str = ""
+    example: str = ""
     choices: tuple[tuple[str, str], ...] = ()
 
 
@@ -77,7 +77,7 @@ def refine_fields() -> dict[str, Field]:
     entries = refine.REFINE.described
     meaning = _("{what}, separated by semicolons", what=_(refine.REFINE.listed["results"].help))
     own = [
-        Field("/refine/results", _("Results"), "", "", "", meaning, "", True, "", "shaft.speed.mean; efficiency"),
+        Field("/refine/results", _("Results"), meaning, required=True, example="shaft.speed.mean; efficiency"),
         described(entries["error"], "/refine"),
         replace(
             described(entries["start"], "/refine"),
@@ -102,19 +102,8 @@ def described(entry: Described, pointer: str) -> Field:
     name = f"{pointer}/{entry.name}"
     choices = [(value, _(words(word) if word == value else word)) for value, word in entry.choices]
     choices.sort(key=lambda pair: entry.default not in (None, pair[0]))
-    return Field(
-        name,
-        _(entry.label or words(entry.name)),
-        "",
-        "",
-        "",
-        _(entry.help),
-        limits,
-        False,
-        entry.default_text,
-        "",
-        tuple(choices),
-    )
+    label = _(entry.label or words(entry.name))
+    return Field(name, label, _(entry.help), range=limits, default=entry.default_text, choices=tuple(choices))
 
 
 def range_words(entry: Parameter) -> str:

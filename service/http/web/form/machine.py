@@ -199,7 +199,7 @@ class _Machine:
 
     def _choice(self, item: data.FormChoice, place: str) -> Iterator[Entry]:
         choices = tuple((option.value, option.label or words(option.value)) for option in item.options)
-        entry = Entry(_own(f"{place}/{item.name}", item.label, item.help, choices), place, item, shape=True)
+        entry = Entry(Field(f"{place}/{item.name}", item.label, item.help, choices=choices), place, item, shape=True)
         option = entry.option(self.values)
         self.chosen[entry.name] = option.value
         if item.control == "switch":
@@ -221,7 +221,7 @@ class _Machine:
         path = name.removeprefix(f"{BASE}/").replace("/", ".")
         entry = None if item.kind else model_parameter(self.model, path) or _described(self.model, path)
         if entry is None:
-            own = _own(name, item.label, item.help)
+            own = Field(name, item.label, item.help)
         elif isinstance(entry, Parameter):
             own = field_for(entry, path)
         else:
@@ -235,11 +235,6 @@ class _Machine:
         if own.choices:
             self.chosen[name] = made.chosen(self.values)
         return made
-
-
-def _own(name: str, label: str, help: str, choices: tuple[tuple[str, str], ...] = ()) -> Field:
-    """A field that no catalogue describes."""
-    return Field(name, label, "", "", "", help, "", False, "", "", choices)
 
 
 def _items(part: data.Block | data.Rows) -> Iterator[data.FormField]:
@@ -290,9 +285,9 @@ def _numbers(model: str, prefix: str) -> list[str]:
 
 def _described(model: str, path: str) -> Described | Parameter | None:
     """What the spec says about an entry of the base that is no number of the catalogue."""
-    found: object = part_of(model).base()
     if path.startswith("drive."):  # the description of a drive is its JSON Schema
         return _OF_DRIVES.get(path.rpartition(".")[2])
+    found: object = part_of(model).base()
     for key in path.split("."):
         ways = [way for way in getattr(found, "ways", [found]) if key in getattr(way, "fields", ())]
         found = found.item if isinstance(found, Listed) else ways[0].fields.get(key) if ways else None

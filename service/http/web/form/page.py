@@ -242,6 +242,7 @@ def form_page(
         address=_address(request),
         key=values.get("key") or secrets.token_hex(8),
         model=model,
+        standard=model == FORM_MODEL,
         form=own,
         models=[(name, _called(name)) for name in models.model_names() if name != model],
         blocks=[] if text_mode else blocks(values),
