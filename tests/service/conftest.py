@@ -20,6 +20,7 @@ from sprag.service.client import Client
 from sprag.service.http.app import chunking, create_app
 from sprag.service.languages.elsewhere import speak
 from sprag.service.settings import Settings
+from sprag.service.storage.database.session import in_one_moment
 from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.models import ChunkResult, KernelShape
@@ -47,7 +48,7 @@ class PortalTransport(httpx.BaseTransport):
 
 
 class InThread:
-    """A computer that runs functions where it is called; what it ran is remembered, without the language."""
+    """A computer that runs functions where it is called; what it ran is remembered, without language and moment."""
 
     def __init__(self) -> None:
         self.calls: list[tuple[Any, ...]] = []
@@ -57,6 +58,7 @@ class InThread:
     async def run(self, function: Any, *args: Any, **kwargs: Any) -> Any:
         """The value of the function, or of ``answer`` in its place."""
         call = args[1:] if function is speak else (function, *args)
+        call = call[1:] if call[0] is in_one_moment else call
         self.calls.append(call)
         return function(*args, **kwargs) if self.answer is None else self.answer(*call[1:], **kwargs)
 
