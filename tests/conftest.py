@@ -173,7 +173,9 @@ def examples() -> Path:
 def empty_database(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """A database without studies, made once."""
     from sprag.service.storage.store import Store
+    from tests import statements
 
+    statements.share()
     path = tmp_path_factory.mktemp("empty") / "sprag.sqlite3"
     with Store.open(f"sqlite:///{path}") as store:
         store.backup(path.with_suffix(".copy"))
@@ -198,7 +200,9 @@ def postgres_server() -> Iterator[postgres.Server]:
 @pytest.fixture(scope="session")
 def _ready_database(postgres_server: postgres.Server) -> str:
     from sprag.service.storage.store import Store
+    from tests import statements
 
+    statements.share()
     url = postgres_server.url(postgres_server.new_database())
     Store.open(url).close()
     return url
