@@ -190,12 +190,14 @@ class Record:
     help : what it means
     required : the fields that it must have
     either : fields of which it must have exactly one
+    some : fields of which it must have one or more
     """
 
     fields: Mapping[str, Field]
     help: str = ""
     required: Sequence[str] = ()
     either: Sequence[str] = ()
+    some: Sequence[str] = ()
 
     @property
     def described(self) -> dict[str, Described]:
@@ -223,6 +225,8 @@ class Record:
         """Its JSON Schema, in which it has no other fields."""
         properties = {name: schema_of(field) for name, field in self.fields.items()}
         schema = object_schema(properties, self.required, self.help)
+        if self.some:
+            schema["anyOf"] = [{"required": [name]} for name in self.some]
         return one_of(schema, self.either) if self.either else schema
 
 
@@ -240,9 +244,12 @@ class Variants:
         return node.has(tuple(known))
 
     def schema(self) -> Schema:
-        """Its JSON Schema."""
+        """Its JSON Schema; that of a quantity where the first way is one."""
         described = {"description": self.help} if self.help else {}
-        return {**described, "oneOf" if self.only else "anyOf": [schema_of(way) for way in self.ways]}
+        ways = [schema_of(way) for way in self.ways]
+        if isinstance(self.ways[0], Parameter):
+            return {**ways[0], "anyOf": [*ways[0]["anyOf"], *ways[1:]]}
+        return {**described, "oneOf" if self.only else "anyOf": ways}
 
 
 def _settled(rows: Sequence[Node]) -> list[list[Node]]:

@@ -21,18 +21,18 @@ if TYPE_CHECKING:
     from sprag.service.spec.node import Node
     from sprag.worker.models import Parameter
 
-_DRAWN: Final = Record(
+#: A part of a sample with a distribution.
+DRAWN: Final = Record(
     {
         "path": PATHS,
         "nominal": {**QUANTITY, "description": "the value in the middle; by default that of `base`"},
         **FIELDS,
     },
     required=("path",),
+    some=("plus_minus", "values"),
 )
-#: JSON Schema of a part of a sample with a distribution.
-DRAWN: Final = {**_DRAWN.schema(), "anyOf": [{"required": ["plus_minus"]}, {"required": ["values"]}]}
 #: Fields that a range does not have.
-_MARKS: Final = frozenset(_DRAWN.fields) - {"path"}
+_MARKS: Final = frozenset(DRAWN.fields) - {"path"}
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def is_distribution(item: object) -> bool:
 
 def read_distribution(item: Node) -> SampleDistribution | None:
     """Read an item of `ranges` with a distribution; None, with the faults recorded, when it is invalid."""
-    if not _DRAWN.read(item):
+    if not DRAWN.read(item):
         return None
     paths = read_paths(item["path"])
     if paths is None:

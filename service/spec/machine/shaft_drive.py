@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from sprag.sentences import Sentence
-from sprag.service.spec.described import Listed, Record, choice
+from sprag.service.spec.described import Listed, Record, Variants, choice
 from sprag.service.spec.machine.shaft_parts import (
     ANGLE,
     INTERPOLATION,
@@ -19,7 +19,7 @@ from sprag.service.spec.machine.shaft_parts import (
     value_in,
 )
 from sprag.service.spec.node import Node
-from sprag.service.spec.schema.quantity import quantity_schema, required_of
+from sprag.service.spec.schema.quantity import required_of
 from sprag.worker.models import Parameter, machine_shaft
 
 BALANCE_SIDE: Final = choice(
@@ -59,21 +59,17 @@ _DIAGRAM: Final = Record(
     "either a table or a formula",
 )
 _NUMBERS: Final = numbers_under("drive.")
-_TORQUE: Final = quantity_schema(_NUMBERS["torque"])
-_DRIVE: Final = Record(
+DRIVE: Final = Record(
     {
         **_NUMBERS,
-        "torque": {**_TORQUE, "anyOf": [*_TORQUE["anyOf"], _DIAGRAM.schema()]},
+        "torque": Variants((_NUMBERS["torque"], _DIAGRAM)),
         "motor": _MOTOR,
         "stages": STAGES,
         "flywheel": _FLYWHEEL,
     },
     "what turns the shaft",
+    some=("inertia", "stages", "flywheel"),
 )
-#: JSON Schema of the drive, which has an inertia.
-DRIVE: Final = {
-    **_DRIVE.schema(), "anyOf": [{"required": [name]} for name in ("inertia", "stages", "flywheel")],
-}  # fmt: skip
 
 
 def read_balance(base: Node, drive: Mapping[str, Any] | None) -> str | None:
@@ -121,7 +117,7 @@ def _has_drive(base: Node, motor: bool, given: bool) -> bool:
 def read_drive(node: Node, places: dict[str, str]) -> dict[str, Any] | None:
     """Read the drive: the form of its torque, or its motor."""
     places["drive"] = node.pointer
-    if not _DRIVE.read(node):
+    if not DRIVE.read(node):
         return None
     drive: dict[str, Any] = {"form": "constant", "table": None, "formula": None, "motor": None}
     if "stages" in node:

@@ -17,8 +17,6 @@ from sprag.service.languages import _
 from sprag.service.reading.wording import words
 from sprag.service.spec.described import Described, Listed
 from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.machine.shaft_drive import STAGE
-from sprag.service.spec.machine.shaft_parts import INTERPOLATION
 from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report
 from sprag.worker import models
@@ -29,7 +27,6 @@ from sprag.worker.models.parameters import general_path, model_parameter
 BASE: Final = "/base"
 #: What the form of a model says of a field instead of its catalogue.
 _GIVEN: Final = ("label", "symbol", "mark", "unit", "range", "default", "example", "required")
-_OF_DRIVES: Final = {"kind": STAGE, "interpolation": INTERPOLATION}
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,8 +282,6 @@ def _numbers(model: str, prefix: str) -> list[str]:
 
 def _described(model: str, path: str) -> Described | Parameter | None:
     """What the spec says about an entry of the base that is no number of the catalogue."""
-    if path.startswith("drive."):  # the description of a drive is its JSON Schema
-        return _OF_DRIVES.get(path.rpartition(".")[2])
     found: object = part_of(model).base()
     for key in path.split("."):
         ways = [way for way in getattr(found, "ways", [found]) if key in getattr(way, "fields", ())]
