@@ -252,6 +252,19 @@ class Variants:
         return {**described, "oneOf" if self.only else "anyOf": ways}
 
 
+def below(field: Field, path: str) -> Field | None:
+    """What describes the entry at a path of names, and of anything for an item of a list; None where nothing does."""
+    found: Field | None = field
+    for key in path.split("."):
+        if isinstance(found, Listed):
+            found = found.item
+            continue
+        ways = found.ways if isinstance(found, Variants) else [found]
+        records = [way for way in ways if isinstance(way, Record) and key in way.fields]
+        found = records[0].fields[key] if records else None
+    return found
+
+
 def _settled(rows: Sequence[Node]) -> list[list[Node]]:
     """The cells of a table, their texts with decimal points; no cells for a row that is not a list.
 

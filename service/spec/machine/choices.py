@@ -2,40 +2,22 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from sprag.service.languages import N_
-from sprag.service.spec.described import FIT
-from sprag.service.spec.machine import shaft, shaft_drive, shaft_parts
+from sprag.service.spec.described import FIT, Described, Listed, below
+from sprag.service.spec.machine.shaft import SHAFT
 
 if TYPE_CHECKING:
     from sprag.worker.study import Study
 
-#: The choices of a machine shaft.
-MEANINGS: Final = {
+#: What parts of a machine shaft are, whose descriptions say what they have.
+PARTS: Final = {
     "cycle": N_("revolutions of a cycle"),
-    "mean_speed_is": shaft.MEAN_SPEED_IS.help,
-    "balance": shaft_drive.BALANCE.help,
-    "balance_side": shaft_drive.BALANCE_SIDE.help,
-    "phi_c": shaft_parts.PHI_C.help,
-    "drive.motor.kind": shaft_drive.MOTOR.help,
-    "drive.flywheel.kind": shaft_drive.FLYWHEEL.help,
-    "drive.stages": shaft_drive.STAGES.help,
     "mechanism": N_("the mechanism"),
     "operation": N_("how the resistance is given"),
-    **{
-        f"mechanism.{kind}.{name}": field.help
-        for kind, fields in shaft_parts.MECHANISM_CHOICES.items()
-        for name, field in fields.items()
-    },
-    **{f"operation.{name}": field.help for name, field in shaft_parts.OPERATION_CHOICES.items()},
-    **{f"{part}.interpolation": shaft_parts.INTERPOLATION.help for part in ("drive.torque", "mechanism", "operation")},
 }
-
-
-_PART: Final = re.compile(r"^parts\.[0-9]+\.")
 
 
 class Choice(NamedTuple):
@@ -63,7 +45,9 @@ def drive_choices(study: Study, spec: Mapping[str, Any]) -> Iterator[Choice]:
 def shaft_choices(study: Study, _: Mapping[str, Any]) -> Iterator[Choice]:
     """The structure of a machine shaft."""
     for path, text in _chosen(study.structure or {}):
-        yield Choice(path, text, MEANINGS[_PART.sub("", path)])
+        entry = below(SHAFT, path)
+        meaning = entry.help if isinstance(entry, Described | Listed) else PARTS[path.rpartition(".")[2]]
+        yield Choice(path, text, meaning)
 
 
 def _chosen(structure: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

@@ -15,7 +15,7 @@ from sprag.service.http.web.form.entries import count_in
 from sprag.service.http.web.form.fields import FORM_MODEL, Choice, Field, Groups, described, field_for, label_of
 from sprag.service.languages import _
 from sprag.service.reading.wording import words
-from sprag.service.spec.described import Described, Listed
+from sprag.service.spec.described import Described, below
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report
@@ -282,10 +282,7 @@ def _numbers(model: str, prefix: str) -> list[str]:
 
 def _described(model: str, path: str) -> Described | Parameter | None:
     """What the spec says about an entry of the base that is no number of the catalogue."""
-    found: object = part_of(model).base()
-    for key in path.split("."):
-        ways = [way for way in getattr(found, "ways", [found]) if key in getattr(way, "fields", ())]
-        found = found.item if isinstance(found, Listed) else ways[0].fields.get(key) if ways else None
+    found = below(part_of(model).base(), path)
     return found if isinstance(found, Described | Parameter) else None
 
 

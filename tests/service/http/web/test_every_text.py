@@ -15,7 +15,7 @@ from sprag.service import languages
 from sprag.service.http.web import manual
 from sprag.service.languages.catalogue import Catalogue, Entry, Key
 from sprag.service.spec.described import ANY_RUN, SETTLED_RUN
-from sprag.service.spec.machine.choices import MEANINGS
+from sprag.service.spec.machine.shaft_parts import MECHANISM_CHOICES, OPERATION_CHOICES
 from sprag.worker.models import ENDING_SENTENCES, REGIME_SENTENCES
 from sprag.worker.models.registry import all_models
 from tests.service.http.web.test_accessibility import LONG, PAGES, studies
@@ -43,7 +43,13 @@ _SAME = re.compile(
 )
 #: Code names in one word, which a title has beside the caption of an element.
 _CHOICES = {"slider_crank", "force", "angle", "steps", "constant", "midrange", "resisting", "none"}
-_NAMES = {*MEANINGS, *SETTLED_RUN, *ANY_RUN, *ENDING_SENTENCES, *_CHOICES, "duration"}
+_CHOSEN = {
+    *("cycle", "mean_speed_is", "balance", "balance_side", "phi_c", "drive.motor.kind", "drive.flywheel.kind"),
+    *("drive.stages", "mechanism", "operation", *(f"operation.{name}" for name in OPERATION_CHOICES)),
+    *(f"mechanism.{kind}.{name}" for kind, own in MECHANISM_CHOICES.items() for name in own),
+    *(f"{part}.interpolation" for part in ("drive.torque", "mechanism", "operation")),
+}
+_NAMES = {*_CHOSEN, *SETTLED_RUN, *ANY_RUN, *ENDING_SENTENCES, *_CHOICES, "duration"}
 for _model in all_models():
     _NAMES |= {_model.name, *_model.flags}
     _NAMES |= {*(entry.path for entry in _model.parameters()), *(info.name for info in _model.result_catalogue())}
