@@ -112,7 +112,7 @@ def narrow(
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Submit the sweep of a study once more, with smaller steps where its motion jumps."""
+    """Submit the sweep of a study again, with smaller steps where its motion jumps."""
     query = [("steps", str(steps)), *(("at", text) for text in at or [])]
     with connection(server, token) as client:
         study = further(client, study_of(client, study_id), "narrow", params=query)

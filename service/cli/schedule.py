@@ -68,7 +68,8 @@ Overlap = Annotated[
     typer.Option(
         "--overlap",
         metavar="POLICY",
-        help="While an earlier study of it has not ended: queue (default), skip the due time, or replace that study.",
+        help="While an earlier study of the schedule has not ended: queue (default), skip the due time, or replace "
+        "that study.",
     ),
 ]
 CatchUp = Annotated[

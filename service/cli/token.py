@@ -60,7 +60,7 @@ def create(
         typer.Option(
             "--user",
             metavar="NAME",
-            help="User whose token it is; default: nobody's.",
+            help="User to whom the token belongs; default: none.",
             autocompletion=completion.users,
         ),
     ] = None,

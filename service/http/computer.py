@@ -288,9 +288,9 @@ class ProcessComputer:
 def _of_death(*, killed: bool, again: bool) -> Sentence:
     if again:
         return (
-            Sentence("The process that ran the computation was killed, and when it was run once more, too.")
+            Sentence("The process that ran the computation was killed, and so was the one that ran it again.")
             if killed
-            else Sentence("The process that ran the computation died, and when it was run once more, too.")
+            else Sentence("The process that ran the computation died, and so did the one that ran it again.")
         )
     return (
         Sentence("The process that ran the computation was killed.")

@@ -27,7 +27,7 @@ Along = Annotated[
 Low = Annotated[
     str | None, Setting("start of the range, SI or with a unit; by default the smallest on its axis", alias="from")
 ]
-High = Annotated[str | None, Setting("end of the range, likewise; by default the largest on its axis", alias="to")]
+High = Annotated[str | None, Setting("end of the range; by default the largest on its axis", alias="to")]
 Phase = Annotated[
     str | None,
     Setting(
@@ -56,7 +56,8 @@ class TrajectoryQuestion:
     high: Annotated[
         str | None,
         Setting(
-            "last time or angle, likewise; by default the end of the run (`at_most` of a settled study) or cycle",
+            "last time or angle, with the same units; by default the end of the run (`at_most` of a settled study) or "
+            "cycle",
             alias="to",
             examples=("2.5 periods",),
             metavar="TIME",

@@ -354,7 +354,7 @@ async def narrow_study(
     ] = None,
     idempotency_key: NarrowKey = None,
 ) -> Response:
-    """Submit the sweep of a study once more, with smaller steps where its motion jumps."""
+    """Submit the sweep of a study again, with smaller steps where its motion jumps."""
     now, given = context.store.clock.now(), given_options(steps=steps, at=at)
     made = await work.check(checks.narrowed_study, context.library, study_id, steps, pairs(at), now, given)
     return await in_thread(taken_in, context, made, idempotency_key, 0)

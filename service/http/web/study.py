@@ -353,7 +353,7 @@ async def run_longer(context: Ctx, work: Attended, study_id: StudyId, kind: str)
 
     counts = await in_thread(find)
     if kind not in counts:
-        raise ApiError("not-found", Sentence("No case of this study is of this kind."))
+        raise ApiError("not-found", Sentence("This study has no such case."))
     now = context.store.clock.now()
     made = await work.check(checks.longer_study, context.library, study_id, kind, None, now, {})
     # Pressed twice, it submits one study, unless more cases of this kind have finished.

@@ -140,7 +140,7 @@ def test_what_was_typed_outlives_the_session(house: House, tab: Page) -> None:
     tab.get_by_text("Your session has ended").wait_for()
     tab.get_by_role("button", name="Log in").click()
     log_in(tab, secret)
-    tab.get_by_role("button", name="Go on").click()
+    tab.get_by_role("button", name="Continue").click()
     tab.wait_for_url("**/new")
     assert tab.get_by_label("Load", exact=False).first.input_value() == "1.25"
 
