@@ -14,6 +14,7 @@ from typing import Any, Final, Literal
 from sprag.service.http.web.form.entries import count_in
 from sprag.service.http.web.form.fields import FORM_MODEL, Choice, Field, Groups, described, field_for, label_of
 from sprag.service.languages import _
+from sprag.service.reading.reader import part_label, shown
 from sprag.service.reading.wording import words
 from sprag.service.spec.described import Described, below
 from sprag.service.spec.machine.registry import part_of
@@ -298,7 +299,6 @@ def choices_of(values: Mapping[str, str], base: Mapping[str, Any]) -> Groups:
     for path, entry in part_of(model).read_base(Node(Report(), BASE, base)).parameters.items():
         group, known = group_of(model, path), form.labels.get(_general(path))
         if known:
-            group = _(words(path.rsplit(".", 2)[0]))
             label = _(known, part=group, number=int(path.rpartition(".")[2]) + 1)
         else:
             label = label_of(re.sub(form.nameless, "", path, count=1), model, path)
@@ -319,8 +319,10 @@ def group_of(model: str, path: str) -> str:
     """Heading under which a number stands."""
     form, (rows, number, own) = models.model_of(model).presentation.form, row_of(model, path)
     title = next((title for prefix, title in form.groups if own.startswith(prefix)), "")
+    if form.labels.get(_general(path)):
+        return shown(part_label(words(path.rsplit(".", 2)[0])))
     if not title:
         rest = (part.title for part in form.parts if isinstance(part, data.Block) for item in part.items
                 if item.name == "*")  # fmt: skip
-        return _(words(path.rpartition(".")[0]) or next(rest, words("other parameters")))
+        return shown(part_label(words(path.rpartition(".")[0]) or next(rest, words("other parameters"))))
     return _(title) if rows is None else _(rows.title, number=number, label=_(title).lower())
