@@ -16,8 +16,7 @@ from time import perf_counter
 import sqlalchemy as sa
 
 from sprag.service.storage.store import Store
-from sprag.service.storage.studies.labels import search_text
-from sprag.service.storage.studies.listing import StudyFilter, StudyOrder
+from sprag.service.storage.studies.listing import StudyFilter, StudyOrder, search_text
 from sprag.service.storage.tables import STUDIES
 from sprag.worker.chunking import Chunking
 from tests.worker import fakes

@@ -124,7 +124,7 @@ def prune(
     from sprag.service.storage.clock_watch import distrust
 
     with named_store(db, quiet=as_json) as store:
-        if not dry_run and (problem := distrust(store)):
+        if not dry_run and (problem := distrust(store.dispatchers)):
             raise TroubleError("unavailable", f"{problem}.")
         found = store.purging.prune(store.clock.now() - timedelta(days=older_than), dry=dry_run)
         store.purging.purge()

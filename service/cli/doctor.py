@@ -191,7 +191,7 @@ def _clock(url: str, file: Path | None) -> tuple[bool, str]:
     if file is not None and not file.exists():
         return True, now
     with Store.open(url, create=False) as store:
-        problem = clock_problem(store)
+        problem = clock_problem(store.dispatchers)
     return problem is None, problem or now
 
 
@@ -203,7 +203,7 @@ def _workers(url: str, file: Path | None) -> tuple[bool, str]:
     if file is not None and not file.exists():
         return True, _("none yet")
     with Store.open(url, create=False) as store:
-        found = worker_list(store)
+        found = worker_list(store.dispatchers)
     alive = [item for item in found["dispatchers"] if not (item["silent"] or item["ended_at"])]
     silent = [item["owner"] for item in found["dispatchers"] if item["silent"] and not item["ended_at"]]
     if silent:

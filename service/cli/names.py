@@ -12,7 +12,7 @@ from sprag.service.languages import N_, _
 
 if TYPE_CHECKING:
     from sprag.service.client import Client
-    from sprag.service.storage.store import Store
+    from sprag.service.storage.people.people import People
 
 
 def study_of(client: Client, text: str) -> str:
@@ -31,21 +31,21 @@ def schedule_of(client: Client, text: str) -> str:
         return naming.schedule_of(client, text)
 
 
-def token_of(store: Store, text: str) -> str:
+def token_of(people: People, text: str) -> str:
     """The id of the token that is meant, of one that is revoked by its id only; errors as of `study_of`."""
     from sprag.service.client.matching import Named, meant
 
     with _one("ID", text, _("the id or name of a token"), _("the token is not unique")):
-        tokens = [Named(t.id, t.name, f"{t.id} ({t.name})") for t in store.people.tokens() if t.revoked_at is None]
+        tokens = [Named(t.id, t.name, f"{t.id} ({t.name})") for t in people.tokens() if t.revoked_at is None]
         return meant(text, tokens, "tokens", "tk_")
 
 
-def user_of(store: Store, text: str, where: str = "NAME") -> str:
+def user_of(people: People, text: str, where: str = "NAME") -> str:
     """The name of the user who is meant by ``where`` of a command; errors as of `study_of`."""
     from sprag.service.client.matching import Named, meant
 
     with _one(where, text, _("the name of a user"), _("the user is not unique")):
-        return meant(text, [Named(user.name, user.name, user.name) for user in store.people.users()], "users")
+        return meant(text, [Named(user.name, user.name, user.name) for user in people.users()], "users")
 
 
 @contextmanager

@@ -79,7 +79,7 @@ def create(
         raise wrong_option("--name", "invalid-text", N_("is not the name of a token"), name, allowed=allowed)
     with users_of(db, as_json) as store:
         ends = None if expires is None else store.clock.now() + timedelta(days=expires)
-        owner = None if user is None else user_of(store, user, "--user")
+        owner = None if user is None else user_of(store.people, user, "--user")
         secret, record = store.people.create_token(name, scope, owner=owner, expires_at=ends)
     if as_json:
         write_json({"database": store.session.location, "token": secret, **_json(record)})
@@ -126,7 +126,7 @@ def revoke(
 
     with users_of(db, as_json) as store:
         try:
-            record = store.people.revoke_token(token_of(store, token_id))
+            record = store.people.revoke_token(token_of(store.people, token_id))
         except TokenNotFoundError as error:
             raise WrongInputError("token-not-found", str(error)) from error
     if as_json:

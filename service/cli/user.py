@@ -125,7 +125,7 @@ def change(
     if role is None and cases is None and storage is None and checks is None:
         raise WrongInputError("invalid-parameter", _("nothing to change; `sprag user change --help` lists the options"))
     with users_of(db, as_json) as store:
-        record = store.people.change_user(user_of(store, name), role, _quota(cases, storage, checks))
+        record = store.people.change_user(user_of(store.people, name), role, _quota(cases, storage, checks))
     _show(store, record, as_json, _("{name} is changed: {role}", name=record.name, role=record.role))
 
 
@@ -133,7 +133,7 @@ def change(
 def remove(name: Known, db: Database = None, as_json: JsonFlag = False) -> None:
     """Remove a user, whose tokens and sessions end within two seconds; studies and schedules are kept."""
     with users_of(db, as_json) as store:
-        record = store.people.change_user(user_of(store, name), removed=True)
+        record = store.people.change_user(user_of(store.people, name), removed=True)
     _show(
         store,
         record,
@@ -146,7 +146,7 @@ def remove(name: Known, db: Database = None, as_json: JsonFlag = False) -> None:
 def restore(name: Known, db: Database = None, as_json: JsonFlag = False) -> None:
     """Let a removed user in again, with the same tokens."""
     with users_of(db, as_json) as store:
-        record = store.people.change_user(user_of(store, name), removed=False)
+        record = store.people.change_user(user_of(store.people, name), removed=False)
     _show(store, record, as_json, _("{name} is a user again: {role}", name=record.name, role=record.role))
 
 
@@ -167,7 +167,7 @@ def hand_over(
 ) -> None:
     """Give the studies and schedules of one user to another."""
     with users_of(db, as_json) as store:
-        name, to = user_of(store, name), user_of(store, to, "--to")
+        name, to = user_of(store.people, name), user_of(store.people, to, "--to")
         studies, schedules = store.people.hand_over(name, to)
     if as_json:
         write_json({"database": store.session.location, "studies": studies, "schedules": schedules})

@@ -12,8 +12,7 @@ from sprag.service.storage.people.audit import TIME_ALLOWED
 from sprag.service.storage.people.people import Quota
 
 if TYPE_CHECKING:
-    from sprag.service.storage.people.people import UserRecord
-    from sprag.service.storage.store import Store
+    from sprag.service.storage.people.people import People, UserRecord
 
 Since = Annotated[
     str | None, Query(max_length=40, description=f"from then on: {TIME_ALLOWED}", examples=["2027-01-31"])
@@ -24,9 +23,9 @@ Action = Annotated[str | None, Query(max_length=40, description="only this actio
 Target = Annotated[str | None, Query(max_length=200, description="only changes of this study, schedule, token or user")]
 
 
-def quota_json(store: Store, name: str, own: Quota) -> QuotaUse:
+def quota_json(people: People, name: str, own: Quota) -> QuotaUse:
     """The quotas of a user, and what is used of them."""
-    quota, used = own.over(store.people.default_quota), store.people.usage(name)
+    quota, used = own.over(people.default_quota), people.usage(name)
     return {
         "cases": used.cases,
         "most_cases": quota.cases or None,
@@ -36,6 +35,6 @@ def quota_json(store: Store, name: str, own: Quota) -> QuotaUse:
     }
 
 
-def user_json(store: Store, record: UserRecord) -> User:
+def user_json(people: People, record: UserRecord) -> User:
     """A user as JSON data."""
-    return filled(User, record, quota=quota_json(store, record.name, record.quota))
+    return filled(User, record, quota=quota_json(people, record.name, record.quota))

@@ -124,6 +124,6 @@ class Housekeeping(threading.Thread):
     def checkpoint(self) -> None:
         """Checkpoint the write-ahead log, so that the database file alone is nearly up to date."""
         try:
-            self._store.checkpoint()
+            self._store.session.checkpoint()
         except StoreError as error:
             _LOG.warning("The write-ahead log cannot be checkpointed for now: %s", error)

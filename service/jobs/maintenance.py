@@ -92,7 +92,7 @@ class Maintenance(threading.Thread):
         super().__init__(name="sprag-maintenance", daemon=True)
         self._store = store
         self._plan = plan
-        self._watch = watch or ClockWatch(store)
+        self._watch = watch or ClockWatch(store.dispatchers)
         self._ending = threading.Event()
         self._tasks: list[_Task] = []
         self._tasks.append(_Task("deletion of old reports", self._prune_reports))

@@ -8,13 +8,13 @@ from sprag.service.json_text import timestamp
 
 if TYPE_CHECKING:
     from sprag.service.answers.workers import Dispatcher, WorkerList
-    from sprag.service.storage.store import Store
     from sprag.service.storage.studies.records import DispatcherRecord
+    from sprag.service.storage.work.dispatchers import Dispatchers
 
 
-def worker_list(store: Store) -> WorkerList:
+def worker_list(dispatchers: Dispatchers) -> WorkerList:
     """The dispatchers and their workers, as they last reported them."""
-    found = [_dispatcher(record) for record in store.dispatchers.all()]
+    found = [_dispatcher(record) for record in dispatchers.all()]
     return {
         "usable": sum(item["usable"] for item in found),
         "chunks_in_flight": sum(item["chunks_in_flight"] for item in found if not (item["ended_at"] or item["silent"])),

@@ -11,7 +11,7 @@ from threading import Lock
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from sprag.service.storage.store import Store
+    from sprag.service.storage.work.dispatchers import Dispatchers
 
 _LOG = logging.getLogger("sprag.clock")
 
@@ -29,10 +29,10 @@ MESSAGE: Final = (
 
 
 class ClockWatch:
-    """Compares the store's clock with the elapsed time. Safe to use from several threads."""
+    """Compares the clock of the store with the elapsed time. Safe to use from several threads."""
 
-    def __init__(self, store: Store) -> None:
-        self._store = store
+    def __init__(self, dispatchers: Dispatchers) -> None:
+        self._dispatchers = dispatchers
         self._lock = Lock()
         #: The latest trusted time, and the elapsed time at that moment.
         self._believed: tuple[datetime, float] | None = None
@@ -45,9 +45,9 @@ class ClockWatch:
         """Check the clock: False while it is ahead of the expected time. Raises StoreError."""
         with self._lock:
             now, elapsed, noted = (
-                self._store.clock.now(),
-                self._store.clock.monotonic(),
-                self._store.dispatchers.believed_clock(),
+                self._dispatchers.clock.now(),
+                self._dispatchers.clock.monotonic(),
+                self._dispatchers.believed_clock(),
             )
             if self._believed is None or noted is None or noted != self._noted:  # the start, or `sprag db clock`
                 expected, allowed = noted or now, LONGEST_PAUSE
@@ -64,7 +64,7 @@ class ClockWatch:
             back = self._put_back(now, expected, elapsed)
             self._believed = now if back else max(expected, now), elapsed
             if back or noted is None or now - noted > NOTE_AFTER:
-                self._store.dispatchers.note_clock(now)
+                self._dispatchers.note_clock(now)
                 noted = now
             self._noted = noted
             return True
@@ -89,17 +89,17 @@ def jump_message(before: datetime, now: datetime) -> str:
     return MESSAGE.format(*(moment.isoformat(timespec="seconds") for moment in (before, now)))
 
 
-def distrust(store: Store) -> str | None:
+def distrust(dispatchers: Dispatchers) -> str | None:
     """Why nothing may be deleted by age now, from a single look at the clock; None where nothing speaks against it."""
-    noted, now = store.dispatchers.believed_clock(), store.clock.now()
+    noted, now = dispatchers.believed_clock(), dispatchers.clock.now()
     if noted is not None and now - noted > LONGEST_PAUSE:
         return jump_message(noted, now)
-    return clock_problem(store)
+    return clock_problem(dispatchers)
 
 
-def clock_problem(store: Store) -> str | None:
+def clock_problem(dispatchers: Dispatchers) -> str | None:
     """Why the running worker does not trust the clock; None where it does, or no worker is running."""
-    noted, worker, now = store.dispatchers.believed_clock(), store.dispatchers.latest(), store.clock.now()
+    noted, worker, now = dispatchers.believed_clock(), dispatchers.latest(), dispatchers.clock.now()
     if noted is None or worker is None or now - noted <= 2 * JUMP or now - worker.heartbeat_at > JUMP:
         return None
     return jump_message(noted, now)

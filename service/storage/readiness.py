@@ -67,7 +67,7 @@ class Readiness:
         """What does not prevent work but needs attention, one sentence each."""
         found = []
         with suppress(StoreError):
-            if problem := clock_problem(self._store):
+            if problem := clock_problem(self._store.dispatchers):
                 found.append(f"{problem}.")
             if self._store.schedules.any() and self._store.deployment.is_copy():
                 found.append(Sentence(recorded.COPY))

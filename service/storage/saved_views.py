@@ -11,10 +11,9 @@ import sqlalchemy as sa
 from sprag.service.actor import acting
 from sprag.service.faults import Fault, FaultError
 from sprag.service.spec.saved_views import View
-from sprag.service.storage.editions import edition_of, require_edition
 from sprag.service.storage.errors import TooManyViewsError, ViewNotFoundError
 from sprag.service.storage.part import Part, change_row, moment, row_of
-from sprag.service.storage.people.audit import note, require_own
+from sprag.service.storage.people.audit import edition_of, note, require_edition, require_own
 from sprag.service.storage.people.pools import pool_of
 from sprag.service.storage.tables import METADATA, STUDIES
 from sprag.worker.limits import MAX_REPORT_FIGURES, MAX_VIEWS

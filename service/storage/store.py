@@ -101,10 +101,6 @@ class Store:
         """
         return maintenance.backup(self.session, path)
 
-    def checkpoint(self) -> None:
-        """Move the write-ahead log into the file as far as no reader needs the old state; blocks nobody."""
-        self.session.checkpoint()
-
     def close(self) -> None:
         """Close every connection."""
         self.session.close()

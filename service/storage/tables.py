@@ -85,7 +85,7 @@ STUDIES = sa.Table(
     # Until then a deleted study can be restored; 0, or NULL in those deleted before revision 0023: its rows are being
     # removed.
     sa.Column("purge_at", sa.BigInteger),
-    # Name, tags and notes as they are searched (`sprag.service.storage.studies.labels`).
+    # Name, tags and notes as they are searched (`sprag.service.storage.studies.listing`).
     sa.Column("search", sa.Text, nullable=False, server_default=""),
     # Epoch of the dispatcher to which it belongs; NULL: to none, so any of them may take it.
     sa.Column("dispatcher", sa.Integer),

@@ -34,14 +34,14 @@ def get_me(context: Ctx, request: Request) -> Response:
     store, quota = context.store, None
     if grant.user is not None:
         own = next((user.quota for user in store.people.users() if user.name == grant.user), Quota())
-        quota = quota_json(store, grant.user, own)
+        quota = quota_json(store.people, grant.user, own)
     return json_response(filled(m.Me, grant, quota=quota))
 
 
 @router.get("/users", response_model=m.UserList, responses=problems("invalid-parameter", "not-allowed"))
 def list_users(context: Ctx) -> Response:
     """Every user with role and quotas, by name, for administrators. `sprag user` adds and changes them."""
-    return json_response({"users": [user_json(context.store, user) for user in context.store.people.users()]})
+    return json_response({"users": [user_json(context.store.people, user) for user in context.store.people.users()]})
 
 
 @router.get(

@@ -26,8 +26,8 @@ from sprag.service.schedules.policies import GRACE_ALLOWED
 from sprag.service.schedules.report_to import LONGEST_WEBHOOK, MOST_RECIPIENTS, require_deliverable
 from sprag.service.schedules.times import ALIASES
 from sprag.service.spec.described import schemas
-from sprag.service.storage.editions import require_edition
 from sprag.service.storage.errors import ChangedMeanwhileError
+from sprag.service.storage.people.audit import require_edition
 from sprag.service.storage.schedules.runs import ScheduleRecord
 from sprag.worker.codes import FLAG_MASKS
 from sprag.worker.limits import MAX_NAME_LENGTH

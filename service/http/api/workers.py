@@ -17,4 +17,4 @@ router = api_router("workers")
 @router.get("/workers", response_model=m.WorkerList, responses=problems("invalid-parameter"))
 def list_workers(context: Ctx) -> Any:
     """The dispatchers, and the workers of each by host, with those that are refused and why, as last reported."""
-    return json_response(worker_list(context.store))
+    return json_response(worker_list(context.store.dispatchers))

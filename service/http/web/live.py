@@ -45,7 +45,7 @@ def _night(context: Context, given: QueryParams) -> Any:
 
 
 def _workers(context: Context, _: QueryParams) -> Any:
-    return worker_list(context.store)
+    return worker_list(context.store.dispatchers)
 
 
 #: What is listed, by the name of its stream.

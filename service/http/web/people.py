@@ -56,4 +56,4 @@ def users(context: Ctx) -> Response:
     now, listed = context.store.clock.now(), context.store.people.users()
     records = {user.name: user for user in listed}
     tokens = [(token, token.state_at(now, records.get(token.owner or ""))) for token in context.store.people.tokens()]
-    return page("users.html", users=[user_json(context.store, user) for user in listed], tokens=tokens)
+    return page("users.html", users=[user_json(context.store.people, user) for user in listed], tokens=tokens)

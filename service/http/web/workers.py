@@ -15,4 +15,4 @@ router = page_router()
 @router.get("/workers")
 def workers_page(context: Ctx) -> Response:
     """The dispatcher and its workers, as it last reported them."""
-    return page("workers.html", found=worker_list(context.store))
+    return page("workers.html", found=worker_list(context.store.dispatchers))

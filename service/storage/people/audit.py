@@ -2,10 +2,13 @@
 
 Every change writes its row in its own transaction, so there is neither a change without a row nor a row without one.
 What the worker does with a study by itself (its cases, rounds, end) is no row: the study has it.
+
+Whoever saves what people edit names the edition that was read, so that no edit in between is lost.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import dataclass
 from datetime import UTC, date, datetime, time, timedelta
@@ -16,12 +19,27 @@ import sqlalchemy as sa
 from sprag.service.actor import acting
 from sprag.service.faults import parameter_error
 from sprag.service.languages import N_
-from sprag.service.storage.errors import NotOwnerError, PageTokenError
+from sprag.service.storage.errors import ChangedMeanwhileError, NotOwnerError, PageTokenError
 from sprag.service.storage.part import MAX_INTEGER, Part, micros_of, moment
 from sprag.service.storage.people.tables import AUDIT_LOG
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
+
+
+def edition_of(*content: object) -> str:
+    """A short name for exactly this content, plain data and times; equal content has equal names."""
+    text = json.dumps(content, default=str, sort_keys=True)
+    return hashlib.sha256(text.encode("utf-8", "backslashreplace")).hexdigest()[:16]
+
+
+def require_edition(kind: str, identity: str, present: str, read: Collection[str] | None) -> None:
+    """Raise ChangedMeanwhileError unless the ``present`` edition is among those ``read``; None: any will do."""
+    if read is not None and present not in read:
+        raise ChangedMeanwhileError(
+            f"the {kind} {identity} was changed after it was read, so nothing was saved: read it again first"
+        )
+
 
 _A = AUDIT_LOG.c
 #: Rows read at a time for a file of the whole log.

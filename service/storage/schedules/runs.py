@@ -19,10 +19,9 @@ from sprag.service.schedules.outcomes import Outcome, Result
 from sprag.service.schedules.policies import CatchUp
 from sprag.service.schedules.report_to import ReportWhen
 from sprag.service.schedules.times import local_time
-from sprag.service.storage.editions import edition_of
 from sprag.service.storage.errors import RunClosedError
 from sprag.service.storage.part import Part, micros_of, moment, optional_moment
-from sprag.service.storage.people.audit import note
+from sprag.service.storage.people.audit import edition_of, note
 from sprag.service.storage.people.tables import AUDIT_LOG
 from sprag.service.storage.saved_views import inherit_figures
 from sprag.service.storage.schedules.reports import add_reports

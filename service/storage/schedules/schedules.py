@@ -15,10 +15,9 @@ from sprag.sentences import Sentence
 from sprag.service.actor import acting
 from sprag.service.languages import recorded
 from sprag.service.storage.deployment import ANY_SCHEDULE
-from sprag.service.storage.editions import require_edition
 from sprag.service.storage.errors import IdempotencyConflictError, ScheduleNotFoundError, TooManySchedulesError
 from sprag.service.storage.part import Part, change_row, micros_of, moment, move_row, optional_moment
-from sprag.service.storage.people.audit import by_sender, note, require_own
+from sprag.service.storage.people.audit import by_sender, note, require_edition, require_own
 from sprag.service.storage.people.pools import pool_of
 from sprag.service.storage.schedules.runs import RunRecord, ScheduleRecord, refuse_open_runs, runs_of
 from sprag.service.storage.schedules.tables import (

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sprag.service.storage.editions import edition_of
 from sprag.service.storage.part import moment, optional_moment
+from sprag.service.storage.people.audit import edition_of
 from sprag.service.storage.stored_sentences import read_warnings, sentence_in
 from sprag.service.storage.tables import COARSE_TO_FINE, HELD_AT_DEADLINE
 from sprag.worker.states import StudyState

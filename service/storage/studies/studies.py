@@ -20,7 +20,6 @@ from sprag.service.actor import acting
 from sprag.service.answers.studies import StudyOrder
 from sprag.service.languages import recorded
 from sprag.service.spec.labels import folded
-from sprag.service.storage.editions import require_edition
 from sprag.service.storage.errors import (
     IdempotencyConflictError,
     NothingToRetryError,
@@ -42,15 +41,22 @@ from sprag.service.storage.part import (
     move_row,
     row_of,
 )
-from sprag.service.storage.people.audit import by_sender, note, require_own
+from sprag.service.storage.people.audit import by_sender, note, require_edition, require_own
 from sprag.service.storage.people.people import STUDY_BYTES, TEXTS, require_queue, size_of_texts
 from sprag.service.storage.people.pools import rank_of
 from sprag.service.storage.rows.case_keys import KEYED, NOT_YET, TOO_MANY, add_keys
 from sprag.service.storage.rows.reuse import endings_of
 from sprag.service.storage.schedules.runs import submit_run
 from sprag.service.storage.schedules.schedules import lift_window
-from sprag.service.storage.studies.labels import changed_tags, search_text
-from sprag.service.storage.studies.listing import MAX_PAGE, StudyFilter, read_token, sort_key, token_of
+from sprag.service.storage.studies.listing import (
+    MAX_PAGE,
+    StudyFilter,
+    changed_tags,
+    read_token,
+    search_text,
+    sort_key,
+    token_of,
+)
 from sprag.service.storage.studies.progress import RECENT_CHUNKS, progress_of
 from sprag.service.storage.studies.records import Progress, RoundProgress, StudyPage, StudyRecord, record_of
 from sprag.service.storage.studies.retry import failed_cases, failed_places, failed_runs, give_back, nothing_to_retry

@@ -85,7 +85,7 @@ def end_studies(store: Store) -> None:
 
 
 def by_cp(store: Store, target: Path) -> None:
-    store.checkpoint()
+    store.session.checkpoint()
     shutil.copy2(store.session.path, target)
     shutil.copy2(f"{store.session.path}-wal", f"{target}-wal")
 

@@ -92,21 +92,21 @@ def test_a_jump_deletes_nothing_and_is_told_and_survives_a_restart(
 
 
 def test_the_user_can_say_that_the_clock_is_right(store: Store, clock: Wrong) -> None:
-    watch = ClockWatch(store)
+    watch = ClockWatch(store.dispatchers)
     assert watch.believable()
     clock.ahead = timedelta(days=100)
     assert not watch.believable()
     store.dispatchers.note_clock(clock.now())
     assert watch.believable()
-    assert ClockWatch(store).believable()
+    assert ClockWatch(store.dispatchers).believable()
 
 
 def test_a_pause_of_weeks_and_a_clock_that_is_put_back_are_no_jump(store: Store, clock: Wrong) -> None:
-    assert ClockWatch(store).believable()
+    assert ClockWatch(store.dispatchers).believable()
     clock.ahead = timedelta(days=59)
-    assert ClockWatch(store).believable()
+    assert ClockWatch(store.dispatchers).believable()
     clock.ahead = timedelta(days=-20_000)
-    watch = ClockWatch(store)
+    watch = ClockWatch(store.dispatchers)
     assert watch.believable()
     clock.ahead = timedelta(days=59)  # it is set by the network a while after the start
     assert watch.believable()
@@ -114,14 +114,14 @@ def test_a_pause_of_weeks_and_a_clock_that_is_put_back_are_no_jump(store: Store,
 
 def test_a_first_start_under_a_wrong_clock_does_not_cover_its_next_jump(store: Store, clock: Wrong) -> None:
     clock.ahead = timedelta(days=3650)
-    assert ClockWatch(store).believable(), "nothing is known to compare it with"
+    assert ClockWatch(store.dispatchers).believable(), "nothing is known to compare it with"
     clock.ahead = timedelta()
-    watch = ClockWatch(store)
+    watch = ClockWatch(store.dispatchers)
     for clock.seconds in (0.0, 1800.0, 3700.0):
         assert watch.believable()
     clock.ahead = timedelta(days=3650)
     assert not watch.believable()
-    assert not ClockWatch(store).believable()
+    assert not ClockWatch(store.dispatchers).believable()
 
 
 def test_the_command_deletes_nothing_on_the_word_of_a_clock_that_jumped(

@@ -13,12 +13,11 @@ import pytest
 import sqlalchemy as sa
 
 from sprag.service.cli.app import execute
-from sprag.service.storage import maintenance, moved_rows
+from sprag.service.storage import maintenance, moving
 from sprag.service.storage.database.lock import DispatcherLock
 from sprag.service.storage.database.session import Session
 from sprag.service.storage.errors import DatabaseError, SchemaError
-from sprag.service.storage.moved_rows import TableOf
-from sprag.service.storage.moving import Moved, move
+from sprag.service.storage.moving import Moved, TableOf, move
 from sprag.service.storage.people.scopes import TokenScope
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import all_tables
@@ -89,9 +88,9 @@ def _move(source: Session, target: Session, say: Callable[[str], None] = lambda 
 def test_every_row_of_every_table_is_there_and_back_again(
     opened: tuple[Session, Session], urls: tuple[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(moved_rows, "BATCH_ROWS", 3)
-    monkeypatch.setattr(moved_rows, "_FETCHED", 2)
-    monkeypatch.setattr(moved_rows, "_FETCHED_RESULTS", 2)
+    monkeypatch.setattr(moving, "BATCH_ROWS", 3)
+    monkeypatch.setattr(moving, "_FETCHED", 2)
+    monkeypatch.setattr(moving, "_FETCHED_RESULTS", 2)
     source, target = opened
     _fill(source)
     before = _contents(source)
@@ -164,9 +163,9 @@ def test_a_move_that_is_killed_before_it_begins_leaves_no_sound_empty_database(
 def test_an_interrupted_move_is_continued_with_what_changed_meanwhile(
     opened: tuple[Session, Session], urls: tuple[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(moved_rows, "BATCH_ROWS", 2)
-    monkeypatch.setattr(moved_rows, "_FETCHED", 1)
-    monkeypatch.setattr(moved_rows, "_FETCHED_RESULTS", 1)
+    monkeypatch.setattr(moving, "BATCH_ROWS", 2)
+    monkeypatch.setattr(moving, "_FETCHED", 1)
+    monkeypatch.setattr(moving, "_FETCHED_RESULTS", 1)
     source, target = opened
     _fill(source)
     put, left = TableOf.put, [11]

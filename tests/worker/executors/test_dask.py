@@ -320,7 +320,9 @@ def test_workers_that_would_give_other_values_run_nothing_and_the_study_says_so(
 
         def told() -> bool:
             reason = store.studies.get(record.id).reason or ""
-            reported = sum(len(item["refused"]) for item in worker_list(store)["dispatchers"]) == len(others)
+            reported = sum(len(item["refused"]) for item in worker_list(store.dispatchers)["dispatchers"]) == len(
+                others
+            )
             return (
                 reported
                 and f"(and {len(others) - 1} more)" in reason
@@ -332,7 +334,7 @@ def test_workers_that_would_give_other_values_run_nothing_and_the_study_says_so(
         assert told()
         assert store.studies.get(record.id).done == 0
         assert [each for each in others.values() if each not in caplog.text] == []
-        (found,) = worker_list(store)["dispatchers"]
+        (found,) = worker_list(store.dispatchers)["dispatchers"]
         assert (found["usable"], [host["refused"] for host in found["hosts"]]) == (0, [len(others)])
         reasons = " ".join(worker["reason"] for worker in found["refused"])
         assert [each for each in others.values() if each not in reasons] == []

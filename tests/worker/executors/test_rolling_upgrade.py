@@ -73,7 +73,7 @@ class Upgrade:
 
     def workers(self) -> tuple[int, list[str]]:
         """How many workers are usable, and why others are refused, by the dispatcher that is at work."""
-        alive = [found for found in worker_list(self.store)["dispatchers"] if found["ended_at"] is None]
+        alive = [found for found in worker_list(self.store.dispatchers)["dispatchers"] if found["ended_at"] is None]
         reasons = [worker["reason"] for found in alive for worker in found["refused"]]
         return sum(found["usable"] for found in alive), reasons
 
