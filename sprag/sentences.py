@@ -2,7 +2,7 @@
 
 A `Sentence` is an English string for programs, files and logs. It keeps the text of the catalogue that it was made of,
 with the values that stand in it, and has a form as JSON data, so that it can be stored. Who knows a reader
-(`sprag.service.reading.phrases`) says it in his language. The engine warns and the worker gives reasons in sentences;
+(`sprag.service.reading.reader`) says it in his language. The engine warns and the worker gives reasons in sentences;
 neither knows a language, so this module stands below both.
 """
 

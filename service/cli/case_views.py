@@ -5,7 +5,6 @@ Their options are the settings of the views (`sprag.service.views.setting`); not
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -110,8 +109,9 @@ def command(about: ViewInfo) -> Callable[..., None]:
 
 
 def is_study(spec: str) -> bool:
-    """Whether an argument names a study of a service: it is no file, and looks like none."""
-    return spec != "-" and not Path(spec).exists() and not Path(spec).suffix and os.sep not in spec
+    """Whether an argument names a study of a service: it is no file, and not called like a spec."""
+    path = Path(spec)
+    return spec != "-" and path.suffix.lower() not in (".json", ".toml") and not path.is_file()
 
 
 def parameter(name: str, annotation: Any, default: Any) -> Parameter:

@@ -109,3 +109,17 @@ def test_every_view_has_a_command_with_its_settings() -> None:
             }
             assert asked <= options, command
     assert not abouts
+
+
+@pytest.mark.parametrize(
+    ("argument", "study"),
+    [("st_0123456789abcdef", True), ("feeder v1.2", True), ("folder", True), ("a/b", True), ("-", False),
+     ("missing.json", False), ("spec.TOML", False), ("spec", False)],
+)  # fmt: skip
+def test_an_argument_is_a_study_or_a_spec(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, argument: str, study: bool
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "spec").write_text("{}")
+    assert case_views.is_study(argument) is study
