@@ -14,7 +14,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 CHECKS := mypy ruff imports reference catalogues collect
 
-.PHONY: help demo test check serve docs clean $(CHECKS)
+.PHONY: help demo test check kernels serve docs clean $(CHECKS)
 
 help:
 	@echo "make demo [EXIT=1]   set up, run the example study over HTTP, show its curve, then serve (or stop)"
@@ -34,7 +34,7 @@ docs: $(DEV)
 
 # The tests of one file share processes and servers, so they stay together, as do some files (TOGETHER in tests/conftest.py).
 # Many wait for processes of the program, so that three run side by side even on two cores.
-test: check
+test: check kernels
 	$(BIN)/python -m pytest --numprocesses 3 --dist loadfile --no-loadscope-reorder
 
 # mypy takes as long as the others together.
@@ -60,6 +60,10 @@ catalogues: $(DEV)
 # Every file of tests can be imported. The processes that run them find them compiled, which each of them did anew.
 collect: $(DEV)
 	$(BIN)/python -m pytest --collect-only --quiet --quiet >$(VENV)/collected || (cat $(VENV)/collected; exit 1)
+
+# Processes that begin side by side would each compile what the formulas of shafts need.
+kernels: $(DEV)
+	$(BIN)/sprag run examples/compressor.toml >/dev/null
 
 # The first Python in PYTHONS that is new enough makes the environment; a broken environment is made anew. The pip that
 # Python brings takes twice as long to install the rest.

@@ -68,18 +68,11 @@ LONG = (
 
 #: Files that share a server or a browser, which each process of tests starts for itself: one process runs them.
 TOGETHER = (
-    tuple(
-        f"tests/service/http/web/test_{name}.py"
-        for name in (
-            "connection",
-            "designers",
-            "drive_laboratory",
-            "goal_forms",
-            "laboratory",
-            "lesson",
-            "nights",
-            "paper_and_phones",
-            "study_pages",
+    *(
+        tuple(f"tests/service/http/web/test_{name}.py" for name in names.split())
+        for names in (
+            "connection designers drive_laboratory goal_forms laboratory lesson nights paper_and_phones study_pages",
+            "answers explore form_in_browser keys motion_pages order returning script_texts walks",
         )
     ),
     tuple(f"tests/acceptance/test_{name}.py" for name in ("bad_input", "commands", "notebook")),
