@@ -63,8 +63,7 @@ class Components(Part):
     def all(self, kind: str | None = None) -> tuple[ComponentRecord, ...]:
         """Every component, or those of a kind, by kind and name."""
         query = sa.select(COMPONENTS).order_by(_C.kind, _C.name)
-        with self.session.read() as connection:
-            rows = connection.execute(query if kind is None else query.where(_C.kind == kind)).all()
+        rows = self._all(query if kind is None else query.where(_C.kind == kind))
         return tuple(map(_record, rows))
 
     def put(self, given: Iterable[Component]) -> tuple[ComponentRecord, ...]:

@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING
 import sqlalchemy as sa
 
 from sprag.service.storage.part import Part, micros_of, moment
-from sprag.service.storage.tables import CHUNKS, DISPATCHERS, ENDINGS, HELD_AT_DEADLINE, STUDIES
-from sprag.worker.states import TERMINAL, ChunkState
+from sprag.service.storage.tables import CHUNKS, DISPATCHERS, ENDED, ENDINGS, HELD_AT_DEADLINE, STUDIES
+from sprag.worker.states import ChunkState
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-_TERMINAL = [state.value for state in TERMINAL]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +45,7 @@ class Totals(Part):
         """The current figures."""
         c = STUDIES.c
         alive = c.deleted_at.is_(None)
-        going = alive & c.state.not_in(_TERMINAL) & c.waits_for.is_distinct_from(HELD_AT_DEADLINE)
+        going = alive & ~ENDED & c.waits_for.is_distinct_from(HELD_AT_DEADLINE)
         with self.session.read() as connection:
             states = connection.execute(sa.select(c.state, sa.func.count()).where(alive).group_by(c.state)).all()
             waiting, reused = connection.execute(
@@ -94,8 +92,7 @@ class Totals(Part):
             )
             .order_by(c.finished_at)
         )
-        with self.session.read() as connection:
-            rows = connection.execute(query).all()
+        rows = self._all(query)
         return [
             FinishedWork(moment(end), max(0.0, (end - (end if begin is None else begin)) / 1e6), count)
             for begin, end, count in rows

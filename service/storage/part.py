@@ -17,7 +17,7 @@ from sprag.service.storage.tables import CHUNKS, RECORD_COLUMNS, STUDIES
 from sprag.worker.states import ChunkState, StudyEvent, StudyState, follow
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
     from pathlib import Path
 
     from sprag.service.storage.database.session import Session
@@ -96,6 +96,11 @@ class Part:
     def _now(self) -> int:
         """The current time in microseconds since 1970."""
         return micros_of(self.clock.now())
+
+    def _all(self, query: sa.Select[Any]) -> Sequence[Any]:
+        """The rows of a query, read in a transaction of its own."""
+        with self.session.read() as connection:
+            return connection.execute(query).all()
 
 
 def row_of(connection: sa.Connection, study_id: str, *columns: sa.ColumnElement[Any]) -> sa.Row[Any]:

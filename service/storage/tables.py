@@ -8,7 +8,7 @@ import sqlalchemy as sa
 
 from sprag.migrations import REVISIONS
 from sprag.worker import models
-from sprag.worker.states import ChunkState
+from sprag.worker.states import TERMINAL, ChunkState
 
 #: Revision of the schema below.
 HEAD_REVISION: Final = REVISIONS[-1]
@@ -116,6 +116,9 @@ _BESIDE = frozenset(
 )
 #: The columns of a `StudyRecord`.
 RECORD_COLUMNS = tuple(column for column in STUDIES.c if column.name not in _BESIDE)
+
+#: Condition: a study has ended.
+ENDED = STUDIES.c.state.in_([state.value for state in TERMINAL])
 
 _CHUNK_STATE = sa.Enum(ChunkState, native_enum=False, length=8, values_callable=lambda states: list(map(str, states)))
 

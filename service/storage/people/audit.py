@@ -164,8 +164,7 @@ class Audit(Part):
             if not (page_token.isascii() and page_token.isdigit() and len(page_token) < 19):
                 raise PageTokenError(f"{page_token[:40]!r} is not a page token of this list")
             query = query.where(_A.number < min(int(page_token), MAX_INTEGER))
-        with self.session.read() as connection:
-            rows = connection.execute(query.order_by(_A.number.desc()).limit(page_size + 1)).all()
+        rows = self._all(query.order_by(_A.number.desc()).limit(page_size + 1))
         found = tuple(map(_audit_record, rows[:page_size]))
         return AuditPage(found, str(found[-1].number) if len(rows) > page_size else None)
 
@@ -174,8 +173,7 @@ class Audit(Part):
         last = 0
         query = sa.select(AUDIT_LOG).where(*wanted.conditions()).order_by(_A.number).limit(_BLOCK)
         while True:
-            with self.session.read() as connection:
-                rows = connection.execute(query.where(_A.number > last)).all()
+            rows = self._all(query.where(_A.number > last))
             yield from map(_audit_record, rows)
             if len(rows) < _BLOCK:
                 return

@@ -28,8 +28,7 @@ from sprag.service.storage.people.scopes import TokenScope, TokenState
 from sprag.service.storage.people.tables import ENDED_SESSIONS, SESSION_KEY, TOKENS, USERS
 from sprag.service.storage.saved_views import SAVED_VIEWS
 from sprag.service.storage.schedules.tables import SCHEDULES
-from sprag.service.storage.tables import HELD_AT_DEADLINE, STUDIES
-from sprag.worker.states import TERMINAL
+from sprag.service.storage.tables import ENDED, HELD_AT_DEADLINE, STUDIES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -43,9 +42,7 @@ TEXTS: Final = ("name", "spec", "study", "warnings", "notes", "tags", "search")
 #: What the rest of a study takes: its row, its first chunk, its key, and their places in indexes.
 STUDY_BYTES: Final = 1024
 #: Condition: a study has not ended, and is not held at its deadline.
-WAITING_STUDY = STUDIES.c.state.not_in([state.value for state in TERMINAL]) & STUDIES.c.waits_for.is_distinct_from(
-    HELD_AT_DEADLINE
-)
+WAITING_STUDY = ~ENDED & STUDIES.c.waits_for.is_distinct_from(HELD_AT_DEADLINE)
 #: Prefix of a token, so that people and secret scanners recognise it.
 TOKEN_PREFIX: Final = "sprag_"  # noqa: S105 - the beginning of all tokens is no secret
 _TOKEN_BYTES: Final = 32
@@ -155,8 +152,7 @@ class People(Part):
 
     def users(self) -> tuple[UserRecord, ...]:
         """Every user, removed ones included, by name."""
-        with self.session.read() as connection:
-            return tuple(map(_user_record, connection.execute(sa.select(USERS).order_by(_U.name)).all()))
+        return tuple(map(_user_record, self._all(sa.select(USERS).order_by(_U.name))))
 
     def change_user(
         self, name: str, role: Role | None = None, quota: Quota | None = None, *, removed: bool | None = None
@@ -256,8 +252,7 @@ class People(Part):
 
     def tokens(self) -> tuple[TokenRecord, ...]:
         """Every token ever created, newest first."""
-        with self.session.read() as connection:
-            rows = connection.execute(sa.select(TOKENS).order_by(TOKENS.c.number.desc())).all()
+        rows = self._all(sa.select(TOKENS).order_by(TOKENS.c.number.desc()))
         return tuple(map(_token_record, rows))
 
     def revoke_token(self, token_id: str) -> TokenRecord:
@@ -333,9 +328,8 @@ def _usage(connection: sa.Connection, name: str) -> Usage:
     """
     c = STUDIES.c
     most = sa.func.coalesce(c.most_cases, c.cases)
-    ended = c.state.in_([state.value for state in TERMINAL])
     whole = sa.func.coalesce(c.estimated_bytes, 0)
-    rows = sa.case((ended & (most > 0), whole * c.done / sa.func.nullif(most, 0)), else_=whole)
+    rows = sa.case((ENDED & (most > 0), whole * c.done / sa.func.nullif(most, 0)), else_=whole)
     texts = sum((_octets(connection, c[name]) for name in TEXTS), start=sa.literal(STUDY_BYTES))
     waits = WAITING_STUDY & c.deleted_at.is_(None)
     row = connection.execute(

@@ -27,8 +27,8 @@ from sprag.service.storage.saved_views import inherit_figures
 from sprag.service.storage.schedules.reports import add_reports
 from sprag.service.storage.schedules.tables import SCHEDULE_RUNS, SCHEDULES, fields_of, report_to_of, trouble_flags_of
 from sprag.service.storage.stored_sentences import sentence_in, written
-from sprag.service.storage.tables import CHUNKS, GO_ON, HELD_AT_DEADLINE, STUDIES, WAITS_FOR_ROOM
-from sprag.worker.states import GOING, TERMINAL, ChunkState, StudyState
+from sprag.service.storage.tables import CHUNKS, ENDED, GO_ON, HELD_AT_DEADLINE, STUDIES, WAITS_FOR_ROOM
+from sprag.worker.states import GOING, ChunkState, StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -330,7 +330,7 @@ class Runs(Part):
 
     def ended(self) -> list[EndedRun]:
         """Due times that are over and have not been concluded yet, a limited number."""
-        over = _C.state.in_([state.value for state in TERMINAL]) | (_C.waits_for == HELD_AT_DEADLINE)
+        over = ENDED | (_C.waits_for == HELD_AT_DEADLINE)
         query = (
             sa.select(_S.id.label("schedule_id"), _S.trouble_flags, *COLUMNS)
             .select_from(runs_with_studies().join(SCHEDULES, _S.number == _R.schedule))
@@ -338,8 +338,7 @@ class Runs(Part):
             .order_by(_R.due)
             .limit(_MOST)
         )
-        with self.session.read() as connection:
-            rows = connection.execute(query).all()
+        rows = self._all(query)
         return [
             EndedRun(row.schedule, row.schedule_id, row.due, outcome_of(row), trouble_flags_of(row)) for row in rows
         ]
@@ -373,8 +372,7 @@ class Runs(Part):
             .order_by(_R.due.desc(), _R.schedule)
             .limit(most)
         )
-        with self.session.read() as connection:
-            rows = connection.execute(query).all()
+        rows = self._all(query)
         return [
             NightRun(
                 row.schedule_id,

@@ -29,9 +29,9 @@ from sprag.service.storage.schedules.tables import (
     row_values,
     window_of,
 )
-from sprag.service.storage.tables import STUDIES, WAITS_FOR_WINDOW
+from sprag.service.storage.tables import ENDED, STUDIES, WAITS_FOR_WINDOW
 from sprag.worker.limits import MAX_SCHEDULES
-from sprag.worker.states import TERMINAL, StudyEvent, StudyState
+from sprag.worker.states import StudyEvent, StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -160,8 +160,7 @@ class Schedules(Part):
     def recover(self, now: datetime) -> list[str]:
         """Make schedules that a fast clock postponed due again at their next time after ``now``; returns their ids."""
         recovered = []
-        with self.session.read() as connection:
-            rows = connection.execute(sa.select(SCHEDULES).where(_S.next_due > micros_of(now))).all()
+        rows = self._all(sa.select(SCHEDULES).where(_S.next_due > micros_of(now)))
         for row in rows:
             due = fields_of(row).next_due(now)
             if due is None or micros_of(due) >= row.next_due:
@@ -184,11 +183,10 @@ class Schedules(Part):
             .join(STUDIES, c.number == _R.study)
             .where(
                 _S.window_begin.is_not(None) & (_R.unbound == 0) | (c.waits_for == WAITS_FOR_WINDOW),
-                c.state.not_in([state.value for state in TERMINAL]),
+                ~ENDED,
             )
         )
-        with self.session.read() as connection:
-            rows = connection.execute(query).all()
+        rows = self._all(query)
         return [
             BoundStudy(r.number, StudyState(r.state), r.waits_for == WAITS_FOR_WINDOW, r.reason, window_of(r), r.id)
             for r in rows

@@ -15,6 +15,7 @@ from sprag.service.storage.saved_views import SAVED_VIEWS
 from sprag.service.storage.tables import (
     CASE_KEYS,
     CHUNKS,
+    ENDED,
     ENDINGS,
     HELD_AT_DEADLINE,
     ROUNDS,
@@ -23,7 +24,6 @@ from sprag.service.storage.tables import (
     results_table,
 )
 from sprag.worker.case_keys import case_keys
-from sprag.worker.states import TERMINAL
 from sprag.worker.study import Study
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class Purging(Part):
         ``dry``: only return the ids.
         """
         c = STUDIES.c
-        ended = c.state.in_([state.value for state in TERMINAL]) & (c.finished_at < micros_of(ended_before))
+        ended = ENDED & (c.finished_at < micros_of(ended_before))
         over = (c.waits_for == HELD_AT_DEADLINE) & (c.finish_by < micros_of(ended_before))
         old = (ended | over) & c.deleted_at.is_(None)
         with self.session.read() as connection:

@@ -66,6 +66,7 @@ from sprag.service.storage.studies.study_row import study_row
 from sprag.service.storage.tables import (
     CHUNKS,
     COARSE_TO_FINE,
+    ENDED,
     ENDINGS,
     HELD_AT_DEADLINE,
     IDEMPOTENCY_KEYS,
@@ -76,7 +77,7 @@ from sprag.service.storage.work.dispatchers import dispatcher_of
 from sprag.worker.chunking import spans
 from sprag.worker.limits import MAX_AXIS_VALUES, MAX_WAITING_STUDIES
 from sprag.worker.ports import Chunk
-from sprag.worker.states import TERMINAL, ChunkState, StudyEvent, StudyState, follow
+from sprag.worker.states import ChunkState, StudyEvent, StudyState, follow
 from sprag.worker.study import Study
 from sprag.worker.sweeps import LineOrder
 
@@ -420,9 +421,7 @@ class Studies(Part):
     def ended(self, cases: int, limit: int) -> list[StudyRecord]:
         """The latest studies that have ended with more than ``cases`` finished cases, newest first."""
         c = STUDIES.c
-        query = sa.select(*RECORD_COLUMNS).where(
-            c.deleted_at.is_(None), c.state.in_([state.value for state in TERMINAL]), c.done > cases
-        )
+        query = sa.select(*RECORD_COLUMNS).where(c.deleted_at.is_(None), ENDED, c.done > cases)
         with self.session.read() as connection:
             return [record_of(row) for row in connection.execute(query.order_by(c.number.desc()).limit(limit))]
 

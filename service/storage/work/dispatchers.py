@@ -17,10 +17,10 @@ from sprag.sentences import Sentence
 from sprag.service.storage.part import SILENT_SECONDS, Part, announce, micros_of, moment, move_row, optional_moment
 from sprag.service.storage.rows.origins import differences_of, remember
 from sprag.service.storage.studies.records import DispatcherRecord
-from sprag.service.storage.tables import CHUNKS, DISPATCHERS, STUDIES
+from sprag.service.storage.tables import CHUNKS, DISPATCHERS, ENDED, STUDIES
 from sprag.worker import fingerprint
 from sprag.worker.ports import EpochLostError, Peer
-from sprag.worker.states import TERMINAL, ChunkState, StudyEvent, StudyState
+from sprag.worker.states import ChunkState, StudyEvent, StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -37,11 +37,8 @@ _RUNS: Final = " runs "
 TAKE_OVER_SECONDS = 600
 #: Values of a chunk that is returned to waiting.
 WAITING = {"state": ChunkState.WAITING, "epoch": None, "claimed_at": None}
-_TERMINAL = [state.value for state in TERMINAL]
 #: Only studies that have not ended have claims; by study the chunks have an index.
-CLAIMED = (CHUNKS.c.state == ChunkState.CLAIMED) & CHUNKS.c.study.in_(
-    sa.select(STUDIES.c.number).where(STUDIES.c.state.not_in(_TERMINAL))
-)
+CLAIMED = (CHUNKS.c.state == ChunkState.CLAIMED) & CHUNKS.c.study.in_(sa.select(STUDIES.c.number).where(~ENDED))
 _ALIVE = DISPATCHERS.c.ended_at.is_(None)
 #: For every transaction of a dispatcher; building the statement anew takes longer than running it.
 _OWN = sa.select(DISPATCHERS.c.epoch).where(DISPATCHERS.c.epoch == sa.bindparam("epoch"), _ALIVE).with_for_update()
@@ -164,8 +161,7 @@ class Dispatchers(Part):
         A process that begins anew takes nothing from another; a `run_owner`, which leaves its end to the next one, does
         not count either.
         """
-        with self.session.read() as connection:
-            rows = connection.execute(sa.select(DISPATCHERS)).all()
+        rows = self._all(sa.select(DISPATCHERS))
         begun = {row.started_at: row for row in rows}
         since = self._now() - TAKE_OVER_SECONDS * 1_000_000
         return sum(
@@ -227,7 +223,7 @@ class Dispatchers(Part):
         with self.session.write() as connection:
             if not may_change(connection, epoch, number):
                 return False
-            this = (STUDIES.c.number == number) & STUDIES.c.state.not_in(_TERMINAL)
+            this = (STUDIES.c.number == number) & ~ENDED
             return bool(connection.execute(sa.update(STUDIES).where(this).values(dispatcher=epoch)).rowcount)
 
     def leave(self, epoch: int, number: int) -> None:
@@ -251,7 +247,7 @@ class Dispatchers(Part):
     def all(self) -> tuple[DispatcherRecord, ...]:
         """The dispatchers at work, in order of their beginning; without any, the last one; () before the first."""
         c = STUDIES.c
-        having = sa.select(c.dispatcher, sa.func.count()).where(c.state.not_in(_TERMINAL)).group_by(c.dispatcher)
+        having = sa.select(c.dispatcher, sa.func.count()).where(~ENDED).group_by(c.dispatcher)
         with self.session.read() as connection:
             rows = list(connection.execute(sa.select(DISPATCHERS).order_by(DISPATCHERS.c.epoch)))
             studies = {row[0]: row[1] for row in connection.execute(having)}

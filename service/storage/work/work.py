@@ -23,6 +23,7 @@ from sprag.service.storage.studies.round_table import add_round, latest_place
 from sprag.service.storage.studies.study_digests import WITH_DIGEST, grown_digest, problem_of, readable
 from sprag.service.storage.tables import (
     CHUNKS,
+    ENDED,
     ENDINGS,
     GO_ON,
     HELD_AT_DEADLINE,
@@ -39,7 +40,7 @@ from sprag.worker.models import ChunkResult
 from sprag.worker.planning.rounds import Rows as RoundRows
 from sprag.worker.ports import ActiveStudy, Chunk, Finished, UnreadableStudyError
 from sprag.worker.reuse import taken
-from sprag.worker.states import GOING, TERMINAL, ChunkState, StudyEvent, StudyState
+from sprag.worker.states import GOING, ChunkState, StudyEvent, StudyState
 from sprag.worker.study import Study
 
 if TYPE_CHECKING:
@@ -57,7 +58,6 @@ if TYPE_CHECKING:
     from sprag.service.storage.work.room import Room
     from sprag.worker.ports import Clock, Known
 
-_TERMINAL = [state.value for state in TERMINAL]
 _C = STUDIES.c
 #: Asked at each poll; building the statement anew takes longer than running it.
 _ACTIVE = (
@@ -65,7 +65,7 @@ _ACTIVE = (
         _C.number, _C.id, _C.state, _C.priority, _C.waits_for, _C.finish_by, _C.most_cases, _C.ok, _C.dispatcher,
         _C.fingerprint, _C.rank, _C.owner,
     )
-    .where(_C.state.not_in(_TERMINAL), _C.waits_for.is_distinct_from(HELD_AT_DEADLINE))
+    .where(~ENDED, _C.waits_for.is_distinct_from(HELD_AT_DEADLINE))
     .order_by(_C.rank.desc(), _C.priority.desc(), _C.number)
 )  # fmt: skip
 #: The parameters of these are the numbers of studies, ``numbers``.
@@ -132,8 +132,7 @@ class Work(Part):
 
         Studies held at their deadline are left out.
         """
-        with self.session.read() as connection:
-            rows = connection.execute(_ACTIVE).all()
+        rows = self._all(_ACTIVE)
         return [
             ActiveStudy(
                 row.number,
