@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sprag.service.http.views import preset_of
+from sprag.service.http.web.form.check import check_form
 from sprag.service.http.web.form.machine import Entry, entries
 from sprag.service.http.web.form.machine_spec import base_of, values_of_base
 from sprag.service.http.web.form.page import empty
@@ -18,6 +19,7 @@ from sprag.service.http.web.form.undo import history_of
 from sprag.service.presets import preset_names
 from sprag.service.spec.document import parse_spec
 from sprag.worker import models
+from sprag.worker.chunking import Chunking
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
@@ -84,6 +86,12 @@ def test_a_machine_with_more_than_the_form_shows_is_a_text() -> None:
     press["base"]["balance"] = "refuse"  # which a torque that balances the operation cannot
     with pytest.raises(ValueError, match="no fields"):
         values_of(press)
+
+
+@pytest.mark.parametrize("way", ["formula", "csv"])
+def test_a_driving_torque_without_its_course_is_refused(way: str) -> None:
+    values = values_of(preset_of("press")["spec"]) | {"/base/drive": way}
+    assert "exactly one of" in check_form(values, Chunking()).faults["/base/drive"][0]
 
 
 def test_fields_of_older_drafts_are_read(service: Service) -> None:
