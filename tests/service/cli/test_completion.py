@@ -27,7 +27,7 @@ Sprag = Callable[..., Any]
 
 #: Prints what bash offers for the last of its arguments.
 BASH = """
-eval "$(_SPRAG_COMPLETE=source_bash sprag)"
+eval "$COMPLETION"
 complete -p sprag >&2
 COMP_WORDS=(sprag "$@"); COMP_CWORD=$#
 _sprag_completion sprag
@@ -35,15 +35,25 @@ printf '%s\n' "${COMPREPLY[@]}"
 """
 
 
-@pytest.fixture
-def program(tmp_path: Path) -> dict[str, str]:
-    """An environment whose PATH has the command `sprag`."""
-    script = tmp_path / "bin" / "sprag"
-    script.parent.mkdir()
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """An environment whose PATH has the command `sprag`, with what it gives bash to read as `COMPLETION`."""
+    script = tmp_path_factory.mktemp("bin") / "sprag"
     script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m sprag.service.cli "$@"\n')
     script.chmod(0o755)
     path = f"{script.parent}{os.pathsep}{os.environ['PATH']}"
-    return {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT), "HOME": str(tmp_path)}
+    environment = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT)}
+    asked = subprocess.run(
+        ["sprag"], env={**environment, "_SPRAG_COMPLETE": "source_bash"}, executable=script, capture_output=True,
+        text=True, check=True,
+    )  # fmt: skip
+    return {**environment, "COMPLETION": asked.stdout}
+
+
+@pytest.fixture
+def program(installed: dict[str, str], tmp_path: Path) -> dict[str, str]:
+    """That environment with a home of the test's own."""
+    return {**installed, "HOME": str(tmp_path)}
 
 
 def offered(program: dict[str, str], *words: str) -> list[str]:
