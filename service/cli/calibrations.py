@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from sprag.service.cli.configured import read_settings
-from sprag.service.cli.console import WrongInputError, say, show_table, warning_lines, write_json, write_text
+from sprag.service.cli.console import WrongInputError, say, warning_lines, write_json
 from sprag.service.cli.file_formats import file_format
 from sprag.service.cli.files import MAX_DATA_BYTES, decode, read_bytes, read_spec, spec_failure, write_pieces
 from sprag.service.cli.options import (
@@ -18,7 +18,7 @@ from sprag.service.cli.options import (
     SpecFile,
 )
 from sprag.service.cli.running import run_parsed
-from sprag.service.cli.shown import heading
+from sprag.service.cli.shown import show_calibration
 from sprag.service.cli.stores import store_of
 from sprag.service.faults import Fault
 from sprag.service.languages import N_, _
@@ -122,19 +122,3 @@ def _report(study_id: str, found: Calibration) -> dict[str, Any]:
     from sprag.service.results.calibration import calibration_json
 
     return cast("dict[str, Any]", calibration_json(study_id, found))
-
-
-def show_calibration(found: dict[str, Any]) -> None:
-    """Values with their intervals, correlations, and what to do next."""
-    heads = (_("parameter"), _("value"), _("from"), _("to"), _("deviation"))
-    columns = [(head, place > 0) for place, head in enumerate(heads)]
-    rows = [
-        (heading(one["name"], one["unit"]), one["value"], *(one["interval"] or (None, None)), one["deviation"])
-        for one in found["parameters"]
-    ]
-    show_table(_("Values and 95 % intervals"), columns, rows)
-    if found["correlations"] and len(rows) > 1:
-        names = [one["name"] for one in found["parameters"]]
-        lines = [(name, *row) for name, row in zip(names, found["correlations"], strict=True)]
-        show_table(_("Correlations"), [("", False), *((name.replace(".", ".\n"), True) for name in names)], lines)
-    write_text("".join(f"{sentence}\n" for sentence in found["sentences"]))

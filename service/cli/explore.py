@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from sprag.service.cli import completion
-from sprag.service.cli.console import Column, show_table
 from sprag.service.cli.following import further, submitted
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import (
@@ -23,8 +22,6 @@ from sprag.service.cli.options import (
     WaitTimeout,
 )
 from sprag.service.cli.remote import connection
-from sprag.service.cli.shown import heading
-from sprag.service.languages import _
 from sprag.worker.limits import MAX_POINTS_SELECTED
 
 Where = Annotated[
@@ -65,21 +62,3 @@ def select(
     with connection(server, token) as client:
         study = further(client, study_of(client, study_id), "select", params=query)
         submitted(client, study, wait, timeout, as_json)
-
-
-def show_cases(found: dict[str, Any]) -> None:
-    """A line for each case in its order."""
-    units = {item["name"]: item["unit"] for item in found["quantities"]}
-    columns: list[Column] = [(_("case"), True), *((heading(name, unit), True) for name, unit in units.items())]
-    columns += [(_("ending"), False), (_("regime"), False), (_("flags"), False)]
-    rows = [
-        (
-            case["case"],
-            *({**case["parameters"], **case["results"]}.get(name) for name in units),
-            case["ending"],
-            case["regime"] or "",
-            ", ".join(case["flags"]),
-        )
-        for case in found["cases"]
-    ]
-    show_table(_("{selected} of {known} cases", selected=found["selected"], known=found["known"]), columns, rows)

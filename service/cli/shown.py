@@ -1,16 +1,19 @@
-"""Curves, maps and sensitivities as tables."""
+"""The answers of views of a study as tables."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.cli.console import OK, cell_text, say, show_table, warning_lines
+from sprag.service.cli.console import OK, Column, cell_text, say, show_table, warning_lines, write_text
 from sprag.service.languages import N_, _, decimal
 
 if TYPE_CHECKING:
     from sprag.service.answers import Value
+    from sprag.service.answers.key import AnswerValue
+    from sprag.service.reading.reader import Reading
 
 #: Indices and the headings of their columns.
 _SHARES = {"first_order": N_("first order"), "first_order_error": "+-", "total": N_("total"), "total_error": "+-"}
@@ -147,3 +150,193 @@ def held_text(values: Mapping[str, Value], units: Mapping[str, str]) -> str:
 def heading(name: str, unit: str) -> str:
     """A column's heading: the name with its unit."""
     return name if unit == "1" else f"{name} [{unit}]"
+
+
+def show_ribbon(found: dict[str, Any]) -> None:
+    """A table for each line and result: the nominal drive and the quantiles at each place; then the causes."""
+    for line in found["lines"]:
+        held = held_text({**line["by"], **line["at"]}, found["units"])
+        for name, result in line["results"].items():
+            result_title = heading(name, found["results"][name]["unit"])
+            title = _("{result}, {drives} drives", result=result_title, drives=found["drives"])
+            columns = [*_x_column(found), (_("nominal"), True)]
+            columns += [(f"{100.0 * p:g} %", True) for p in found["quantiles"]]
+            columns += [(_("failed"), True)]
+            x = [line["x"]] if found["x"] else []
+            rows = list(zip(*x, result["nominal"], *result["values"], line["failed"], strict=True))
+            show_table(f"{title}; {held}" if held else title, columns, rows)
+            _show_causes(_("causes of the spread of {name}", name=name), result["causes"])
+
+
+def show_yield(found: dict[str, Any]) -> None:
+    """A table for each line: the yield at each place; then the yield everywhere, the causes and the worst drives."""
+    title = _(" and ").join(condition["text"] for condition in found["conditions"])
+    for line in found["lines"]:
+        held = held_text({**line["by"], **line["at"]}, found["units"])
+        heads = (_("yield"), _("from"), _("to"), _("drives"), _("failed"))
+        columns = [*_x_column(found), *((head, True) for head in heads)]
+        x = [line["x"]] if found["x"] else []
+        shares = [[_share(share[part]) for share in line["each"]] for part in ("value", "low", "high")]
+        rows = list(zip(*x, *shares, [share["drives"] for share in line["each"]], line["failed"], strict=True))
+        show_table(f"{title}; {held}" if held else title, columns, rows)
+        if found["x"]:
+            say(_("at every place: {share}", share=yield_text(line["all"])))
+        _show_causes(_("causes of missing the conditions"), line["causes"])
+        if line["worst"]:
+            names = list(line["worst"][0]["results"])
+            columns = [(_("drive"), True), (_("case"), True), *_x_column(found), (_("margin"), True)]
+            columns += [(name, True) for name in names]
+            rows = [
+                (one["drive"], one["case"], *([one["x"]] if "x" in one else []), _share(one["margin"]),
+                 *one["results"].values())
+                for one in line["worst"]
+            ]  # fmt: skip
+            show_table(_("worst drives"), columns, rows)
+
+
+def yield_text(share: dict[str, Any]) -> str:
+    """A yield in words."""
+    if share["value"] is None:
+        return _("no drive is run yet")
+    low, high = _share(share["low"]), _share(share["high"])
+    value = _share(share["value"])
+    return _("{value} ({low} to {high}) of {drives} drives", value=value, low=low, high=high, drives=share["drives"])
+
+
+def _x_column(found: dict[str, Any]) -> list[tuple[str, bool]]:
+    return [(heading(found["x"]["path"], found["x"]["unit"]), True)] if found["x"] else []
+
+
+def _show_causes(title: str, causes: dict[str, Any]) -> None:
+    known = [item for item in causes["shares"] if item["share"] is not None]
+    known.sort(key=lambda item: -item["share"])
+    if known:
+        rows = [(item["tolerance"], _share(max(item["share"], 0.0)), _share(item["error"])) for item in known]
+        show_table(title, [(_("tolerance"), False), (_("share"), True), ("+-", True)], rows)
+    if causes["note"]:
+        say(_("note: {text}", text=_(causes["note"])))
+
+
+def _share(share: float | None) -> str:
+    return "" if share is None else f"{cell_text(round(100.0 * share, 1))} %"
+
+
+def show_answers(found: dict[str, Any], model: str) -> None:
+    """A table for each curve: its answers and its working point; then the extremes among all cases."""
+    from sprag.service.reading.reader import Reading  # knows the models
+
+    reading = Reading(model)
+    x = heading(found["x"] or "", found["unit"] or "1")
+    columns: list[Column] = [
+        (_("answer"), False, True),
+        (_("value"), True),
+        (_("unit"), False),
+        (x, True),
+        (_("cases"), False),
+        (_("note"), False),
+    ]
+    unit = found["unit"] or "1"
+    for curve in found["curves"]:
+        title = held_text({**curve["by"], **curve["at"]}, found["units"])
+        every = (*curve["answers"], *curve["working_point"])
+        show_table(title, columns, [_answer_row(item, unit, reading) for item in every])
+    if found["overall"]:
+        columns[3] = (_("case with"), False)
+        rows = [
+            (*row[:3], held_text(item["parameters"], found["units"]), *row[4:])
+            for item in found["overall"]
+            for row in [_answer_row(item, "1", reading)]
+        ]
+        show_table(_("among all cases"), columns, rows)
+
+
+def _answer_row(item: AnswerValue, x_unit: str, reading: Reading) -> tuple[object, ...]:
+    from sprag.service.results.key_answer_words import note_of
+
+    unit = "" if item["unit"] == "1" else item["unit"]
+    title = reading.caption(item["title"]) if item["title"] == item["result"] else _(item["title"])
+    value: object = item["value"]
+    if item["above"] and item["value"] is not None:
+        value = f"> {cell_text(item['value'])}"
+    cases, note = ", ".join(map(str, item["cases"])), note_of(item, x_unit).said(reading)
+    return title, value, unit, item["x"], cases, note
+
+
+def show_designs(found: dict[str, Any]) -> None:
+    """A line for each design, the best first."""
+    counts = found["counts"]
+    parts = [
+        _("{count} designs", count=counts["known"]),
+        _("{count} feasible", count=counts["feasible"]),
+        _("{count} on the front", count=counts["front"]),
+    ]
+    if counts["pending"]:
+        parts.append(_("{count} still to be run", count=counts["pending"]))
+    columns = [(name, True) for name in (_("design"), _("case"))]
+    columns += [(_lines(goal["result"], goal["unit"]), True) for goal in found["best"]]
+    columns += [(_lines(one["name"], one["unit"]), True) for one in found["variables"]]
+    limited, points = _limited(found), len(found["at"])
+    columns += [
+        (_lines(name if points == 1 else _("{name} at {number}", name=name, number=number), unit), True)
+        for name, unit in limited.items()
+        for number in range(1, points + 1)
+    ]
+    rows = [
+        (
+            design["design"],
+            design["cases"][0],
+            *design["goals"].values(),
+            *design["variables"].values(),
+            *chain.from_iterable(design["results"][name] for name in limited),
+            *(design[name] for name in ("feasible", "exact", "rank")),
+            ", ".join(dict.fromkeys([*filter(None, design["regimes"] or ()), *design["flags"]])),
+        )
+        for design in found["designs"]
+    ]
+    columns += [(_("feasible"), False), (_("exact"), False), (_("rank"), True), (_("motion"), False)]
+    show_table(", ".join(parts), columns, rows)
+
+
+def _limited(found: dict[str, Any]) -> dict[str, str]:
+    """Names and units of the results of limits; without those that the columns of goals show."""
+    goals = {goal["result"] for goal in found["best"]} if len(found["at"]) == 1 else ()
+    return {limit["result"]: limit["unit"] for limit in found["subject_to"] if limit["result"] not in goals}
+
+
+def _lines(name: str, unit: str) -> str:
+    """The heading of a narrow column: a line for each part of the name, and one for the unit."""
+    return heading(name, unit).replace(".", ".\n").replace(" ", "\n")
+
+
+def show_cases(found: dict[str, Any]) -> None:
+    """A line for each case in its order."""
+    units = {item["name"]: item["unit"] for item in found["quantities"]}
+    columns: list[Column] = [(_("case"), True), *((heading(name, unit), True) for name, unit in units.items())]
+    columns += [(_("ending"), False), (_("regime"), False), (_("flags"), False)]
+    rows = [
+        (
+            case["case"],
+            *({**case["parameters"], **case["results"]}.get(name) for name in units),
+            case["ending"],
+            case["regime"] or "",
+            ", ".join(case["flags"]),
+        )
+        for case in found["cases"]
+    ]
+    show_table(_("{selected} of {known} cases", selected=found["selected"], known=found["known"]), columns, rows)
+
+
+def show_calibration(found: dict[str, Any]) -> None:
+    """Values with their intervals, correlations, and what to do next."""
+    heads = (_("parameter"), _("value"), _("from"), _("to"), _("deviation"))
+    columns = [(head, place > 0) for place, head in enumerate(heads)]
+    rows = [
+        (heading(one["name"], one["unit"]), one["value"], *(one["interval"] or (None, None)), one["deviation"])
+        for one in found["parameters"]
+    ]
+    show_table(_("Values and 95 % intervals"), columns, rows)
+    if found["correlations"] and len(rows) > 1:
+        names = [one["name"] for one in found["parameters"]]
+        lines = [(name, *row) for name, row in zip(names, found["correlations"], strict=True)]
+        show_table(_("Correlations"), [("", False), *((name.replace(".", ".\n"), True) for name in names)], lines)
+    write_text("".join(f"{sentence}\n" for sentence in found["sentences"]))

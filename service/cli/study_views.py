@@ -14,15 +14,11 @@ from inspect import Signature
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from sprag.service import languages
-from sprag.service.cli.calibrations import show_calibration
 from sprag.service.cli.case_views import SpecOrStudy, is_study, naming_options, option, parameter, query_of
 from sprag.service.cli.configured import read_settings
 from sprag.service.cli.console import say, warning_lines, write_json, wrong_option
-from sprag.service.cli.explore import show_cases
 from sprag.service.cli.file_formats import PICTURES, file_format
 from sprag.service.cli.files import read_study, write_pieces
-from sprag.service.cli.fronts import show_designs
-from sprag.service.cli.key_answers import show_answers
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import (
     DEFAULT_SERVER,
@@ -36,9 +32,18 @@ from sprag.service.cli.options import (
     in_units,
 )
 from sprag.service.cli.remote import connection
-from sprag.service.cli.ribbons import show_ribbon, show_yield
 from sprag.service.cli.running import run_parsed
-from sprag.service.cli.shown import show_curves, show_map, show_sensitivity
+from sprag.service.cli.shown import (
+    show_answers,
+    show_calibration,
+    show_cases,
+    show_curves,
+    show_designs,
+    show_map,
+    show_ribbon,
+    show_sensitivity,
+    show_yield,
+)
 from sprag.service.languages import N_, _
 from sprag.service.views import study_questions as questions
 from sprag.service.views.setting import settings_of

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from sprag.service.answers.tolerances import RibbonLine, YieldLine
-from sprag.service.cli.ribbons import yield_text
+from sprag.service.cli.shown import yield_text
 from sprag.service.jobs.local import run_here
 from sprag.service.spec.document import parse_spec
 from sprag.service.views.drives import RibbonQuery, YieldQuery, both
