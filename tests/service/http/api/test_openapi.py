@@ -51,6 +51,11 @@ def operations(document: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]
     ]
 
 
+def validator(document: dict[str, Any], schema: dict[str, Any]) -> jsonschema.Draft202012Validator:
+    """For values of a schema of the document: that all of this is valid is checked once, below."""
+    return jsonschema.Draft202012Validator({**schema, "components": document["components"]})
+
+
 def test_the_document_is_openapi_3_1(document: dict[str, Any]) -> None:
     assert document["openapi"].startswith("3.1")
     OpenAPIV31SpecValidator(document).validate()
@@ -107,6 +112,7 @@ def test_every_operation_is_documented(service: Service, document: dict[str, Any
 
 
 def test_every_operation_documents_its_problems(document: dict[str, Any]) -> None:
+    problem = validator(document, document["components"]["schemas"]["Problem"])
     seen: set[str] = set()
     for path, method, operation in operations(document):
         responses = operation["responses"]
@@ -120,10 +126,7 @@ def test_every_operation_documents_its_problems(document: dict[str, Any]) -> Non
             assert content["schema"] == {"$ref": "#/components/schemas/Problem"}
             for slug, example in content["examples"].items():
                 assert example["value"]["status"] == int(status)
-                jsonschema.validate(
-                    example["value"],
-                    {**document["components"]["schemas"]["Problem"], "components": document["components"]},
-                )
+                problem.validate(example["value"])
                 seen.add(slug)
     undocumented = set(PROBLEM_TYPES) - seen - {"not-found", "method-not-allowed", "bad-request"}
     assert undocumented == set()
@@ -202,13 +205,11 @@ def test_every_example_works(service: Service, document: dict[str, Any]) -> None
             if declared:
                 assert media in declared, (method, path)
             if media == "application/json" and "schema" in declared[media]:
-                schema = {**declared[media]["schema"], "components": document["components"]}
-                jsonschema.validate(answer.json(), schema, cls=jsonschema.Draft202012Validator)
+                validator(document, declared[media]["schema"]).validate(answer.json())
 
 
 def test_examples_of_bodies_fit_their_schemas(document: dict[str, Any]) -> None:
     for _path, _method, operation in operations(document):
         content = operation.get("requestBody", {}).get("content", {}).get("application/json", {"examples": {}})
         for example in content["examples"].values():
-            schema = {**content["schema"], "components": document["components"]}
-            jsonschema.validate(example["value"], schema, cls=jsonschema.Draft202012Validator)
+            validator(document, content["schema"]).validate(example["value"])
