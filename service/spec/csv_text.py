@@ -138,17 +138,17 @@ class Column(NamedTuple):
         return cell if number is None else f"{cell} {self.unit}" if self.unit else number
 
 
-def read_column(node: Node, rows: Sequence[CsvRow], column: Column, parameter: Parameter) -> list[float]:
-    """The values of a parameter (SI); fewer, or NaN, and the faults recorded, where they are invalid."""
-    values: list[float] = []
-    if not column.unit and refuse_mixed_column(node, rows, column, parameter.unit):
-        return values
-    for row in rows:
-        try:
-            values.append(to_float(exact(column.quantity(column.cell(row)), parameter)) + 0.0)
-        except QuantityError as error:
-            refuse_cell(node, row, column, error, range_sentence(parameter), parameter.unit)
-            values.append(math.nan)
+def read_columns(node: Node, rows: Sequence[CsvRow], columns: Sequence[tuple[Column, Parameter]]) -> list[list[float]]:
+    """The values (SI) of each parameter; fewer, or NaN, where they are invalid: faults are recorded line by line."""
+    values: list[list[float]] = [[] for _ in columns]
+    mixed = [not own.unit and refuse_mixed_column(node, rows, own, parameter.unit) for own, parameter in columns]
+    for row in () if any(mixed) else rows:
+        for read, (column, parameter) in zip(values, columns, strict=True):
+            try:
+                read.append(to_float(exact(column.quantity(column.cell(row)), parameter)) + 0.0)
+            except QuantityError as error:
+                refuse_cell(node, row, column, error, range_sentence(parameter), parameter.unit)
+                read.append(math.nan)
         if node.report.full:
             break
     return values

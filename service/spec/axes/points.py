@@ -9,7 +9,7 @@ import numpy as np
 from sprag.service.reading.texts import shorten_text
 from sprag.service.spec.axes.axes import read_paths
 from sprag.service.spec.axes.blocks import Block
-from sprag.service.spec.csv_text import Column, read_column, read_csv
+from sprag.service.spec.csv_text import Column, read_columns, read_csv
 from sprag.service.spec.described import Record
 from sprag.service.spec.node import Node
 from sprag.service.spec.table_text import heading_of
@@ -42,13 +42,13 @@ def read_points(item: Node) -> Block | None:
     if len(known) < len(columns):
         return None
     parameters, paths = node.machine.parameters, tuple(column.name for column in known)
-    values = [np.array(read_column(node, rows[1:], column, parameters[column.name])) for column in known]
+    read = read_columns(node, rows[1:], [(column, parameters[column.name]) for column in known])
     if not node.sound:
         return None
     if len(set(paths)) < len(paths):
         node.refuse("repeated", "names the same path twice", [shorten_text(path) for path in paths])
         return None
-    lines = tuple(row.line for row in rows[1:])
+    values, lines = [np.array(column) for column in read], tuple(row.line for row in rows[1:])
     return Block(item.pointer, paths, len(lines), lambda: dict(zip(paths, values, strict=True)), lines)
 
 

@@ -13,7 +13,7 @@ from sprag.service.reading.catalogue import result_of
 from sprag.service.reading.numbers import parse_number
 from sprag.service.reading.texts import did_you_mean, shorten_text
 from sprag.service.reading.units import QuantityError, parse_quantity
-from sprag.service.spec.csv_text import Column, read_column, read_csv, refuse_cell, refuse_mixed_column
+from sprag.service.spec.csv_text import Column, read_columns, read_csv, refuse_cell, refuse_mixed_column
 from sprag.service.spec.node import Node
 from sprag.service.spec.table_text import CsvRow, heading_of
 from sprag.worker.planning.calibrate.plan import MOST_MEASURED, Measured
@@ -75,7 +75,7 @@ def read_table(node: Node) -> MeasuredTable | None:
     fits = [_check_unit(node, column, machine.parameters[column.name].unit) for column in paths]
     if not all(fits):
         return None
-    values = [read_column(node, rows[1:], column, machine.parameters[column.name]) for column in paths]
+    values = read_columns(node, rows[1:], [(column, machine.parameters[column.name]) for column in paths])
     if node.report.found > before:
         return None
     points = list(zip(*values, strict=True)) if values else [()] * (len(rows) - 1)
