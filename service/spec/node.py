@@ -80,8 +80,9 @@ class Node:
 
     def parts(self) -> list[Node]:
         """The items of a list, the fields of an object; nothing of any other value."""
-        keys = range(len(self.value)) if isinstance(self.value, list) else self.value
-        return [self[key] for key in keys] if isinstance(self.value, list | Mapping) else []
+        if isinstance(self.value, list):
+            return [Node(self.report, f"{self.pointer}/{index}", item) for index, item in enumerate(self.value)]
+        return [self[name] for name in self.value] if isinstance(self.value, Mapping) else []
 
     def otherwise(self, default: object) -> Node:
         """The same place with ``default``, where nothing is given."""
