@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import copy
+from functools import cache
 from typing import Any
 
+import jsonschema
 import pytest
 
 from sprag.service.faults import Fault
 from sprag.service.spec.document import ParsedSpec, SpecError, parse_spec
+from sprag.service.spec.schema.document import spec_schema
 
 #: The example of the spec's own documentation.
 SPEC: dict[str, Any] = {
@@ -73,3 +76,9 @@ def problems(changes: dict[str, Any]) -> dict[str, Fault]:
     assert len(found) == len(caught.value.faults)
     assert str(caught.value)
     return found
+
+
+@cache
+def schema() -> jsonschema.Draft202012Validator:
+    """The JSON Schema of specs. That it is valid itself, which takes half a second, has its own test."""
+    return jsonschema.Draft202012Validator(spec_schema())

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import jsonschema
 import numpy as np
 import pytest
 
 from sprag.service.results.fronts import designs_of
 from sprag.service.spec.design import design_spec
 from sprag.service.spec.document import SpecError, parse_spec
-from sprag.service.spec.schema.document import spec_schema
 from sprag.worker.rounds import Rounds
 from sprag.worker.spread import DRIVE
 from tests.service.rounds import run_round
 from tests.service.searching import rows_of, spec_of
+from tests.service.spec_sample import schema
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
@@ -40,7 +39,7 @@ def robust(**fields: Any) -> dict[str, Any]:
 
 def test_each_design_is_run_with_every_drive_at_every_operating_point() -> None:
     spec = robust()
-    jsonschema.validate(spec, spec_schema())
+    schema().validate(spec)
     study = parse_spec(spec).study
     assert study.plan is not None
     assert (study.plan["drives"], study.plan["best"]) == (8, [{"result": "efficiency", "quantile": 0.25, "max": True}])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import jsonschema
 import numpy as np
 import pytest
 
@@ -18,10 +17,9 @@ from sprag.service.reading.reader import Reading
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.report import SpecError
-from sprag.service.spec.schema.document import spec_schema
 from sprag.worker.chunking import Chunking
 from tests.service.spec.test_together import LOAD, form, goal
-from tests.service.spec_sample import changed, parsed
+from tests.service.spec_sample import changed, parsed, schema
 
 
 @pytest.mark.parametrize(
@@ -45,7 +43,7 @@ def test_a_list_of_a_spec_is_one_text(text: str, expected: list[float]) -> None:
     spec = changed({"/axes": [{"path": LOAD, "values": text}]})
     study = parse_spec(spec).study
     assert study.columns(range(study.cases))[LOAD].tolist() == pytest.approx(expected)
-    jsonschema.validate(spec, spec_schema())
+    schema().validate(spec)
     shown = values_of(spec)
     assert np.array_equal(parse_spec(spec_of(shown)[0]).study.axes[0].array, study.axes[0].array)
 
@@ -181,7 +179,7 @@ def test_the_values_of_a_condition_are_one_text() -> None:
     spec = changed(
         {"/axes": [{"path": LOAD, "values": "0; 50; 100; 150 N*mm"}], "/exclude": [{LOAD: {"is": "50; 150 N*mm"}}]}
     )
-    jsonschema.validate(spec, spec_schema())
+    schema().validate(spec)
     study = parse_spec(spec).study
     assert study.columns(range(study.cases))[LOAD].tolist() == pytest.approx([0.0, 0.1])
     assert spec_of(values_of(spec))[0]["exclude"] == [{LOAD: {"is": ["50 N*mm", "150 N*mm"]}}]

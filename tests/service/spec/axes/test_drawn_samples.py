@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import jsonschema
 import numpy as np
 import pytest
 from scipy import stats
 
-from sprag.service.spec.schema.document import spec_schema
-from tests.service.spec_sample import changed, parsed, problems
+from tests.service.spec_sample import changed, parsed, problems, schema
 
 MASS, LOAD = "pendulums.0.mass", "shaft.load"
 
@@ -20,7 +18,7 @@ def sample(*ranges: dict[str, Any], **more: Any) -> dict[str, Any]:
 
 
 def columns_of(changes: dict[str, Any]) -> dict[str, Any]:
-    jsonschema.validate(changed(changes), spec_schema())
+    schema().validate(changed(changes))
     study = parsed(changes).study
     return study.columns(range(study.cases))
 

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import jsonschema
 import pytest
 
 from sprag.service.spec.design import design_spec
 from sprag.service.spec.document import SpecError, parse_spec
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.longer import longer_spec
-from sprag.service.spec.schema.document import spec_schema
-from tests.service.spec_sample import changed, parsed
+from tests.service.spec_sample import changed, parsed, schema
 
 AXIS: dict[str, Any] = {"path": "excitation.frequency", "linspace": ["16 Hz", "35 Hz", 5]}
 STARTS: dict[str, Any] = {"count": 4, "ranges": {"shaft.initial_speed": ["0 rad/s", "30 rad/s"]}}
@@ -32,7 +30,7 @@ def test_a_swept_axis_adds_an_axis_of_directions(way: str, values: tuple[float, 
     assert study.axes[-1].values == values
     assert study.shape == (5, 2, len(values))
     assert study.case_parameters(len(values) - 1)["sweep"] == values[-1]
-    jsonschema.validate(changed(spec(way)), spec_schema())
+    schema().validate(changed(spec(way)))
 
 
 @pytest.mark.parametrize(

@@ -6,18 +6,16 @@ import subprocess
 import sys
 from typing import Any
 
-import jsonschema
 import numpy as np
 import pytest
 
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.longer import longer_spec
-from sprag.service.spec.schema.document import spec_schema
 from sprag.worker.models.parameters import in_range, parameter_of
 from sprag.worker.spread import DRIVE, Spread
 from sprag.worker.study import Study, without_drives
-from tests.service.spec_sample import changed, parsed, problems
+from tests.service.spec_sample import changed, parsed, problems, schema
 
 LOADS = [{"path": "shaft.load", "values": [0.05, 0.1, 0.2]}]
 BACKLASH = "pendulums.0.backlash"
@@ -43,7 +41,7 @@ def test_each_place_of_a_grid_is_run_with_the_nominal_drive_and_every_drawn_one(
     spec = changed(
         with_tolerances({"path": BACKLASH, "plus_minus": "60 %"}, {"path": "shaft.load", "plus_minus": "5 %"})
     )
-    jsonschema.validate(spec, spec_schema())
+    schema().validate(spec)
     study = parse_spec(spec).study
     assert study.shape == (3, 65)
     assert study.axes[-1].paths == (DRIVE,)
