@@ -4,10 +4,12 @@ from sprag.engine.endings import Ending
 
 
 class MachineError(ValueError):
-    """A fault of a machine; ``str`` is a sentence for users.
+    """A fault of a machine; ``str`` is its sentence in English.
 
     Attributes
     ----------
+    message : str
+        The sentence for users, with its values.
     ending : Ending or None
         Ending of a case of a grid with the same fault; None for faults that no numeric parameter can remove.
     found, allowed : str or None
@@ -17,3 +19,7 @@ class MachineError(ValueError):
     ending: Ending | None = None
     found: str | None = None
     allowed: str | None = None
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+        self.message = message

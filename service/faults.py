@@ -190,7 +190,7 @@ class Fault:
     message : str
         Description of the fault, without the value: a `Sentence`, or a text of the catalogue.
     value : object
-        The value received, shortened, always plain JSON data.
+        The value received, shortened, always plain JSON data; a `Sentence` where it was computed.
     allowed : str or None
         The allowed range or choices.
     unit : str or None
@@ -219,7 +219,7 @@ class Fault:
 
     def to_json(self) -> dict[str, Any]:
         """The fault as JSON data; ``sentences`` has those of its texts that have values in them, to be translated."""
-        texts = {"message": self.message, "allowed": self.allowed}
+        texts = {"message": self.message, "value": self.value, "allowed": self.allowed}
         sentences = {name: text.to_json() for name, text in texts.items() if isinstance(text, Sentence) and text.parts}
         return {
             self.place: self.where,

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from sprag.engine import elementary
 from sprag.engine.problems import MachineError
+from sprag.sentences import Sentence
 
 Floats = NDArray[np.float64]
 Value = Floats | float
@@ -48,9 +49,21 @@ class ExpressionError(MachineError):
         the text was checked.
     """
 
-    def __init__(self, message: str, position: int | None, part: str = "") -> None:
-        super().__init__(message if position is None else f"{message} (at character {position + 1})")
+    def __init__(self, message: Sentence, position: int | None, part: str = "") -> None:
+        self._unplaced = message
+        super().__init__(message if position is None else self.at(position))
         self.position, self.part = position, part
+
+    def at(self, position: int) -> Sentence:
+        """What is wrong, with a position in the text."""
+        return Sentence("{what} (at character {character})", what=self._unplaced, character=str(position + 1))
+
+
+_TOO_DEEP = Sentence("the formula is nested more than {most} deep", most=MAX_DEPTH)
+
+
+def _operand_expected(token: str) -> Sentence:
+    return Sentence("a number, a name or a bracket expected, {token} found", token=token)
 
 
 _TOKEN = re.compile(
@@ -158,7 +171,8 @@ class _Parser:
         while position < end:
             match = _TOKEN.match(text, position)
             if match is None:
-                raise ExpressionError(f"{text[position:].lstrip()[:1]!r} has no meaning here", self._bare(position))
+                sign = repr(text[position:].lstrip()[:1])
+                raise ExpressionError(Sentence("{sign} has no meaning here", sign=sign), self._bare(position))
             kind = match.lastgroup or ""
             self.tokens.append((kind, match.group(kind), match.start(kind)))
             position = match.end()
@@ -177,19 +191,21 @@ class _Parser:
     def node(self, kind: str, position: int, *parts: Node, number: float = 0.0) -> Node:
         self.nodes += 1
         if self.nodes > MAX_NODES:
-            raise ExpressionError(f"the formula has more than {MAX_NODES} operations", position)
+            message = Sentence("the formula has more than {most} operations", most=MAX_NODES)
+            raise ExpressionError(message, position)
         return Node(kind, position, parts, number)
 
     def expect(self, sign: str) -> None:
         if self.peek() != sign:
-            found = repr(self.peek()) if self.peek() else "the end"
-            raise ExpressionError(f"{sign!r} expected, {found} found", self.position())
+            token = repr(self.peek()) if self.peek() else Sentence("the end")
+            message = Sentence("{sign} expected, {token} found", sign=repr(sign), token=token)
+            raise ExpressionError(message, self.position())
         self.index += 1
 
     def comparison(self) -> Node:
         self.depth += 1
         if self.depth > MAX_DEPTH:
-            raise ExpressionError(f"the formula is nested more than {MAX_DEPTH} deep", self.position())
+            raise ExpressionError(_TOO_DEEP, self.position())
         left = self.chain(("+", "-"), lambda: self.chain(("*", "/"), self.sign))
         if self.peek() in _COMPARE:
             position, kind = self.position(), self.peek()
@@ -220,7 +236,7 @@ class _Parser:
             position = self.position()
             self.depth += 1
             if self.depth > MAX_DEPTH:
-                raise ExpressionError(f"the formula is nested more than {MAX_DEPTH} deep", position)
+                raise ExpressionError(_TOO_DEEP, position)
             self.index += 1
             base = self.node("^", position, base, self.sign())
             self.depth -= 1
@@ -229,13 +245,13 @@ class _Parser:
     def atom(self) -> Node:
         position = self.position()
         if self.index >= len(self.tokens):
-            raise ExpressionError("a number, a name or a bracket expected, the end found", position)
+            raise ExpressionError(_operand_expected(Sentence("the end")), position)
         kind, text, _ = self.tokens[self.index]
         self.index += 1
         if kind == "number":
             number = float(text)
             if not np.isfinite(number):
-                raise ExpressionError(f"the number {text} is too large", position)
+                raise ExpressionError(Sentence("the number {number} is too large", number=text), position)
             return self.node("number", position, number=number)
         if kind == "name":
             return self.named(text, position)
@@ -243,7 +259,7 @@ class _Parser:
             inner = self.comparison()
             self.expect(")")
             return inner
-        raise ExpressionError(f"a number, a name or a bracket expected, {text!r} found", position)
+        raise ExpressionError(_operand_expected(repr(text)), position)
 
     def named(self, name: str, position: int) -> Node:
         if name in _ARITY:
@@ -255,8 +271,11 @@ class _Parser:
             self.expect(")")
             fewest, most = _ARITY[name]
             if not fewest <= len(parts) <= most:
-                wanted = str(fewest) if fewest == most else f"{fewest} to {most}"
-                raise ExpressionError(f"{name} takes {wanted} arguments, not {len(parts)}", position)
+                wanted = str(fewest) if fewest == most else Sentence("{low} to {high}", low=fewest, high=most)
+                message = Sentence(
+                    "{name} takes {wanted} arguments, not {given}", name=name, wanted=wanted, given=len(parts)
+                )
+                raise ExpressionError(message, position)
             if name in {"min", "max"}:
                 # Equal arguments are identical everywhere, which is neither a jump nor a kink.
                 parts = list({_content(part): part for part in reversed(parts)}.values())[::-1]
@@ -272,7 +291,8 @@ class _Parser:
             parts = [self.node(f"name {own}", position) for own in ("phi", MEAN_SPEED)]
             return self.node("/", position, *parts)
         known = ", ".join(sorted((self.names | RESERVED | ({TIME} if timed else set())) - {MEAN_SPEED}))
-        raise ExpressionError(f"{name[:40]!r} is not known; known are {known}", position)
+        message = Sentence("{name} is not known; known are {known}", name=repr(name[:40]), known=known)
+        raise ExpressionError(message, position)
 
 
 class Expression:
@@ -293,12 +313,14 @@ class Expression:
 
     def __init__(self, text: str, names: Iterable[str] = ("phi",)) -> None:
         if len(text) > MAX_LENGTH:
-            raise ExpressionError(f"the formula is longer than {MAX_LENGTH} characters", MAX_LENGTH)
+            message = Sentence("the formula is longer than {most} characters", most=str(MAX_LENGTH))
+            raise ExpressionError(message, MAX_LENGTH)
         parser = _Parser(text, frozenset(names))
         self.text = text
         self.root = parser.comparison()
         if parser.index < len(parser.tokens):
-            raise ExpressionError(f"{parser.peek()!r} is not expected here", parser.position())
+            message = Sentence("{token} is not expected here", token=repr(parser.peek()))
+            raise ExpressionError(message, parser.position())
         #: The variables that it uses.
         self.used = frozenset(names_of(self.root))
         self._switches: list[Callable[[Mapping[str, Dual]], Value]] = []

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from sprag.engine import elementary
 from sprag.engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, number_of, reduced
+from sprag.engine.machine_shaft.problems import amount
+from sprag.sentences import Sentence
 
 Floats = NDArray[np.float64]
 CamLaw = Literal["cycloidal", "polynomial_345"]
@@ -82,12 +84,17 @@ class Cam(Mechanism):
         late = np.where(phi >= 2.0 * np.pi, 2.0 * np.pi - used, 1.0)
         return np.asarray(np.where(late >= -1e-12, 1.0, -1.0))
 
-    def broken_rule(self, values: Values) -> str | None:
+    def broken_rule(self, values: Values) -> Sentence | None:
         """See Mechanism."""
         rise, dwell, fall = (math.degrees(number_of(values, f"{name}_angle")) for name in ("rise", "dwell", "fall"))
-        return (
-            f"rise, dwell and fall of the cam take {rise:.6g} + {dwell:.6g} + {fall:.6g} = {rise + dwell + fall:.6g} "
-            "deg, more than the 360 deg of a revolution"
+        return Sentence(
+            "rise, dwell and fall of the cam take {rise} + {dwell} + {fall} = {together}, more than the {turn} of a "
+            "revolution",
+            rise=amount(rise),
+            dwell=amount(dwell),
+            fall=amount(fall),
+            together=amount(rise + dwell + fall, "deg"),
+            turn=amount(360.0, "deg"),
         )
 
     def worst_angles(self, values: Values) -> Sequence[Floats]:

@@ -65,10 +65,9 @@ def _problem(spec: MachineSpec, ending: Ending, result: Mapping[str, float], row
     if ending is Ending.NEGATIVE_INERTIA:
         return NegativeInertiaError(float(result["inertia.min"]))
     if ending is Ending.UNBALANCED_WORK:
-        scaled = {"drive": "driving torque", "operation": "operation"}[spec.balance_side]
         works = float(result["work.drive"]), float(result["work.resistance"])
         friction = float(row.row("friction_torque")[0]) * 2.0 * np.pi * spec.cycle
-        return UnbalancedWorkError(*works, scaled if spec.balance == "scale" else "", friction)
+        return UnbalancedWorkError(*works, spec.balance_side if spec.balance == "scale" else "", friction)
     if ending is Ending.INERTIA_INSUFFICIENT:
         return InsufficientInertiaError(float(row.row("mean_speed")[0]), float(result["least_mean_speed"]))
     plain = _PLAIN_PROBLEMS.get(ending)

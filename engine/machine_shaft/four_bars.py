@@ -1,6 +1,7 @@
 """Four-bar linkages: kinematics, the crank-rocker and parallel cranks."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from sprag.engine.machine_shaft.mechanisms import (
     number_of,
     reduced,
 )
+from sprag.engine.machine_shaft.problems import amount
+from sprag.sentences import Sentence
 
 Floats = NDArray[np.float64]
 
@@ -94,21 +97,42 @@ def rocking(values: Values) -> Floats:
     return np.asarray((np.minimum(values["frame"], values["coupler"]) - values["crank"]) / values["frame"])
 
 
-def crank_rocker_rule(values: Values) -> str | None:
+def crank_rocker_rule(values: Values) -> Sentence | None:
     """Why the links are not a crank-rocker, as a clause; None where they are merely too short."""
     sizes = {name: number_of(values, name) for name in ("crank", "coupler", "rocker", "frame")}
     crank, ordered = sizes["crank"], sorted(sizes.values())
     short = [name for name in ("frame", "coupler") if sizes[name] <= crank]
     spare = ordered[1] + ordered[2] - ordered[0] - ordered[3]
     pairs = np.isclose(crank, sizes["rocker"], rtol=1e-9) and np.isclose(sizes["frame"], sizes["coupler"], rtol=1e-9)
-    hint = "; links that are equal in pairs are a parallel_crank" if pairs else ""
+    hint = Sentence("; links that are equal in pairs are a parallel_crank") if pairs else Sentence("")
     if not short:
-        folds = abs(spare) <= 1e-9 * ordered[3]
-        return f"all its links lie in one line there, and the rocker could continue either way{hint}" if folds else None
-    told = " and ".join(f"the {name} ({sizes[name]:.6g} m)" for name in short)
+        if abs(spare) > 1e-9 * ordered[3]:
+            return None
+        return Sentence(
+            "all its links lie in one line there, and the rocker could continue either way{hint}", hint=hint
+        )
     if sizes["frame"] == ordered[0] and spare > 1e-9 * ordered[3]:
-        hint = "; with the frame as the shortest link both links turn fully: a drag_link"
-    return f"the crank ({crank:.6g} m) of a crank-rocker must be shorter than {told}{hint}"
+        hint = Sentence("; with the frame as the shortest link both links turn fully: a drag_link")
+    return Sentence(
+        "the crank ({crank}) of a crank-rocker must be shorter than {links}{hint}",
+        crank=amount(crank, "m"),
+        links=listed_links({name: sizes[name] for name in short}),
+        hint=hint,
+    )
+
+
+def listed_links(lengths: Mapping[str, float]) -> Sentence:
+    """Links with their lengths in m: ``the frame (0.5 m) and the coupler (0.4 m)``."""
+    texts = {
+        "frame": Sentence("the frame"),
+        "crank": Sentence("the crank"),
+        "coupler": Sentence("the coupler"),
+        "follower": Sentence("the follower"),
+    }
+    links = (
+        Sentence("{link} ({length})", link=texts[name], length=amount(length, "m")) for name, length in lengths.items()
+    )
+    return reduce(lambda before, link: Sentence("{before} and {link}", before=before, link=link), links)
 
 
 class FourBar(RodMechanism):
@@ -145,7 +169,7 @@ class FourBar(RodMechanism):
         """See Mechanism."""
         return np.asarray(np.minimum(1.0 - np.abs(Links.of(values, phi).cos_gamma), rocking(values)))
 
-    def broken_rule(self, values: Values) -> str | None:
+    def broken_rule(self, values: Values) -> Sentence | None:
         """See Mechanism."""
         return crank_rocker_rule(values)
 

@@ -16,7 +16,9 @@ from sprag.engine.machine_shaft.mechanisms import (
     number_of,
     reduced,
 )
+from sprag.engine.machine_shaft.problems import amount
 from sprag.engine.machine_shaft.sliders import Slider, slider_bodies, slider_dead_centres, slider_fold, slider_margin
+from sprag.sentences import Sentence
 
 Floats = NDArray[np.float64]
 
@@ -58,9 +60,9 @@ class SliderCrank(RodMechanism):
         """See Mechanism."""
         return slider_margin(values["crank"], values, phi)
 
-    def broken_rule(self, values: Values) -> str | None:
+    def broken_rule(self, values: Values) -> Sentence | None:
         """See Mechanism."""
-        return slider_fold("crank", "crank", values)
+        return slider_fold("crank", Sentence("the crank"), values)
 
     def worst_angles(self, values: Values) -> Sequence[Floats]:
         """See Mechanism."""
@@ -165,14 +167,16 @@ class Whitworth(_QuickReturn):
         rod = slider_margin(values["link_arm"], values, self._link(values, phi)[0])
         return np.asarray(np.minimum(rod, (values["crank"] - values["pivot_distance"]) / values["crank"]))
 
-    def broken_rule(self, values: Values) -> str | None:
+    def broken_rule(self, values: Values) -> Sentence | None:
         """See Mechanism."""
         crank, distance = number_of(values, "crank"), number_of(values, "pivot_distance")
         if crank > distance:
-            return slider_fold("link_arm", "link", values)
-        return (
-            f"the pivot_distance ({distance:.6g} m) of a whitworth must be less than the crank ({crank:.6g} m): its "
-            "pivot lies within the crank's circle"
+            return slider_fold("link_arm", Sentence("the link"), values)
+        return Sentence(
+            "the pivot_distance ({distance}) of a whitworth must be less than the crank ({crank}): its pivot lies "
+            "within the crank's circle",
+            distance=amount(distance, "m"),
+            crank=amount(crank, "m"),
         )
 
     def worst_angles(self, values: Values) -> Sequence[Floats]:
@@ -199,24 +203,26 @@ class CrankShaper(_QuickReturn):
         swing = (values["pivot_distance"] - values["crank"]) / values["pivot_distance"]
         return np.asarray(np.minimum(np.minimum(rod, swing), straight))
 
-    def broken_rule(self, values: Values) -> str | None:
+    def broken_rule(self, values: Values) -> Sentence | None:
         """See Mechanism."""
         crank, distance = number_of(values, "crank"), number_of(values, "pivot_distance")
         if distance > crank:
             return self._rod_at_fault(values)
-        return (
-            f"the pivot_distance ({distance:.6g} m) of a crank_shaper must be more than the crank ({crank:.6g} m): "
-            "its pivot lies outside the crank's circle"
+        return Sentence(
+            "the pivot_distance ({distance}) of a crank_shaper must be more than the crank ({crank}): its pivot lies "
+            "outside the crank's circle",
+            distance=amount(distance, "m"),
+            crank=amount(crank, "m"),
         )
 
-    def _rod_at_fault(self, values: Values) -> str | None:
+    def _rod_at_fault(self, values: Values) -> Sentence | None:
         """The fault where the link swings correctly; None where the rod does not reach the ram's line."""
         theta = np.stack([self._link(values, phi)[0] for phi in self.worst_angles(values)])
         reach = float(slider_margin(values["link_arm"], values, theta).min())
         if abs(reach) <= 1e-9:
-            return "the rod is perpendicular to the ram's line there, and the ram could continue either way"
+            return Sentence("the rod is perpendicular to the ram's line there, and the ram could continue either way")
         if reach > 0.0:
-            return "the link_arm and the rod are in line there, and the ram would reverse within a stroke"
+            return Sentence("the link_arm and the rod are in line there, and the ram would reverse within a stroke")
         return None
 
     def worst_angles(self, values: Values) -> Sequence[Floats]:

@@ -9,12 +9,15 @@ from sprag.engine import elementary
 from sprag.engine.machine_shaft.four_bars import (
     Links,
     crank_rocker_rule,
+    listed_links,
     rocker_dead_centres,
     rocking,
     swinging,
 )
 from sprag.engine.machine_shaft.mechanisms import Motion, RodMechanism, Values, lifted, number_of, reduced
+from sprag.engine.machine_shaft.problems import amount
 from sprag.engine.machine_shaft.sliders import Slider, slider_bodies, slider_dead_centres, slider_fold, slider_margin
+from sprag.sentences import Sentence
 
 Floats = NDArray[np.float64]
 
@@ -81,22 +84,28 @@ class DragLink(RodMechanism):
         rod = slider_margin(values["arm"], values, self._arm(values, links))
         return np.asarray(np.minimum(np.minimum(1.0 - np.abs(links.cos_gamma), turns), rod))
 
-    def broken_rule(self, values: Values) -> str | None:
+    def broken_rule(self, values: Values) -> Sentence | None:
         """See Mechanism."""
         sizes = {name: number_of(values, name) for name in ("crank", "coupler", "follower")}
         frame, most = number_of(values, "frame"), max(sizes.values())
-        short = [f"the {name} ({size:.6g} m)" for name, size in sizes.items() if size <= frame]
+        short = {name: size for name, size in sizes.items() if size <= frame}
         if short:
-            return f"the frame ({frame:.6g} m) of a drag_link must be shorter than {' and '.join(short)}"
+            return Sentence(
+                "the frame ({frame}) of a drag_link must be shorter than {links}",
+                frame=amount(frame, "m"),
+                links=listed_links(short),
+            )
         spare = sum(sizes.values()) - 2.0 * most - frame
         if abs(spare) <= 1e-9 * most:
-            return "all its links lie in one line there, and the follower could continue either way"
+            return Sentence("all its links lie in one line there, and the follower could continue either way")
         if spare < 0.0:
-            return (
-                f"the frame and the longest link ({frame + most:.6g} m together) must be shorter than the other two "
-                f"({sum(sizes.values()) - most:.6g} m), else the follower cannot turn fully"
+            return Sentence(
+                "the frame and the longest link ({together} together) must be shorter than the other two ({others}), "
+                "else the follower cannot turn fully",
+                together=amount(frame + most, "m"),
+                others=amount(sum(sizes.values()) - most, "m"),
             )
-        return slider_fold("arm", "arm", values)
+        return slider_fold("arm", Sentence("the arm"), values)
 
     def worst_angles(self, values: Values) -> Sequence[Floats]:
         """See Mechanism; where frame and crank are in line, and where the arm is across the ram's line."""
@@ -153,15 +162,15 @@ class Toggle(RodMechanism):
         return np.asarray(np.minimum.reduce(np.broadcast_arrays(
             1.0 - np.abs(links.cos_gamma), rocking(values), bent, ram)))  # fmt: skip
 
-    def broken_rule(self, values: Values) -> str | None:
+    def broken_rule(self, values: Values) -> Sentence | None:
         """See Mechanism."""
         with np.errstate(invalid="ignore"):
             ends = [Links.of(values, angle) for angle in (*self.dead_centres(values), np.zeros((1, 1, 1)))]
         if rocking(values).flat[0] <= 0.0 or not all(np.abs(links.cos_gamma).flat[0] < 1.0 for links in ends):
             return crank_rocker_rule(values)
         if min(float(self._slider(values, links.psi).sin.flat[0]) for links in ends) < 0.0:
-            return "rocker and rod pass the position in line, and the ram would turn back within a stroke"
-        return "the rod does not reach the ram's line, or reaches it on the wrong side of the pivot"
+            return Sentence("rocker and rod pass the position in line, and the ram would turn back within a stroke")
+        return Sentence("the rod does not reach the ram's line, or reaches it on the wrong side of the pivot")
 
     def worst_angles(self, values: Values) -> Sequence[Floats]:
         """See Mechanism; where crank and frame are in line, the ends of the stroke, and the rocker across the line."""

@@ -15,7 +15,7 @@ from sprag.engine.machine_shaft.operations import SpeedLaw, formula_breaks
 from sprag.engine.machine_shaft.parameters import parameters
 from sprag.engine.machine_shaft.parts import Jumps, ShaftPart, mechanism_of
 from sprag.engine.machine_shaft.pieces import Formula
-from sprag.engine.machine_shaft.problems import StructureError
+from sprag.engine.machine_shaft.problems import StructureError, amount
 from sprag.engine.machine_shaft.spec import (
     LINKED,
     MAX_CONSTANTS,
@@ -26,17 +26,22 @@ from sprag.engine.machine_shaft.spec import (
     PartChoice,
 )
 from sprag.engine.machine_shaft.tables import periodic
+from sprag.sentences import Amount, Sentence
 
 Floats = NDArray[np.float64]
 
 _TURN = 2.0 * np.pi
 
 
-def _check_form(part: str, form: str, has_table: bool, has_formula: bool) -> None:
+_DRIVE = Sentence("The driving torque")
+_INERTIA = Sentence("The inertia of the mechanism")
+
+
+def _check_form(part: Sentence, form: str, has_table: bool, has_formula: bool) -> None:
     if form == "table" and not has_table:
-        raise StructureError(f"{part} needs a table, but none is given.")
+        raise StructureError(Sentence("{part} needs a table, but none is given.", part=part))
     if form == "formula" and not has_formula:
-        raise StructureError(f"{part} needs a formula, but none is given.")
+        raise StructureError(Sentence("{part} needs a formula, but none is given.", part=part))
 
 
 def check_structure(spec: MachineSpec) -> None:
@@ -48,28 +53,40 @@ def check_structure(spec: MachineSpec) -> None:
         With a plain sentence.
     """
     if spec.phi_c is not None and spec.phi_c < 0:
-        raise StructureError(f"phi_c counts the angles with T = T_mean from 0; it cannot be {spec.phi_c}.")
+        raise StructureError(
+            Sentence("phi_c counts the angles with T = T_mean from 0; it cannot be {given}.", given=str(spec.phi_c))
+        )
     if spec.cycle not in REVOLUTIONS:
-        raise StructureError(f"A cycle has 1 to {max(REVOLUTIONS)} revolutions, not {spec.cycle}.")
+        raise StructureError(
+            Sentence("A cycle has 1 to {most} revolutions, not {given}.", most=max(REVOLUTIONS), given=str(spec.cycle))
+        )
     if spec.balance == "motor" and spec.balance_side == "operation":
-        raise StructureError("With a motor the speed follows from the operation, which is not to be found then.")
+        raise StructureError(
+            Sentence("With a motor the speed follows from the operation, which is not to be found then.")
+        )
     if spec.balance == "motor" and spec.drive.motor is None:
-        raise StructureError('The balance "motor" needs a motor in the drive.')
+        raise StructureError(Sentence('The balance "motor" needs a motor in the drive.'))
     if spec.balance == "motor" and spec.drive.motor == "table":
         if spec.drive.table is None:
-            raise StructureError("A motor of the kind table needs a table of its torque over its speed.")
+            raise StructureError(Sentence("A motor of the kind table needs a table of its torque over its speed."))
         characteristic(spec.drive)
     if len(spec.constants) > MAX_CONSTANTS:
-        raise StructureError(f"A machine has at most {MAX_CONSTANTS} constants.")
+        raise StructureError(Sentence("A machine has at most {most} constants.", most=MAX_CONSTANTS))
     taken = sorted((RESERVED | {"phi", "x"}) & set(spec.constants))
     if taken:
-        raise StructureError(f"A constant cannot be named {taken[0]}: that name has a meaning in formulas.")
+        raise StructureError(
+            Sentence("A constant cannot be named {name}: that name has a meaning in formulas.", name=taken[0])
+        )
     if spec.balance != "motor":
-        _check_form("The driving torque", spec.drive.form, spec.drive.table is not None, bool(spec.drive.formula))
+        _check_form(_DRIVE, spec.drive.form, spec.drive.table is not None, bool(spec.drive.formula))
     if len(spec.parts) > MAX_PARTS:
-        raise StructureError(f"A machine has at most {MAX_PARTS} parts, not {len(spec.parts)}.")
+        raise StructureError(
+            Sentence("A machine has at most {most} parts, not {given}.", most=MAX_PARTS, given=str(len(spec.parts)))
+        )
     if spec.parts and (spec.mechanism.kind != "none" or spec.operation.quantity != "none"):
-        raise StructureError("A machine has either parts or a mechanism and an operation of its own, not both.")
+        raise StructureError(
+            Sentence("A machine has either parts or a mechanism and an operation of its own, not both.")
+        )
     for _, part in spec.every_part():
         _check_part(part)
     # The parts are built once with arbitrary valid numbers, so that tables and formulas are read.
@@ -77,28 +94,34 @@ def check_structure(spec: MachineSpec) -> None:
     machine = Machine(spec, Columns.of(spec, columns, 1))
     if spec.balance == "motor" and any(part.uses_time for part in machine.parts):
         raise StructureError(
-            "The formula of an operation uses t, the time in which the shaft comes to phi at its mean speed; with a "
-            "motor that speed is not known before. Give the operation over phi."
+            Sentence(
+                "The formula of an operation uses t, the time in which the shaft comes to phi at its mean speed; with "
+                "a motor that speed is not known before. Give the operation over phi."
+            )
         )
 
 
 def _check_part(part: PartChoice) -> None:
     mechanism, operation = part.mechanism, part.operation
     if not 0 <= operation.steps <= MAX_STEPS:
-        raise StructureError(f"An operation has at most {MAX_STEPS} steps.")
+        raise StructureError(Sentence("An operation has at most {most} steps.", most=MAX_STEPS))
     rods = mechanism.weights == "all" or mechanism.bodies == "two_mass"
     if rods and not isinstance(mechanism_of(mechanism), RodMechanism):
-        raise StructureError("The weights of all bodies and two masses need a mechanism with a rod or a coupler.")
+        raise StructureError(
+            Sentence("The weights of all bodies and two masses need a mechanism with a rod or a coupler.")
+        )
     has_formula = bool(mechanism.formula)
-    _check_form("The inertia of the mechanism", mechanism.kind, mechanism.table is not None, has_formula)
+    _check_form(_INERTIA, mechanism.kind, mechanism.table is not None, has_formula)
     if operation.quantity in {"torque", "force", "pressure"}:
-        _check_form("The operation", operation.form, operation.table is not None, bool(operation.formula))
+        _check_form(Sentence("The operation"), operation.form, operation.table is not None, bool(operation.formula))
     needs = operation.quantity in {"force", "gas", "pressure"} or (
         operation.quantity == "torque" and operation.over == "stroke"
     )
     if needs and mechanism.kind not in LINKED:
         raise StructureError(
-            "A force, a gas or a diagram over the stroke needs a mechanism with dimensions, such as a slider_crank."
+            Sentence(
+                "A force, a gas or a diagram over the stroke needs a mechanism with dimensions, such as a slider_crank."
+            )
         )
 
 
@@ -159,7 +182,7 @@ class Machine:
         """First angle at which a mechanism cannot be assembled, NaN where all always can; shape (cases,)."""
         return reduce(np.fmin, (part.unassembled() for part in self.parts))
 
-    def broken_rule(self) -> tuple[str, str | None]:
+    def broken_rule(self) -> tuple[str, Sentence | None]:
         """Of the first case, the prefix of the first part that cannot be assembled, and the condition it violates.
 
         The condition is None where the links are merely too short.
@@ -266,13 +289,22 @@ class Machine:
             if np.isnan(angle):
                 continue
             end = min(angle, self.cycle - angle) < 1e-6
-            what = (
-                f"The inertia does not close on itself: it begins with {after:.6g} kg*m^2 and ends, a cycle later, "
-                f"with {before:.6g} kg*m^2"
+            message = (
+                Sentence(
+                    "The inertia does not close on itself: it begins with {after} and ends, a cycle later, with "
+                    "{before} (the drive's with it). Only a torque may jump.",
+                    after=amount(after, "kg*m^2"),
+                    before=amount(before, "kg*m^2"),
+                )
                 if end
-                else f"The inertia jumps at {np.degrees(angle):.6g} deg from {before:.6g} to {after:.6g} kg*m^2"
+                else Sentence(
+                    "The inertia jumps at {angle} from {before} to {after} (the drive's with it). Only a torque may "
+                    "jump.",
+                    angle=amount(np.degrees(angle), "deg"),
+                    before=amount(before),
+                    after=amount(after, "kg*m^2"),
+                )
             )
-            message = f"{what} (the drive's with it). Only a torque may jump."
             raise ExpressionError(message, None, f"{part.prefix}mechanism")
 
     def check_finite(self) -> None:
@@ -283,15 +315,16 @@ class Machine:
         ExpressionError
         """
         phi = np.asarray((np.arange(720 * self.spec.cycle) + 0.5) * np.pi / 360.0, dtype=np.float64)[None, None, :]
-        courses: list[tuple[str, str, Floats]] = []
+        courses: list[tuple[str, Sentence, Floats]] = []
         with np.errstate(all="ignore"):
             for part in self.parts:
                 own = part.fields(phi)
-                courses.append((f"{part.prefix}mechanism", "inertia of the mechanism", own.inertia))
-                courses.append((f"{part.prefix}operation", "torque of the operation", own.resistance))
-            courses.append(("drive", "driving torque", self._drive(phi)))
+                courses.append((f"{part.prefix}mechanism", _INERTIA, own.inertia))
+                courses.append((f"{part.prefix}operation", Sentence("The torque of the operation"), own.resistance))
+            courses.append(("drive", _DRIVE, self._drive(phi)))
         for place, name, values in courses:
             wrong = ~np.isfinite(np.broadcast_to(values, (self.columns.cases, 1, phi.size))[0, 0])
             if wrong.any():
-                angle = float(np.degrees(phi[0, 0, int(np.argmax(wrong))]))
-                raise ExpressionError(f"The {name} is not a finite number at {angle:.4g} deg.", None, place)
+                angle = Amount(float(np.degrees(phi[0, 0, int(np.argmax(wrong))])), "deg", 4)
+                message = Sentence("{part} is not a finite number at {angle}.", part=name, angle=angle)
+                raise ExpressionError(message, None, place)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine import elementary
+from sprag.sentences import Sentence
 
 Floats = NDArray[np.float64]
 #: Values of parameters by their name within the mechanism; each of shape (cases or 1, 1, 1).
@@ -129,7 +130,7 @@ class Mechanism(ABC):
         del values
         return None, None
 
-    def broken_rule(self, values: Values) -> str | None:
+    def broken_rule(self, values: Values) -> Sentence | None:
         """Why the dimensions of a case cannot be assembled, as a clause; None where links are merely too short."""
         del values
         return None

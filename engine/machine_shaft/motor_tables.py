@@ -7,8 +7,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.machine_shaft.problems import TableError
+from sprag.engine.machine_shaft.problems import TableError, amount
 from sprag.engine.machine_shaft.tables import Curve, Table, over_speed
+from sprag.sentences import Sentence
 
 Floats = NDArray[np.float64]
 
@@ -94,16 +95,27 @@ def motor_table(table: Table) -> MotorTable:
     curve = over_speed(table)
     x, y = np.array(table.rows, dtype=np.float64).T
     if x[0] < 0.0:
-        message = f"The characteristic of a motor begins at the speed 0 or above, not at {x[0]:g} rad/s."
-        raise TableError(message, f"{x[0]:g} rad/s", "0 rad/s or more in row 1")
+        speed = amount(x[0], "rad/s")
+        message = Sentence("The characteristic of a motor begins at the speed 0 or above, not at {speed}.", speed=speed)
+        raise TableError(message, speed, Sentence("{low} or more in row 1", low=amount(0.0, "rad/s")))
     if not (y[-1] <= 0.0 < y[-2]) and not (y[-1] < y[-2] <= 0.0):
+        last = amount(y[-1], "N*m")
         raise TableError(
-            f"The characteristic of a motor ends beyond its speed without load, with a falling torque that is not "
-            f"positive: this one ends with {y[-2]:g} and {y[-1]:g} N*m.",
-            f"{y[-1]:g} N*m",
-            f"at most 0 N*m and less than {y[-2]:g} N*m in the last row",
+            Sentence(
+                "The characteristic of a motor ends beyond its speed without load, with a falling torque that is not "
+                "positive: this one ends with {before} and {last}.",
+                before=amount(y[-2]),
+                last=last,
+            ),
+            last,
+            Sentence(
+                "at most {most} and less than {before} in the last row",
+                most=amount(0.0, "N*m"),
+                before=amount(y[-2], "N*m"),
+            ),
         )
     if y.max() <= 0.0:
-        message = "The characteristic of a motor has a positive torque at some speed."
-        raise TableError(message, f"{y.max():g} N*m at most", "a torque > 0 N*m")
+        message = Sentence("The characteristic of a motor has a positive torque at some speed.")
+        most, low = amount(y.max(), "N*m"), amount(0.0, "N*m")
+        raise TableError(message, Sentence("{most} at most", most=most), Sentence("a torque > {low}", low=low))
     return MotorTable(curve)

@@ -22,10 +22,11 @@ from sprag.engine.machine_shaft.linked_rams import DragLink, Toggle
 from sprag.engine.machine_shaft.mechanisms import Mechanism, Motion, RodMechanism, Values
 from sprag.engine.machine_shaft.operations import Operation, SpeedLaw, every_revolution, formula_breaks
 from sprag.engine.machine_shaft.pieces import Formula
-from sprag.engine.machine_shaft.problems import TableError
+from sprag.engine.machine_shaft.problems import TableError, amount
 from sprag.engine.machine_shaft.spec import MechanismChoice, MechanismKind, PartChoice
 from sprag.engine.machine_shaft.strokes import Stroke
 from sprag.engine.machine_shaft.tables import Curve, periodic
+from sprag.sentences import Sentence
 
 Floats = NDArray[np.float64]
 
@@ -59,12 +60,17 @@ def _inertia_curve(choice: MechanismChoice, revolutions: int) -> Curve | None:
         return None
     for number, (row, following) in enumerate(pairwise(table.rows), start=1):
         if row[0] == following[0]:
-            raise TableError(
-                f"Rows {number} and {number + 1} of the inertia both have {row[0]:g} rad, with {row[1]:g} and "
-                f"{following[1]:g} kg*m^2: only a torque may jump, not an inertia.",
-                f"{row[0]:g} rad",
-                f"more than {row[0]:g} rad in row {number + 1}",
+            angle, second = amount(row[0], "rad"), str(number + 1)
+            message = Sentence(
+                "Rows {first} and {second} of the inertia both have {angle}, with {before} and {after}: only a torque "
+                "may jump, not an inertia.",
+                first=str(number),
+                second=second,
+                angle=angle,
+                before=amount(row[1]),
+                after=amount(following[1], "kg*m^2"),
             )
+            raise TableError(message, angle, Sentence("more than {low} in row {row}", low=angle, row=second))
     within_one = len(table.rows) > 0 and table.rows[-1][0] - table.rows[0][0] <= _TURN * (1.0 + 1e-9)
     return periodic(table, _TURN if within_one else _TURN * revolutions)
 
@@ -157,7 +163,7 @@ class ShaftPart:
             return np.full(self.cases, np.nan)
         return np.broadcast_to(self.mechanism.unassembled(self.values, self._ahead), (self.cases,))
 
-    def broken_rule(self) -> str | None:
+    def broken_rule(self) -> Sentence | None:
         """The condition that the dimensions of the first case violate; None where its links are merely too short."""
         return None if self.mechanism is None else self.mechanism.broken_rule(self.values)
 

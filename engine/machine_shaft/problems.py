@@ -4,6 +4,17 @@ import math
 
 from sprag.engine.endings import Ending
 from sprag.engine.problems import MachineError
+from sprag.sentences import Amount, Part, Sentence, joined
+
+
+def amount(value: float, unit: str = "1") -> Amount:
+    """A number of a sentence, with six digits."""
+    return Amount(float(value), unit, 6)
+
+
+def alone(*parts: Part) -> Sentence:
+    """Parts without words, such as ``> 0 m``."""
+    return joined(" ", parts)
 
 
 class StructureError(MachineError):
@@ -13,9 +24,9 @@ class StructureError(MachineError):
 class TableError(MachineError):
     """A table is not ascending, not finite, too short, or does not close on itself."""
 
-    def __init__(self, message: str, found: float | str, allowed: str) -> None:
+    def __init__(self, message: Sentence, found: Amount | Sentence, allowed: Sentence) -> None:
         super().__init__(message)
-        self.found = found if isinstance(found, str) else f"{found:g}"
+        self.found = found if isinstance(found, Sentence) else alone(found)
         self.allowed = allowed
 
 
@@ -31,7 +42,7 @@ class RelationError(MachineError):
         Its range given the others, with the unit.
     """
 
-    def __init__(self, path: str, value: float, message: str, allowed: str) -> None:
+    def __init__(self, path: str, value: float, message: Sentence, allowed: Sentence) -> None:
         super().__init__(message)
         self.path, self.value, self.allowed = path, value, allowed
 
@@ -44,13 +55,21 @@ class AssemblyError(MachineError):
 
     ending = Ending.CANNOT_ASSEMBLE
 
-    def __init__(self, angle: float, rule: str | None = None, prefix: str = "") -> None:
-        what = "is refused" if rule else "cannot be assembled"
-        why = rule or "its links do not reach each other there"
-        which = f" of {prefix.rstrip('.')}" if prefix else ""
+    def __init__(self, angle: float, rule: Sentence | None = None, prefix: str = "") -> None:
+        which = Sentence(" of {part}", part=prefix.rstrip(".")) if prefix else ""
+        parts: dict[str, Part] = {"which": which, "angle": amount(math.degrees(angle), "deg")}
         super().__init__(
-            f"The mechanism{which} {what} at a shaft angle of {math.degrees(angle):.6g} deg: {why}. "
-            "Change the dimensions."
+            Sentence(
+                "The mechanism{which} cannot be assembled at a shaft angle of {angle}: its links do not reach each "
+                "other there. Change the dimensions.",
+                **parts,
+            )
+            if rule is None
+            else Sentence(
+                "The mechanism{which} is refused at a shaft angle of {angle}: {rule}. Change the dimensions.",
+                rule=rule,
+                **parts,
+            )
         )
         self.angle, self.prefix = angle, prefix
 
@@ -61,16 +80,23 @@ class NegativeInertiaError(MachineError):
     ending = Ending.NEGATIVE_INERTIA
 
     def __init__(self, inertia: float) -> None:
+        least = amount(inertia, "kg*m^2")
         super().__init__(
-            f"The reduced inertia falls to {inertia:.6g} kg*m^2 within the cycle; it must be positive at every angle. "
-            "Give the drive more inertia, or correct the table or formula of the mechanism."
+            Sentence(
+                "The reduced inertia falls to {least} within the cycle; it must be positive at every angle. "
+                "Give the drive more inertia, or correct the table or formula of the mechanism.",
+                least=least,
+            )
         )
         self.inertia = inertia
-        self.found, self.allowed = f"{inertia:.6g} kg*m^2", "> 0 kg*m^2 at every angle"
+        self.found, self.allowed = alone(least), Sentence("> {low} at every angle", low=amount(0.0, "kg*m^2"))
 
 
 class UnbalancedWorkError(MachineError):
-    """Drive and resistance do not do opposite work over the cycle, and the requested balance cannot correct it."""
+    """Drive and resistance do not do opposite work over the cycle, and the requested balance cannot correct it.
+
+    ``scaled`` is what the balance scales: "drive", "operation", or "" for none.
+    """
 
     ending = Ending.UNBALANCED_WORK
 
@@ -78,29 +104,39 @@ class UnbalancedWorkError(MachineError):
         # A work that is the rounding error of the other one is zero.
         most = max(abs(drive), abs(resistance))
         drive, resistance = (0.0 if abs(work) <= 1e-12 * most else work for work in (drive, resistance))
-        super().__init__(
-            f"The work over a cycle is not zero: the drive does {drive:.6g} J and the resistance {resistance:.6g} J. "
-            + self._advice(drive, resistance, scaled, friction)
+        works = Sentence(
+            "The work over a cycle is not zero: the drive does {drive} and the resistance {resistance}.",
+            drive=amount(drive, "J"),
+            resistance=amount(resistance, "J"),
         )
+        super().__init__(joined(" ", (works, self._advice(drive, resistance, scaled, friction))))
         self.drive, self.resistance = drive, resistance
 
     @staticmethod
-    def _advice(drive: float, resistance: float, scaled: str, friction: float) -> str:
+    def _advice(drive: float, resistance: float, scaled: str, friction: float) -> Sentence:
         if not scaled:
-            return 'Steady motion needs opposite works: choose balance "scale" or "constant", or correct the torques.'
-        own, other = (drive, resistance) if scaled == "driving torque" else (resistance + friction, drive)
-        if abs(own) <= 1e-9 * abs(other):
-            return f"No factor on the {scaled} balances that, since it does no work over a cycle of its own."
-        if abs(other) <= 1e-9 * abs(own):
-            rest = "operation" if scaled == "driving torque" else "driving torque"
-            return f"No positive factor on the {scaled} balances that, since the {rest} does no work over a cycle."
-        if scaled == "operation" and own < 0.0 < drive:
-            return (
-                f"No positive factor on the operation balances that: the friction of the shaft takes {friction:.6g} J."
+            return Sentence(
+                'Steady motion needs opposite works: choose balance "scale" or "constant", or correct the torques.'
             )
-        if drive < 0.0 and resistance < 0.0:
-            return f"No positive factor on the {scaled} balances that: the driving torque brakes, too."
-        return f"No positive factor on the {scaled} balances that: the operation drives instead of resisting."
+        by_drive = scaled == "drive"
+        own, other = (drive, resistance) if by_drive else (resistance + friction, drive)
+        factor = Sentence("factor on the driving torque") if by_drive else Sentence("factor on the operation")
+        if abs(own) <= 1e-9 * abs(other):
+            return Sentence("No {factor} balances that, since it does no work over a cycle of its own.", factor=factor)
+        if abs(other) <= 1e-9 * abs(own):
+            why = (
+                Sentence("since the operation does no work over a cycle")
+                if by_drive
+                else Sentence("since the driving torque does no work over a cycle")
+            )
+            return Sentence("No positive {factor} balances that, {why}.", factor=factor, why=why)
+        if not by_drive and own < 0.0 < drive:
+            why = Sentence("the friction of the shaft takes {friction}", friction=amount(friction, "J"))
+        elif drive < 0.0 and resistance < 0.0:
+            why = Sentence("the driving torque brakes, too")
+        else:
+            why = Sentence("the operation drives instead of resisting")
+        return Sentence("No positive {factor} balances that: {why}.", factor=factor, why=why)
 
 
 class InsufficientInertiaError(MachineError):
@@ -112,24 +148,34 @@ class InsufficientInertiaError(MachineError):
     ending = Ending.INERTIA_INSUFFICIENT
 
     def __init__(self, asked: float, least_mean_speed: float) -> None:
-        stops = f"The inertia is insufficient for a mean speed of {_in_rpm(asked)}: the shaft would "
+        speed, least = _in_rpm(asked), _in_rpm(least_mean_speed)
         if math.isnan(least_mean_speed):
-            more = "stop within the cycle. Choose a higher mean speed, or give the drive more inertia."
-        elif asked > least_mean_speed:
-            more = "nearly stop within the cycle. Choose a higher mean speed, or give the drive more inertia."
-        else:
-            more = (
-                f"stop within the cycle. The least feasible mean speed is {_in_rpm(least_mean_speed)}; "
-                "or give the drive more inertia."
+            message = Sentence(
+                "The inertia is insufficient for a mean speed of {speed}: the shaft would stop within the cycle. "
+                "Choose a higher mean speed, or give the drive more inertia.",
+                speed=speed,
             )
-        super().__init__(stops + more)
+        elif asked > least_mean_speed:
+            message = Sentence(
+                "The inertia is insufficient for a mean speed of {speed}: the shaft would nearly stop within the "
+                "cycle. Choose a higher mean speed, or give the drive more inertia.",
+                speed=speed,
+            )
+        else:
+            message = Sentence(
+                "The inertia is insufficient for a mean speed of {speed}: the shaft would stop within the cycle. The "
+                "least feasible mean speed is {least}; or give the drive more inertia.",
+                speed=speed,
+                least=least,
+            )
+        super().__init__(message)
         self.asked, self.least_mean_speed = asked, least_mean_speed
-        self.allowed = "a higher speed" if math.isnan(least_mean_speed) else f"> {_in_rpm(least_mean_speed)}"
+        self.allowed = Sentence("a higher speed") if math.isnan(least_mean_speed) else alone(">", least)
 
 
-def _in_rpm(speed: float) -> str:
+def _in_rpm(speed: float) -> Sentence:
     """A speed in rad/s with its revolutions a minute."""
-    return f"{speed:.6g} rad/s ({speed * 30.0 / math.pi:.6g} rpm)"
+    return Sentence("{speed} ({turns})", speed=amount(speed, "rad/s"), turns=amount(speed * 30.0 / math.pi, "rpm"))
 
 
 class MotorStalledError(MachineError):

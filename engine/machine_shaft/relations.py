@@ -2,8 +2,9 @@
 
 from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.operations import reachable_pressure
-from sprag.engine.machine_shaft.problems import RelationError
+from sprag.engine.machine_shaft.problems import RelationError, alone, amount
 from sprag.engine.machine_shaft.spec import MachineSpec
+from sprag.sentences import Sentence
 
 
 def check_relations(spec: MachineSpec, row: Columns) -> None:
@@ -27,7 +28,12 @@ def _check_stages(spec: MachineSpec, row: Columns) -> None:
     for index, kind in enumerate(spec.drive.stages):
         path = f"drive.stages.{index}.radius"
         if kind in {"belt", "chain"} and row.row(f"drive.stages.{index}.mass")[0] > 0.0 == row.row(path)[0]:
-            raise RelationError(path, 0.0, f"is needed for the speed of the {kind}, which has a mass", "> 0 m")
+            message = (
+                Sentence("is needed for the speed of the belt, which has a mass")
+                if kind == "belt"
+                else Sentence("is needed for the speed of the chain, which has a mass")
+            )
+            raise RelationError(path, 0.0, message, alone(">", amount(0.0, "m")))
 
 
 def _check_steps(row: Columns, prefix: str, steps: int) -> None:
@@ -36,9 +42,12 @@ def _check_steps(row: Columns, prefix: str, steps: int) -> None:
         if last < first:
             raise RelationError(
                 f"{prefix}{k}.to", last,
-                f"a step over the stroke cannot end before it begins: this one begins at {first:.6g} and would "
-                "never act; `during` selects the stroke",
-                f">= {first:.6g} and <= 1",
+                Sentence(
+                    "a step over the stroke cannot end before it begins: this one begins at {begin} and would never "
+                    "act; `during` selects the stroke",
+                    begin=amount(first),
+                ),
+                Sentence(">= {low} and <= {high}", low=amount(first), high=1),
             )  # fmt: skip
 
 
@@ -49,11 +58,17 @@ def _check_gas(row: Columns, prefix: str) -> None:
     most, least, wanted = float(reachable_pressure(low, clearance, exponent)[0]), float(low[0]), float(high[0])
     if least <= wanted <= most:
         return
+    suction, highest = amount(least, "Pa"), amount(most, "Pa")
     message = (
-        "is below the suction pressure: nothing would be compressed"
+        Sentence("is below the suction pressure: nothing would be compressed")
         if wanted < least
-        else f"cannot be reached: at the end of the stroke a clearance of {clearance[0]:.6g} times the displaced "
-        f"volume is left, and the gas reaches {most:.6g} Pa at most"
+        else Sentence(
+            "cannot be reached: at the end of the stroke a clearance of {clearance} times the displaced volume is "
+            "left, and the gas reaches {most} at most",
+            clearance=amount(clearance[0]),
+            most=highest,
+        )
     )
-    allowed = f">= {least:.6g} Pa" + (f" and <= {most:.6g} Pa" if most < float("inf") else "")
+    bounded = most < float("inf")
+    allowed = Sentence(">= {low} and <= {high}", low=suction, high=highest) if bounded else alone(">=", suction)
     raise RelationError(f"{prefix}discharge_pressure", wanted, message, allowed)

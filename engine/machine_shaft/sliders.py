@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from sprag.engine import elementary
 from sprag.engine.machine_shaft.mechanisms import Body, Values, number_of
+from sprag.sentences import Sentence
 
 Floats = NDArray[np.float64]
 
@@ -87,9 +88,9 @@ def slider_margin(radius: Floats, values: Values, theta: Floats) -> Floats:
     return np.asarray(1.0 - np.abs((radius * elementary.sin(theta) - values["offset"]) / values["rod"]))
 
 
-def slider_fold(arm: str, part: str, values: Values) -> str | None:
+def slider_fold(arm: str, part: Sentence, values: Values) -> Sentence | None:
     """The fault where the rod folds onto its arm at full retraction; None otherwise."""
     length, rod = number_of(values, arm) + abs(number_of(values, "offset")), number_of(values, "rod")
     if abs(length - rod) > 1e-9 * rod:
         return None
-    return f"the rod folds onto the {part} there, and the ram could continue either way"
+    return Sentence("the rod folds onto {part} there, and the ram could continue either way", part=part)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.machine_shaft.problems import TableError
+from sprag.engine.machine_shaft.problems import TableError, amount
+from sprag.sentences import Sentence, plural
 
 if TYPE_CHECKING:
     # Imported on use, so that reading catalogues does not wait for it.
@@ -66,20 +67,30 @@ class Curve:
 
 def _checked(rows: Sequence[tuple[float, float]]) -> tuple[Floats, Floats]:
     if not 2 <= len(rows) <= MAX_ROWS:
-        message = f"A table needs 2 to {MAX_ROWS} rows, not {len(rows)}."
-        raise TableError(message, len(rows), f"2 to {MAX_ROWS} rows")
+        given, most = amount(len(rows)), str(MAX_ROWS)
+        message = Sentence("A table needs 2 to {most} rows, not {given}.", most=most, given=given)
+        raise TableError(message, given, Sentence("2 to {most} rows", most=most))
     x, y = np.array(rows, dtype=np.float64).T
     if not (np.isfinite(x).all() and np.isfinite(y).all()):
-        raise TableError("A table must contain finite numbers only.", "a number that is not finite", "finite numbers")
+        message = Sentence("A table must contain finite numbers only.")
+        raise TableError(message, Sentence("a number that is not finite"), Sentence("finite numbers"))
     steps = np.diff(x)
     if np.any(steps < 0.0):
         row = int(np.argmax(steps < 0.0)) + 1
-        message = f"The rows of a table must ascend: row {row + 1} has {x[row]:g} after {x[row - 1]:g}."
-        raise TableError(message, float(x[row]), f"at least {x[row - 1]:g} in row {row + 1}")
+        number, given, low = str(row + 1), amount(x[row]), amount(x[row - 1])
+        message = Sentence(
+            "The rows of a table must ascend: row {row} has {given} after {low}.", row=number, given=given, low=low
+        )
+        raise TableError(message, given, Sentence("at least {low} in row {row}", low=low, row=number))
     if np.any((steps[1:] == 0.0) & (steps[:-1] == 0.0)):
         row = int(np.argmax((steps[1:] == 0.0) & (steps[:-1] == 0.0)))
-        message = f"A table has at most two rows with the same x (a jump): rows {row + 1} to {row + 3} have {x[row]:g}."
-        raise TableError(message, float(x[row]), "at most two rows with the same x")
+        message = Sentence(
+            "A table has at most two rows with the same x (a jump): rows {first} to {last} have {given}.",
+            first=str(row + 1),
+            last=str(row + 3),
+            given=amount(x[row]),
+        )
+        raise TableError(message, amount(x[row]), Sentence("at most two rows with the same x"))
     return x, y
 
 
@@ -128,13 +139,19 @@ def periodic(table: Table, period: float) -> Curve:
     x, y = _checked(table.rows)
     excess = x[-1] - x[0] - period
     if excess > 1e-9 * period:
-        covered, most = (f"{math.degrees(angle):g} deg" for angle in (x[-1] - x[0], period))
-        raise TableError(f"The table covers {covered}, more than its cycle of {most}.", covered, f"at most {most}")
+        covered, most = (amount(math.degrees(angle), "deg") for angle in (x[-1] - x[0], period))
+        message = Sentence("The table covers {covered}, more than its cycle of {most}.", covered=covered, most=most)
+        raise TableError(message, covered, Sentence("at most {high}", high=most))
     if abs(excess) <= 1e-9 * period:
         gap = abs(y[-1] - y[0])
         if gap > CLOSING * max(np.ptp(y), np.abs(y).max(), 1e-300):
-            message = f"it begins with {y[0]:g} and ends, a cycle later, with {y[-1]:g}."
-            raise TableError(f"The table does not close on itself: {message}", float(y[-1]), f"{y[0]:g} at the end")
+            at_first, at_last = amount(y[0]), amount(y[-1])
+            message = Sentence(
+                "The table does not close on itself: it begins with {begin} and ends, a cycle later, with {end}.",
+                begin=at_first,
+                end=at_last,
+            )
+            raise TableError(message, at_last, Sentence("{value} at the end", value=at_first))
         x[-1], y[-1] = x[0] + period, y[0]
     else:
         x, y = np.append(x, x[0] + period), np.append(y, y[0])
@@ -166,24 +183,32 @@ def along_strokes(table: Table, strokes: int) -> tuple[Curve, ...]:
     ends, first = (1.0, 0.0), 0
     curves: list[Curve] = []
     if not table.rows or abs(table.rows[0][0]) > 1e-9:
-        first_x = table.rows[0][0] if table.rows else "no row"
-        message = "An indicator diagram over the stroke begins at 0, where the forward stroke does."
-        raise TableError(message, first_x, "0 in the first row")
+        message = Sentence("An indicator diagram over the stroke begins at 0, where the forward stroke does.")
+        given = amount(table.rows[0][0]) if table.rows else Sentence("no row")
+        raise TableError(message, given, Sentence("0 in the first row"))
     while first < len(table.rows) - 1:
         end = ends[len(curves) % 2]
         last = next((k for k in range(first + 1, len(table.rows)) if abs(table.rows[k][0] - end) <= 1e-9), None)
         if last is None:
-            number = len(curves) + 1
-            message = f"Stroke {number} of the indicator diagram does not come to {end:g}."
-            raise TableError(message, table.rows[-1][0], f"{end:g} at the end of stroke {number}")
+            number, wanted = str(len(curves) + 1), amount(end)
+            message = Sentence(
+                "Stroke {number} of the indicator diagram does not come to {end}.", number=number, end=wanted
+            )
+            allowed = Sentence("{end} at the end of stroke {number}", end=wanted, number=number)
+            raise TableError(message, amount(table.rows[-1][0]), allowed)
         rows = table.rows[first : last + 1]
         curves.append(over_stroke(Table(rows if end == 1.0 else rows[::-1], table.interpolation)))
         # Two rows at a dead centre are a jump there.
         first = last + 1 if last + 1 < len(table.rows) and abs(table.rows[last + 1][0] - end) <= 1e-9 else last
     if len(curves) != strokes:
-        count = f"{len(curves)} stroke{'' if len(curves) == 1 else 's'}"
-        message = f"The indicator diagram has {count}, but the cycle has {strokes}."
-        raise TableError(message, len(curves), f"{strokes} strokes")
+        message = plural(
+            "The indicator diagram has {count} stroke, but the cycle has {strokes}.",
+            "The indicator diagram has {count} strokes, but the cycle has {strokes}.",
+            len(curves),
+            count=str(len(curves)),
+            strokes=strokes,
+        )
+        raise TableError(message, amount(len(curves)), plural("{count} stroke", "{count} strokes", strokes))
     return tuple(curves)
 
 
@@ -197,8 +222,9 @@ def over_stroke(table: Table) -> Curve:
     """
     x, y = _checked(table.rows)
     if abs(x[0]) > 1e-9 or abs(x[-1] - 1.0) > 1e-9:
-        found = f"from {x[0]:g} to {x[-1]:g}"
-        raise TableError(f"A table over the stroke runs from 0 to 1 of it, not {found}.", found, "from 0 to 1")
+        given = Sentence("from {low} to {high}", low=amount(x[0]), high=amount(x[-1]))
+        message = Sentence("A table over the stroke runs from 0 to 1 of it, not {given}.", given=given)
+        raise TableError(message, given, Sentence("from 0 to 1"))
     x[0], x[-1] = 0.0, 1.0
     return Curve(_pieces(x, y, table.interpolation), None)
 
@@ -214,6 +240,12 @@ def over_speed(table: Table) -> Curve:
     x, y = _checked(table.rows)
     if np.any(np.diff(x) == 0.0):
         row = int(np.argmax(np.diff(x) == 0.0))
-        message = f"A characteristic does not jump: rows {row + 1} and {row + 2} both have {x[row]:g} rad/s."
-        raise TableError(message, f"{x[row]:g} rad/s", f"more than {x[row]:g} rad/s in row {row + 2}")
+        speed, second = amount(x[row], "rad/s"), str(row + 2)
+        message = Sentence(
+            "A characteristic does not jump: rows {first} and {second} both have {speed}.",
+            first=str(row + 1),
+            second=second,
+            speed=speed,
+        )
+        raise TableError(message, speed, Sentence("more than {low} in row {row}", low=speed, row=second))
     return Curve(_pieces(x, y, table.interpolation), None)

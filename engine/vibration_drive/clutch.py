@@ -21,7 +21,7 @@ from sprag.engine.vibration_drive.clutch_report import (
     DegreeReport,
 )
 from sprag.engine.vibration_drive.singular_values import singular_values
-from sprag.sentences import Amount, Sentence, WarningText
+from sprag.sentences import Amount, Part, Sentence, WarningText, joined
 
 __all__ = [
     "HIGHEST_DEGREE",
@@ -92,11 +92,11 @@ def fit_clutch(
             return _accepted(rows, law, tuple(reports), accuracy, first_power)
     reached, tried, advice = _not_reached(rows, tuple(reports), accuracy, max_degree, first_power)
     raise ClutchFitError(
-        f"{reached}; largest residuals: {tried}.{advice}",
+        Sentence("{reached}; largest residuals: {tried}. {advice}", reached=reached, tried=tried, advice=advice),
         name="accuracy",
         value=accuracy,
         degrees=tuple(reports),
-        summary=f"{reached}.{advice}",
+        summary=joined(". ", (reached, advice)),
     )
 
 
@@ -180,11 +180,16 @@ def _accepted(
     dip = find_dip(coefficients, rows.limit)
     if dip is not None:
         raise ClutchFitError(
-            f"the fitted law of degree {last.degree} is negative {dip.place} (for instance {dip.value:.6g} N*m at "
-            f"{dip.at:.6g} rad) and would pull the shaft back. Measure more rows there, "
-            + ("" if first_power else "fit through the origin, ")
-            + "choose another accuracy (a lower or higher degree then serves), or check the backlash and the signs of "
-            "the torques",
+            Sentence(
+                "the fitted law of degree {degree} is negative {place} (for instance {torque} at {windup}) and would "
+                "pull the shaft back. Measure more rows there, {origin}choose another accuracy (a lower or higher "
+                "degree then serves), or check the backlash and the signs of the torques",
+                degree=last.degree,
+                place=dip.place,
+                torque=Amount(dip.value, "N*m", 6),
+                windup=Amount(dip.at, "rad", 6),
+                origin="" if first_power else Sentence("fit through the origin, "),
+            ),
             name="data",
             value=list(coefficients),
             degrees=reports,
@@ -192,7 +197,8 @@ def _accepted(
     try:
         checked = check_law(coefficients, rows.limit)
     except ClutchLawError as error:
-        raise ClutchFitError(f"the fitted law cannot be used: {error}", name="data", degrees=reports) from error
+        message = Sentence("the fitted law cannot be used: {fault}", fault=error.placed)
+        raise ClutchFitError(message, name="data", degrees=reports) from error
     residuals = rows.residuals(law)
     backlash_rows = tuple(int(row) for row in np.flatnonzero(~rows.fitted))
     return ClutchFit(
@@ -250,32 +256,46 @@ def _data_warnings(
 
 def _not_reached(
     rows: Rows, reports: tuple[DegreeReport, ...], accuracy: float, max_degree: int, first_power: int
-) -> tuple[str, str, str]:
+) -> tuple[Sentence, Sentence, Sentence]:
     """For data that no tried degree fits well enough: the missed accuracy, the residuals, and advice."""
-    tried = ", ".join(
-        f"{report.max_residual:.4g} N*m at degree {report.degree}"
-        + ("" if report.rank == report.degree + 1 - first_power else " (not determined by these angles)")
-        for report in reports
-    )
+    tried = joined(", ", (_residual(report, report.degree + 1 - first_power) for report in reports))
     best = min(reports, key=lambda report: report.max_residual)
     law, _ = _fit_degree(rows, np.arange(first_power, best.degree + 1))
     row = int(np.argmax(np.abs(rows.residuals(law))))
-    reached = f"the accuracy of {accuracy:g} N*m is not reached up to degree {reports[-1].degree}"
-    text = ""
-    out_of_rows = reports[-1].degree == rows.distinct - 1 + first_power
-    if out_of_rows:
-        text += (
-            f" Higher degrees have more unknowns than the data has different windups ({rows.distinct}); measure more."
-        )
-    text += (
-        f" The best, degree {best.degree}, is farthest off at the row with windup {rows.windup[row]:.6g} rad and "
-        f"torque {rows.torque[row]:.6g} N*m. Check that row, or allow a larger residual"
+    reached = Sentence(
+        "the accuracy of {accuracy} is not reached up to degree {degree}",
+        accuracy=Amount(float(accuracy), "N*m", 6),
+        degree=reports[-1].degree,
     )
+    out_of_rows = reports[-1].degree == rows.distinct - 1 + first_power
+    more = Sentence("")
     if first_power and rows.windup[row] == 0.0:
-        text += ", or fit without through_origin, since this row shows torque at zero windup"
+        more = Sentence(", or fit without through_origin, since this row shows torque at zero windup")
     elif max_degree < HIGHEST_DEGREE and not out_of_rows:
-        text += f", or raise max_degree (up to {HIGHEST_DEGREE})"
-    return reached, tried, text + "."
+        more = Sentence(", or raise max_degree (up to {highest})", highest=HIGHEST_DEGREE)
+    advice = Sentence(
+        "The best, degree {degree}, is farthest off at the row with windup {windup} and torque {torque}. Check that "
+        "row, or allow a larger residual{more}.",
+        degree=best.degree,
+        windup=Amount(float(rows.windup[row]), "rad", 6),
+        torque=Amount(float(rows.torque[row]), "N*m", 6),
+        more=more,
+    )
+    if out_of_rows:
+        rest = Sentence(
+            "Higher degrees have more unknowns than the data has different windups ({windups}); measure more.",
+            windups=rows.distinct,
+        )
+        advice = joined(" ", (rest, advice))
+    return reached, tried, advice
+
+
+def _residual(report: DegreeReport, unknowns: int) -> Sentence:
+    """The largest residual of a degree, and whether its unknowns are determined."""
+    parts: dict[str, Part] = {"residual": Amount(report.max_residual, "N*m", 4), "degree": report.degree}
+    if report.rank == unknowns:
+        return Sentence("{residual} at degree {degree}", **parts)
+    return Sentence("{residual} at degree {degree} (not determined by these angles)", **parts)
 
 
 def _rms(residuals: NDArray[np.float64]) -> float:

@@ -18,7 +18,7 @@ from sprag.engine.taylor.straight import horner, integral, slope
 from sprag.engine.vibration_drive.clutch_report import ClutchLaw, ClutchLawError
 from sprag.engine.vibration_drive.formulas import beyond
 from sprag.engine.vibration_drive.parameters import CLUTCH_COEFFICIENT, MAX_COEFFICIENTS
-from sprag.sentences import Amount, Sentence, WarningText
+from sprag.sentences import Amount, Sentence, WarningText, joined, plural
 
 #: A value counts as negative when it is below zero by more than this share of the sum of its terms' magnitudes;
 #: less than that is rounding of a law that touches zero.
@@ -105,7 +105,10 @@ def check_law(coefficients: Sequence[float], windup_limit: float = math.inf) -> 
     limit = _limit(windup_limit)
     if not any(law):
         raise ClutchLawError(
-            "every coefficient is zero, so the clutch would never transmit torque; give at least one that is not zero",
+            Sentence(
+                "every coefficient is zero, so the clutch would never transmit torque; give at least one that is not "
+                "zero"
+            ),
             name="coefficients",
             value=list(law),
         )
@@ -211,20 +214,21 @@ def _at_end(law: _Array, limit: float) -> float:
 
 
 def _numbers(coefficients: Sequence[float]) -> tuple[float, ...]:
-    allowed = f"1 to {MAX_COEFFICIENTS} numbers, c_1 first"
+    allowed = Sentence("1 to {most} numbers, c_1 first", most=MAX_COEFFICIENTS)
     if isinstance(coefficients, (str, bytes)) or not isinstance(coefficients, (Sequence, np.ndarray)):
-        raise ClutchLawError("must be a list of numbers", name="coefficients", value=coefficients, allowed=allowed)
-    if not 1 <= len(coefficients) <= MAX_COEFFICIENTS:
-        raise ClutchLawError(
-            f"has {len(coefficients)} entries", name="coefficients", value=len(coefficients), allowed=allowed
-        )
+        message = Sentence("must be a list of numbers")
+        raise ClutchLawError(message, name="coefficients", value=coefficients, allowed=allowed)
+    count = len(coefficients)
+    if not 1 <= count <= MAX_COEFFICIENTS:
+        message = plural("has {count} entry", "has {count} entries", count, count=str(count))
+        raise ClutchLawError(message, name="coefficients", value=count, allowed=allowed)
     for index, value in enumerate(coefficients):
         if not is_number(value) or not CLUTCH_COEFFICIENT.accepts(float(value)):
             raise ClutchLawError(
-                "must be a finite number in range",
+                Sentence("must be a finite number in range"),
                 name=f"coefficients.{index}",
                 value=value,
-                allowed=f"{CLUTCH_COEFFICIENT.low:g} .. {CLUTCH_COEFFICIENT.high:g} N*m/rad^{index}",
+                allowed=span(CLUTCH_COEFFICIENT.low, CLUTCH_COEFFICIENT.high, f"N*m/rad^{index}"),
             )
     return tuple(float(value) for value in coefficients)
 
@@ -232,12 +236,19 @@ def _numbers(coefficients: Sequence[float]) -> tuple[float, ...]:
 def _limit(windup_limit: float) -> float:
     if not is_number(windup_limit) or not (0.0 < windup_limit <= MAX_ANGLE or windup_limit == math.inf):
         raise ClutchLawError(
-            "must be a positive windup",
+            Sentence("must be a positive windup"),
             name="windup_limit",
             value=windup_limit,
-            allowed=f"> 0 rad and <= {MAX_ANGLE:g} rad, or infinite",
+            allowed=Sentence(
+                "> {low} and <= {high}, or infinite", low=Amount(0.0, "rad"), high=Amount(MAX_ANGLE, "rad", 6)
+            ),
         )
     return float(windup_limit)
+
+
+def span(low: float, high: float, unit: str) -> Sentence:
+    """A range, such as ``0 .. 1000 rad``."""
+    return joined(" .. ", (Amount(low, digits=6), Amount(high, unit, 6)))
 
 
 def is_number(value: object) -> bool:
@@ -251,24 +262,30 @@ def is_number(value: object) -> bool:
     return True
 
 
-def _negative_message(law: Sequence[float], limit: float, dip: Dip) -> str:
+def _negative_message(law: Sequence[float], limit: float, dip: Dip) -> Sentence:
     if law[0] < 0.0:
-        return (
-            f"c_1 = {law[0]:.6g} N*m is negative: the clutch would pull the shaft back as soon as contact begins; "
-            "use c_1 = 0 (no torque at zero windup) or a positive one"
+        return Sentence(
+            "c_1 = {torque} is negative: the clutch would pull the shaft back as soon as contact begins; use c_1 = 0 "
+            "(no torque at zero windup) or a positive one",
+            torque=Amount(law[0], "N*m", 6),
         )
-    text = (
-        f"the torque is negative {dip.place} (for instance {dip.value:.6g} N*m at {dip.at:.6g} rad): it would pull the "
-        "shaft back"
-    )
+    start = Amount(dip.start, "rad", 6)
     if dip.start <= 0.0:
-        return f"{text}; the first coefficient that is not zero must be positive"
-    if math.isinf(limit):
-        return (
-            f"{text}; if the law was measured only up to some windup of at most {dip.start:.6g} rad, give that as "
-            "windup_limit"
+        advice = Sentence("the first coefficient that is not zero must be positive")
+    elif math.isinf(limit):
+        advice = Sentence(
+            "if the law was measured only up to some windup of at most {windup}, give that as windup_limit",
+            windup=start,
         )
-    return f"{text}; correct the coefficients, or lower windup_limit to at most {dip.start:.6g} rad"
+    else:
+        advice = Sentence("correct the coefficients, or lower windup_limit to at most {windup}", windup=start)
+    return Sentence(
+        "the torque is negative {place} (for instance {torque} at {windup}): it would pull the shaft back; {advice}",
+        place=dip.place,
+        torque=Amount(dip.value, "N*m", 6),
+        windup=Amount(dip.at, "rad", 6),
+        advice=advice,
+    )
 
 
 def _on_unit_interval(law: _Array, end: float) -> tuple[_Array, float]:

@@ -3,7 +3,7 @@
 import reprlib
 from dataclasses import dataclass
 
-from sprag.sentences import WarningText
+from sprag.sentences import Sentence, WarningText, joined
 
 
 class ClutchError(ValueError):
@@ -29,9 +29,17 @@ class ClutchError(ValueError):
         self.value = value
         self.allowed = allowed
 
+    @property
+    def placed(self) -> str:
+        """The sentence with name, value and range."""
+        head = joined(": ", (self.name, self.message)) if self.name else self.message
+        if self.allowed is None:
+            return head
+        value = reprlib.repr(self.value)
+        return Sentence("{fault} (got {value}; allowed: {allowed})", fault=head, value=value, allowed=self.allowed)
+
     def __str__(self) -> str:
-        head = f"{self.name}: {self.message}" if self.name else self.message
-        return head if self.allowed is None else f"{head} (got {reprlib.repr(self.value)}; allowed: {self.allowed})"
+        return str(self.placed)
 
 
 class ClutchLawError(ClutchError):

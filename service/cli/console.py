@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
-from sprag.sentences import WarningText
+from sprag.sentences import Sentence, WarningText
 from sprag.service import languages
 from sprag.service.cli.layout import Shape, blocks, broken, longest_piece, width_of
 from sprag.service.faults import Code, Fault, FaultError
@@ -74,7 +74,7 @@ class CommandFailureError(FaultError):
 
     def lines(self) -> Iterator[str]:
         """The message and every fault, one per line."""
-        yield _(self.detail)
+        yield _translated(self.detail) if isinstance(self.detail, Sentence) else _(self.detail)
         for fault in self.faults:
             yield f"  {fault_line(fault)}"
             if languages.current() != languages.ENGLISH and not _is_translated(fault):
@@ -94,6 +94,12 @@ def _is_translated(fault: Fault) -> bool:
     return is_translated(fault)
 
 
+def _translated(sentence: Sentence) -> str:
+    from sprag.service.reading.faults import translated
+
+    return translated(sentence)
+
+
 def fault_line(fault: Fault) -> str:
     """A fault in one line: where it is, what it is, the value, and what is allowed.
 
@@ -101,12 +107,13 @@ def fault_line(fault: Fault) -> str:
     """
     if languages.current() == languages.ENGLISH:
         return str(fault)
-    from sprag.service.reading.faults import allowed_text, fault_text
+    from sprag.service.reading.faults import allowed_text, fault_text, value_text
     from sprag.service.reading.wording import unit_text
 
     details = []
     if fault.value is not None:
-        details.append(_("got {value}", value=repr(fault.value) if isinstance(fault.value, str) else fault.value))
+        value = value_text(fault.value)
+        details.append(_("got {value}", value=repr(value) if isinstance(value, str) else value))
     if fault.allowed is not None:
         details.append(_("allowed: {allowed}", allowed=allowed_text(fault.allowed)))
     if fault.unit is not None and (fault.allowed is None or fault.unit not in fault.allowed):

@@ -93,15 +93,15 @@ def _fault(error: Mapping[str, Any]) -> Fault:
     made = ParameterFault if error.get("parameter") is not None else Fault
     where = error.get("parameter", error.get("pointer"))
     message = _sentence(error, "message") or str(error.get("message", "is wrong"))
-    return made(where, code, message, error.get("value"), _sentence(error, "allowed"), error.get("unit"))
+    return made(where, code, message, _sentence(error, "value"), _sentence(error, "allowed"), error.get("unit"))
 
 
-def _sentence(error: Mapping[str, Any], name: str) -> str | None:
+def _sentence(error: Mapping[str, Any], name: str) -> Any:
     """A text of a fault with its values, where the service tells them."""
     try:
         return sentence_of(error["sentences"][name])
     except (KeyError, TypeError, ValueError, AttributeError):
-        return cast("str | None", error.get(name))
+        return error.get(name)
 
 
 class StudyTimeoutError(ServiceError):

@@ -36,6 +36,11 @@ def allowed_text(allowed: str | None) -> str:
     return translated(allowed or "")
 
 
+def value_text(value: object) -> object:
+    """The value of a fault as it is, or in the reader's language where it was computed."""
+    return translated(value) if isinstance(value, Sentence) else value
+
+
 def translated(text: str) -> str:
     """A sentence, or a text of the catalogue, in the reader's language; in English as programs have it."""
     if current() == ENGLISH:
@@ -57,4 +62,4 @@ def message(item: Fault) -> str:
 
 def plainly(value: object) -> object:
     """A value as a user would write it: a whole number without decimals."""
-    return int(value) if isinstance(value, float) and value.is_integer() and abs(value) < 1e15 else value
+    return int(value) if isinstance(value, float) and value.is_integer() and abs(value) < 1e15 else value_text(value)

@@ -47,7 +47,7 @@ def shorten(value: object, depth: int = 2) -> object:
     if isinstance(value, float):
         return value if math.isfinite(value) else str(value)
     if isinstance(value, str):
-        return shorten_text(value)
+        return value if isinstance(value, Sentence) else shorten_text(value)
     if isinstance(value, Mapping):
         return _shorten_mapping(value, depth)
     if isinstance(value, list | tuple):

@@ -165,10 +165,9 @@ class _Scan:
     def located(self, error: ExpressionError) -> str:
         """The message of a fault in the converted formula, with the position in the original one."""
         if error.position is None:
-            return str(error)
+            return error.message
         here, there = max(place for place in self._places if place[0] <= error.position)
-        sentence = str(error).removesuffix(f" (at character {error.position + 1})")
-        return f"{sentence} (at character {there + error.position - here + 1})"
+        return error.at(there + error.position - here)
 
     def _last_unit(self, text: str, position: int) -> int:
         """The end of the units that follow a number; its own end where there are none."""

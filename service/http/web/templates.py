@@ -24,7 +24,7 @@ from sprag.service.http.prefix import here
 from sprag.service.http.web.explained import explained
 from sprag.service.http.web.script_texts import translated_texts
 from sprag.service.languages import N_
-from sprag.service.reading.faults import allowed_text, fault_text
+from sprag.service.reading.faults import allowed_text, fault_text, value_text
 from sprag.service.reading.reader import CLUTCH, Reading, model_title, shown, titled, told, word
 from sprag.service.reading.wording import counted, duration, number, symbol, typed_text, unit_text
 from sprag.service.schedules.times import wall_clock
@@ -122,6 +122,7 @@ def _templates() -> Environment:
         "fault": fault_text,
         "warning": _warning,
         "allowed": allowed_text,
+        "given": value_text,
         "day": day,
         "model": model_title,
         "moment": moment,

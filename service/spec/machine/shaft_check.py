@@ -95,18 +95,18 @@ def check_machine(
             report.warn("unstable-motion", "/base", _UNSTABLE)
     except ExpressionError as error:
         formula = _at(structure, error.part).get("formula") if error.part in places else None
-        report.fault(places.get(error.part, "/base"), "invalid-formula", str(error), formula)
+        report.fault(places.get(error.part, "/base"), "invalid-formula", error.message, formula)
     except InsufficientInertiaError as error:
         report.fault(
-            "/base/mean_speed", "inertia-insufficient", str(error), error.asked, allowed=error.allowed, unit="rad/s"
+            "/base/mean_speed", "inertia-insufficient", error.message, error.asked, allowed=error.allowed, unit="rad/s"
         )
     except machine_shaft.RelationError as error:
         report.fault(
-            "/base/" + error.path.replace(".", "/"), "conflict", str(error), error.value, allowed=error.allowed
+            "/base/" + error.path.replace(".", "/"), "conflict", error.message, error.value, allowed=error.allowed
         )
     except MachineError as error:
         where = _pointer(error, structure, places)
-        report.fault(where, code_of(error), str(error), error.found, allowed=error.allowed)
+        report.fault(where, code_of(error), error.message, error.found, allowed=error.allowed)
 
 
 def _alone(structure: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any], Any]]:
@@ -158,4 +158,4 @@ def _note(report: Report, pointer: str, check: Callable[[], None], value: object
         check()
     except MachineError as error:
         found = value if error.found is None else error.found
-        report.fault(pointer, code_of(error), str(error), found, allowed=error.allowed)
+        report.fault(pointer, code_of(error), error.message, found, allowed=error.allowed)

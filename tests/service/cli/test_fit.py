@@ -71,6 +71,15 @@ def test_an_accuracy_that_no_degree_reaches_tells_the_best_of_each(sprag: Sprag,
     assert [line.split(":")[0].strip() for line in done.err.splitlines()[1:]] == ["degree 1", "degree 2", "degree 3"]
 
 
+def test_a_refusal_in_ukrainian_is_whole_sentences(sprag: Sprag, tmp_path: Path) -> None:
+    (tmp_path / "m.csv").write_text("angle [rad],torque [N*m]\n0.1,1\n0.1,1.5\n0.2,2\n0.3,3\n", encoding="utf-8")
+    refused = sprag("--language", "uk", "fit", tmp_path / "m.csv", "--accuracy", "0.1")
+    assert refused.err.startswith(
+        "sprag: точності 0,1 Н·м не досягнуто до степеня 3. Вищі степені мають більше невідомих, ніж різних "
+        "закручувань у даних (3); виміряйте більше. Найкращий, степінь 3, найбільше відхиляється в рядку із закручуванням 0,1 рад"
+    )
+
+
 def test_the_full_polynomial_may_have_torque_at_zero_windup(sprag: Sprag, tmp_path: Path) -> None:
     data = tmp_path / "data.csv"
     data.write_text("".join(f"{u},{1.0 + 100 * u}\n" for u in (0.0, 0.01, 0.02, 0.03)))
