@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sa
 
+from sprag.sentences import Sentence
 from sprag.service.actor import acting
 from sprag.service.faults import Fault, FaultError
 from sprag.service.spec.saved_views import View
@@ -173,7 +174,7 @@ class Views(Part):
         figures = sa.select(_V.id).where(_V.study == row.study, _V.place.is_not(None), _V.id != row.id)
         order = list(connection.execute(figures.order_by(_V.place, _V.number)).scalars())
         if wanted and len(order) >= MAX_REPORT_FIGURES:
-            allowed = f"at most {MAX_REPORT_FIGURES} figures"
+            allowed = Sentence("at most {count} figures", count=MAX_REPORT_FIGURES)
             raise _fault("/in_report", "too-many", "the report would have too many figures", len(order) + 1, allowed)
         if wanted:
             order.insert(len(order) if place is None else place - 1, row.id)

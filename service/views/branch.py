@@ -121,7 +121,8 @@ def range_of(
     least, most = allowed_values(study, tuple(paths))
     for name, number, text in (("from", first, low), ("to", last, high)):
         if not least <= number <= most:
-            raise parameter_error(name, "out-of-range", _OUTSIDE, text, f"{least:g} .. {most:g}")
+            limits = {"low": Amount(least, digits=6), "high": Amount(most, digits=6)}
+            raise parameter_error(name, "out-of-range", _OUTSIDE, text, Sentence("{low} .. {high}", **limits))
     if not first <= value <= last or first == last:
         parts = {"first": Amount(first, digits=6), "last": Amount(last, digits=6), "value": Amount(value, digits=6)}
         message = Sentence("the range {first} .. {last} must contain the value of the case, {value}", **parts)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
+from sprag.sentences import Sentence
 from sprag.service.answers.studies import StudyOrder
 from sprag.service.faults import Fault, FaultError
 from sprag.service.spec.labels import folded
@@ -46,7 +47,8 @@ def changed_tags(present: tuple[str, ...], change: StudyChange) -> tuple[str, ..
     found = tuple(tag for key, tag in tags.items() if key not in lost)
     if len(found) > MAX_TAGS:
         place = "/add_tags" if change.add_tags else "/tags"
-        fault = Fault(place, "too-many", "the study would have too many tags", len(found), f"at most {MAX_TAGS} tags")
+        allowed = Sentence("at most {count} tags", count=MAX_TAGS)
+        fault = Fault(place, "too-many", "the study would have too many tags", len(found), allowed)
         raise FaultError("invalid-body", str(fault), (fault,))
     return found
 
