@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from sprag.sentences import Sentence
+
 
 class SpragError(Exception):
     """A failure, as one sentence or with a line for each fault.
@@ -17,3 +19,11 @@ class SpragError(Exception):
 
     code: str = "unavailable"
     faults: tuple[Any, ...] = ()
+
+
+class WrongPlanError(ValueError):
+    """A plan with a field out of its range; ``message`` names it."""
+
+    def __init__(self, message: Sentence) -> None:
+        super().__init__(message)
+        self.message = message

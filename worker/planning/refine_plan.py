@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.sentences import Sentence
+from sprag.worker.errors import WrongPlanError
 from sprag.worker.models.usable import half_width
 
 if TYPE_CHECKING:
@@ -87,7 +89,7 @@ class RefinePlan:
 
     Raises
     ------
-    ValueError
+    WrongPlanError
         With the name of the field, its value and what is allowed.
     """
 
@@ -120,8 +122,12 @@ class RefinePlan:
             different = len(set(fixed.values)) == len(fixed.values)
             _check(different, f"fixed {fixed.paths[0]}", list(fixed.values), "different values")
         numbers = self.combinations * self.grid_points * len(self.results)
-        allowed = f"at most {_MAX_NUMBERS:,} for all points of the finest grids and all results"
-        _check(numbers <= _MAX_NUMBERS, "finest", self.finest, f"{allowed}, not {numbers:,}")
+        allowed = Sentence(
+            "at most {most} for all points of the finest grids and all results, not {numbers}",
+            most=_MAX_NUMBERS,
+            numbers=numbers,
+        )
+        _check(numbers <= _MAX_NUMBERS, "finest", self.finest, allowed)
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> RefinePlan:
@@ -228,4 +234,8 @@ def _power(number: int) -> bool:
 
 def _check(valid: bool, name: str, value: object, allowed: str) -> None:
     if not valid:
-        raise ValueError(f"{name}: {value} is not allowed; it must be {allowed}")
+        raise WrongPlanError(
+            Sentence(
+                "{name}: {value} is not allowed; it must be {allowed}", name=name, value=str(value), allowed=allowed
+            )
+        )

@@ -13,6 +13,7 @@ from sprag.service.spec.kinds.measured_points import MeasuredTable, read_results
 from sprag.service.spec.kinds.tolerances import expanded
 from sprag.service.spec.node import Node
 from sprag.service.spec.schema.quantity import QUANTITY
+from sprag.worker.errors import WrongPlanError
 from sprag.worker.planning.calibrate.plan import LOSSES, MOST_MEASURED, MOST_UNKNOWN, REFITS, CalibratePlan, Unknown
 
 if TYPE_CHECKING:
@@ -109,6 +110,6 @@ def _read_plan(
         return None
     try:
         return CalibratePlan(unknown, table.paths, table.conditions, measured, loss, refits, seed).to_json()
-    except ValueError as error:
-        node.refuse("too-many", str(error), None, allowed="fewer different points or unknown parameters")
+    except WrongPlanError as error:
+        node.refuse("too-many", error.message, None, allowed="fewer different points or unknown parameters")
         return None

@@ -12,6 +12,7 @@ from sprag.service.spec.axes.design import AXES
 from sprag.service.spec.described import Described, Listed, Record
 from sprag.service.spec.kinds.draft import Kind
 from sprag.service.spec.kinds.fields import RESULT, read_ends, read_numeric_result, read_path_of
+from sprag.worker.errors import WrongPlanError
 from sprag.worker.limits import MAX_PLANNED_CASES
 from sprag.worker.models import regime_info
 from sprag.worker.planning.refine_plan import AdaptiveAxis, FixedAxis, RefinePlan
@@ -155,8 +156,8 @@ def _read_plan(node: Node, axes: RefinedAxes) -> RefinePlan | None:
         plan = RefinePlan(
             tuple(results), error, start, finest, adaptive, fixed, most, regime_info(infos) is not None, widths
         )
-    except ValueError as fault:
-        node.refuse("too-many", str(fault), None, allowed="fewer curves, results or intervals")
+    except WrongPlanError as wrong:
+        node.refuse("too-many", wrong.message, None, allowed="fewer curves, results or intervals")
         return None
     if plan.most_cases > MAX_PLANNED_CASES:
         node["finest"].otherwise(fields["finest"].default).refuse(

@@ -11,6 +11,8 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.sentences import Sentence
+from sprag.worker.errors import WrongPlanError
 from sprag.worker.limits import MAX_PLANNED_CASES
 
 Floats = NDArray[np.float64]
@@ -95,8 +97,8 @@ class CalibratePlan:
 
     Raises
     ------
-    ValueError
-        If a field is out of its range; the message names it.
+    WrongPlanError
+        If a field is out of its range.
     """
 
     unknown: tuple[Unknown, ...]
@@ -117,9 +119,8 @@ class CalibratePlan:
         low, high = REFITS
         _check(low <= self.refits <= high, "refits", self.refits, f"{low} to {high:,}")
         most = MAX_PLANNED_CASES // 2 // (self.least_fit + self.scan)
-        _check(
-            self.fit_sets >= self.least_fit, "measured", len(self.conditions), f"at most {most} different conditions"
-        )
+        different = Sentence("at most {most} different conditions", most=str(most))
+        _check(self.fit_sets >= self.least_fit, "measured", len(self.conditions), different)
         _check(0 <= self.seed < 2**63, "seed", self.seed, "an integer of at least 0")
         seen = [path for paths in self.paths for path in paths]
         _check(len(set(seen)) == len(seen), "unknown", seen, "each parameter once, unknown or measured")
@@ -261,7 +262,9 @@ def _measured(data: Mapping[str, Any]) -> Measured:
 
 def _check(holds: bool, name: str, value: object, allowed: str) -> None:
     if not holds:
-        raise ValueError(f"calibrate.{name} is {value}; allowed: {allowed}")
+        raise WrongPlanError(
+            Sentence("calibrate.{name} is {value}; allowed: {allowed}", name=name, value=str(value), allowed=allowed)
+        )
 
 
 def _check_measured(plan: CalibratePlan) -> None:

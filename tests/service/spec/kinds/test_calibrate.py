@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 
 from sprag.service.jobs.preview import preview_json
+from sprag.service.languages import language
+from sprag.service.reading.faults import fault_text
 from sprag.service.spec.document import ParsedSpec, SpecError, parse_spec
 from sprag.service.spec.schema.document import spec_schema
 from sprag.worker.chunking import Chunking
@@ -191,7 +193,11 @@ def test_too_many_points_are_refused() -> None:
     lines = "".join(f"{0.01 + 0.0001 * k:.5f},20,1\n" for k in range(400))
     with pytest.raises(SpecError) as error:
         read(_HEAD + lines)
-    assert [fault.code for fault in error.value.faults] == ["too-many"]
+    (fault,) = error.value.faults
+    assert fault.code == "too-many"
+    assert fault_text(fault).startswith("calibrate.measured is 400; allowed: at most ")
+    with language("uk"):
+        assert fault_text(fault).startswith("calibrate.measured дорівнює 400; дозволено: різних умов щонайбільше ")
 
 
 def test_the_schema_has_the_calibration() -> None:

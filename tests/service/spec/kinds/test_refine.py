@@ -10,6 +10,8 @@ import pytest
 
 from sprag.service.http.web.form.fields import refine_fields
 from sprag.service.jobs.preview import preview_json
+from sprag.service.languages import language
+from sprag.service.reading.faults import fault_text
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.kinds.refine import REFINE as RECORD
 from sprag.service.spec.longer import longer_spec
@@ -108,6 +110,15 @@ def test_what_is_wrong_is_told_with_its_place(changes: dict[str, Any], pointer: 
     found = problems(refined({"/run": {}, **changes}))
     assert {where: fault.code for where, fault in found.items()} == {pointer: code}
     assert found[pointer].allowed or pointer == "/axes/1/path"
+
+
+def test_too_many_points_are_refused() -> None:
+    many = {"path": "excitation.frequency", "linspace": ["16 Hz", "35 Hz", 50_000]}
+    fault = problems(refined({"/run": {}, "/axes/0": many, "/refine/finest": "1/4096"}))["/refine"]
+    english = "finest: 4096 is not allowed; it must be at most 8,000,000 for all points of the finest grids and all"
+    assert fault_text(fault).startswith(english)
+    with language("uk"):
+        assert fault_text(fault).startswith("finest: значення 4096 неприпустиме; має бути щонайбільше 8")
 
 
 def test_a_refinement_needs_what_it_is_about() -> None:
