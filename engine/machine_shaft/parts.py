@@ -315,7 +315,8 @@ class ShaftPart:
         jumps = Jumps.none(self.cases)
         if self.inertia_formula is None:
             return jumps
-        exact = self._inertia(np.array([[[0.0, self.cycle]]]), None)[0] + beside
+        ends = np.array([[[0.0, self.cycle]]])
+        exact = self._inertia(ends, None)[0] + beside + np.zeros_like(ends)  # a constant formula has one value
         angles = [np.zeros((1, 1))]
         angles += [np.sort(found, axis=1)
                    for found in formula_breaks(self.inertia_formula, self._environment, self._revolutions)]  # fmt: skip
