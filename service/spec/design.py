@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.spec.derive import with_values
-from sprag.service.spec.fields import TOLERANCE_FIELDS, renamed, without_cases
+from sprag.service.spec.fields import TOLERANCE_FIELDS, renamed
+from sprag.service.spec.kinds.registry import without_cases
 from sprag.worker.models import NO_PARAMETERS
 from sprag.worker.models.parameters import parameter_of
 from sprag.worker.spread import DRIVE

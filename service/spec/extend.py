@@ -16,7 +16,8 @@ from sprag.service.spec.axes.design import ANYTHING
 from sprag.service.spec.derive import read_machine
 from sprag.service.spec.described import Listed, Record
 from sprag.service.spec.document import ParsedSpec, parse_spec
-from sprag.service.spec.fields import TOLERANCE_FIELDS, without_cases
+from sprag.service.spec.fields import TOLERANCE_FIELDS
+from sprag.service.spec.kinds.registry import without_cases
 from sprag.service.spec.kinds.sweep import sweep_of
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.node import Node

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.spec.axes.blocks import as_axes, chosen, first_rows
-from sprag.service.spec.fields import renamed, without_cases
+from sprag.service.spec.fields import renamed
+from sprag.service.spec.kinds.registry import without_cases
 from sprag.service.spec.run import SETTLED_FIELDS, TIMED_FIELDS
 from sprag.worker.limits import MAX_RUN_PERIODS, MAX_SETTLED_PERIODS
 from sprag.worker.models import SETTLED, is_settled

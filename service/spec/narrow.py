@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag.service.spec.axes.axes import SWEPT
-from sprag.service.spec.fields import renamed, without_cases
+from sprag.service.spec.fields import renamed
+from sprag.service.spec.kinds.registry import without_cases
 from sprag.service.spec.kinds.sweep import sweep_of
 from sprag.worker.directions import DIRECTIONS, DOWN
 from sprag.worker.limits import NARROW_STEPS

@@ -278,7 +278,7 @@ def test_an_interrupt_of_a_command_that_follows_names_the_study_that_goes_on(
         said = process.stderr.read().decode()
         assert process.wait(SECONDS) == 130
     assert "interrupted" in said.splitlines()
-    assert f"{study} goes on" in said
+    assert f"{study} continues" in said
     assert f"sprag cancel {study}" in said
     state = json.loads(sprag("list", "--json", *at).out)
     assert {item["id"]: item["state"] for item in state["studies"]}[study] in ("queued", "running")

@@ -22,7 +22,7 @@ from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.reader import Reading
-from sprag.service.spec.fields import without_cases
+from sprag.service.spec.kinds.registry import without_cases
 from sprag.service.spec.stored import accepted
 from sprag.worker import models
 from sprag.worker.limits import MAX_NAME_LENGTH

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from sprag.sentences import Sentence
 from sprag.service.spec.axes.design import AXES, COMBINE, read_design
@@ -20,7 +20,7 @@ from sprag.worker.planning import planner_of
 from sprag.worker.study import Axis
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     from sprag.service.spec.described import Field
     from sprag.service.spec.kinds.draft import Finish
@@ -66,7 +66,16 @@ _PLAIN: Final[Mapping[str, Field]] = {
 }  # fmt: skip
 #: How a study comes by its cases.
 CASES: Final = Kind(
-    {**_PLAIN, **{name: field for kind in _PLANNED.values() for name, field in kind.fields.items()}}, _read_cases
+    {**_PLAIN, **{name: field for kind in _PLANNED.values() for name, field in kind.fields.items()}},
+    _read_cases,
+    chooses=True,
 )
 #: What is done with the cases; in this order.
 WITH_CASES: Final = (SWEEPS, MANY_STARTS, DRIVES)
+#: Fields of a spec that say which cases a study has.
+WHICH_CASES: Final = frozenset(name for kind in (CASES, *WITH_CASES) if kind.chooses for name in kind.fields)
+
+
+def without_cases(spec: Mapping[str, Any], kept: Collection[str] = ()) -> dict[str, Any]:
+    """``spec`` without the fields that say which cases it has, except for those that are ``kept``."""
+    return {key: value for key, value in spec.items() if key not in WHICH_CASES or key in kept}

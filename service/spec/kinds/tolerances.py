@@ -100,7 +100,7 @@ def _read(draft: Draft) -> Finish | None:
 
 
 #: Studies of drives as they are built.
-DRIVES: Final = Kind(SPREAD, _read)
+DRIVES: Final = Kind(SPREAD, _read, chooses=True)
 
 
 def _read_spread(spec: Node, axes: Sequence[Axis] | None) -> Spread | None:

@@ -9,7 +9,7 @@ from sprag.service.figures.motion import motion_figure
 from sprag.service.figures.read import read_figure
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.json_text import numbers
-from sprag.service.spec.fields import without_cases
+from sprag.service.spec.kinds.registry import without_cases
 from sprag.worker import models
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from sprag.service.reading.faults import message
 from sprag.service.spec.derive import with_values
 from sprag.service.spec.design import design_spec
 from sprag.service.spec.document import parse_spec
-from sprag.service.spec.fields import WHICH_CASES, without_cases
+from sprag.service.spec.kinds.registry import WHICH_CASES, without_cases
 from sprag.service.spec.report import SpecError
 from sprag.service.spec.stored import accepted
 from sprag.worker import models
