@@ -196,12 +196,12 @@ def test_what_people_write_and_heartbeats_do_not_wait_for_rows(
         def slowly(*given: Any) -> None:
             insert(*given)
             copied.set()
-            assert go_on.wait(60)
+            assert go_on.wait(600)
 
         monkeypatch.setattr(store.session, "insert_blocks", slowly)
         storing = threading.Thread(target=store.work.commit, args=(epoch, chunk, fakes.result(0, size)))
         storing.start()
-        assert copied.wait(60)
+        assert copied.wait(600)
         for service in (store, other):
             for study_id in (record.id, waiting.id):
                 service.studies.change(study_id, StudyChange(name=f"renamed {study_id}"))
