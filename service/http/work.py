@@ -145,7 +145,11 @@ class Work:
 
     async def _attended(self, work: Coroutine[Any, Any, R]) -> R:
         """The value of ``work``, which is cancelled when the client disconnects."""
-        await end_moment()  # it may take long
+        try:
+            await end_moment()  # the work may take long
+        except BaseException:
+            work.close()  # nobody awaits it
+            raise
         doing, leaving = asyncio.ensure_future(work), asyncio.ensure_future(self._left())
         try:
             await asyncio.wait((doing, leaving), return_when=asyncio.FIRST_COMPLETED)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import threading
 from collections import Counter
 from random import Random
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 
     from anyio.from_thread import BlockingPortal
     from starlette.types import Receive, Scope, Send
+
+    from sprag.service.http.kept_files import KeptFiles
 
 EXPORTS = 45
 STREAMS = 50
@@ -88,6 +91,11 @@ async def until(condition: Callable[[], bool]) -> None:
             await anyio.sleep(0.001)
 
 
+def wanting(files: KeptFiles) -> list[int]:
+    """The requests that want each file."""
+    return [entry.clients for entry in files._entries.values()]
+
+
 def rows(study_id: str, form: str) -> str:
     return f"{API}/studies/{study_id}/results?format={form}"
 
@@ -97,12 +105,13 @@ def test_one_request_writes_what_many_want(
     service: Service, ended: str, tokens: dict[str, str], portal: BlockingPortal, form: str
 ) -> None:
     curve = f"{API}/studies/{ended}/curves?rest=usual"
+    files = service.app.state.context.files
 
     async def export() -> None:
         held = Held(service)
         order = Random(form).choices(["one", "one", "one", "writer"], k=EXPORTS)
         asked = [asyncio.ensure_future(ask(service, rows(ended, form), tokens[name])) for name in order]
-        await until(lambda: bool(held.begun) and not threads_taken())
+        await until(lambda: wanting(files) == [EXPORTS] and bool(held.begun) and not threads_taken())
         # Everybody waits for the file, and nobody for a thread.
         for path in ("/livez", "/readyz", curve):
             assert (await ask(service, path, tokens["other"])).status_code in (200, 503)
@@ -187,7 +196,7 @@ def test_a_file_is_written_on_while_anybody_wants_it(
         first, second, third = (
             asyncio.ensure_future(ask(service, rows(ended, "csv"), tokens[name])) for name in ("one", "one", "other")
         )
-        await until(lambda: [entry.clients for entry in files._entries.values()] == [3] and bool(held.begun))
+        await until(lambda: wanting(files) == [3] and bool(held.begun))
         first.cancel()
         await asyncio.wait([first])
         held.allowed.set()
@@ -205,7 +214,7 @@ def test_the_last_client_ends_the_file_and_the_next_begins_anew(
     async def export() -> None:
         held = Held(service)
         asked = [asyncio.ensure_future(ask(service, rows(ended, "csv"), tokens[name])) for name in ("one", "other")]
-        await until(lambda: len(held.begun) == 1)
+        await until(lambda: wanting(files) == [2] and len(held.begun) == 1)
         for task in asked:
             task.cancel()
         await asyncio.wait(asked)
@@ -218,6 +227,27 @@ def test_the_last_client_ends_the_file_and_the_next_begins_anew(
         assert [path.is_file() for path in files._folder.iterdir()] == [True], "what was begun is gone"
 
     portal.call(export)
+
+
+def test_who_leaves_before_the_file_is_begun_leaves_nothing(
+    service: Service, ended: str, tokens: dict[str, str], portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def export() -> None:
+        ending = anyio.Event()
+
+        async def end_moment() -> None:
+            ending.set()
+            await anyio.sleep_forever()
+
+        monkeypatch.setattr(work, "end_moment", end_moment)
+        leaver = asyncio.ensure_future(ask(service, rows(ended, "csv"), tokens["one"]))
+        await ending.wait()
+        leaver.cancel()
+        await asyncio.wait([leaver])
+
+    portal.call(export)
+    gc.collect()  # what is never awaited warns, and warnings are errors
+    assert not wanting(service.app.state.context.files)
 
 
 def test_who_waits_for_a_turn_takes_a_file_that_another_has_written(
@@ -301,6 +331,8 @@ def test_rows_that_are_read_slowly_leave_a_process_for_files(
 
 
 def test_a_failure_is_everybodys(service: Service, ended: str, tokens: dict[str, str], portal: BlockingPortal) -> None:
+    files = service.app.state.context.files
+
     async def export() -> None:
         held = Held(service)
 
@@ -311,7 +343,7 @@ def test_a_failure_is_everybodys(service: Service, ended: str, tokens: dict[str,
 
         service.writer.run = fail  # type: ignore[method-assign]
         asked = [asyncio.ensure_future(ask(service, rows(ended, "xlsx"), tokens["one"])) for _ in range(5)]
-        await until(lambda: len(held.begun) == 1 and not threads_taken())
+        await until(lambda: wanting(files) == [5] and len(held.begun) == 1)
         held.allowed.set()
         assert {answer.status_code for answer in await asyncio.gather(*asked)} == {422}
         assert len(held.begun) == 1
