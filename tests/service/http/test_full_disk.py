@@ -25,15 +25,6 @@ from tests.serving import served
 BUILT = ("xlsx", "netcdf")
 
 
-@pytest.fixture
-def ended(service: Service, spec: dict[str, Any]) -> str:
-    """A study of several blocks of rows that has ended."""
-    spec["axes"] = [{"path": "shaft.load", "linspace": [0.01, 0.5, 12]}]
-    study_id = service.submit(spec)
-    service.fill(study_id)
-    return study_id
-
-
 @pytest.fixture(autouse=True)
 def _small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     blocks = Rows.blocks

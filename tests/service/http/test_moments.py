@@ -37,14 +37,6 @@ def reading(service: Service, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple
         sa.event.remove(sa.Engine, "before_cursor_execute", told)
 
 
-@pytest.fixture
-def ended(service: Service, spec: dict[str, Any]) -> str:
-    spec["axes"] = [{"path": "shaft.load", "linspace": [0.01, 0.5, 12]}]
-    study_id = service.submit(spec)
-    service.fill(study_id)
-    return study_id
-
-
 @pytest.mark.parametrize(
     "address", [*(f"/studies/{{}}{page}" for page in PAGES), *(f"{API}/studies/{{}}{of}" for of in ANSWERS)]
 )

@@ -15,6 +15,7 @@ from sprag.service.storage.store import Store
 from sprag.service.storage.studies import purging
 from sprag.service.storage.studies.records import StudyRecord
 from sprag.worker.chunking import Chunking
+from tests.contract.filling import finish
 from tests.worker import fakes
 
 SECONDS = 600.0
@@ -28,12 +29,7 @@ def store(sqlite_url: str) -> Iterator[Store]:
 
 def finished(store: Store, cases: int = 9) -> StudyRecord:
     record = store.studies.create({}, fakes.study(cases))
-    epoch = store.work.take_over("test")
-    chunks = store.work.open_chunks(record.number)
-    store.work.claim(epoch, chunks)
-    for chunk in chunks:
-        store.work.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
-    store.work.settle(epoch, record.number)
+    finish(store, record)
     return record
 
 

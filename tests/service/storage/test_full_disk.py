@@ -23,6 +23,7 @@ from sprag.service.storage.database.lock import DispatcherLock
 from sprag.service.storage.readiness import Readiness
 from sprag.service.storage.store import Store
 from sprag.worker.chunking import Chunking
+from tests.contract.filling import finish
 from tests.worker import fakes
 
 place = Path(sys.argv[1])
@@ -43,11 +44,7 @@ MAKING_ROOM = """
 with Store.open(f"sqlite:///{place / 'a.sqlite3'}", chunking=Chunking(cases=500)) as store:
     record = store.studies.create({}, fakes.study(20_000))
     waiting = store.studies.create({}, fakes.study(500))
-    epoch = store.work.take_over("test")
-    for chunk in store.work.open_chunks(record.number):
-        store.work.claim(epoch, [chunk])
-        store.work.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
-    store.work.settle(epoch, record.number)
+    epoch = finish(store, record)
     assert store.work.shortage() is None, "makes the reserve"
     assert Readiness(store).problems() == ()
     with store.session.plain() as connection:
@@ -81,11 +78,7 @@ OPENED_ON_FULL = """
 url = f"sqlite:///{place / 'a.sqlite3'}"
 with Store.open(url, chunking=Chunking(cases=500)) as store:
     record = store.studies.create({}, fakes.study(20_000))
-    epoch = store.work.take_over("test")
-    for chunk in store.work.open_chunks(record.number):
-        store.work.claim(epoch, [chunk])
-        store.work.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
-    store.work.settle(epoch, record.number)
+    epoch = finish(store, record)
     assert store.work.shortage() is None, "makes the reserve"
     store.work.let_go(epoch)
 fill_up()

@@ -14,6 +14,7 @@ from sprag.service.storage.store import Store
 from sprag.service.storage.work.room import RESERVE_BYTES
 from sprag.worker.chunking import Chunking
 from sprag.worker.ports import StoreFullError
+from tests.contract.filling import finish
 from tests.faults import refused
 from tests.worker import fakes
 
@@ -40,11 +41,7 @@ def world(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 def fill(store: Store) -> str:
     """A finished study of some 8 MB of rows; its id."""
     record = store.studies.create({}, fakes.study(20_000))
-    epoch = store.work.take_over("test")
-    for chunk in store.work.open_chunks(record.number):
-        store.work.claim(epoch, [chunk])
-        store.work.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
-    store.work.settle(epoch, record.number)
+    finish(store, record)
     return record.id
 
 
