@@ -28,7 +28,7 @@ _WORDS: Final = re.compile(r"[a-z]{3}|\b(?:as|in|no|or)\b")
 
 
 def fault_texts() -> Iterator[str]:
-    """Messages of faults and what they say is allowed; some more than once. Those with values are phrases.
+    """Messages of faults and what they say is allowed; some more than once. Those with values are sentences.
 
     Raises ValueError for an f-string, which cannot be translated.
     """

@@ -54,9 +54,9 @@ def _add(connection: sa.Connection, described: sa.MetaData) -> None:
 
 def _hash_kin(connection: sa.Connection) -> None:
     """0004: studies have the hash that those with a common case share."""
-    rows = connection.execute(sa.text("SELECT number, study, engine_version FROM studies")).all()
-    for number, text, engine in rows:
-        study = json.loads(text)
+    engines = connection.execute(sa.text("SELECT number, engine_version FROM studies")).all()
+    for number, engine in engines:
+        study = json.loads(_text(connection, "studies", "study", number))
         paths = sorted({*study["base"], *(path for axis in study["axes"] for path in axis["paths"])})
         content = json.dumps(
             {"engine": engine, "model": study["model"], "run": study["run"], "paths": paths},
@@ -81,8 +81,8 @@ def _name_variants(connection: sa.Connection) -> None:
 def _give_durations(connection: sa.Connection) -> None:
     """0014: a run without duration and window lasted 60 periods; now it lasts until its motion is settled."""
     for table in ("studies", "schedules"):
-        for number, text in connection.execute(sa.text(f"SELECT number, spec FROM {table}")).all():  # noqa: S608
-            spec = json.loads(text)
+        for number in connection.execute(sa.text(f"SELECT number FROM {table}")).scalars().all():  # noqa: S608
+            spec = json.loads(_text(connection, table, "spec", number))
             if not isinstance(spec, dict) or spec.get("model") != "vibration-drive":
                 continue
             run = spec.get("run", {})
@@ -146,6 +146,13 @@ def _keep_ranks(connection: sa.Connection) -> None:
 def _drop_index_of_kin(connection: sa.Connection) -> None:
     """0035: another index begins with the same column."""
     connection.execute(sa.text("DROP INDEX IF EXISTS ix_studies_kin_hash"))
+
+
+def _text(connection: sa.Connection, table: str, name: str, number: int) -> str:
+    """A text of a row. One at a time: that of a study can have megabytes."""
+    rows = sa.table(table, sa.column("number"), sa.column(name))
+    text: str = connection.execute(sa.select(rows.c[name]).where(rows.c.number == number)).scalar_one()
+    return text
 
 
 def _set(connection: sa.Connection, table: str, number: int, **values: str) -> None:

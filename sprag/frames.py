@@ -73,13 +73,18 @@ def simulate(
     Raises
     ------
     ValueError
-        Where a path is unknown or missing, a value out of range, or the arrays differ in length.
+        Where a path is unknown or missing, a value out of range, the arrays differ in length, or ``run`` or ``base`` is
+        given for a model that does not take it.
     SpecError
         Where the machine of another model is invalid.
     """
     index = cases.index if isinstance(cases, pd.DataFrame) else None
     columns = {str(path): np.asarray(values, dtype=np.float64) for path, values in cases.items()}
     count = _count(columns) if index is None else len(index)
+    if base is not None and model == VIBRATION_DRIVE:
+        raise ValueError(f"base: not used by {model}, whose cases have every parameter")
+    if run is not None and model != VIBRATION_DRIVE:
+        raise ValueError(f"run: not used by {model}; only {VIBRATION_DRIVE} takes it")
     if model != VIBRATION_DRIVE:
         return _of_model(model, base or {}, columns, count, index)
     for path, values in columns.items():

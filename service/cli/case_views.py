@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from sprag.service import languages
 from sprag.service.cli import completion
 from sprag.service.cli.console import ExitCode, WrongInputError, say, write_json, wrong_option
 from sprag.service.cli.file_formats import PICTURES, value_format
@@ -24,6 +25,7 @@ from sprag.service.cli.options import (
     CaseOption,
     JsonFlag,
     OutputFile,
+    PictureLanguage,
     PointsFile,
     Server,
     StartOption,
@@ -31,6 +33,7 @@ from sprag.service.cli.options import (
     Token,
     ValueFormat,
     ValueFormatOption,
+    in_language,
 )
 from sprag.service.cli.remote import connection
 from sprag.service.faults import Fault, FaultError
@@ -64,13 +67,15 @@ def command(about: ViewInfo) -> Callable[..., None]:
     def run(
         spec: str, case: int, file: str | None, form: ValueFormat | None, server: str, token: str | None, as_json: bool,
         points_file: str | None = None, tables: list[str] | None = None, start: int | None = None, every: bool = False,
-        **settings: Any,
+        language: str | None = None, **settings: Any,
     ) -> None:  # fmt: skip
         written = value_format(form, file, as_json, PICTURES if about.pictures else ())
+        drawing = in_language(language)
         if is_study(spec):
             from sprag.service.client.wire import case_path
 
-            query = [*query_of(asked, settings), *([] if start is None else [("start", str(start))])]
+            _refuse_local(every=every, points_file=points_file, tables=tables)
+            query = [*query_of(asked, settings), *([] if start is None else [("start", str(start))]), *drawing]
             with connection(server, token) as client:
                 path = case_path(study_of(client, spec), case, f"/{about.name}")
                 with client.pieces(path, [*query, ("format", written)]) as pieces:
@@ -91,7 +96,7 @@ def command(about: ViewInfo) -> Callable[..., None]:
         if every:
             _write_all(study, chosen[0], file, as_json=written == "json")
         else:
-            _write(view, study, case, chosen, start, written, file, as_json)
+            _write(view, study, case, chosen, start, written, file, dict(drawing), as_json)
 
     options = [parameter(one.name, option(one), one.default) for one in asked]
     last = [
@@ -100,12 +105,23 @@ def command(about: ViewInfo) -> Callable[..., None]:
         *([parameter("every", _EachCase, False)] if about is TRANSIENT else ()),
         *([parameter("points_file", PointsFile, None)] if not counted else ()),
         parameter("tables", TableFiles, None), parameter("file", OutputFile, None),
-        parameter("form", ValueFormatOption, None), parameter("server", Server, DEFAULT_SERVER),
+        parameter("form", ValueFormatOption, None),
+        *([parameter("language", PictureLanguage, None)] if about.pictures else ()),
+        parameter("server", Server, DEFAULT_SERVER),
         parameter("token", Token, None), parameter("as_json", JsonFlag, False),
     ]  # fmt: skip
     run.__doc__ = about.summary
     run.__signature__ = Signature([parameter("spec", SpecOrStudy, ...), *options, *last])  # type: ignore[attr-defined]
     return run
+
+
+def _refuse_local(**given: Any) -> None:
+    """Refuse what only a spec has; WrongInputError."""
+    options = {"every": "--all", "points_file": "--points", "tables": "--file"}
+    for name, value in given.items():
+        if value:
+            reason = N_("belongs to a spec that is run here, not to a study of a service")
+            raise wrong_option(options[name], "not-used", reason, value if isinstance(value, str) else None)
 
 
 def is_study(spec: str) -> bool:
@@ -175,7 +191,9 @@ def naming_options(study: Study, asked: Sequence[NamedSetting], lacks: str) -> I
             raise wrong_option("/model", "wrong-type", lacks, study.model, detail=error.detail) from error
         options = {one.alias: one.option for one in asked}
         faults = [
-            Fault(_named(options, fault), fault.code, fault.message, fault.value, fault.allowed)
+            fault
+            if fault.where is None
+            else Fault(_named(options, fault), fault.code, fault.message, fault.value, fault.allowed)
             for fault in error.faults
         ]
         raise WrongInputError("invalid-parameter", _("invalid option"), faults) from error
@@ -188,14 +206,18 @@ def _named(options: dict[str, str], fault: Fault) -> str:
 
 def _write(
     view: CaseView[Any, Any, Any], study: Study, case: int, chosen: Any, start: int | None, form: Any,
-    file: str | None, as_json: bool,
+    file: str | None, drawing: Mapping[str, str], as_json: bool,
 ) -> None:  # fmt: skip
     """Compute the view of a case, write it, and say what it has."""
     from sprag.service.views.case_view import drawn, see, written
 
     with output(file) as write:
         answer = see(study, case, view, chosen, start)
-        content = drawn(view, answer, form) if form in PICTURES else written(view, answer, form)
+        if form in PICTURES:
+            with languages.language(drawing.get("language", languages.ENGLISH)):
+                content = drawn(view, answer, form)
+        else:
+            content = written(view, answer, form)
         write(content if content.endswith(b"\n") or form in PICTURES else content + b"\n")
     said = view.said(answer)
     if said is None:

@@ -11,6 +11,8 @@ from sprag.service.cli.console import OK, Column, cell_text, say, show_table, wa
 from sprag.service.languages import N_, _, decimal
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from sprag.service.answers import Value
     from sprag.service.answers.key import AnswerValue
     from sprag.service.reading.reader import Reading
@@ -221,11 +223,11 @@ def _share(share: float | None) -> str:
     return "" if share is None else f"{cell_text(round(100.0 * share, 1))} %"
 
 
-def show_answers(found: dict[str, Any], model: str) -> None:
+def show_answers(found: dict[str, Any], model: Callable[[], str]) -> None:
     """A table for each curve: its answers and its working point; then the extremes among all cases."""
     from sprag.service.reading.reader import Reading  # knows the models
 
-    reading = Reading(model)
+    reading = Reading(model())
     x = heading(found["x"] or "", found["unit"] or "1")
     columns: list[Column] = [
         (_("answer"), False, True),

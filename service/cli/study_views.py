@@ -60,20 +60,21 @@ _FORMATS: Final = ("csv", *PICTURES)
 class Command:
     """The command of a view: its name, how it shows the answer, and what differs from the settings of the view.
 
-    ``show`` gets the answer, and the model of the study. ``limits`` gives the most rows of a table and of a file.
+    ``show`` gets the answer, and what gives the model of the study. ``limits`` are the most rows of a table and of a
+    file.
     """
 
     name: str
     about: ViewInfo
-    show: Callable[[dict[str, Any], str], None]
-    limits: Callable[[], tuple[int, int]] | None = None
+    show: Callable[[dict[str, Any], Callable[[], str]], None]
+    limits: tuple[int, int] | None = None
 
 
 _COMMANDS: Final = (
     Command("answers", questions.ANSWERS, show_answers),
     Command("curve", questions.CURVES, lambda found, _model: show_curves(found)),
-    Command("explore", questions.EXPLORE, lambda found, _model: show_cases(found), lambda: (20, MAX_SELECTED)),
-    Command("front", questions.FRONT, lambda found, _model: show_designs(found), lambda: (20, MAX_DESIGNS)),
+    Command("explore", questions.EXPLORE, lambda found, _model: show_cases(found), (20, MAX_SELECTED)),
+    Command("front", questions.FRONT, lambda found, _model: show_designs(found), (20, MAX_DESIGNS)),
     Command("calibration", questions.CALIBRATION, lambda found, _model: show_calibration(found)),
     Command("map", questions.MAP, lambda found, _model: show_map(found)),
     Command("ribbon", questions.RIBBON, lambda found, _model: show_ribbon(found)),
@@ -104,11 +105,13 @@ def _made(command: Command) -> Callable[..., None]:
             settings["quantile"] = list(map(_probability, settings["quantile"]))
         whole, most = settings, None
         if command.limits is not None:
-            few, most = command.limits()
+            few, most = command.limits
             settings = {**settings, "limit": settings["limit"] or few}
             whole = {**settings, "limit": most}
         drawing = [*in_units(units), *in_language(language)]
-        opened = _remote(study, server, token, about, asked) if is_study(study) else _local(study, about, asked)
+        opened = (
+            _remote(study, server, token, about, asked) if is_study(study) else _local(study, about, asked, settings)
+        )
         with opened as source:
             found = source.answer(settings)
             if file is not None and form is not None:
@@ -116,7 +119,7 @@ def _made(command: Command) -> Callable[..., None]:
             if as_json:
                 write_json(found)
             else:
-                command.show(found, source.model())
+                command.show(found, source.model)
         if file is not None:
             _say_file(file, form, None if most is None or found.get("selected", 0) <= most else most)
 
@@ -183,7 +186,7 @@ def _remote(
 
 
 @contextmanager
-def _local(path: str, about: ViewInfo, asked: tuple[NamedSetting, ...]) -> Iterator[_Source]:
+def _local(path: str, about: ViewInfo, asked: tuple[NamedSetting, ...], first: dict[str, Any]) -> Iterator[_Source]:
     """The view of the study of a spec, which is run here first."""
     from sprag.service.reading.quantities import SI
     from sprag.service.reading.reader import CAPTIONS, Choice
@@ -194,6 +197,9 @@ def _local(path: str, about: ViewInfo, asked: tuple[NamedSetting, ...]) -> Itera
     parsed = read_study(path)
     say(*warning_lines(parsed.warnings))
     view = STUDY_VIEWS[about.name]
+    if parsed.study.plan is None:  # otherwise the cases that it chooses decide what can be asked
+        with naming_options(parsed.study, asked, ""):
+            view.choose(parsed.study, about.question(**first))
 
     def file_of(settings: dict[str, Any], form: str, drawing: dict[str, str]) -> bytes:
         with naming_options(study, asked, ""):

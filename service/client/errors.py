@@ -92,7 +92,8 @@ def _fault(error: Mapping[str, Any]) -> Fault:
     code = cast("Code", error["code"] if error.get("code") in get_args(Code) else "invalid-text")
     made = ParameterFault if error.get("parameter") is not None else Fault
     where = error.get("parameter", error.get("pointer"))
-    message = _sentence(error, "message") or str(error.get("message", "is wrong"))
+    message = _sentence(error, "message") or "is wrong"
+    message = message if isinstance(message, str) else str(message)
     return made(where, code, message, _sentence(error, "value"), _sentence(error, "allowed"), error.get("unit"))
 
 

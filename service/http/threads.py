@@ -63,7 +63,10 @@ async def in_thread(function: Callable[..., R], *args: Any, threads: Threads | N
     kind = threads or (Threads.WRITE if current().changing else Threads.READ)
     if kind is Threads.READ:
         moment = current().moment
-        return await anyio.to_thread.run_sync(call if moment is None else partial(_joined, moment, call))
+        if moment is None:
+            return await anyio.to_thread.run_sync(call)
+        # What holds a connection has a thread at once: the others may all wait for connections. Those are limited.
+        return await anyio.to_thread.run_sync(partial(_joined, moment, call), limiter=_unlimited() if moment else None)
     place = _places()[kind]
     if kind is Threads.WRITE:
         try:
@@ -113,7 +116,7 @@ def _joined(moment: Moment, call: Callable[[], R]) -> R:
 async def end_moment() -> None:
     """End the moment in which the current request reads; what it reads next is of another one."""
     if moment := current().moment:
-        await anyio.to_thread.run_sync(moment.end)
+        await anyio.to_thread.run_sync(moment.end, limiter=_unlimited())
 
 
 class ThreadedRoute(APIRoute):

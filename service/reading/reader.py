@@ -261,7 +261,9 @@ def reading_for(study: Study, spec: Mapping[str, Any], choice: Choice) -> Readin
     return Reading(study.model, units_for(study, spec, choice.units), choice.names)
 
 
-#: Sentences that earlier releases stored in English only: what they say is found in them again, for one release.
+# Sentences that earlier releases stored in English only: what they say is found in them again, for one release.
+
+#: Units of SI.
 _SI: Final = {kind.unit for kind in KINDS} | {"N*m/rad"}
 _UNITS: Final = sorted(_SI | {unit for kind in KINDS for unit in kind.others}, key=len, reverse=True)
 #: A number in a sentence.

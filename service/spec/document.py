@@ -1,7 +1,8 @@
 """The study spec, version 1: turns JSON or TOML data into a study in SI numbers, or reports all its faults.
 
 Its parts are the modules beside it (`text`, `units`, `run`, `warnings`, the `report` of faults) and packages: `machine`
-(drive, clutch, shaft), `axes` (values, points, samples, combinations), `draws` (tolerances), `plan`, `schema`.
+(drive, clutch, shaft), `axes` (values, points, samples, combinations), `draws` (distributions and correlations),
+`kinds` (of studies), `schema`.
 """
 
 from __future__ import annotations

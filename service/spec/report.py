@@ -48,7 +48,7 @@ class Report:
     ) -> None:
         """Record a fault, unless there are `MAX_PROBLEMS` already; numbers appear as the user wrote them.
 
-        ``message`` and ``allowed`` are phrases, texts of the catalogue, or names that are the same in all languages.
+        ``message`` and ``allowed`` are sentences, texts of the catalogue, or names that are the same in all languages.
         """
         self.found += 1
         if not self.full:

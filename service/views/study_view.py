@@ -89,7 +89,7 @@ class StudyView(ABC, Generic[Question, Chosen, Result]):
 
     @abstractmethod
     def csv(self, answer: StudyAnswer[Chosen, Result], reading: Reading) -> bytes:
-        """The view as a table, in a reader's units."""
+        """The view as a table, in a reader's units where it has columns in them."""
 
     def figure(self, answer: StudyAnswer[Chosen, Result], columns: int = 2) -> Figure | None:
         """The view as a described figure with so many panels in a row; None where there is nothing to draw."""

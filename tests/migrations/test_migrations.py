@@ -83,7 +83,7 @@ def upgrade(url: str) -> tuple[str | None, str]:
 
 
 def schema(session: Session) -> dict[str, object]:
-    """What the tables of a database are, in any order and without names of constraints."""
+    """What the tables of a database are, in any order and without names of foreign keys."""
     with session.read() as connection:
         there = sa.inspect(connection)
         unnamed = {

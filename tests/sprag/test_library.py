@@ -148,6 +148,10 @@ def test_the_library_runs_cases_of_any_model() -> None:
     assert results.attrs["units"]["omega.mean"] == "rad/s"
     with pytest.raises(sprag.SpecError, match="/base/drive: is required"):
         sprag.simulate({"drive.inertia": 1.0}, model="machine-shaft")
+    with pytest.raises(ValueError, match="run: not used by machine-shaft"):
+        sprag.simulate({"drive.inertia": 1.0}, sprag.engine.Run(), model="machine-shaft", base=press["base"])
+    with pytest.raises(ValueError, match="base: not used by vibration-drive"):
+        sprag.simulate(drive(1), base={})
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 from urllib.parse import urlencode
 
 from fastapi import Request
@@ -18,9 +18,6 @@ from sprag.service.views import basin as basins
 from sprag.service.views.case_questions import BasinQuestion
 from sprag.service.views.cases import CASE_VIEWS
 from sprag.service.views.setting import question_of, settings_of
-
-if TYPE_CHECKING:
-    pass
 
 router = page_router()
 

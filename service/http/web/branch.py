@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from starlette.responses import Response
 
@@ -16,9 +16,6 @@ from sprag.service.results.start_states import check_start
 from sprag.service.views.branch import along_of, result_of, usual_along
 from sprag.service.views.portrait import require_strobes
 from sprag.worker.models.abilities import branch_results
-
-if TYPE_CHECKING:
-    pass
 
 router = page_router()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Any, Final
 
 from fastapi import Query
 from starlette.responses import Response
@@ -17,9 +17,6 @@ from sprag.service.results.start_states import check_start
 from sprag.service.views.branch import usual_along
 from sprag.service.views.portrait import require_strobes
 from sprag.service.views.sections import diagram_of, section_of, variable_of, variables
-
-if TYPE_CHECKING:
-    pass
 
 router = page_router()
 

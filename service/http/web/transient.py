@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Any, Final
 from urllib.parse import urlencode
 
 from fastapi import Query
@@ -20,9 +20,6 @@ from sprag.service.languages import N_
 from sprag.service.views.transient import course_of, require_transients
 from sprag.worker.models.abilities import has_motor, run_transient, shape_of_transients
 from sprag.worker.models.transients import RESULTS
-
-if TYPE_CHECKING:
-    pass
 
 router = page_router()
 

@@ -80,6 +80,7 @@ Part = SampleRange | SampleDistribution
 
 def read_sample(item: Node) -> Block | None:
     """Read the block of a sample; None, with the faults recorded, when it is invalid."""
+    before = item.report.found
     SAMPLE.read(item)
     method, count, seed, second_order = SAMPLE.values(item).values()
     parts = SAMPLE.items(item, "ranges")
@@ -99,7 +100,8 @@ def read_sample(item: Node) -> Block | None:
         )  # fmt: skip
     if method == "morris":
         _check_trajectories(item, count, parts)
-    if not item.sound or method is None or count is None or seed is None:
+    # A sample counts its own faults: the axes before it may have some too.
+    if item.report.found > before or method is None or count is None or seed is None:
         return None
     known = tuple(part for part in read if part is not None)
     correlations = item["correlations"]

@@ -75,7 +75,8 @@ class Kind(NamedTuple):
     ----------
     fields : its fields of the spec with their descriptions
     read : reads them, records their faults, and returns what is left to do; None where nothing is
-    chooses : whether its fields say which cases the study has, so that a study of other cases drops them
+    chooses : whether its fields say which cases the study has, so that a study of other cases drops them; of kinds
+        that `cases` reads, `cases` says it
     """
 
     fields: Mapping[str, Field]

@@ -32,11 +32,6 @@ def one_of(schema: Schema, names: Iterable[str]) -> Schema:
     return {**schema, "oneOf": [{"required": [name]} for name in names]}
 
 
-def quantities(parameters: Mapping[str, Parameter]) -> Schema:
-    """Schemas of quantities by name."""
-    return {name: quantity_schema(parameter) for name, parameter in parameters.items()}
-
-
 def required_of(parameters: Mapping[str, Parameter]) -> list[str]:
     """The names of those that have no default."""
     return [name for name, parameter in parameters.items() if parameter.default is None]

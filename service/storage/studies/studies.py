@@ -173,25 +173,8 @@ class Studies(Part):
         It is that of ``run``, the due time of a schedule: RunClosedError where this has an outcome by now. FaultError
         where there are as many waiting studies as the ``queue`` takes, or the sender's share of it is used up.
         """
-        values = {
-            **row,
-            "id": f"st_{secrets.token_hex(8)}",
-            "state": StudyState.QUEUED.value,
-            "done": 0,
-            "ok": 0,
-            "priority": priority,
-            "fresh": int(fresh),
-            "finish_by": None if finish_by is None else micros_of(finish_by),
-            # The cases of a round are in order of their value already.
-            "coarse": row["coarse"] or COARSE_TO_FINE * (finish_by is not None and row["most_cases"] is None),
-            "revision": 1,
-            "owner": acting().user,
-            "search": search_text(row["name"]),
-            "created_at": self._now(),
-        }
-        keys = values.pop("keys", None)
-        values["keyed"] = NOT_YET if "keys" not in row else TOO_MANY if keys is None else KEYED
-        values["digest"] = digest_of_study(values)
+        values = _queued(row, priority, fresh=fresh, finish_by=finish_by, now=self._now())
+        keys = row.get("keys")
         with self.session.write() as connection:
             if idempotency_key is not None:
                 earlier = _study_of_key(connection, idempotency_key, body_hash)
@@ -561,6 +544,30 @@ class Studies(Part):
         """The rounds of a study, in order; none where its cases were given. Raises StudyNotFoundError."""
         with self.session.read() as connection:
             return rounds_of(connection, row_of(connection, study_id, STUDIES.c.number).number)
+
+
+def _queued(
+    row: Mapping[str, Any], priority: int, *, fresh: bool, finish_by: datetime | None, now: int
+) -> dict[str, Any]:
+    """The columns of a study that is accepted now, with its digest."""
+    values = {
+        **{name: value for name, value in row.items() if name != "keys"},
+        "id": f"st_{secrets.token_hex(8)}",
+        "state": StudyState.QUEUED.value,
+        "done": 0,
+        "ok": 0,
+        "priority": priority,
+        "fresh": int(fresh),
+        "finish_by": None if finish_by is None else micros_of(finish_by),
+        # The cases of a round are in order of their value already.
+        "coarse": row["coarse"] or COARSE_TO_FINE * (finish_by is not None and row["most_cases"] is None),
+        "revision": 1,
+        "owner": acting().user,
+        "search": search_text(row["name"]),
+        "created_at": now,
+        "keyed": NOT_YET if "keys" not in row else TOO_MANY if row["keys"] is None else KEYED,
+    }
+    return {**values, "digest": digest_of_study(values)}
 
 
 def _values(study: Study) -> int:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import TYPE_CHECKING, Any
 
 import pytest
 from typer.main import get_command
 
+from sprag.service import languages
 from sprag.service.cli import case_views, study_views
 from sprag.service.cli.app import app
 from sprag.service.views.case_questions import CASE_VIEWS
@@ -74,11 +76,16 @@ def test_views_of_a_case(sprag: Callable[..., Finished], sources: tuple[Path, st
     pictures = []
     for number, source in enumerate(sources):
         file = tmp_path / f"{number}.svg"
-        assert sprag("strobes", source, "--case", 1, "-o", file).code == 0
-        pictures.append(file.read_bytes())
-    assert pictures[0] == pictures[1]
+        for options in ((), ("--language", "uk")):
+            with languages.language("uk"):  # that of the command, which pictures have only where it is asked for
+                assert sprag("strobes", source, "--case", 1, "-o", file, *options).code == 0
+            pictures.append(file.read_text())
+    assert pictures[:2] == pictures[2:]
+    assert [bool(re.search("[а-яі]{3}", picture)) for picture in pictures[:2]] == [False, True]
     refused = sprag("engagements", sources[0], "-o", tmp_path / "wrong.svg")
     assert (refused.code, "a name that ends in .csv, .json" in refused.err) == (2, True)
+    refused = sprag("transient", sources[1], "--kind", "run-up", "--all")
+    assert (refused.code, "--all: belongs to a spec" in refused.err) == (2, True)
 
 
 def _answer(done: Finished) -> dict[str, Any]:
@@ -88,12 +95,21 @@ def _answer(done: Finished) -> dict[str, Any]:
     return answer
 
 
-def test_wrong_settings_name_their_options(sprag: Callable[..., Finished], sources: tuple[Path, str]) -> None:
+def test_wrong_settings_name_their_options(
+    sprag: Callable[..., Finished], sources: tuple[Path, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     done = sprag("curve", sources[0], "--x", "shaft.lode")
     assert done.code == 2
     assert "--x: not an axis of this study; did you mean 'shaft.load'?" in done.err
     done = sprag("ribbon", sources[0], "--quantile", "105%")
     assert (done.code, "--quantile: is no probability" in done.err) == (2, True)
+
+    def run(*_: object, **__: object) -> None:
+        raise AssertionError("the study is run before what is wrong is told")
+
+    monkeypatch.setattr(study_views, "run_parsed", run)
+    done = sprag("front", sources[0])
+    assert (done.code, "(the whole spec): the study has no goal" in done.err) == (2, True)
 
 
 def test_every_view_has_a_command_with_its_settings() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,11 +11,14 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import sqlalchemy as sa
 
+from sprag.service.http.threads import _in_one_moment, in_thread
 from sprag.service.storage.database.session import Moment, Session
 from tests.service.conftest import API
 from tests.service.http.api.test_one_moment import end
 
 if TYPE_CHECKING:
+    from anyio.from_thread import BlockingPortal
+
     from tests.service.conftest import Service
 
 PAGES = ("", "/explore", "/cases", "/curves", "/cases/3")
@@ -88,3 +92,25 @@ def test_a_moment_ends_with_an_error_of_the_database(service: Service, monkeypat
     assert service.http.get(f"{API}/studies/st_0123456789abcdef").status_code == 404
     assert taken
     assert service.store.session._engine.pool.checkedout() == 0  # type: ignore[attr-defined]
+
+
+def test_many_readers_at_once_do_not_wait_for_each_others_connections(service: Service, portal: BlockingPortal) -> None:
+    """Each holds the connection of its moment, and more than there are threads wait for one."""
+    pool = service.store.session._engine.pool
+    together = pool.size() + pool._max_overflow + 40 + 20  # type: ignore[attr-defined]
+    begun = list[int]()
+
+    def read() -> None:
+        with service.store.session.read() as connection:
+            connection.exec_driver_sql("SELECT 1")
+
+    async def answer() -> None:
+        await in_thread(read)
+        begun.append(1)
+        await in_thread(read)
+
+    async def many() -> None:
+        await asyncio.gather(*(_in_one_moment(answer)() for _ in range(together)))
+
+    portal.call(many)
+    assert len(begun) == together

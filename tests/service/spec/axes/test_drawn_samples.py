@@ -79,3 +79,10 @@ def test_a_sample_over_ranges_is_drawn_as_before() -> None:
 )
 def test_what_is_refused_names_its_place(changes: dict[str, Any], field: str, code: str) -> None:
     assert {where: fault.code for where, fault in problems(changes).items()}[f"/axes/0/{field}"] == code
+
+
+def test_a_sample_behind_a_wrong_axis_tells_all_its_faults() -> None:
+    parts = ({"path": MASS, "plus_minus": "5 %"}, {"path": LOAD, "nominal": 0.2, "plus_minus": "5 %"})
+    wrong = sample(*parts, correlations=[{"between": [MASS, "nope"], "coefficient": 0.1}])
+    together = [{"path": "nonsense", "values": [1]}, *wrong["/axes"]]
+    assert set(problems({**wrong, "/axes": together})) == {"/axes/0/path", "/axes/1/correlations/0/between"}
