@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from starlette.responses import Response
 
-from sprag.service.figures.pictures.curves import draw_figure
-from sprag.service.figures.read import read_figure
 from sprag.service.http.api.document import CASE_PROBLEMS, files, format_query, problems
 from sprag.service.http.api.drawn_format import DrawnFormat
 from sprag.service.http.asked import asking
@@ -17,8 +15,7 @@ from sprag.service.http.drawing import DRAWN_FORMATS, TABLE_FORMATS, picture, ta
 from sprag.service.http.respond import choose_format
 from sprag.service.http.routers import api_router
 from sprag.service.http.work import Attended
-from sprag.service.reading.reader import Reading
-from sprag.service.views.case_view import case_file, see
+from sprag.service.views.case_view import case_file, drawn, see
 from sprag.service.views.cases import CASE_VIEWS
 
 if TYPE_CHECKING:
@@ -40,8 +37,7 @@ def _add(view: CaseView[Any, Any, Any]) -> None:
             content = await work.compute(case_file, study, case, view, asked, written, which)
             return table(content, written, "-".join(filter(None, (study_id, "case", str(case), view.file_name(asked)))))
         answer = await work.compute(see, study, case, view, asked, which)
-        figure = read_figure(view.figure(answer), Reading(study.model))
-        return await picture(draw_figure, written, figure, f"{study.name}, case {case}").response(work)
+        return await picture(drawn, written, view, answer).response(work)
 
     about = view.about
     without = {"form" if about.pictures else "chosen", *(() if about.starts else ("which",))}
