@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sprag.service import languages
 from sprag.service.cli.configured import read_settings
 from sprag.service.cli.console import WrongInputError, say, warning_lines, write_json
-from sprag.service.cli.file_formats import file_format
+from sprag.service.cli.file_formats import PICTURES, file_format
 from sprag.service.cli.files import MAX_DATA_BYTES, decode, read_bytes, read_spec, spec_failure, write_pieces
 from sprag.service.cli.options import (
     JsonFlag,
+    PictureLanguage,
     Processes,
     SpecFile,
 )
@@ -24,11 +28,9 @@ from sprag.service.faults import Fault
 from sprag.service.languages import N_, _
 
 if TYPE_CHECKING:
-    from sprag.service.figures.pictures.curves import Picture
-    from sprag.service.results.calibration import Calibration
     from sprag.service.spec.document import ParsedSpec
 
-_FORMS = ("csv", "svg", "png", "pdf")
+_FORMS = ("csv", *PICTURES)
 _File = Annotated[
     str | None,
     typer.Option("-o", "--output", metavar="FILE", help="File to write: .csv with the residuals, or .svg, .png, .pdf."),
@@ -47,6 +49,7 @@ def calibrate(
         typer.Option("--db", metavar="URL", help="Database to keep the study in; default: a temporary database."),
     ] = None,
     processes: Processes = None,
+    language: PictureLanguage = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Find the parameters that explain measured points, here, without a service: values with their intervals.
@@ -56,10 +59,11 @@ def calibrate(
     form = None if file is None else file_format(file, _FORMS)
     parsed = _read(spec, measured)
     say(*warning_lines(parsed.warnings))
-    found, study_id = _run(parsed, db, processes)
-    if file is not None and form is not None:
-        write_pieces(file, [_content(found, form, parsed.study.name)])
-    answer = _report(study_id, found)
+    with _found(parsed, db, processes) as written:
+        answer = json.loads(written("json"))
+        if file is not None and form is not None:
+            with languages.language(language or languages.ENGLISH):
+                write_pieces(file, [written(form)])
     if as_json:
         write_json(answer)
     else:
@@ -84,10 +88,15 @@ def _read(path: str, measured: str | None) -> ParsedSpec:
         raise spec_failure(path, error) from error
 
 
-def _run(parsed: ParsedSpec, db: str | None, processes: int | None) -> tuple[Calibration, str]:
-    """Run the study to its end; what it has found, and its id."""
-    from sprag.service.results.calibration import calibration_of
+@contextmanager
+def _found(parsed: ParsedSpec, db: str | None, processes: int | None) -> Iterator[Callable[[str], bytes]]:
+    """Run the study to its end; what writes the calibration in a form."""
+    from sprag.service.reading.quantities import SI
+    from sprag.service.reading.reader import CAPTIONS, Choice
     from sprag.service.results.rounds import sentence
+    from sprag.service.views.calibration import CalibrationView
+    from sprag.service.views.library import Library
+    from sprag.service.views.study_view import study_file
 
     settings = read_settings(database=db, processes=processes)
     if db is not None:
@@ -100,25 +109,6 @@ def _run(parsed: ParsedSpec, db: str | None, processes: int | None) -> tuple[Cal
         db=db,
         processes=processes,
     ) as done:
-        study_id, store = done.record.id, done.store
-        rows = partial(store.rows.for_cases, study_id)
-        return calibration_of(store.studies.study(study_id), store.studies.rounds(study_id), rows), study_id
-
-
-def _content(found: Calibration, form: str, title: str) -> bytes:
-    from sprag.service.figures.calibration import calibration_figure
-    from sprag.service.figures.pictures.curves import draw_figure
-    from sprag.service.figures.read import read_figure
-    from sprag.service.reading.reader import Reading
-    from sprag.service.results.calibration import calibration_csv
-
-    if form == "csv":
-        return calibration_csv(found)
-    figure = read_figure(calibration_figure(found), Reading(found.study.model))
-    return draw_figure(figure, title, cast("Picture", form))
-
-
-def _report(study_id: str, found: Calibration) -> dict[str, Any]:
-    from sprag.service.results.calibration import calibration_json
-
-    return cast("dict[str, Any]", calibration_json(study_id, found))
+        library, title = Library(done.store), parsed.study.name
+        choice = Choice(SI, CAPTIONS)
+        yield partial(study_file, library, done.record.id, CalibrationView(), None, choice, title)

@@ -8,28 +8,17 @@ from typing import Annotated, Any, Final
 import typer
 
 from sprag.service.cli.console import say, show_table, write_json, wrong_option
-from sprag.service.cli.file_formats import file_format
+from sprag.service.cli.file_formats import PICTURES, file_format
 from sprag.service.cli.files import to_file, write_pieces
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, OutputFile, Server, StudyId, Token
 from sprag.service.cli.remote import connection
 from sprag.service.languages import N_, _
+from sprag.service.views.case_questions import CASE_VIEWS
 
-
-class Part(StrEnum):
-    """What a service computes of one case."""
-
-    TRAJECTORY = "trajectory"
-    ENGAGEMENTS = "engagements"
-    STROBES = "strobes"
-    BRANCH = "branch"
-    DIAGRAM = "diagram"
-    SECTION = "section"
-    BASIN = "basin"
-    TRANSIENT = "transient"
-
-
-_FORMATS: Final = ("csv", "json", "svg", "png", "pdf")
+#: What a service computes of one case.
+Part = StrEnum("Part", {about.name.upper(): about.name for about in CASE_VIEWS})  # type: ignore[misc]
+_FORMATS: Final = ("csv", "json", *PICTURES)
 
 
 def case(

@@ -13,7 +13,7 @@ from sprag.service.exports.inputs import choices, defaults
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.directions import value_columns
 from sprag.service.reading.quantities import SI, Units, units_for
-from sprag.service.spec.fields import TOLERANCE_FIELDS
+from sprag.service.spec.kinds.tolerances import SPREAD
 from sprag.worker import models
 from sprag.worker.ports import StoreError
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 #: Parts of a spec that describe the machine and its run; the rows themselves contain the axes.
-_GIVEN: Final = ("base", "derive", "run", *TOLERANCE_FIELDS)
+_GIVEN: Final = ("base", "derive", "run", *SPREAD)
 
 
 @dataclass(frozen=True, slots=True)

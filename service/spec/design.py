@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.spec.derive import with_values
-from sprag.service.spec.fields import TOLERANCE_FIELDS, renamed
+from sprag.service.spec.fields import renamed
 from sprag.service.spec.kinds.registry import without_cases
+from sprag.service.spec.kinds.tolerances import SPREAD
 from sprag.worker.models import NO_PARAMETERS
 from sprag.worker.models.parameters import parameter_of
 from sprag.worker.spread import DRIVE
@@ -40,7 +41,7 @@ def design_spec(spec: Mapping[str, Any], study: Study, case: int, along: str | N
     # The nominal drive of a design keeps its tolerances; a drawn drive has its own values in the base.
     nominal = not study.case_parameters(case).get(DRIVE)
     made = {
-        **without_cases(spec, TOLERANCE_FIELDS if nominal else ()),
+        **without_cases(spec, SPREAD if nominal else ()),
         "name": renamed(spec.get("name", ""), f", design of case {case}"),
         "base": with_values(spec["base"], {path: _text(study, path, value) for path, value in values.items()}),
     }

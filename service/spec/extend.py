@@ -16,9 +16,9 @@ from sprag.service.spec.axes.design import ANYTHING
 from sprag.service.spec.derive import read_machine
 from sprag.service.spec.described import Listed, Record
 from sprag.service.spec.document import ParsedSpec, parse_spec
-from sprag.service.spec.fields import TOLERANCE_FIELDS
 from sprag.service.spec.kinds.registry import without_cases
 from sprag.service.spec.kinds.sweep import sweep_of
+from sprag.service.spec.kinds.tolerances import SPREAD
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.node import Node
 from sprag.service.spec.report import Report, SpecError
@@ -88,7 +88,7 @@ def extended_spec(
     root = Node(Report(addition) if report is None else report, "", addition)
     items, field = _read_addition(root, study)
     # The tolerances stay: every further place is run with the same drives.
-    kept = without_cases(spec, TOLERANCE_FIELDS)
+    kept = without_cases(spec, SPREAD)
     kept["name"] = root["name"].otherwise(study.name).value
     places = without_drives(study)
     own: list[dict[str, Any]] = [

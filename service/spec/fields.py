@@ -1,13 +1,20 @@
-"""Fields of a spec about tolerances, and names of studies that follow from others."""
+"""Paths with ``*``, and names of studies that follow from others."""
 
 from __future__ import annotations
 
-from typing import Final
+import re
+from typing import TYPE_CHECKING
 
 from sprag.worker.limits import MAX_NAME_LENGTH
 
-#: Fields of a spec about tolerances.
-TOLERANCE_FIELDS: Final = ("tolerances", "drives", "seed", "draws", "correlations")
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+def expanded(pattern: str, known: Iterable[str]) -> list[str]:
+    """The known paths that a path with ``*`` for numbers of pendulums or steps stands for, in their order."""
+    expression = re.compile(re.escape(pattern).replace(r"\*", "[0-9]+"))
+    return [path for path in known if expression.fullmatch(path)]
 
 
 def renamed(name: str, suffix: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from functools import partial
 from threading import Lock
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Generic, TypeVar
 
 from cachetools import LRUCache
 
@@ -13,9 +13,13 @@ from sprag.service.results.calibration import calibration_of
 from sprag.service.results.fronts import designs_of
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from sprag.service.results.calibration import Calibration
     from sprag.service.results.fronts import Designs
     from sprag.service.storage.store import Store
+
+Found = TypeVar("Found")
 
 #: Calibrations that are kept.
 _CALIBRATIONS: Final = 16
@@ -23,30 +27,39 @@ _CALIBRATIONS: Final = 16
 _DESIGNS: Final = 50_000
 
 
-class Calibrations:
-    """Calibrations, each followed through its rows again, which takes a second, only when it has other rows."""
+class _Kept(Generic[Found]):
+    """What is found in the rows of a study, anew only when it has other rows."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Store, kept: LRUCache[tuple[object, ...], Found]) -> None:
         self._store = store
         self._lock = Lock()
-        self._kept: LRUCache[tuple[str, int], Calibration] = LRUCache(_CALIBRATIONS)
+        self._kept = kept
 
-    def of(self, study_id: str) -> Calibration:
-        """A calibration; raises StudyNotFoundError, and FaultError for a study that is not one."""
+    def _of(self, study_id: str, find: Callable[..., Found], **options: bool) -> Found:
         store = self._store
-        key = (study_id, store.studies.get(study_id).revision)
+        key = (study_id, store.studies.get(study_id).revision, *options.values())
         with self._lock:
             found = self._kept.get(key)
         if found is None:
-            found = calibration_of(
-                store.studies.study(study_id), store.studies.rounds(study_id), partial(store.rows.for_cases, study_id)
-            )
-            with self._lock:
+            fetch = partial(store.rows.for_cases, study_id)
+            found = find(store.studies.study(study_id), store.studies.rounds(study_id), fetch, **options)
+            with self._lock, suppress(ValueError):  # too large to be kept
                 self._kept[key] = found
         return found
 
 
-class Fronts:
+class Calibrations(_Kept["Calibration"]):
+    """Calibrations, each followed through its rows again, which takes a second, only when it has other rows."""
+
+    def __init__(self, store: Store) -> None:
+        super().__init__(store, LRUCache(_CALIBRATIONS))
+
+    def of(self, study_id: str) -> Calibration:
+        """A calibration; raises StudyNotFoundError, and FaultError for a study that is not one."""
+        return self._of(study_id, calibration_of)
+
+
+class Fronts(_Kept["Designs"]):
     """The designs of studies, each ranked anew only when the study has other rows.
 
     Ranking takes a time that grows faster than the number of designs, seconds for tens of thousands; a page with its
@@ -54,21 +67,8 @@ class Fronts:
     """
 
     def __init__(self, store: Store) -> None:
-        self._store = store
-        self._lock = Lock()
-        self._kept: LRUCache[tuple[str, int, bool], Designs] = LRUCache(
-            _DESIGNS, getsizeof=lambda found: 100 + len(found.numbers)
-        )
+        super().__init__(store, LRUCache(_DESIGNS, getsizeof=lambda found: 100 + len(found.numbers)))
 
     def of(self, study_id: str, *, exact: bool) -> Designs:
         """The designs of a study; raises StudyNotFoundError, and FaultError for a study without a goal."""
-        store = self._store
-        key = (study_id, store.studies.get(study_id).revision, exact)
-        with self._lock:
-            found = self._kept.get(key)
-        if found is None:
-            fetch = partial(store.rows.for_cases, study_id)
-            found = designs_of(store.studies.study(study_id), store.studies.rounds(study_id), fetch, exact=exact)
-            with self._lock, suppress(ValueError):  # too large to be kept
-                self._kept[key] = found
-        return found
+        return self._of(study_id, designs_of, exact=exact)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
@@ -11,6 +10,7 @@ import numpy as np
 from sprag.sentences import Amount, Sentence
 from sprag.service.languages import N_
 from sprag.service.spec.described import Described, Listed, Record
+from sprag.service.spec.fields import expanded
 from sprag.worker.limits import MAX_CORRELATIONS
 
 if TYPE_CHECKING:
@@ -84,8 +84,7 @@ def _read_pairs(node: Node, columns: Mapping[str, int]) -> list[tuple[int, int]]
         return []
     sides = []
     for path in data:
-        expression = re.compile(re.escape(path).replace(r"\*", "[0-9]+"))
-        known = list(dict.fromkeys(column for name, column in columns.items() if expression.fullmatch(name)))
+        known = list(dict.fromkeys(columns[name] for name in expanded(path, columns)))
         if not known:
             node.refuse("invalid-path", "has no tolerance", path, allowed=", ".join(columns) or allowed)
             return []

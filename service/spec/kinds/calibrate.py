@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, Final
 from sprag.sentences import Sentence, plural
 from sprag.service.spec.axes.axes import PATHS, check_paths
 from sprag.service.spec.described import Described, Listed, Record, choice, named
+from sprag.service.spec.fields import expanded
 from sprag.service.spec.kinds.draft import Kind
 from sprag.service.spec.kinds.fields import read_ends, read_path_of
 from sprag.service.spec.kinds.measured_points import MeasuredTable, read_results, read_table
-from sprag.service.spec.kinds.tolerances import expanded
 from sprag.service.spec.node import Node
 from sprag.service.spec.schema.quantity import QUANTITY
 from sprag.worker.errors import WrongPlanError

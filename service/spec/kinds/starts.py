@@ -14,8 +14,8 @@ from sprag.service.reading.limits import at_most
 from sprag.service.spec.axes.axes import varied_values
 from sprag.service.spec.described import Described, Record, named
 from sprag.service.spec.draws.unit import unit_sample
+from sprag.service.spec.fields import expanded
 from sprag.service.spec.kinds.draft import Kind
-from sprag.service.spec.kinds.tolerances import expanded
 from sprag.service.spec.lists import refuse_mixed
 from sprag.service.spec.schema.quantity import QUANTITY
 from sprag.worker.limits import MAX_START_RANGES, MAX_STARTS

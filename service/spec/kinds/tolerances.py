@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -22,7 +20,7 @@ from sprag.service.spec.draws.correlations import CORRELATIONS, read_correlation
 from sprag.service.spec.draws.described import DISTRIBUTION, FIELDS, read_measured, read_plus_minus
 from sprag.service.spec.draws.distributions import Distribution
 from sprag.service.spec.draws.unit import correlated, unit_sample
-from sprag.service.spec.fields import TOLERANCE_FIELDS
+from sprag.service.spec.fields import expanded
 from sprag.service.spec.kinds.draft import Kind
 from sprag.worker.derived import blocks, involved
 from sprag.worker.limits import MAX_AXIS_VALUES, MAX_CASES, MAX_DRIVES, MAX_TOLERANCES
@@ -111,7 +109,7 @@ def _read_spread(spec: Node, axes: Sequence[Axis] | None) -> Spread | None:
     """
     node = spec["tolerances"]
     if not node.given:
-        for name in TOLERANCE_FIELDS:
+        for name in SPREAD:
             if name in spec:
                 spec[name].refuse("not-used", "has no effect without `tolerances`")
         return None
@@ -210,12 +208,6 @@ def _read_item(item: Node, axes: Sequence[Axis]) -> list[_Drawn]:
         else:
             drawn += _around(item, str(kind), name, group, nominal)
     return drawn
-
-
-def expanded(pattern: str, known: Mapping[str, Any]) -> list[str]:
-    """The known paths that a path with ``*`` for numbers of pendulums or steps stands for, in their order."""
-    expression = re.compile(re.escape(pattern).replace(r"\*", "[0-9]+"))
-    return [path for path in known if expression.fullmatch(path)]
 
 
 def _read_paths(node: Node) -> list[str] | None:

@@ -317,16 +317,8 @@ class Runs(Part):
 
     def latest_study(self, run: OpenRun) -> str | None:
         """Id of the study of the last earlier due time of that schedule that has one."""
-        c = STUDIES.c
-        query = (
-            sa.select(c.id)
-            .join_from(SCHEDULE_RUNS, STUDIES, c.number == _R.study)
-            .where(_R.schedule == run.schedule, _R.due < run.due, c.deleted_at.is_(None))
-            .order_by(_R.due.desc())
-            .limit(1)
-        )
         with self.session.read() as connection:
-            return connection.execute(query).scalar_one_or_none()
+            return connection.execute(_latest_before(run, STUDIES.c.id)).scalar_one_or_none()
 
     def ended(self) -> list[EndedRun]:
         """Due times that are over and have not been concluded yet, a limited number."""
@@ -495,14 +487,18 @@ def submit_run(connection: sa.Connection, run: OpenRun, study: int) -> None:
     """
     if not _change_open(connection, run.schedule, run.due, state=RunState.SUBMITTED.value, study=study, problem=None):
         raise RunClosedError(f"the due time {moment(run.due).isoformat()} of the schedule {run.id} is no longer open")
-    before = (
-        sa.select(_R.study)
+    inherit_figures(connection, connection.execute(_latest_before(run, _R.study)).scalar(), study)
+
+
+def _latest_before(run: OpenRun, column: sa.Column[Any]) -> sa.Select[Any]:
+    """A column of the last earlier due time of that schedule that has a study, or of the study."""
+    return (
+        sa.select(column)
         .join_from(SCHEDULE_RUNS, STUDIES, STUDIES.c.number == _R.study)
         .where(_R.schedule == run.schedule, _R.due < run.due, STUDIES.c.deleted_at.is_(None))
         .order_by(_R.due.desc())
         .limit(1)
     )
-    inherit_figures(connection, connection.execute(before).scalar(), study)
 
 
 def refuse_open_runs(connection: sa.Connection, schedule: int, schedule_id: str, now: int, problem: str) -> None:

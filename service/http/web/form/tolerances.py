@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
@@ -13,6 +13,7 @@ from sprag.service.http.web.form.machine import entries
 from sprag.service.languages import _
 from sprag.service.reading.wording import words
 from sprag.service.spec.draws.described import DISTRIBUTION
+from sprag.service.spec.fields import expanded
 from sprag.service.spec.kinds.tolerances import DRAWS
 
 #: Fields of a spec that this part of the form shows.
@@ -107,7 +108,7 @@ def tolerance_values(spec: Mapping[str, Any], values: Mapping[str, str]) -> Valu
     order: list[str] = []
     for item in spec["tolerances"]:
         given = item["path"] if isinstance(item["path"], list) else [item["path"]]
-        paths = [own for path in given for own in (_matching(path, shown) or [path])]
+        paths = [own for path in given for own in (expanded(path, shown) or [path])]
         groups = [paths] if item.get("shared") else [[path] for path in paths]
         for first, *others in groups:
             if first not in shown:
@@ -120,9 +121,3 @@ def tolerance_values(spec: Mapping[str, Any], values: Mapping[str, str]) -> Valu
             if others:
                 found[f"{name}/with"] = ", ".join(others)
     return found | {ORDER: " ".join(order)}
-
-
-def _matching(path: str, shown: Iterable[str]) -> list[str]:
-    """The paths for which ``path`` stands, whose ``*`` is any number."""
-    pattern = re.compile(re.escape(path).replace(r"\*", "[0-9]+"))
-    return [own for own in shown if pattern.fullmatch(own)]
