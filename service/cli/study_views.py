@@ -47,7 +47,6 @@ from sprag.service.cli.shown import (
 from sprag.service.languages import N_, _
 from sprag.service.views import study_questions as questions
 from sprag.service.views.setting import settings_of
-from sprag.worker.limits import MAX_DESIGNS, MAX_SELECTED
 
 if TYPE_CHECKING:
     from sprag.service.views.setting import NamedSetting, ViewInfo
@@ -60,21 +59,21 @@ _FORMATS: Final = ("csv", *PICTURES)
 class Command:
     """The command of a view: its name, how it shows the answer, and what differs from the settings of the view.
 
-    ``show`` gets the answer, and what gives the model of the study. ``limits`` are the most rows of a table and of a
-    file.
+    ``show`` gets the answer, and what gives the model of the study. ``few`` are the rows of a table, unless others are
+    asked for; a file has as many as the question allows.
     """
 
     name: str
     about: ViewInfo
     show: Callable[[dict[str, Any], Callable[[], str]], None]
-    limits: tuple[int, int] | None = None
+    few: int | None = None
 
 
 _COMMANDS: Final = (
     Command("answers", questions.ANSWERS, show_answers),
     Command("curve", questions.CURVES, lambda found, _model: show_curves(found)),
-    Command("explore", questions.EXPLORE, lambda found, _model: show_cases(found), (20, MAX_SELECTED)),
-    Command("front", questions.FRONT, lambda found, _model: show_designs(found), (20, MAX_DESIGNS)),
+    Command("explore", questions.EXPLORE, lambda found, _model: show_cases(found), 20),
+    Command("front", questions.FRONT, lambda found, _model: show_designs(found), 20),
     Command("calibration", questions.CALIBRATION, lambda found, _model: show_calibration(found)),
     Command("map", questions.MAP, lambda found, _model: show_map(found)),
     Command("ribbon", questions.RIBBON, lambda found, _model: show_ribbon(found)),
@@ -104,9 +103,9 @@ def _made(command: Command) -> Callable[..., None]:
         if settings.get("quantile"):
             settings["quantile"] = list(map(_probability, settings["quantile"]))
         whole, most = settings, None
-        if command.limits is not None:
-            few, most = command.limits
-            settings = {**settings, "limit": settings["limit"] or few}
+        if command.few is not None:
+            most = _most_rows(about.question)
+            settings = {**settings, "limit": settings["limit"] or command.few}
             whole = {**settings, "limit": most}
         drawing = [*in_units(units), *in_language(language)]
         opened = (
@@ -125,8 +124,7 @@ def _made(command: Command) -> Callable[..., None]:
 
     run.__doc__ = about.summary
     own = [
-        parameter(one.name, option(one), None if one.name == "limit" and command.limits else one.default)
-        for one in asked
+        parameter(one.name, option(one), None if one.name == "limit" and command.few else one.default) for one in asked
     ]
     run.__signature__ = Signature(  # type: ignore[attr-defined]
         [
@@ -137,6 +135,11 @@ def _made(command: Command) -> Callable[..., None]:
         ]
     )  # fmt: skip
     return run
+
+
+def _most_rows(question: type) -> int | None:
+    """The most rows of a table that may be asked for."""
+    return next(asked.setting.high for asked in settings_of(question) if asked.name == "limit")
 
 
 def _say_file(file: str, form: str | None, first: int | None) -> None:
