@@ -1,26 +1,22 @@
-"""The mechanisms of a machine shaft as drawings in SVG: still at one angle, with the frames that move them."""
+"""The mechanisms and the train of a machine shaft as drawings: still at one angle, with the frames that move them."""
 
 from __future__ import annotations
 
 import json
 import math
-import re
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.languages import gettext
+from sprag.service.figures.drawing import Dimension, Drawing
+from sprag.service.languages import N_, gettext
 from sprag.service.reading.reader import titled
-from sprag.service.reading.wording import symbol
 from sprag.worker.models import machine_shaft
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
-
-    from sprag.worker.study import Study
 
     Floats = NDArray[np.float64]
     Place = tuple[float, float]
@@ -28,72 +24,43 @@ if TYPE_CHECKING:
 #: Degrees of the shaft from one frame to the next.
 STEP: Final = 5
 #: Largest width and height of a drawing, and its margin.
-_WIDTH, _HEIGHT, _MARGIN = 420.0, 260.0, 22.0
+_WIDTH, _HEIGHT, _MARGIN = 420.0, 260.0, 24.0
 _ROUNDED: Final = 1
-_PRINTED: Final = re.compile(r"<i>(.*)</i>(?:<sub>(.*)</sub>)?")
+#: Of the train: distance of two shafts, height of its axis, and the radii of wheels (px).
+_APART, _LEVEL, _SMALL, _LARGE = 84.0, 58.0, 13.0, 30.0
+_STAGES: Final = {
+    "gear": N_("gear"), "worm": N_("worm gear"), "belt": N_("belt"), "chain": N_("chain"), "screw_nut": N_("screw"),
+    "rack": N_("rack"),
+}  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Shape:
-    """A bar, plate or label: ``moves`` are the joints it goes through, or its joint and the name of its turn.
+def machine_drawings(structure: Mapping[str, Any], base: Mapping[str, float], angle: float) -> tuple[Drawing, ...]:
+    """The train of a machine, where it has more than a shaft, and each mechanism at an angle of the shaft (degrees).
 
-    ``at`` is its place at the still's angle: the points of a bar, the transform of a plate, (x, y) of a label, which is
-    a letter with its index.
+    A mechanism whose links do not reach has none.
     """
-
-    moves: str
-    at: str
-    about: str = ""
-    outline: str = ""
-    label: tuple[str, str] = ("", "")
-
-
-@dataclass(frozen=True, slots=True)
-class Drawing:
-    """One mechanism: sizes in px; ``frames`` are the joints and turns every `STEP` degrees of the shaft, as JSON."""
-
-    title: str
-    width: float
-    height: float
-    frames: str
-    bars: tuple[Shape, ...]
-    plates: tuple[Shape, ...]
-    labels: tuple[Shape, ...]
-    joints: tuple[Shape, ...]
-    pivots: tuple[Place, ...]
-    guides: tuple[str, ...]
-
-
-def drawings(study: Study, angle: float) -> tuple[Drawing, ...]:
-    """The mechanisms of a study's base at an angle of its shaft, in degrees; none where links do not reach."""
-    if study.model != machine_shaft.MODEL:
-        return ()
-    structure = study.structure or {}
     angles = np.radians(np.append(np.arange(0.0, 360.0 + STEP, STEP), math.fmod(angle, 360.0)))
+    symbols = {path: entry.symbol for path, entry in machine_shaft.parameters_of(structure).items()}
     several = "parts" in structure
-    found = []
-    for index, sketch in enumerate(machine_shaft.sketches_of(structure, study.base, angles)):
-        mechanism = structure["parts"][index]["mechanism"] if several else structure["mechanism"]
+    found = list(_train(structure, base))
+    for index, sketch in enumerate(machine_shaft.sketches_of(structure, base, angles)):
+        part = structure["parts"][index] if several else structure
         if not all(np.isfinite(points).all() for points in sketch.joints.values()):
             continue
+        mechanism = part["mechanism"]
         kind = str(mechanism["kind"])
         plain = kind in {"none", "table", "formula"}
         title = gettext("Shaft") if plain else titled(mechanism.get("quick_return", kind))
-        prefix = f"{f'parts.{index}.' if several else ''}mechanism.{kind}."
-        symbols = {
-            path.removeprefix(prefix): entry.symbol
-            for path, entry in machine_shaft.parameters_of(structure).items()
-            if path.startswith(prefix)
-        }
-        found.append(_drawing(_of_part(index + 1, title) if several else title, sketch, symbols))
-    return tuple(found)
+        at = f"parts.{index}." if several else ""
+        found.append(_drawing(_of_part(index + 1, title) if several else title, sketch, f"{at}mechanism.{kind}."))
+    return tuple(drawing.labelled(symbols) for drawing in found)
 
 
 def _of_part(number: int, title: str) -> str:
     return gettext("Part {number}: {title}", number=number, title=title.lower())
 
 
-def _drawing(title: str, sketch: machine_shaft.Sketch, symbols: dict[str, str]) -> Drawing:
+def _drawing(title: str, sketch: machine_shaft.Sketch, prefix: str) -> Drawing:
     """The drawing of a sketch, whose last angle is that of the still."""
     reach = [*sketch.joints.values(), *sketch.guides]
     for plate in sketch.plates:
@@ -108,45 +75,136 @@ def _drawing(title: str, sketch: machine_shaft.Sketch, symbols: dict[str, str]) 
         return np.asarray(np.round((points - (low[0], high[1])) * (scale, -scale) + _MARGIN, _ROUNDED))
 
     joints = {name: placed(points) for name, points in sketch.joints.items()}
-    turns = {name: np.round(-np.degrees(np.unwrap(values)), _ROUNDED) for name, values in sketch.turns.items()}
+    turns: dict[str, Floats] = {
+        name: np.asarray(np.round(-np.degrees(np.unwrap(values)), _ROUNDED)) for name, values in sketch.turns.items()
+    }
     frames = {
         "joints": {name: points[:-1].tolist() for name, points in joints.items()},
         "turns": {name: values[:-1].tolist() for name, values in turns.items()},
     }
-    bars = [Shape(" ".join(bar.joints), _points([joints[name][-1] for name in bar.joints]), " ".join(bar.about))
-            for bar in sketch.bars]  # fmt: skip
-    plates = []
+    width, height = (round(float(own) * scale + 2.0 * _MARGIN, 1) for own in span)
+    return Drawing(
+        title,
+        gettext("Drawing of the mechanism: {title}", title=title.lower()),
+        width,
+        height,
+        "".join(_shapes(sketch, joints, turns, [placed(line) for line in sketch.guides], scale)),
+        tuple(_dimensions(sketch, joints, prefix, width)),
+        json.dumps(frames, separators=(",", ":")),
+    )
+
+
+def _shapes(
+    sketch: machine_shaft.Sketch,
+    joints: dict[str, Floats],
+    turns: dict[str, Floats],
+    guides: list[Floats],
+    scale: float,
+) -> Iterator[str]:
+    for line in guides:
+        yield f'<polyline class="dashed" points="{_points(line)}"/>'
+    pivots = [(float(joints[name][-1][0]), float(joints[name][-1][1])) for name in sketch.pivots]
+    for x, y in pivots:
+        yield f'<path class="body" d="M{x:g} {y:g}l-9 14h18zM{x - 14:g} {y + 14:g}h28"/>'
     for plate in sketch.plates:
         x, y = joints[plate.joint][-1]
         turn = f"translate({x:g} {y:g}) rotate({turns[plate.turn][-1] % 360.0:g})"
         outline = _points(np.round(plate.outline * (scale, -scale), _ROUNDED))
-        plates.append(Shape(f"{plate.joint} {plate.turn}", turn, " ".join(plate.about), outline))
-    moving = [name for name in joints if name not in sketch.pivots]
-    return Drawing(
-        title=title,
-        width=round(float(span[0]) * scale + 2.0 * _MARGIN, 1),
-        height=round(float(span[1]) * scale + 2.0 * _MARGIN, 1),
-        frames=json.dumps(frames, separators=(",", ":")),
-        bars=tuple(bars),
-        plates=tuple(plates),
-        labels=tuple(_labels(sketch, joints, symbols)),
-        joints=tuple(Shape(name, f"{joints[name][-1][0]:g} {joints[name][-1][1]:g}") for name in moving),
-        pivots=tuple((float(joints[name][-1][0]), float(joints[name][-1][1])) for name in sketch.pivots),
-        guides=tuple(_points(placed(line)) for line in sketch.guides),
+        moves = f"{plate.joint} {plate.turn}"
+        yield f'<polygon class="mass" data-plate="{moves}" transform="{turn}" points="{outline}"/>'
+    for bar in sketch.bars:
+        crank = " crank" if bar.about == ("crank",) else ""
+        still = _points([joints[name][-1] for name in bar.joints])
+        yield f'<polyline class="rod{crank}" data-bar="{" ".join(bar.joints)}" points="{still}"/>'
+    for x, y in pivots:
+        yield f'<circle class="pin" cx="{x:g}" cy="{y:g}" r="4.5"/>'
+    for name in joints:
+        if name not in sketch.pivots:
+            x, y = joints[name][-1]
+            yield f'<circle class="pin" r="3.5" data-joint="{name}" cx="{x:g}" cy="{y:g}"/>'
+
+
+def _dimensions(
+    sketch: machine_shaft.Sketch, joints: dict[str, Floats], prefix: str, width: float
+) -> Iterator[Dimension]:
+    """The numbers that bars and plates stand for: along each bar, and one below the other in a plate."""
+    for bar in sketch.bars:
+        first, last = joints[bar.joints[0]][-1], joints[bar.joints[-1]][-1]
+        for index, name in enumerate(bar.about):
+            x, y = first + (last - first) * (index + 1.0) / (len(bar.about) + 1.0)
+            yield _at(f"{prefix}{name}", float(x), float(y), width)
+    known = {name for bar in sketch.bars for name in bar.about}
+    for plate in sketch.plates:
+        x, y = joints[plate.joint][-1]
+        own = [name for name in plate.about if name not in known]
+        known |= set(own)
+        for index, name in enumerate(own):
+            yield _at(f"{prefix}{name}", float(x), float(y) + 15.0 * index, width)
+
+
+def _at(path: str, x: float, y: float, width: float) -> Dimension:
+    return Dimension(path, "", round(x, 1), round(y, 1), "left" if x < width / 2 else "right")
+
+
+def _train(structure: Mapping[str, Any], base: Mapping[str, float]) -> Iterator[Drawing]:
+    """The motor, the stages and the flywheel on the main shaft, from left to right; none of a shaft alone.
+
+    Radii of the wheels of a stage are in its ratio, as far as there is room.
+    """
+    drive = structure.get("drive", {})
+    stages = list(drive.get("stages", ()))
+    if not (drive.get("motor") or stages or drive.get("flywheel")):
+        return
+    shapes, dimensions = list[str](), list[Dimension]()
+    x = 16.0
+    if drive.get("motor"):
+        x = 70.0
+        shapes.append(_box(x - 30.0, gettext("Motor")))
+        names = [path for path in base if path.startswith("drive.motor.")]
+        dimensions += [Dimension(path, "", x - 30.0, _LEVEL - 26.0, "right") for path in names[:1]]
+    for index, kind in enumerate(stages):
+        shapes += [_line(x, x + _APART), *_stage(kind, x + _APART / 2, base.get(f"drive.stages.{index}.ratio", 1.0))]
+        name = next((own for own in ("ratio", "lead", "radius") if f"drive.stages.{index}.{own}" in base), "inertia")
+        dimensions.append(Dimension(f"drive.stages.{index}.{name}", "", x + _APART / 2 - 4, 12.0, "right"))
+        x += _APART
+    end = x + _APART
+    shapes.append(_line(x, end))
+    if drive.get("flywheel"):
+        shapes.append(f'<rect class="mass" x="{x + 36:g}" y="{_LEVEL - 36:g}" width="12" height="72"/>')
+        dimensions.append(Dimension("drive.flywheel.mass", "", x + 48, _LEVEL - 28, "right"))
+        dimensions.append(Dimension("drive.flywheel.diameter", "", x + 48, _LEVEL + 28, "right"))
+    shapes.append(f'<circle class="solid" cx="{end:g}" cy="{_LEVEL:g}" r="4"/>')
+    about = gettext("Drawing of the train: from the motor to the shaft of the machine")
+    yield Drawing(gettext("Train"), about, end + 24.0, 2 * _LEVEL, "".join(shapes), tuple(dimensions))
+
+
+def _line(start: float, end: float) -> str:
+    return f'<path class="body" stroke-width="3" d="M{start:g} {_LEVEL:g}H{end:g}"/>'
+
+
+def _box(x: float, title: str) -> str:
+    return (
+        f'<rect class="mass" x="{x - 30:g}" y="{_LEVEL - 18:g}" width="60" height="36" rx="4"/>'
+        f'<text x="{x:g}" y="{_LEVEL + 4:g}" text-anchor="middle">{title}</text>'
     )
 
 
-def _labels(sketch: machine_shaft.Sketch, joints: dict[str, Floats], symbols: dict[str, str]) -> list[Shape]:
-    """The symbols of the bars, at their middles."""
-    found = []
-    for bar in sketch.bars:
-        text = symbols.get(bar.about[0] if bar.about else "", "")
-        if text:
-            x, y = (joints[bar.joints[0]][-1] + joints[bar.joints[-1]][-1]) / 2.0
-            printed = _PRINTED.fullmatch(str(symbol(text)))
-            label = (text, "") if printed is None else (printed[1], printed[2] or "")
-            found.append(Shape(f"{bar.joints[0]} {bar.joints[-1]}", f"{x:g} {y:g}", " ".join(bar.about), "", label))
-    return found
+def _stage(kind: str, x: float, ratio: float) -> Iterator[str]:
+    """Two wheels of a stage; belts and chains go round both."""
+    share = ratio if math.isfinite(ratio) and ratio > 0.0 else 1.0
+    small, large = (_LARGE / share, _LARGE) if share >= 1.0 else (_LARGE, _LARGE * share)
+    small, large = (max(own, 6.0) for own in (small, large))
+    apart = (small + large) / 2 if kind in {"gear", "worm"} else 22.0
+    left, right = x - apart, x + apart
+    yield f'<circle class="wheel" cx="{left:g}" cy="{_LEVEL:g}" r="{small:g}"/>'
+    yield f'<circle class="wheel" cx="{right:g}" cy="{_LEVEL:g}" r="{large:g}"/>'
+    if kind in {"belt", "chain"}:
+        ends = (
+            f"{left:g} {_LEVEL - small:g}L{right:g} {_LEVEL - large:g}",
+            f"{left:g} {_LEVEL + small:g}L{right:g} {_LEVEL + large:g}",
+        )
+        yield f'<path class="body" d="M{ends[0]}M{ends[1]}"/>'
+    yield f'<text x="{x:g}" y="{2 * _LEVEL - 6:g}" text-anchor="middle">{gettext(_STAGES.get(kind, kind))}</text>'
 
 
 def _points(points: Sequence[Floats] | Floats) -> str:

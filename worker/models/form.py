@@ -175,7 +175,6 @@ class Form:
     called : the model in a sentence, such as "a machine shaft"; "" for its title
     with_run : whether its studies have a run, so that cases can start from their neighbours
     examples : what fields of the study show while they are empty, and a formula
-    sketch : template of a drawing that explains the machine; "" for its mechanisms
     batch, normal : what is said about a batch of machines that differ
     advice : what is said about axes
     groups : beginning of paths -> heading under which they are offered as axes; by default their first parts
@@ -189,7 +188,6 @@ class Form:
     called: str = ""
     with_run: bool = False
     examples: Mapping[str, str] = field(default_factory=dict)
-    sketch: str = ""
     batch: str = "Built machines differ: a field “±” beside each parameter, a share of it or a quantity"
     normal: str = (
         "Normal: ± is three standard deviations, so that nearly all machines are within it. Each place of the study is "

@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import Any, Final
 from urllib.parse import urlencode
 
-from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from jinja2.ext import Extension
 from markupsafe import Markup, escape
 from starlette.responses import Response
@@ -18,6 +18,8 @@ from starlette.responses import Response
 from sprag.sentences import Sentence, WarningText
 from sprag.service import languages
 from sprag.service.actor import Role
+from sprag.service.figures.drawing import Drawing
+from sprag.service.figures.drawing import svg as drawing_svg
 from sprag.service.http.current import current
 from sprag.service.http.language import language_pairs
 from sprag.service.http.prefix import here
@@ -92,8 +94,7 @@ def _warning(text: str, reading: Reading) -> str:
 @lru_cache(maxsize=1)
 def _templates() -> Environment:
     environment = Environment(
-        # Sketches of machines stand in reports too.
-        loader=ChoiceLoader([PackageLoader("sprag.service.http.web"), PackageLoader("sprag.service.report")]),
+        loader=PackageLoader("sprag.service.http.web"),
         autoescape=True,
         extensions=[Addresses, "jinja2.ext.i18n"],
         undefined=StrictUndefined,
@@ -132,6 +133,7 @@ def _templates() -> Environment:
         "bytes": bytes_text,
         "query": urlencode,
         "here": here,
+        "drawn": drawn,
     }
     environment.globals["here"] = here
     environment.globals["prefix_of_urls"] = lambda: current().prefix
@@ -189,6 +191,11 @@ def fragment(name: str, **values: Any) -> Markup:
 def spec_text(spec: dict[str, Any]) -> str:
     """A spec as it was given: keys in order, characters unescaped; the page escapes it as a whole."""
     return json.dumps(spec, ensure_ascii=False, indent=2)
+
+
+def drawn(drawing: Drawing) -> Markup:
+    """A drawing of a machine, whose texts are escaped where it is made."""
+    return Markup(drawing_svg(drawing))  # noqa: S704
 
 
 def marked(text: str) -> Markup:

@@ -84,7 +84,6 @@ FORM: Final = Form(
     ),
     called="a vibration drive",
     with_run=True,
-    sketch="_sketch.html",
     examples={
         "formula": "1.1 * pendulums.0.mass * pendulums.0.arm^2 + 2e-4 kg*m^2",
         "values": "0; 0.1; 0.2 N*m", "from": "20 Hz", "to": "35 Hz", "step": "1 Hz", "value": "0.2 N*m",

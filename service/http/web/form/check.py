@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
 from sprag.sentences import Place, WarningText
 from sprag.service.faults import Fault
-from sprag.service.figures.linkage import Drawing, drawings
+from sprag.service.figures.drawing import Drawing
+from sprag.service.figures.drawings import drawings
 from sprag.service.http.web.figures.fits import FitChart, fit_at
 from sprag.service.http.web.form.columns import COLUMNS
 from sprag.service.http.web.form.entries import Faults, items_of, list_of, range_of
@@ -38,10 +39,6 @@ if TYPE_CHECKING:
     from sprag.worker.study import Study
 
     Known = Callable[[Study], int]
-
-
-#: Angle of the shaft in the sketch of a form, in degrees.
-_SKETCHED: Final = 60.0
 
 
 @dataclass(slots=True)
@@ -147,7 +144,7 @@ def check_form(
         found.parsed = None
     if found.parsed is not None:
         found.preview = preview_json(found.parsed, chunking, known(found.parsed.study), left)
-        found.sketch = drawings(found.parsed.study, _SKETCHED)
+        found.sketch = drawings(found.parsed.study)
     found.notes += _points(values)
     for pointer in places(values, "measured"):
         found.notes += _assumed(values.get(f"{pointer}/data", ""))

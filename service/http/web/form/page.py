@@ -202,7 +202,7 @@ async def check(context: Ctx, work: Attended, request: Request, values: Form) ->
         return {
             "faults": checked.faults,
             "panel": fragment("_form_panel.html", checked=checked, address=_address(request)),
-            "sketch": fragment("_linkage.html", drawings=checked.sketch) if checked.sketch else "",
+            "sketch": fragment("_drawings.html", drawings=checked.sketch) if checked.sketch else "",
             "fits": {
                 pointer: fragment("_form_fit.html", fit=fit, chart=chart, pointer="")
                 for pointer, (fit, chart) in checked.fits.items()

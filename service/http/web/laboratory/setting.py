@@ -10,7 +10,8 @@ from urllib.parse import parse_qsl, urlencode
 
 from sprag.sentences import Amount
 from sprag.service.faults import Fault, shown
-from sprag.service.figures.linkage import Drawing, drawings
+from sprag.service.figures.drawing import Drawing
+from sprag.service.figures.drawings import drawings
 from sprag.service.http.problems import ApiError
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.figures.shaft import overridden

@@ -138,16 +138,11 @@ const newShape = async (extra, body = encoded(extra)) => {
   return true;
 };
 
+// The dimension of the field that has the focus stands out in the drawing.
 const mark = (event) => {
   for (const part of document.querySelectorAll("[data-mark].shown")) part.classList.remove("shown");
-  const wanted = event.target.dataset && event.target.dataset.for;
-  if (!wanted) return;
-  for (const part of document.querySelectorAll("[data-mark]")) {
-    const names = part.dataset.mark.split(" ");
-    const meant = names.includes(wanted) || (wanted === "inertia" && event.target.name.includes("/shaft/") && names.includes("shaft"));
-    const other = wanted === "inertia" && event.target.name.includes("/shaft/") && names.includes("mass");
-    if (meant && !other) part.classList.add("shown");
-  }
+  const path = (event.target.name ?? "").replace(/^\/base\//, "").replaceAll("/", ".");
+  if (path) document.querySelector(`[data-mark="${CSS.escape(path)}"]`)?.classList.add("shown");
 };
 
 // A pasted column or row of a spreadsheet becomes a list of values, several columns become axes.

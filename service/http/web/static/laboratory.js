@@ -75,11 +75,6 @@ const pose = () => {
       joint.setAttribute("cx", x);
       joint.setAttribute("cy", y);
     }
-    for (const label of figure.querySelectorAll("[data-label]")) {
-      const [from, to] = label.dataset.label.split(" ").map((name) => at[name]);
-      label.setAttribute("x", (from[0] + to[0]) / 2);
-      label.setAttribute("y", (from[1] + to[1]) / 2);
-    }
   }
 };
 

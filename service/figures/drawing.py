@@ -1,0 +1,162 @@
+"""The drawing of a machine to scale from its numbers, with the place of each dimension, as the text of an SVG.
+
+Pages colour it by their variables (the classes of ``.drawing`` in the style sheet); as a picture of its own it has
+colours of its own. A script moves what has a mark such as ``data-arm`` or ``data-bar``.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from html import escape
+from typing import TYPE_CHECKING, Final, Literal
+
+from sprag.service.reading.wording import symbol
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+Side = Literal["left", "right"]
+#: Width beside a drawing for labels with values, and the least distance of two of them.
+_LABEL, _APART = 118.0, 17.0
+_PRINTED: Final = re.compile(r"<i>(.*)</i>(?:<sub>(.*)</sub>)?")
+_COLOURS: Final = """<style>.drawing text{font:13px sans-serif;fill:#1b2430}
+.drawing .thin,.drawing .dashed,.drawing .leader{fill:none;stroke:#8593a5}.drawing .dashed{stroke-dasharray:9 4 2 4}
+.drawing .body{fill:none;stroke:#1b2430;stroke-width:1.6}.drawing .rod{fill:none;stroke:#1b2430;stroke-width:5;
+stroke-linecap:round;stroke-linejoin:round}.drawing .mass{fill:#cfe0f2;stroke:#1b2430;stroke-width:1.6}
+.drawing .wheel{fill:#f0dfc8;stroke:#1b2430;stroke-width:1.6}.drawing .pin{fill:#fff;stroke:#1b2430;stroke-width:1.6}
+.drawing .solid{fill:#1b2430}.drawing .measure{fill:none;stroke:#0a5aa6}.drawing .tip{fill:#0a5aa6}
+.drawing .crank{stroke:#0a5aa6}.drawing .letter{font-style:italic}</style>"""
+
+
+@dataclass(frozen=True, slots=True)
+class Dimension:
+    """A number of the machine in its drawing: its path and symbol, its place (px), and the side of its label."""
+
+    path: str
+    symbol: str
+    x: float
+    y: float
+    side: Side
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """One picture of a machine or a part of it: sizes in px, its shapes as SVG without labels.
+
+    ``about`` says in a sentence what it shows; ``frames`` are the places of what moves over a turn of the shaft, as
+    JSON, where the numbers alone say them.
+    """
+
+    title: str
+    about: str
+    width: float
+    height: float
+    shapes: str
+    dimensions: tuple[Dimension, ...] = ()
+    frames: str = ""
+
+    def labelled(self, symbols: Mapping[str, str]) -> Drawing:
+        """With the symbols of the catalogue, and without dimensions that the machine does not have."""
+        own = tuple(replace(each, symbol=symbols[each.path]) for each in self.dimensions if each.path in symbols)
+        return replace(self, dimensions=own)
+
+
+def svg(drawing: Drawing, labels: Mapping[str, str] | None = None, *, alone: bool = False) -> str:
+    """The drawing with a letter at each dimension, or with a label beside it where ``labels`` has one for its path.
+
+    ``alone`` gives it the name space and the colours that it has as a file.
+    """
+    beside = 0.0 if labels is None else _LABEL
+    text = _letters(drawing) if labels is None else _beside(drawing, labels)
+    head = f' xmlns="http://www.w3.org/2000/svg" width="{drawing.width + 2 * beside:g}" height="{drawing.height:g}"'
+    frames = f' data-frames="{escape(drawing.frames)}"' if drawing.frames and not alone else ""
+    return (
+        f'<svg{head if alone else ""} class="drawing" role="img" aria-label="{escape(drawing.about)}"{frames} '
+        f'viewBox="{-beside:g} 0 {drawing.width + 2 * beside:g} {drawing.height:g}">'
+        f"{_COLOURS if alone else ''}{drawing.shapes}{text}</svg>"
+    )
+
+
+def rows_of(drawing: Drawing, side: Side) -> tuple[Dimension, ...]:
+    """The dimensions whose labels stand at one side, from top to bottom."""
+    return tuple(sorted((each for each in drawing.dimensions if each.side == side), key=lambda each: each.y))
+
+
+def leaders(drawing: Drawing, step: float, gap: float, at: float) -> str:
+    """Lines from dimensions to fields that stand in two columns beside the drawing, ``step`` px from one to the next.
+
+    ``gap`` is the distance of the columns from the drawing, ``at`` the place in each field to which its line goes.
+    """
+    found = []
+    for side, edge in (("left", -gap), ("right", drawing.width + gap)):
+        for row, each in enumerate(rows_of(drawing, side)):  # type: ignore[arg-type]
+            found.append(f"M{edge:g} {row * step + at:g}L{each.x:g} {each.y:g}")
+    return f'<path class="leader" d="{"".join(found)}"/>' if found else ""
+
+
+def with_leaders(drawing: Drawing, step: float, gap: float, at: float) -> str:
+    """The drawing as `svg` gives it, with the lines of `leaders` behind it."""
+    text = svg(drawing)
+    place = text.index(">") + 1
+    return text[:place] + leaders(drawing, step, gap, at) + text[place:]
+
+
+def _letters(drawing: Drawing) -> str:
+    """The symbols at their places; of two at one place the first."""
+    found, taken = list[str](), list[Dimension]()
+    for each in drawing.dimensions:
+        if any(abs(each.x - other.x) < _APART and abs(each.y - other.y) < _APART for other in taken):
+            continue
+        taken.append(each)
+        left = each.side == "left"
+        end = ' text-anchor="end"' if left else ""
+        found.append(
+            f'<text class="letter" data-mark="{escape(each.path)}" x="{each.x + (-7 if left else 7):g}" '
+            f'y="{each.y + 4:g}"{end}>{_printed(each.symbol)}</text>'
+        )
+    return "".join(found)
+
+
+def _printed(text: str) -> str:
+    """A symbol with its index as in print, as a part of a text of an SVG."""
+    found = _PRINTED.fullmatch(str(symbol(text))) if text else None
+    if found is None:
+        return escape(text)
+    return found[1] + (f'<tspan dy="3" font-size="10">{found[2]}</tspan>' if found[2] else "")
+
+
+def _beside(drawing: Drawing, labels: Mapping[str, str]) -> str:
+    found = []
+    for side in ("left", "right"):
+        rows = [each for each in rows_of(drawing, side) if labels.get(each.path)]
+        edge, end = (-8.0, ' text-anchor="end"') if side == "left" else (drawing.width + 8.0, "")
+        for each, y in zip(rows, _spread([each.y for each in rows], drawing.height), strict=True):
+            symbol_ = f'<tspan class="letter">{_plain(each.symbol)}</tspan> = ' if each.symbol else ""
+            found.append(
+                f'<path class="leader" d="M{edge + (4 if side == "left" else -4):g} {y:g}L{each.x:g} {each.y:g}"/>'
+                f'<text data-mark="{escape(each.path)}" x="{edge:g}" y="{y + 4:g}"{end}>'
+                f"{symbol_}{escape(labels[each.path])}</text>"
+            )
+    return "".join(found)
+
+
+def _plain(text: str) -> str:
+    found = _PRINTED.fullmatch(str(symbol(text)))
+    return escape(text) if found is None else found[1] + (
+        f'<tspan baseline-shift="sub" font-size="10">{found[2]}</tspan>' if found[2] else ""
+    )  # fmt: skip
+
+
+def _spread(places: Sequence[float], height: float) -> list[float]:
+    """Places from top to bottom at least `_APART` from each other, within the height as far as there is room."""
+    found: list[float] = []
+    for place in places:
+        found.append(max(place, found[-1] + _APART) if found else max(place, 10.0))
+    over = found[-1] - (height - 8.0) if found else 0.0
+    for index in range(len(found) - 1, -1, -1):
+        if over <= 0.0:
+            break
+        limit = (height - 8.0) if index == len(found) - 1 else found[index + 1] - _APART
+        found[index] = min(found[index], limit)
+    return found

@@ -1,0 +1,32 @@
+"""The drawings of any machine that has one: of a study, or of the numbers of a form."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from sprag.service.figures.drive_drawing import drive_drawings
+from sprag.service.figures.linkage import machine_drawings
+from sprag.worker import models
+from sprag.worker.models import machine_shaft
+from sprag.worker.models.parameters import parameter_of
+
+if TYPE_CHECKING:
+    from sprag.service.figures.drawing import Drawing
+    from sprag.worker.study import Study
+
+#: Angle of the shaft in the drawing of a mechanism, in degrees.
+USUAL_ANGLE: Final = 60.0
+
+
+def drawings(study: Study, angle: float = USUAL_ANGLE) -> tuple[Drawing, ...]:
+    """The drawings of a study's base, a mechanism at an angle of its shaft (degrees); none of other models.
+
+    Each has the dimensions that the machine has, with their symbols.
+    """
+    if models.has_clutches(study):
+        entries = {path: parameter_of(study, path) for path in study.base}
+        symbols = {path: entry.symbol for path, entry in entries.items() if entry is not None}
+        return tuple(drawing.labelled(symbols) for drawing in drive_drawings(study.base))
+    if study.model == machine_shaft.MODEL:
+        return machine_drawings(study.structure or {}, study.base, angle)
+    return ()

@@ -1,0 +1,53 @@
+"""Drawings of machines: lengths to scale among themselves, a place for each dimension, pictures that stand alone."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import pytest
+
+from sprag.service.figures.drawing import svg, with_leaders
+from sprag.service.figures.drawings import drawings
+from sprag.service.http.views import preset_of
+from sprag.service.presets import preset_names
+from sprag.service.spec.document import parse_spec
+from sprag.worker.study import Study
+
+
+def _study(name: str) -> Study:
+    return parse_spec(preset_of(name)["spec"]).study
+
+
+def _lengths(study: Study) -> list[float]:
+    """Lengths in px of the dimension lines of a drive's pendulum."""
+    (drawing,) = drawings(study)
+    return [abs(float(end) - float(begin)) for begin, end in re.findall(r"M[\d.]+ ([\d.]+)V([\d.]+)\"", drawing.shapes)]
+
+
+@pytest.mark.parametrize(("arm", "spring_arm"), [(0.03, 0.05), (-0.04, 0.02), (0.05, -0.01)])
+def test_the_arms_of_a_drive_are_to_scale(arm: float, spring_arm: float) -> None:
+    study = _study("one_pendulum")
+    base = study.base | {"pendulums.0.arm": arm, "pendulums.0.spring_arm": spring_arm}
+    _rod, own, spring = _lengths(replace(study, base=base))
+    assert own / spring == pytest.approx(abs(arm / spring_arm), rel=2e-2)
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_every_machine_is_drawn_with_its_dimensions(name: str) -> None:
+    study = _study(name)
+    for drawing in drawings(study):
+        assert drawing.dimensions
+        labels = {each.path: f"{study.base[each.path]:g} <unit>" for each in drawing.dimensions}
+        for text in (svg(drawing, alone=True), svg(drawing, labels, alone=True)):
+            ElementTree.fromstring(text)
+        assert svg(drawing, labels).count("&lt;unit&gt;") == len(labels)
+        assert len(re.findall("L", with_leaders(drawing, 76.0, 20.0, 30.0))) >= len(labels)
+
+
+def test_the_train_has_a_wheel_for_each_shaft_of_its_stages() -> None:
+    train, mechanism = drawings(_study("punching_press"))
+    assert train.shapes.count('class="wheel"') == 4
+    assert {each.path for each in train.dimensions} >= {"drive.stages.0.ratio", "drive.flywheel.mass"}
+    assert "mechanism.slider_crank.crank" in {each.path for each in mechanism.dimensions}
