@@ -82,6 +82,7 @@ def _of_model(model: Model) -> Iterator[str]:
     yield from (info.description for variant in model.variants() for info in model.results(variant))
     yield from (shown.title, shown.heading, shown.portrait, shown.motion, shown.motion_note)
     yield from (answer.title for answer in shown.answers)
+    yield from shown.clauses.texts
     yield from (label for _, _, label in shown.balance)
     yield from map(_term, (*shown.states, *model.flags))
     yield from model.flags.values()

@@ -208,6 +208,32 @@ def find_answers(
     return StudyAnswers(query, x, unit_of(study, query.x), tuple(found), overall, replace(drawn, selection=shown_only))
 
 
+def answers_at(study: Study, infos: Sequence[ResultInfo], found: StudyAnswers, place: int, x: float) -> CurveAnswers:
+    """The answers of the curve at ``place`` of those ``found`` that are drawn, at another working point of it."""
+    assert found.query is not None
+    assert found.drawn is not None
+    by_name = {info.name: info for info in infos}
+    reader = _Reader(found.drawn.curves[place], found.query.x, x)
+    main = (Answer(name, name, name, "here") for name in found.query.y)
+    every = (one for one in answers_of_model(study, infos) if _fits(study, one, found.query.x))
+    return CurveAnswers(
+        found.curves[place].line,
+        tuple(reader.read(one, by_name[one.result], found.drawn) for one in every),
+        tuple(reader.read(one, by_name[one.result], found.drawn) for one in main),
+    )
+
+
+def usual_curve(study: Study, found: StudyAnswers) -> int:
+    """The place of the curve nearest to the machine of the base; that of the first of several."""
+
+    def distance(one: CurveAnswers) -> float:
+        return sum(
+            abs(value - study.base.get(path, value)) / (abs(value) or 1.0) for path, value in one.line.by.items()
+        )
+
+    return min(range(len(found.curves)), key=lambda place: distance(found.curves[place]), default=0)
+
+
 def _fits(study: Study, answer: Answer, x: str) -> bool:
     """Whether an answer has a meaning along the axis of ``x``."""
     return not answer.along or study.axis_of(answer.along) == study.axis_of(x)

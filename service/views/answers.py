@@ -49,11 +49,11 @@ def answers_of(library: Library, study_id: str, chosen: CurveQuery | None, point
         )
     # While a large study runs, all its rows would be read again for each of its chunks.
     over = library.store.studies.get(study_id).over or study.cases <= study_view.FEW
-    whole = partial(_whole, library, study_id) if over else None
+    whole = partial(whole_columns, library, study_id) if over else None
     return find_answers(study, infos, query, point, partial(library.store.rows.for_cases, study_id), whole)
 
 
-def _whole(library: Library, study_id: str, names: Sequence[str]) -> CaseColumns:
+def whole_columns(library: Library, study_id: str, names: Sequence[str]) -> CaseColumns:
     """Results of all finished cases."""
     rows = library.columns.of(study_id, names)
     kinds = [rows.kinds[kind] for kind in rows.kind.tolist()]

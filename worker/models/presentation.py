@@ -64,6 +64,33 @@ class Answer:
     along: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class Clauses:
+    """What is said of cases: clauses in which ``{places}`` stand for results, such as ``it runs at {speed}``.
+
+    Attributes
+    ----------
+    results : the result of each place; the first is what a case is judged by
+    here : of one case, the fullest first; the first one counts whose results are all known and not 0
+    still : of a case whose first result is 0
+    left : of a case with less than half of the first result that its neighbour has
+    stalls : that the first result is 0 from somewhere between ``{low}`` and ``{high}``
+    batch : of drives whose first result has its median at ``{middle}``, and 9 of 10 between ``{low}`` and ``{high}``
+    """
+
+    results: Mapping[str, str] = field(default_factory=dict)
+    here: tuple[str, ...] = ()
+    still: str = ""
+    left: str = ""
+    stalls: str = ""
+    batch: str = ""
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """Every clause."""
+        return tuple(filter(None, (*self.here, self.still, self.left, self.stalls, self.batch)))
+
+
 def panels_by_unit(names: Sequence[str], units: Sequence[str]) -> tuple[Panel, ...]:
     """A panel for each unit, with all variables that have it."""
     pairs = tuple(zip(names, units, strict=True))
@@ -90,6 +117,8 @@ class Presentation:
     drawn : results of the main curve
     main : the main results of a machine; ``heading`` is their common title
     answers : what a page says first; where there are none, the largest and smallest values of the drawn results
+    clauses : what is said of a case in a sentence
+    shares : results that people read in per cent
     columns : results that the table of cases shows first
     operating_point : paths of parameters that every picture must state
     checks : first parts of the names of results that describe the computation rather than the machine
@@ -114,6 +143,8 @@ class Presentation:
     main: tuple[str, ...] = ()
     heading: str = "Main results"
     answers: tuple[Answer, ...] = ()
+    clauses: Clauses = field(default_factory=Clauses)
+    shares: tuple[str, ...] = ()
     columns: tuple[str, ...] = ()
     operating_point: tuple[str, ...] = ()
     checks: tuple[str, ...] = ()

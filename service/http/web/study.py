@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
-import numpy as np
 from starlette.datastructures import QueryParams
 from starlette.responses import RedirectResponse, Response
 
 from sprag.sentences import Sentence
 from sprag.service import formats
-from sprag.service.faults import SelectionError
 from sprag.service.figures.pictures import curves as pictures
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx, StudyId
@@ -35,15 +32,14 @@ from sprag.service.json_text import timestamp
 from sprag.service.languages import N_, _
 from sprag.service.reading.directions import ends_in_words
 from sprag.service.reading.reader import Reading, meanings, reading_for
-from sprag.service.results.choice import characteristic, map_query, pairs_of
-from sprag.service.results.curve_cases import select
+from sprag.service.results.choice import map_query, pairs_of
 from sprag.service.results.defaults import caption, drawn_numbers, main_query, no_curves, varying_axes
 from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.regimes import DOUBTFUL, ORDER, counted
 from sprag.service.results.shown_inputs import inputs, run_settings
 from sprag.service.spec.narrow import narrowed_cases
 from sprag.service.storage.studies.records import Kinds
-from sprag.service.views.study_view import FEW
+from sprag.service.views.headline import is_small, usual_query
 from sprag.worker import models
 from sprag.worker.limits import MAX_CASES, NARROW_STEPS
 from sprag.worker.models.starts import has_starts
@@ -152,9 +148,7 @@ async def shown_study(
 
 def _usual_curves(context: Context, study_id: str) -> tuple[CurveQuery | None, bool]:
     """The curves that are shown first, and whether reading the answers of the study takes long."""
-    study = context.store.studies.study(study_id)
-    usual = characteristic(study, models.study_results(study))
-    return _with_rows(context, study, study_id, usual), study.cases > FEW // 2
+    return usual_query(context.library, study_id), not is_small(context.store.studies.study(study_id))
 
 
 def _study_page(
@@ -304,24 +298,6 @@ def _chosen_figure(
         "invitation": _("Choose others with"),
         "caption": text,
     }
-
-
-def _with_rows(context: Context, study: Study, study_id: str, query: CurveQuery | None) -> CurveQuery | None:
-    """The same curves; where they have no finished case, the undrawn axes are held where there are finished cases."""
-    if query is None or not query.at or StudyState(context.store.studies.get(study_id).state) is StudyState.FINISHED:
-        return query
-    try:
-        cases = [line.cases for line in select(study, models.study_results(study), query).lines]
-    except SelectionError:
-        return query
-    found = context.store.rows.for_cases(study_id, np.concatenate(cases), ())
-    done = context.store.rows.block(study_id, limit=1).cases
-    if not {None, models.WorkerEnding.CANCELLED}.issuperset(found.endings) or not len(done):
-        return query
-    # Of a parameter with a tolerance, the axis has the nominal value.
-    places = [(study.axes[axis], index) for axis, index in enumerate(study.indices(done[:1]))]
-    values = {path: axis.value(int(index[0])) for axis, index in places for path in axis.paths}
-    return replace(query, at=tuple((path, repr(values[path])) for path, _ in query.at))
 
 
 @router.get("/studies/{study_id:study}/delete")

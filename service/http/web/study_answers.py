@@ -20,7 +20,7 @@ from sprag.service.reading.units import split_quantity, to_float
 from sprag.service.reading.wording import unit_text
 from sprag.service.results.choice import curve_query, pairs_of, value_choices
 from sprag.service.results.key_answer_words import answer_facts, curve_name, curve_named, note_of, place_text
-from sprag.service.results.key_answers import answers_query
+from sprag.service.results.key_answers import answers_query, usual_curve
 from sprag.service.views.answers import answers_of
 from sprag.service.views.library import reading_of
 from sprag.worker import models
@@ -152,7 +152,7 @@ def _view(
 ) -> AnswersOnPage:
     names = [curve_name(one, study) for one in found.curves]
     asked_for = curve_named(names, curve)
-    chosen = _usual_curve(study, found) if asked_for is None else asked_for
+    chosen = usual_curve(study, found) if asked_for is None else asked_for
     one = found.curves[chosen] if found.curves else None
     overall = [_tile(item, found.unit, reading, study) for item in found.overall if item.value is not None]
     if one is None:
@@ -199,17 +199,6 @@ def _as_read(text: str, unit: str) -> str:
     """A working point, typed in any language, as its reader has it; a bare number is in ``unit``."""
     value, own = split_quantity(text)
     return f"{decimal(f'{to_float(value):.10g}')} {unit_text(own or unit)}".strip()
-
-
-def _usual_curve(study: Study, found: StudyAnswers) -> int:
-    """The curve nearest to the machine of the base; the first of several."""
-
-    def distance(one: CurveAnswers) -> float:
-        return sum(
-            abs(value - study.base.get(path, value)) / (abs(value) or 1.0) for path, value in one.line.by.items()
-        )
-
-    return min(range(len(found.curves)), key=lambda place: distance(found.curves[place]), default=0)
 
 
 def _row(one: CurveAnswers, found: StudyAnswers, reading: Reading) -> list[Tile]:

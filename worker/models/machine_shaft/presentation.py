@@ -10,7 +10,7 @@ import numpy as np
 from sprag.worker.models.machine_shaft.form import FORM
 from sprag.worker.models.machine_shaft.laboratory import LABORATORY
 from sprag.worker.models.machine_shaft.words import CAPTIONS, LETTERS
-from sprag.worker.models.presentation import Answer, Panel, Presentation, Reference
+from sprag.worker.models.presentation import Answer, Clauses, Panel, Presentation, Reference
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -92,6 +92,15 @@ PRESENTATION: Final = Presentation(
         Answer("energy_fluctuation", "Energy fluctuation", "energy.fluctuation", "here"),
         Answer("mean_energy", "Mean kinetic energy", "energy.mean", "here"),
         Answer("least_irregularity", "Least irregularity", "irregularity", "smallest"),
+    ),
+    clauses=Clauses(
+        results={"irregularity": "irregularity", "inertia": "required_inertia"},
+        here=(
+            "the irregularity is {irregularity}; the wanted one takes a drive of {inertia}",
+            "the irregularity is {irregularity}",
+        ),
+        still="it runs evenly",
+        batch="half of the machines have an irregularity above {middle}, 9 of 10 between {low} and {high}",
     ),
     operating_point=("mean_speed", "drive.inertia"),
     checks=("balance",),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from sprag.worker.models.presentation import Answer, Panel, Presentation
+from sprag.worker.models.presentation import Answer, Clauses, Panel, Presentation
 from sprag.worker.models.vibration_drive.form import FORM
 from sprag.worker.models.vibration_drive.laboratory import LABORATORY
 from sprag.worker.models.vibration_drive.words import CAPTIONS, LETTERS
@@ -62,6 +62,15 @@ PRESENTATION: Final = Presentation(
         Answer("best_efficiency", "Best efficiency", "efficiency", "largest"),
         Answer("stall_torque", "Stall torque", "shaft.speed.mean", "until_zero", along="shaft.load"),
     ),
+    clauses=Clauses(
+        results={"speed": "shaft.speed.mean", "efficiency": "efficiency"},
+        here=("it runs at {speed} with {efficiency} efficiency", "it runs at {speed}"),
+        still="it stands still",
+        left="only {speed} is left",
+        stalls="it stalls between {low} and {high}",
+        batch="half of the drives run faster than {middle}, 9 of 10 between {low} and {high}",
+    ),
+    shares=("efficiency",),
     columns=("regime", "shaft.speed.mean", "shaft.irregularity", "torque.mean", "power.useful.mean", "efficiency"),
     operating_point=_POINT,
     checks=("balance", "run", "reset", "regime"),

@@ -1,0 +1,320 @@
+"""The answer of cases along an axis, of a single case, and of cases that lie on no curve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sprag.sentences import Amount, Name, Whole
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.reader import Phrase, joined, term
+from sprag.service.results.headlines.headline import (
+    MOST,
+    NOTHING,
+    OF_PLACES,
+    Gap,
+    Headline,
+    KeyNumber,
+    amount,
+    digits,
+    shared,
+    shown_unit,
+    trace_of,
+)
+from sprag.service.results.key_answer_words import answer_facts, curve_name, note_of, place_text
+from sprag.service.results.key_answers import answers_at, usual_curve
+from sprag.service.results.selection import axis_name
+from sprag.worker import models
+from sprag.worker.study import SAME_VALUE
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from sprag.sentences import Part
+    from sprag.service.results.curves import Curve
+    from sprag.service.results.key_answers import CurveAnswers, Found, StudyAnswers
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.study import Study
+
+#: What is less than this share of its neighbour is worth a sentence.
+_LEFT: Final = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Along:
+    """A curve of a study and the place on it that is told about.
+
+    Attributes
+    ----------
+    curve : with all results that its answers need
+    path : of its axis
+    x : the place, SI
+    places : of the case at ``x``, or of its two neighbours
+    """
+
+    study: Study
+    infos: Mapping[str, ResultInfo]
+    curve: Curve
+    path: str
+    x: float
+    places: tuple[int, ...]
+
+    @property
+    def first(self) -> ResultInfo:
+        """The result that a case is judged by."""
+        return self.infos[judged_by(self.study, self.curve.y)]
+
+    def value(self, place: int, name: str) -> float:
+        """A result that counts; NaN where there is none."""
+        return float(self.curve.known(name)[place])
+
+    def at(self, place: int) -> Amount:
+        """The place of a case on the axis."""
+        return Amount(float(self.curve.line.x[place]), unit_of(self.study, self.path), OF_PLACES)
+
+
+def judged_by(study: Study, known: Sequence[str] | Mapping[str, object]) -> str:
+    """The result that a case of a study is judged by, of those that are known."""
+    shown = models.presentation_of(study)
+    wanted = (*shown.clauses.results.values(), *shown.drawn)
+    return next((name for name in wanted if name in known), next(iter(known)))
+
+
+def told(
+    study: Study, infos: Mapping[str, ResultInfo], values: Mapping[str, float], widths: Mapping[str, float]
+) -> Phrase:
+    """The clause about a case with these results; "" where none can be said."""
+    clauses = models.presentation_of(study).clauses
+    names = {place: name for place, name in clauses.results.items() if name in infos}
+    parts: dict[str, Part] = {
+        place: amount(study, infos[name], values[name], widths.get(name))
+        for place, name in names.items()
+        if np.isfinite(values.get(name, np.nan))
+    }
+    first = next(iter(names.values()), None)
+    if first is not None and values.get(first) == 0.0 and clauses.still:
+        return Phrase(clauses.still)
+    for text in clauses.here:
+        wanted = [place for place in clauses.results if f"{{{place}}}" in text]
+        if all(place in parts and values[names[place]] != 0.0 for place in wanted):
+            return Phrase(text, **{place: parts[place] for place in wanted})
+    name = next((name for name in values if name in infos and np.isfinite(values[name])), None)
+    if name is None:
+        return NOTHING
+    value = amount(study, infos[name], values[name], widths.get(name))
+    return Phrase("{name} is {value}", name=Name(name, within=True), value=value)
+
+
+def place_on(curve: Curve, name: str, x: float | None, *, asked: bool) -> tuple[float, tuple[int, ...]] | None:
+    """A place of a curve with its case, or its two neighbours; None where the curve has no case, or none around it.
+
+    Unless it was ``asked`` for, it is that of the nearest case with the result ``name``, of two the farther one.
+    """
+    run = curve.run()
+    if not run.size or x is None:
+        return None
+    values = np.asarray(curve.line.x)[run]
+    scale = max(float(np.abs(values).max()), abs(x))
+    exact = np.flatnonzero(np.abs(values - x) <= SAME_VALUE * scale)
+    if exact.size:
+        return x, (int(run[exact[0]]),)
+    below, above = np.flatnonzero(values < x), np.flatnonzero(values > x)
+    if asked and below.size and above.size:
+        low, high = below[np.argmax(values[below])], above[np.argmin(values[above])]
+        return x, (int(run[low]), int(run[high]))
+    known = np.flatnonzero(np.isfinite(curve.known(name)[run])).tolist()
+    nearest = min(
+        known or range(run.size), key=lambda place: (round(abs(float(values[place]) - x) / scale, 9), -values[place])
+    )
+    return float(values[nearest]), (int(run[nearest]),)
+
+
+def along_headline(
+    study: Study, infos: Sequence[ResultInfo], found: StudyAnswers, chosen: int | None = None, *, asked: bool = False
+) -> Headline:
+    """The answer of the ``chosen`` curve at the point of ``found``; at its nearest case unless it was ``asked`` for."""
+    if found.query is None or found.drawn is None or not found.curves:
+        return _no_curve(study, infos, found)
+    place = usual_curve(study, found) if chosen is None else chosen
+    curve = found.drawn.curves[place]
+    spot = place_on(curve, judged_by(study, curve.y), found.point, asked=asked)
+    of = curve_name(found.curves[place], study) if len(found.curves) > 1 else NOTHING
+    if spot is None:
+        return Headline(of=of)
+    own = Along(study, {info.name: info for info in infos}, curve, found.query.x, *spot)
+    answers = answers_at(study, infos, found, place, spot[0])
+    gap = None
+    if len(spot[1]) == 2:
+        low, high = (float(curve.line.x[at]) for at in spot[1])
+        gap = Gap(found.query.x, spot[0], low, high)
+    y = curve.known(own.first.name)
+    return Headline(
+        sentence=tuple(filter(None, (*_sentences(own), _next(own, answers)))),
+        numbers=_numbers(own, answers, found.unit),
+        of=of,
+        trace=trace_of(curve.line.x, y, spot[1][0]),
+        gap=gap,
+    )
+
+
+def _sentences(own: Along) -> list[Phrase]:
+    """What is said of the place: of its case, or that it has none and what its neighbours have."""
+    if len(own.places) == 1:
+        return [_of_case(own, own.places[0])]
+    wanted = Amount(own.x, unit_of(own.study, own.path), OF_PLACES)
+    missing = Phrase("No case was run at {place}.", place=wanted)
+    return [missing, *(_of_case(own, place) for place in own.places)]
+
+
+def _of_case(own: Along, place: int) -> Phrase:
+    clause = _clause(own, place)
+    if not clause:
+        clause = _without(own, place)
+    along = models.presentation_of(own.study).along[:1]
+    if own.path in along:
+        return Phrase("At {place} {clause}.", place=own.at(place), clause=clause)
+    name = Name(axis_name(own.study, own.path).partition(" = ")[0])
+    return Phrase("{name} {place}: {clause}.", name=name, place=own.at(place), clause=clause)
+
+
+def _clause(own: Along, place: int) -> Phrase:
+    values = {name: own.value(place, name) for name in own.curve.y if name in own.infos and not is_width(name)}
+    widths = {name: width for name in values if (width := _width(own, place, name)) is not None}
+    first = own.first.name
+    values = {first: values[first], **values}
+    return NOTHING if not np.isfinite(values[first]) else told(own.study, own.infos, values, widths)
+
+
+def is_width(name: str) -> bool:
+    """Whether a result is the half width of another one."""
+    return name.endswith(models.half_width(""))
+
+
+def _width(own: Along, place: int, name: str) -> float | None:
+    widths = own.curve.y.get(models.half_width(name))
+    return None if widths is None or not np.isfinite(widths[place]) else float(widths[place])
+
+
+def _without(own: Along, place: int) -> Phrase:
+    """Why a case has no result that counts."""
+    ending, kind = own.curve.endings[place], None if own.curve.regimes is None else own.curve.regimes[place]
+    flags = [] if own.curve.flags is None else own.curve.flags[place].split(",")
+    why = ending if ending != models.OK else models.NOT_SETTLED if models.NOT_SETTLED in flags else kind or ending
+    return Phrase("there is no result: {why}", why=term(why))
+
+
+def _next(own: Along, answers: CurveAnswers) -> Phrase:
+    """What comes behind the place: how little is left at the next case, or where nothing is."""
+    if len(own.places) == 2:
+        return NOTHING
+    clauses, name = models.presentation_of(own.study).clauses, own.first.name
+    here = own.value(own.places[0], name)
+    x = np.asarray(own.curve.line.x)
+    after = [place for place in own.curve.run().tolist() if x[place] > own.x * (1.0 + SAME_VALUE)]
+    following = min(after, key=lambda place: x[place], default=None)
+    if following is not None and clauses.left and here > 0.0:
+        value = own.value(following, name)
+        if 0.0 < value < _LEFT * here:
+            place = next(iter(clauses.results))
+            left = Phrase(clauses.left, **{place: amount(own.study, own.first, value)})
+            return Phrase("At {place} {clause}.", place=own.at(following), clause=left)
+    stall = next((one for one in answers.answers if one.answer.kind == "until_zero" and one.value is not None), None)
+    if stall is None or not clauses.stalls:
+        return NOTHING
+    if stall.high is None:
+        there = stall.there or 0.0
+        if not clauses.left or not 0.0 < there < _LEFT * here:
+            return NOTHING
+        left = Phrase(clauses.left, **{next(iter(clauses.results)): amount(own.study, own.first, there)})
+        return Phrase("At {place} {clause}.", place=Amount(stall.value, stall.unit, OF_PLACES), clause=left)
+    ends = {
+        "low": Amount(stall.low, stall.unit, OF_PLACES, bare=True),
+        "high": Amount(stall.high, stall.unit, OF_PLACES),
+    }
+    return joined("", [Whole(Phrase(clauses.stalls, **ends))])
+
+
+def _numbers(own: Along, answers: CurveAnswers, x_unit: str) -> tuple[KeyNumber, ...]:
+    found = [_number(own, one, x_unit) for one in answers.answers if one.value is not None]
+    if not found:
+        found = [_number(own, one, x_unit) for one in answers.working_point if one.value is not None]
+    return tuple(found[:MOST])
+
+
+def _number(own: Along, found: Found, x_unit: str) -> KeyNumber:
+    """An answer as a key number; between two cases what both of them have."""
+    if found.answer.kind == "until_zero":
+        return _stall(own, found)
+    label, value = found.answer.title, shared(own.study, found.info, found.value or 0.0)
+    made = KeyNumber(
+        label, value, shown_unit(own.study, found.info),
+        digits=digits(value, found.half_width),
+        where=_where(found, x_unit),
+        note=_doubt(found),
+        case=found.case,
+    )  # fmt: skip
+    if found.other is None:
+        return made
+    ends = sorted(shared(own.study, found.info, own.value(place, found.info.name)) for place in own.places)
+    return replace(made, value=None, low=ends[0], high=ends[-1])
+
+
+def _where(found: Found, x_unit: str) -> Phrase:
+    if found.other is not None and found.low is not None and found.high is not None:
+        ends = Amount(found.low, x_unit, OF_PLACES, bare=True), Amount(found.high, x_unit, OF_PLACES)
+        return Phrase("between {low} and {high}", low=ends[0], high=ends[1])
+    return NOTHING if found.x is None else Phrase("at {place}", place=Amount(found.x, x_unit, OF_PLACES))
+
+
+def _doubt(found: Found) -> Phrase:
+    """What should make one careful: the end of an axis, an irregular motion."""
+    parts: list[Phrase] = [Phrase("at the end of the axis")] if found.edge and found.x else []
+    if found.regime not in (None, "periodic", "coasting"):
+        parts.append(term(found.regime or ""))
+    return joined(", ", parts)
+
+
+def _stall(own: Along, found: Found) -> KeyNumber:
+    there = NOTHING
+    if found.above and found.there is not None:
+        there = Phrase("there {value}", value=amount(own.study, found.info, found.there))
+    elif found.high is not None:
+        there = Phrase("below {place}", place=Amount(found.high, found.unit, OF_PLACES))
+    return KeyNumber(found.answer.title, found.value, found.unit, OF_PLACES, above=True, where=there, case=found.case)
+
+
+def _no_curve(study: Study, infos: Sequence[ResultInfo], found: StudyAnswers) -> Headline:
+    """The answer of a single case, or the extremes among cases that lie on no curve."""
+    known = {info.name: info for info in infos}
+    if found.curves:
+        one = found.curves[0]
+        values = {item.info.name: item.value for item in (*one.working_point, *one.answers) if item.value is not None}
+        widths = {item.info.name: item.half_width for item in one.working_point if item.half_width}
+        clause = told(study, known, values, widths)
+        numbers = [_plain(study, item) for item in (*one.answers, *one.working_point) if item.value is not None]
+        numbers = list({number.label: number for number in numbers}.values())
+        says = (joined("", [Whole(clause)]),) if clause else ()
+        return Headline(says, tuple(numbers[:MOST]))
+    best = [item for item in found.overall if item.value is not None]
+    numbers = [replace(_plain(study, item), where=place_text(study, item.case or 0)) for item in best]
+    says = ()
+    if best:
+        title = best[0].answer.title
+        says = (
+            Phrase(
+                "{title}: {value}, {place}.",
+                title=title if isinstance(title, Phrase) else Phrase(title),
+                value=amount(study, best[0].info, best[0].value or 0.0, best[0].half_width),
+                place=place_text(study, best[0].case or 0),
+            ),
+        )
+    return Headline(says, tuple(numbers[:MOST]))
+
+
+def _plain(study: Study, item: Found) -> KeyNumber:
+    value = shared(study, item.info, item.value or 0.0)
+    note = note_of(answer_facts(item), "1") if item.flags or item.regime else NOTHING
+    unit, count = shown_unit(study, item.info), digits(value, item.half_width)
+    return KeyNumber(item.answer.title, value, unit, count, note=note, case=item.case)

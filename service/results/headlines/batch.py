@@ -1,0 +1,164 @@
+"""The answer of a batch of drives: what half of them reach, what 9 of 10 lie between, and the yield."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sprag.sentences import Amount, Name, Whole
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.reader import Phrase, joined
+from sprag.service.results.defaults import drawn_results, usual_value
+from sprag.service.results.headlines.along import judged_by
+from sprag.service.results.headlines.headline import (
+    NOTHING,
+    OF_PLACES,
+    Gap,
+    Headline,
+    KeyNumber,
+    Trace,
+    amount,
+    digits,
+    shared,
+    shown_unit,
+    trace_of,
+)
+from sprag.service.results.selection import value_of
+from sprag.service.results.tolerances.batch import Asked
+from sprag.service.results.tolerances.conditions import first_condition
+from sprag.service.results.tolerances.ribbons import QUANTILES, ribbon
+from sprag.service.results.tolerances.yields import yields
+from sprag.worker import models
+from sprag.worker.study import SAME_VALUE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sprag.service.results.curves import Fetch
+    from sprag.service.results.tolerances.ribbons import Ribbon, RibbonLine
+    from sprag.service.results.tolerances.yields import Yield
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.study import Study
+
+_LOW, _MIDDLE, _HIGH = range(len(QUANTILES))
+
+
+def batch_headline(study: Study, infos: Sequence[ResultInfo], point: str | None, fetch: Fetch) -> Headline:
+    """The answer of a batch at a value of its axis, the usual one unless a ``point`` is given.
+
+    Raises SelectionError about ``point`` where it is no value of the axis.
+    """
+    name = judged_by(study, drawn_results(study, infos))
+    found = ribbon(study, infos, (name,), Asked(), QUANTILES, fetch)
+    line, place = _usual_line(study, found), 0
+    gap = None
+    if found.places.x is not None:
+        x = _point(study, found.places.x, point)
+        place, gap = _place(found.places.x, line, x, asked=bool(point))
+    if not line.spreads[name].quantiles.drives[place]:
+        return Headline(gap=gap)
+    reached = yields(study, infos, (first_condition(study, name),), Asked(), 0, fetch)
+    return Headline(
+        _sentences(found, line, name, place, gap),
+        _numbers(found, line, name, place, reached),
+        trace=trace_of(line.line.x, line.spreads[name].nominal, place) if found.places.x else _spread(line, name),
+        gap=gap,
+    )
+
+
+def _usual_line(study: Study, found: Ribbon) -> RibbonLine:
+    """The line nearest to the machine of the base."""
+
+    def distance(line: RibbonLine) -> float:
+        pairs = line.line.by.items()
+        return sum(abs(value - study.base.get(path, value)) / (abs(value) or 1.0) for path, value in pairs)
+
+    return min(found.lines, key=distance)
+
+
+def _point(study: Study, path: str, text: str | None) -> float:
+    if text:
+        return value_of(path, text, unit_of(study, path), "point")
+    axis = study.axis_with(path)
+    return study.base[path] if path in study.base else usual_value(study, axis)
+
+
+def _place(path: str, line: RibbonLine, x: float, *, asked: bool) -> tuple[int, Gap | None]:
+    """The place nearest to ``x``, and the neighbours where that was ``asked`` for and is none of them."""
+    values = np.asarray(line.line.x)
+    place = int(np.argmin(np.abs(values - x)))
+    if not asked or abs(values[place] - x) <= SAME_VALUE * max(float(np.abs(values).max()), abs(x)):
+        return place, None
+    below, above = values[values < x], values[values > x]
+    return place, Gap(path, x, float(below.max()), float(above.min())) if below.size and above.size else None
+
+
+def _sentences(found: Ribbon, line: RibbonLine, name: str, place: int, gap: Gap | None) -> tuple[Phrase, ...]:
+    if gap is None:
+        return (_sentence(found, line, name, place),)
+    x = list(line.line.x)
+    missing = Phrase("No case was run at {place}.", place=Amount(gap.value, found.places.units[gap.path], OF_PLACES))
+    return missing, *(_sentence(found, line, name, x.index(end)) for end in (gap.low, gap.high))
+
+
+def _sentence(found: Ribbon, line: RibbonLine, name: str, place: int) -> Phrase:
+    study, info = found.places.study, found.results[0]
+    low, middle, high = (amount(study, info, float(value)) for value in line.spreads[name].quantiles.values[:, place])
+    low = replace(low, bare=True)
+    clauses = models.presentation_of(study).clauses
+    clause = Phrase("half of the drives have a {name} above {middle}, 9 of 10 between {low} and {high}",
+                    name=Name(name, within=True), middle=middle, low=low, high=high)  # fmt: skip
+    if clauses.batch and next(iter(clauses.results.values())) == name:
+        clause = Phrase(clauses.batch, middle=middle, low=low, high=high)
+    if found.places.x is None:
+        return joined("", [Whole(clause)])
+    at = Amount(line.line.x[place], found.places.units[found.places.x], OF_PLACES)
+    if found.places.x in models.presentation_of(study).along[:1]:
+        return Phrase("At {place} {clause}.", place=at, clause=clause)
+    return Phrase("{name} {place}: {clause}.", name=Name(found.places.x), place=at, clause=clause)
+
+
+def _numbers(found: Ribbon, line: RibbonLine, name: str, place: int, reached: Yield) -> tuple[KeyNumber, ...]:
+    study, info, quantiles = found.places.study, found.results[0], line.spreads[name].quantiles
+    low, middle, high = (shared(study, info, float(value)) for value in quantiles.values[:, place])
+    unit, own = shown_unit(study, info), found.places.x
+    where = (
+        NOTHING
+        if own is None
+        else Phrase("at {place}", place=Amount(line.line.x[place], found.places.units[own], OF_PLACES))
+    )
+    half = _half_width(float(quantiles.low[_MIDDLE, place]), float(quantiles.high[_MIDDLE, place]))
+    nominal = shared(study, info, float(line.spreads[name].nominal[place]))
+    count = digits(high)
+    numbers = [
+        KeyNumber(Phrase("Half of the drives above"), middle, unit, digits(middle, half), where=where),
+        KeyNumber(Phrase("9 of 10 between"), None, unit, count, low, high, where=where),
+    ]
+    if np.isfinite(nominal):
+        case = int(line.line.cases[place])
+        numbers.append(KeyNumber(Phrase("As drawn"), nominal, unit, digits(nominal), where=where, case=case))
+    numbers += _yield(line, place, reached)
+    return tuple(numbers)
+
+
+def _half_width(low: float, high: float) -> float | None:
+    return 0.5 * (high - low) if np.isfinite(low + high) else None
+
+
+def _yield(line: RibbonLine, place: int, reached: Yield) -> list[KeyNumber]:
+    """The share of the drives that reach the usual condition at the place."""
+    own = next((one for one in reached.lines if one.line.by == line.line.by), None)
+    if own is None or not np.isfinite(own.each.value[place]):
+        return []
+    share, low, high = (100.0 * float(ends[place]) for ends in (own.each.value, own.each.low, own.each.high))
+    count = digits(share, 0.5 * (high - low))
+    where = reached.conditions[0].text
+    return [KeyNumber(Phrase("Yield"), share, "%", count, low, high, where=where)]
+
+
+def _spread(line: RibbonLine, name: str) -> Trace | None:
+    """The distribution at a single place as a thumbnail."""
+    distribution = line.spreads[name].distribution
+    return None if distribution is None else trace_of(range(len(distribution)), distribution)

@@ -1,0 +1,52 @@
+"""The answer of a calibration: the values that explain the measurement, with their intervals."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sprag.sentences import Amount, Name
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.reader import Phrase, joined, plural
+from sprag.service.results.headlines.headline import MOST, NOTHING, Headline, KeyNumber, digits
+
+if TYPE_CHECKING:
+    from sprag.service.results.calibration import Calibration
+
+
+def calibrated_headline(found: Calibration) -> Headline:
+    """The answer of a calibration as far as it has come."""
+    if found.answer is None:
+        return Headline()
+    every = tuple(_parameter(found, place) for place in range(len(found.plan.unknown)))
+    amounts = (
+        Amount(value, one.unit, one.digits) for one, value in zip(every, found.answer.values.tolist(), strict=True)
+    )
+    values = joined(
+        "; ",
+        (
+            Phrase("{name} = {value}", name=Name(one.label, within=True), value=value)
+            for one, value in zip(every, amounts, strict=True)
+        ),
+    )
+    count = len(found.plan.values)
+    fits = plural(
+        "{count} measured value is explained best by {values}.",
+        "{count} measured values are explained best by {values}.",
+        count, values=values,
+    )  # fmt: skip
+    doubts = found.sentences
+    return Headline((fits, *(joined("", [one]) for one in doubts[:1])), every[:MOST], every[MOST:] and every)
+
+
+def _parameter(found: Calibration, place: int) -> KeyNumber:
+    """An unknown parameter with its interval and what it was before."""
+    known, path = found.answer, found.names[place]
+    assert known is not None
+    unit, value, before = unit_of(found.study, path), float(known.values[place]), found.study.base.get(path)
+    low, high = (None, None) if known.intervals is None else known.intervals[place].tolist()
+    count = digits(value, None if low is None else 0.5 * (high - low))
+    where = NOTHING
+    if low is not None:
+        where = Phrase("{low} to {high}", low=Amount(low, unit, count, bare=True), high=Amount(high, unit, count))
+    note = NOTHING if before is None else Phrase("{value} before", value=Amount(before, unit, 4))
+    return KeyNumber(path, value, unit, count, low, high, where=where, note=note)

@@ -1,0 +1,176 @@
+"""What a headline is: sentences, key numbers with the place where they hold, and a line for a thumbnail."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sprag.sentences import Amount, Name
+from sprag.service.reading.reader import Phrase
+from sprag.service.reading.wording import number, unit_text
+from sprag.worker import models
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from sprag.service.reading.reader import Reading
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.study import Study
+
+#: Key numbers at most.
+MOST: Final = 4
+#: Digits of a number whose error is not known, and the most of any.
+_DIGITS: Final = 3
+_MOST_DIGITS: Final = 5
+#: Digits of a large number that keeps its ones.
+_WHOLE: Final = 4
+#: Digits of a place of an axis, which is exact.
+OF_PLACES: Final = 5
+NOTHING: Final = Phrase("")
+
+
+@dataclass(frozen=True, slots=True)
+class KeyNumber:
+    """A number that people ask for.
+
+    Attributes
+    ----------
+    label : what it is: a phrase, a text of the model, or the name of a quantity
+    value : SI, or a share in per cent where ``unit`` is that; None where there is an interval only
+    unit : of ``value``, ``low`` and ``high``
+    digits : significant digits that are shown
+    low, high : ends of an interval, or what two neighbouring cases have
+    above : whether the true value is larger than this one
+    where : the place where it holds, for people; "" for none
+    note : what else should be known: its reserve, its value before
+    case : the case that it was read from
+    """
+
+    label: str
+    value: float | str | None
+    unit: str = "1"
+    digits: int = _DIGITS
+    low: float | None = None
+    high: float | None = None
+    above: bool = False
+    where: Phrase = NOTHING
+    note: Phrase = NOTHING
+    case: int | None = None
+
+    def title(self, reading: Reading) -> str:
+        """Its label for a reader."""
+        return reading.say_name(
+            self.label if isinstance(self.label, Phrase) else Phrase("{name}", name=Name(self.label))
+        )
+
+    def number(self, reading: Reading) -> str:
+        """Its value for a reader, without the unit; an interval where there is no value."""
+        if self.value is not None:
+            text = self.value if isinstance(self.value, str) else self._shown(self.value, reading)
+            return f"> {text}" if self.above else text
+        return self.interval(reading) or number(None)
+
+    def interval(self, reading: Reading) -> str:
+        """The ends of its interval for a reader; "" without one."""
+        if self.low is None or self.high is None:
+            return ""
+        return Phrase("{low} to {high}", low=self._shown(self.low, reading), high=self._shown(self.high, reading)).said(
+            reading
+        )
+
+    def unit_text(self, reading: Reading) -> str:
+        """Its unit for a reader."""
+        return "" if isinstance(self.value, str) else unit_text(reading.unit(self.unit))
+
+    def _shown(self, value: float, reading: Reading) -> str:
+        shown = float(reading.value(value, self.unit))
+        return number(shown, max(self.digits, min(digits(shown), _WHOLE)))
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """A line for a thumbnail, SI; NaN where there is no value. ``at`` is the position of the point that is told."""
+
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    at: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """A place between two computed cases that was asked for: ``low`` and ``high`` are those of its neighbours, SI."""
+
+    path: str
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class Headline:
+    """The answer of a study.
+
+    Attributes
+    ----------
+    sentence : one or two sentences
+    numbers : at most `MOST` key numbers
+    dimensions : of a search its best design, of a calibration the parameters: each with what it was before
+    limits : of a search each limit with its reserve
+    of : what the curve is of that the sentence is about, among several; "" for the only one
+    trace : a line for a thumbnail; None where there is none
+    gap : where the sentence is about a place without a case
+    """
+
+    sentence: tuple[Phrase, ...] = ()
+    numbers: tuple[KeyNumber, ...] = ()
+    dimensions: tuple[KeyNumber, ...] = ()
+    limits: tuple[KeyNumber, ...] = ()
+    of: Phrase = NOTHING
+    trace: Trace | None = None
+    gap: Gap | None = None
+
+    def said(self, reading: Reading) -> str:
+        """Its sentences for a reader."""
+        return " ".join(map(reading.say, self.sentence))
+
+
+def digits(value: float, half_width: float | None = None) -> int:
+    """Significant digits of a number: as many as its interval leaves, at least `_DIGITS`, and these where it has none.
+
+    A number below 10 000 keeps its ones.
+    """
+    if value == 0.0 or not math.isfinite(value):
+        return _DIGITS
+    size = math.floor(math.log10(abs(value)))
+    if half_width:
+        return min(max(size - math.floor(math.log10(half_width)) + 1, _DIGITS), _MOST_DIGITS)
+    return min(max(_DIGITS, size + 1), _WHOLE)
+
+
+def amount(study: Study, info: ResultInfo, value: float, half_width: float | None = None) -> Amount:
+    """A result for a sentence; of one that people read in per cent, that."""
+    shown, unit = shared(study, info, value), shown_unit(study, info)
+    return Amount(shown, unit, digits(shown, half_width))
+
+
+def shared(study: Study, info: ResultInfo, value: float) -> float:
+    """A result as it is shown: in per cent where people read it so."""
+    return 100.0 * value if info.name in models.presentation_of(study).shares else value
+
+
+def shown_unit(study: Study, info: ResultInfo) -> str:
+    """The unit of `shared`."""
+    return "%" if info.name in models.presentation_of(study).shares else info.unit
+
+
+def trace_of(x: Sequence[float], y: NDArray[np.float64], at: int | None = None) -> Trace | None:
+    """A thumbnail of these points; None for fewer than two with a value."""
+    known = np.isfinite(y)
+    if np.count_nonzero(known) < 2:
+        return None
+    return Trace(tuple(x), tuple(y.tolist()), at)

@@ -1,0 +1,195 @@
+"""The answer of a search: its best design and what that was before, the reserve of each limit, whether it converged."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sprag.sentences import Amount, Name
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.reader import Phrase, joined, plural, term
+from sprag.service.results.fronts import history
+from sprag.service.results.headlines.headline import (
+    MOST,
+    NOTHING,
+    Headline,
+    KeyNumber,
+    Trace,
+    amount,
+    digits,
+    shared,
+    shown_unit,
+    trace_of,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sprag.service.results.fronts import Designs
+    from sprag.worker.planning.goals import Limit
+
+#: Relative change of the best value that counts as an improvement.
+_BETTER: Final = 1e-3
+#: Share of the generations without an improvement after which a search has converged, and the least number of them.
+_WITHOUT, _LEAST = 0.15, 3
+#: Reserves below this share are none.
+_NONE: Final = 0.005
+
+
+def search_headline(found: Designs, *, over: bool) -> Headline:
+    """The answer of a search; ``over``: it runs no further."""
+    if not len(found.numbers):
+        return Headline()
+    best, goals = int(found.order[0]), found.plan.best
+    feasible = bool(found.front.feasible[best])
+    return Headline(
+        sentence=tuple(filter(None, (_best(found, best), _converged(found, over=over) if feasible else NOTHING))),
+        numbers=tuple(_goal(found, best, place) for place in range(len(goals)))[:MOST],
+        dimensions=tuple(_dimension(found, best, place) for place in range(len(found.plan.vary))),
+        limits=tuple(_limit(found, best, limit) for limit in found.plan.subject_to),
+        trace=_trace(found),
+    )
+
+
+def _best(found: Designs, best: int) -> Phrase:
+    """The value of the best design, or why none is within the limits."""
+    count, goals = len(found.numbers), found.plan.best
+    values = joined(
+        ", ",
+        (
+            joined(" ", (Name(goal.name, within=True), _amount(found, goal.name, value)))
+            for goal, value in zip(goals, found.front.goals[best].tolist(), strict=True)
+            if np.isfinite(value)
+        ),
+    )
+    if not found.front.feasible[best]:
+        return plural("The {count} design is outside a limit.", "None of {count} designs is within all limits.", count)
+    if not values:
+        feasible = int(np.count_nonzero(found.front.feasible))
+        return plural("{count} design is within all limits.", "{count} designs are within all limits.", feasible)
+    first = int(np.count_nonzero(found.front.feasible & (found.front.rank == 0)))
+    if len(goals) > 1 and first > 1:
+        return plural(
+            "{count} design is beaten by no other in every goal, for instance: {values}.",
+            "{count} designs are beaten by no other in every goal, for instance: {values}.",
+            first, values=values,
+        )  # fmt: skip
+    return plural("The only design: {values}.", "The best of {count} designs: {values}.", count, values=values)
+
+
+def _amount(found: Designs, name: str, value: float) -> Amount:
+    return amount(found.study, found.infos[name], value)
+
+
+def _goal(found: Designs, best: int, place: int) -> KeyNumber:
+    name = found.plan.best[place].name
+    info, value = found.infos[name], shared(found.study, found.infos[name], float(found.front.goals[best, place]))
+    known = value if np.isfinite(value) else None
+    unit, case = shown_unit(found.study, info), int(found.front.cases[best, 0])
+    return KeyNumber(name, known, unit, digits(value), where=_points(found), case=case)
+
+
+def _points(found: Designs) -> Phrase:
+    """Over how many operating points a goal is taken."""
+    count = len(found.plan.at)
+    if count == 1:
+        return NOTHING
+    if found.plan.over == "mean":
+        return plural("mean of {count} operating point", "mean of {count} operating points", count)
+    return plural("worst of {count} operating point", "worst of {count} operating points", count)
+
+
+def _dimension(found: Designs, best: int, place: int) -> KeyNumber:
+    """A parameter of the best design, with its value in the base."""
+    path, value = found.plan.vary[place].paths[0], float(found.front.variables[best, place])
+    unit, before = unit_of(found.study, path), found.study.base.get(path)
+    note = NOTHING if before is None else Phrase("{value} before", value=Amount(before, unit, 4))
+    return KeyNumber(path, value, unit, digits(value), note=note, case=int(found.front.cases[best, 0]))
+
+
+def _limit(found: Designs, best: int, limit: Limit) -> KeyNumber:
+    """A limit with the value that is nearest to it at any operating point, and what is left to it."""
+    info, values = found.infos[limit.name], found.values[limit.name][best]
+    case = int(found.front.cases[best, 0])
+    cell = info.cell(limit.value)
+    if info.kind != "real":
+        met = bool(limit.holds(values).all())
+        own = info.cell(float(values[0]))
+        text = term(str(cell)) if info.kind == "category" else Amount(limit.value, info.unit)
+        note = Phrase("as required") if met else Phrase("required: {value}", value=text)
+        return KeyNumber(limit.name, str(term(own)) if isinstance(own, str) else own, info.unit, note=note, case=case)
+    signs = {"at_least": 1.0, "at_most": -1.0}
+    if limit.kind == "is":
+        place = int(np.argmax(np.abs(values - limit.value)))
+        reserve = limit.within - abs(float(values[place]) - limit.value)
+    else:
+        left = signs[limit.kind] * (values - limit.value)
+        place = int(np.argmin(left))
+        reserve = float(left[place])
+    value = shared(found.study, info, float(values[place]))
+    unit, bound = shown_unit(found.study, info), _amount(found, limit.name, limit.value)
+    note = _reserve(limit, bound, reserve / limit.scale)
+    return KeyNumber(limit.name, value, unit, digits(value), note=note, case=case)
+
+
+def _reserve(limit: Limit, bound: Amount, share: float) -> Phrase:
+    if limit.kind == "is":
+        return Phrase("as required: {value}", value=bound) if share >= 0.0 else Phrase("required: {value}", value=bound)
+    texts = {
+        "at_least": (
+            Phrase("at least {value}: {share} % in reserve", value=bound, share=_percent(share)),
+            Phrase("at least {value}: at the limit", value=bound),
+            Phrase("at least {value}: missed by {share} %", value=bound, share=_percent(-share)),
+        ),
+        "at_most": (
+            Phrase("at most {value}: {share} % in reserve", value=bound, share=_percent(share)),
+            Phrase("at most {value}: at the limit", value=bound),
+            Phrase("at most {value}: exceeded by {share} %", value=bound, share=_percent(-share)),
+        ),
+    }
+    left, at, beyond = texts[limit.kind]
+    return beyond if share < 0.0 else at if share < _NONE else left
+
+
+def _percent(share: float) -> Amount:
+    return Amount(100.0 * share, "1", 2)
+
+
+def _bests(found: Designs) -> list[float]:
+    """The best value of the first goal that each generation knew, from the first that has one."""
+    known = [one.get("best") or [None] for one in history(found.rounds)]
+    return [float(values[0]) for values in known if values and values[0] is not None]
+
+
+def _converged(found: Designs, *, over: bool) -> Phrase:
+    """Whether more generations would help."""
+    bests = _bests(found)
+    if len(bests) < _LEAST or len(found.plan.best) > 1:
+        return NOTHING
+    last = bests[-1]
+    same = 0
+    for value in reversed(bests[:-1]):
+        if abs(value - last) > _BETTER * abs(last):
+            break
+        same += 1
+    enough = max(_LEAST, round(_WITHOUT * found.plan.generations))
+    if same >= enough:
+        return plural(
+            "It has not become better for {count} generation.",
+            "It has not become better for {count} generations.",
+            same,
+        )
+    if not over:
+        return NOTHING
+    return Phrase("It was still becoming better at the end: more generations may find a better one.")
+
+
+def _trace(found: Designs) -> Trace | None:
+    bests = np.array(_bests(found))
+    return trace_of(range(len(bests)), bests, len(bests) - 1)
+
+
+def case_of_best(found: Designs) -> Sequence[int]:
+    """The cases of the best design, one for each operating point."""
+    return [] if not len(found.numbers) else found.front.cases[int(found.order[0])].tolist()

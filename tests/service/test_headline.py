@@ -1,0 +1,138 @@
+"""The headline of every kind of study, from stored rows that follow from formulas."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sprag.service.reading.reader import Choice, Reading
+from sprag.service.views.headline import Headline, headline_of
+from sprag.service.views.library import Library, reading_of
+from sprag.worker import models
+from sprag.worker.models import ChunkResult
+from sprag.worker.study import Study
+from tests.service.calibrating import DAMPING, calibration
+from tests.service.conftest import Service
+from tests.service.rounds import run_round
+from tests.service.searching import search
+from tests.service.timed_spec import SPEC
+
+BATCH: dict[str, Any] = {
+    "axes": [{"path": "shaft.load", "values": ["0.1 N*m", "0.3 N*m"]}],
+    "tolerances": [{"path": "excitation.amplitude_x", "plus_minus": "20 %", "distribution": "uniform"}],
+    "drives": 128,
+}
+
+
+def speed_rows(study: Study, cases: range) -> ChunkResult:
+    """A speed of 5000 rad/s for each metre of the amplitude, less 10 for each newton metre."""
+    columns = {path: np.full(len(cases), value) for path, value in study.base.items()} | study.columns(cases)
+    speed = 5000.0 * columns["excitation.amplitude_x"] - 10.0 * columns["shaft.load"]
+    values = np.stack(
+        [speed if info.name == "shaft.speed.mean" else np.zeros(len(cases)) for info in models.study_results(study)],
+        axis=1,
+    )
+    return ChunkResult(cases.start, [models.OK] * len(cases), [""] * len(cases), values)
+
+
+def run(service: Service, spec: dict[str, Any]) -> str:
+    study_id = service.submit(spec)
+    store = service.store
+    number, epoch = store.studies.get(study_id).number, store.work.take_over("test")
+    run_round(store, number, epoch, speed_rows)
+    store.work.settle(epoch, number)
+    return study_id
+
+
+def found(service: Service, study_id: str, point: str | None = None) -> tuple[Headline, Reading]:
+    library = Library(service.store)
+    return headline_of(library, study_id, point=point), reading_of(service.store, study_id, Choice())
+
+
+def test_a_search_shows_its_best_design_with_what_it_was(service: Service) -> None:
+    study_id = search(service, best=[{"result": "efficiency", "max": True}], generations=6)
+    headline, reading = found(service, study_id)
+    designs = service.get(f"/studies/{study_id}/front", limit=1)["designs"]
+    assert headline.said(reading).startswith(f"The best of {len(_all(service, study_id))} designs: efficiency ")
+    told = {one.label: one.value for one in headline.dimensions}
+    assert told == pytest.approx(designs[0]["variables"])
+    assert reading.say(headline.dimensions[0].note) == "25 Hz before"
+    (limit,) = headline.limits
+    assert limit.label == "shaft.speed.mean"
+    assert reading.say(limit.note) == "as required: 8 rad/s"
+    assert headline.numbers[0].case == designs[0]["cases"][0]
+
+
+def _all(service: Service, study_id: str) -> list[Any]:
+    found: list[Any] = service.get(f"/studies/{study_id}/front", limit=1000)["designs"]
+    return found
+
+
+def test_a_search_without_a_design_within_its_limits_says_so(service: Service) -> None:
+    limits = [{"result": "shaft.speed.mean", "at_least": "500 rad/s"}]
+    headline, reading = found(service, search(service, subject_to=limits))
+    assert headline.said(reading).startswith("None of ")
+    assert "missed by" in reading.say(headline.limits[0].note)
+
+
+def test_several_goals_have_several_best_designs(service: Service) -> None:
+    headline, reading = found(service, search(service))
+    assert "beaten by no other in every goal" in headline.said(reading)
+    assert [one.label for one in headline.numbers] == ["efficiency", "shaft.irregularity"]
+
+
+def test_a_calibration_shows_its_values_with_intervals(service: Service) -> None:
+    study_id = calibration(service)
+    headline, reading = found(service, study_id)
+    damping, inertia = headline.numbers
+    assert damping.low is not None
+    assert damping.high is not None
+    assert damping.low < DAMPING < damping.high
+    assert damping.title(reading) == "Damping, pendulum 0"
+    assert reading.say(damping.note) == "0.01 N·m·s/rad before"
+    assert damping.number(reading) in headline.said(reading)
+    assert inertia.interval(reading) in reading.say(inertia.where)
+    assert headline.said(reading).startswith("10 measured values are explained best by")
+
+
+def test_a_batch_tells_its_spread_and_yield_at_one_place(service: Service) -> None:
+    study_id = run(service, {**copy.deepcopy(SPEC), **BATCH})
+    headline, reading = found(service, study_id, "0.1 N*m")
+    ribbon = service.get(f"/studies/{study_id}/ribbon", y="shaft.speed.mean")["lines"][0]["results"]["shaft.speed.mean"]
+    middle, between, nominal, share = headline.numbers
+    assert middle.value == pytest.approx(ribbon["values"][1][0])
+    assert (between.low, between.high) == pytest.approx((ribbon["values"][0][0], ribbon["values"][2][0]))
+    assert (nominal.value, nominal.case) == (pytest.approx(9.0), 0)
+    reached = service.get(f"/studies/{study_id}/yield", condition="shaft.speed.mean >= 90 % of nominal")
+    assert share.value == pytest.approx(100.0 * reached["lines"][0]["each"][0]["value"])
+    assert headline.said(reading).startswith("At 0.1 N·m half of the drives run faster than 9")
+    both, _ = found(service, study_id, "0.2 N*m")
+    assert [text.said(reading)[:12] for text in both.sentence] == ["No case was ", "At 0.1 N·m h", "At 0.3 N·m h"]
+
+
+def test_a_single_case_and_studies_that_have_nothing_yet(service: Service) -> None:
+    plain = {name: value for name, value in copy.deepcopy(SPEC).items() if name not in {"axes", "combine", "exclude"}}
+    headline, reading = found(service, run(service, plain))
+    assert headline.said(reading).startswith("It runs at ")
+    waiting = service.submit({**plain, "name": "waiting", "axes": [{"path": "shaft.load", "values": [0.1, 0.2]}]})
+    headline, reading = found(service, waiting)
+    assert headline.said(reading) == "It waits for its turn; no case has been run yet."
+    assert headline.numbers == ()
+
+
+def test_a_study_all_of_whose_cases_failed_says_how(service: Service) -> None:
+    study_id = service.submit()
+    store = service.store
+    number, epoch = store.studies.get(study_id).number, store.work.take_over("test")
+
+    def failed(study: Study, cases: range) -> ChunkResult:
+        values = np.full((len(cases), len(models.study_results(study))), np.nan)
+        return ChunkResult(cases.start, ["chatter"] * len(cases), [""] * len(cases), values)
+
+    run_round(store, number, epoch, failed)
+    store.work.settle(epoch, number)
+    headline, reading = found(service, study_id)
+    assert headline.said(reading).endswith(" cases has a result: chatter.")
