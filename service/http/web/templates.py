@@ -144,6 +144,7 @@ def _templates() -> Environment:
     environment.globals["page_address"] = lambda: current().page
     environment.globals["read_only"] = _read_only
     environment.globals["units_back"] = _units_back
+    environment.globals["part_of_pages"] = _part
     environment.globals["explained"] = explained
     environment.globals["clutch_reading"] = CLUTCH
     environment.globals["administers"] = _administers
@@ -158,6 +159,30 @@ def _in_language() -> str:
 def cell(value: float | str | None, digits: int = 5) -> str:
     """`number` with the words of a category: ``unsettled`` in the reader's language."""
     return word(value) if isinstance(value, str) else number(value, digits)
+
+
+#: Which part of the pages an address belongs to, for the head of the page; studies are the rest.
+_PARTS: Final = {
+    "components": "parts",
+    "parts": "parts",
+    "schedules": "nights",
+    "night": "nights",
+    "nights": "nights",
+    "docs": "help",
+    "help": "help",
+    "units": "me",
+    "login": "me",
+    "me": "me",
+    "users": "me",
+    "audit": "me",
+    "workers": "me",
+}
+
+
+def _part() -> str:
+    """The part of the pages that the page which is made belongs to."""
+    first = re.split(r"[/?]", current().page.lstrip("/"), maxsplit=1)[0]
+    return _PARTS.get(first, "studies")
 
 
 def _units_back() -> str:

@@ -1,4 +1,4 @@
-// Keyboard shortcuts: g and a letter for the pages, digits for the parts of a study, / for the first field, F1 for the explanation
+// Keyboard shortcuts: g and a letter for the pages, digits for the parts of a study, / for the search of studies, F1 for the explanation
 // of a field, ? for this help.
 "use strict";
 
@@ -10,14 +10,13 @@
   on.addEventListener("change", () => { on.checked ? localStorage.removeItem(OFF) : localStorage.setItem(OFF, "1"); });
 
   const withKey = (prefix, key) => [...document.querySelectorAll(prefix)].find((link) => link.dataset.key === key);
-  const PAGES = "header.site [data-key]", PARTS = ".tabs [data-key]";
+  const PAGES = "header.site [data-key], footer.site [data-key]", PARTS = ".tabs [data-key]";
   // The shortcuts that a key may mean: its own, and under a layout that has no Latin letter on it, that at its place on a US keyboard.
   const meant = ({ key, code, shiftKey }) => {
     const place = code === "Slash" ? (shiftKey ? "?" : "/") : !shiftKey && /^(?:Key|Digit)(.)$/.exec(code)?.[1].toLowerCase();
     return /^[a-z]$/i.test(key) || !place ? [key] : [key, place];
   };
-  const field = () => [...document.querySelectorAll("main [type=search], main form.choices :is(input, select), main form :is(input, select, textarea)")]
-    .find((one) => one.type !== "hidden" && one.checkVisibility());
+  const find = document.querySelector("header.site [type=search]");
 
   const help = () => {
     list.querySelectorAll(".link").forEach((item) => item.remove());
@@ -45,7 +44,7 @@
       if (link) link.click();
       else if (key === "g") waiting = event.timeStamp + WAIT;
       else if (key === "?") help();
-      else if (key === "/" && field()) field().focus();
+      else if (key === "/") { find.focus(); find.select(); }
       else return false;
       return true;
     });
