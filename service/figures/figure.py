@@ -14,6 +14,8 @@ from sprag.service.reading.reader import Phrase
 
 #: Colours that are distinguishable with any kind of colour vision (after Okabe and Ito), on light and dark backgrounds.
 PALETTE: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f6fc4", "#8c6d31")
+#: Colours of numbers in their order, from dark to light, so that they read in grey too (after viridis of matplotlib).
+_SHADES: Final = ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80", "#5ec962", "#addc30", "#fde725")
 #: Colour of what stands for the whole of other lines, or is drawn for reference only.
 NEUTRAL: Final = "#7a7f87"
 #: What bands are, for the legend.
@@ -157,6 +159,10 @@ class Panel:
         return bool(x.size) and note.x > 0.5 * (x.min() + x.max())
 
 
+#: The direction of an axis.
+Direction = Literal["x", "y"]
+
+
 @dataclass(frozen=True, slots=True)
 class Figure:
     """Panels over one axis, row by row.
@@ -175,6 +181,7 @@ class Figure:
     note : a sentence, where there is nothing to draw
     below : a sentence below the panels
     at : x of a line across all panels, such as the working point; pages of motions draw theirs at their slider
+    log, flipped : which axes have equal factors at equal distances, and which run backwards
     """
 
     x: Quantity
@@ -194,6 +201,8 @@ class Figure:
     note: str = ""
     below: str = ""
     at: float | None = None
+    log: tuple[Direction, ...] = ()
+    flipped: tuple[Direction, ...] = ()
 
     @property
     def apart(self) -> bool:
@@ -246,10 +255,16 @@ def line_colours(count: int) -> list[str]:
     """Colours: maximally different for a few lines, graded in order for many."""
     if count <= len(PALETTE):
         return list(PALETTE[:count])
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
+    return [shade(0.92 * index / (count - 1)) for index in range(count)]
 
-    return [to_hex(colormaps["viridis"](0.92 * index / (count - 1))) for index in range(count)]
+
+def shade(share: float) -> str:
+    """The colour of a number that lies at this share, from 0 to 1, between the least and the largest one."""
+    at = min(max(share, 0.0), 1.0) * (len(_SHADES) - 1)
+    place = min(int(at), len(_SHADES) - 2)
+    ends = [[int(colour[start : start + 2], 16) for start in (1, 3, 5)] for colour in _SHADES[place : place + 2]]
+    parts = (round(low + (high - low) * (at - place)) for low, high in zip(*ends, strict=True))
+    return "#" + "".join(f"{part:02x}" for part in parts)
 
 
 def shortened(label: str, most: int) -> str:

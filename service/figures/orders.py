@@ -40,22 +40,26 @@ _DARKEST: Final = 32
 _PATTERNS: Final = {"held": ("-", "--"), "coasting": (".", ".."), "irregular": ("x", "xx"), "unsettled": ("+", "++")}
 
 
-def edges(values: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+def edges(values: Sequence[float] | NDArray[np.float64], *, whole: bool = False) -> NDArray[np.float64]:
     """Borders of the cells around ascending values, one more than there are values.
 
-    The outer cells end at the outer values, so that nothing is drawn where nothing was computed.
+    The outer cells end at the outer values, as curves do, unless they are ``whole``, with the values inside.
     """
     middle = np.array(values)
     if middle.size == 1:
         half = abs(float(middle[0])) * 0.05 or 0.5
         return np.array([middle[0] - half, middle[0] + half])
-    return np.concatenate([middle[:1], (middle[1:] + middle[:-1]) / 2.0, middle[-1:]])
+    between = (middle[1:] + middle[:-1]) / 2.0
+    first, last = middle[:1], middle[-1:]
+    if whole:
+        first, last = 2.0 * first - between[:1], 2.0 * last - between[-1:]
+    return np.concatenate([first, between, last])
 
 
 def map_edges(drawn: Map) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Borders of the cells of a map along x and y; squares of a refined map are whole."""
     if drawn.refined is None:
-        return edges(drawn.x_values), edges(drawn.y_values)
+        return edges(drawn.x_values, whole=True), edges(drawn.y_values, whole=True)
     return _even(np.array(drawn.x_values)), _even(np.array(drawn.y_values))
 
 

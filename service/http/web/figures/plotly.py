@@ -10,7 +10,7 @@ import numpy as np
 
 from sprag.service.figures.figure import BANDS, NEUTRAL, NOTES, PALETTE, shortened
 from sprag.service.figures.orders import motion_text
-from sprag.service.http.web.figures.thinning import thin
+from sprag.service.figures.painter.thinning import thin
 from sprag.service.json_text import numbers
 from sprag.service.languages import decimal, gettext
 from sprag.service.reading.reader import shown

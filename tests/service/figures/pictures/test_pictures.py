@@ -148,7 +148,7 @@ def test_listed_points_of_one_machine_are_joined_in_order(spec: dict[str, Any], 
     assert [x for x in drawn if len(x) > 1] == [[0.1, 0.2], [0.1, 0.3]]
 
 
-def test_a_map_ends_where_its_values_end(spec: dict[str, Any], figures: list[Figure]) -> None:
+def test_the_outer_cells_of_a_map_are_whole(spec: dict[str, Any], figures: list[Figure]) -> None:
     study = parse_spec(grid(spec, 4)).study
     at = (("excitation.amplitude_x", "2 mm"),)
     infos = models.study_results(study)
@@ -157,7 +157,7 @@ def test_a_map_ends_where_its_values_end(spec: dict[str, Any], figures: list[Fig
         made = draw_map(study, infos, "shaft.load", y, SPEED, held, fetch)
         maps.draw_map(read_map(made, Reading(study.model)), "A study", "png")
     axes, bar = figures[0].axes
-    assert axes.collections[0].get_datalim(axes.transData).extents.tolist() == [0.0, 20.0, 1.6, 35.0]
+    assert axes.collections[0].get_datalim(axes.transData).extents.tolist() == [-0.05, 17.5, 2.35, 37.5]
     assert figures[0].get_suptitle() == "A study\nHorizontal amplitude = vertical amplitude = 0.002 m"
     assert bar.get_ylabel() == "Mean shaft speed (rad/s)"
     assert figures[1].axes[0].get_ylabel() == "Horizontal amplitude = vertical amplitude (m)"

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from sprag.service.faults import Fault
+from sprag.service.figures.painter.thinning import thin
 from sprag.service.http.web.figures.motion import motion_figures
-from sprag.service.http.web.figures.thinning import thin
 from sprag.service.http.web.form.check import check_form, check_text
 from sprag.service.http.web.form.entries import plain
 from sprag.service.http.web.form.page import empty

@@ -1,0 +1,139 @@
+"""Names that stand at their curves, where each finds a place without touching a curve or another text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from sprag.service.figures.painter.elements import SMALL, text_width
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    Numbers = NDArray[np.float64]
+
+#: Most curves that are named there, and the widest name (px); a legend has more.
+MOST_NAMED: Final = 8
+_WIDEST: Final = 190.0
+#: Pixels between points that stand for a curve, from a curve to its name, and to the nearest other one at best.
+_STEP: Final = 4.0
+_NEAR: Final = 3.0
+_FAR: Final = 26.0
+_HEIGHT: Final = 12.0
+#: Places along a curve at which its name may stand.
+_PLACES: Final = 24
+
+
+class Box(NamedTuple):
+    """A part of a panel (px)."""
+
+    left: float
+    top: float
+    right: float
+    bottom: float
+
+    def touches(self, other: Box) -> bool:
+        """Whether two boxes have a point in common."""
+        return (
+            self.left < other.right and other.left < self.right and self.top < other.bottom and other.top < self.bottom
+        )
+
+
+class Named(NamedTuple):
+    """A name at a curve: its text, and where it begins on its base line (px)."""
+
+    text: str
+    x: float
+    y: float
+    bold: bool
+
+
+def named_curves(
+    curves: Sequence[tuple[str, Numbers, Numbers]],
+    others: Sequence[tuple[Numbers, Numbers]],
+    taken: Sequence[Box],
+    size: tuple[float, float],
+    chosen: int | None = None,
+) -> list[Named] | None:
+    """The names of all curves at places of their own; None where one has none.
+
+    Parameters
+    ----------
+    curves : names and points (px) of the curves that are named
+    others : points of what is not named; names touch them neither
+    taken : boxes of other texts
+    size : width and height of the panel
+    chosen : the curve whose name is bold
+    """
+    if not curves or len(curves) > MOST_NAMED or any(text_width(name, SMALL) > _WIDEST for name, _, _ in curves):
+        return None
+    dense = [_dense(x, y) for _, x, y in curves]
+    if any(own.shape[0] == 0 for own in dense):
+        return None
+    rest = [_dense(x, y) for x, y in others]
+    boxes, found = list(taken), list[Named | None]([None] * len(curves))
+    # The curves with the fewest points have the fewest places.
+    for index in sorted(range(len(curves)), key=lambda place: dense[place].shape[0]):
+        name = curves[index][0]
+        alien = np.concatenate([*(own for place, own in enumerate(dense) if place != index), *rest, np.empty((0, 2))])
+        best = _best(name, dense[index], alien, boxes, size, bold=index == chosen)
+        if best is None:
+            return None
+        found[index] = Named(name, best.left, best.bottom - 2.0, index == chosen)
+        boxes.append(best)
+    return [one for one in found if one is not None]
+
+
+def _best(
+    name: str, own: Numbers, alien: Numbers, boxes: Sequence[Box], size: tuple[float, float], *, bold: bool
+) -> Box | None:
+    """The place of a name that is farthest from other curves; of equal ones the first."""
+    best, clear = None, _NEAR
+    for box in _places(text_width(name, SMALL, bold=bold), own, size):
+        near = _distance(box, own)
+        if near < _NEAR - 1.0 or any(box.touches(other) for other in boxes):
+            continue
+        free = min(_distance(box, alien), _FAR)
+        # Its own curve is clearly the nearest one.
+        if free > max(clear + 0.5, near + _NEAR):
+            best, clear = box, free
+        if clear >= _FAR:
+            break
+    return best
+
+
+def _places(width: float, own: Numbers, size: tuple[float, float]) -> Iterator[Box]:
+    """Boxes above and below points of a curve: at its ends first."""
+    last = own.shape[0] - 1
+    inside = np.linspace(0, last, _PLACES).astype(np.int64).tolist()
+    for place in dict.fromkeys([last, 0, *inside[::-1]]):
+        x, y = own[place].tolist()
+        for left in dict.fromkeys((min(max(x - width / 2.0, 2.0), size[0] - width), x - width - 4.0, x + 4.0)):
+            for top in (y - _HEIGHT - _NEAR - 2.0, y + _NEAR + 2.0):
+                box = Box(left, top, left + width, top + _HEIGHT)
+                if left >= 0.0 and box.right <= size[0] + 1.0 and top >= 0.0 and box.bottom <= size[1] - 1.0:
+                    yield box
+
+
+def _distance(box: Box, points: Numbers) -> float:
+    """Pixels from a box to the nearest of some points."""
+    if not points.size:
+        return _FAR
+    x, y = points[:, 0], points[:, 1]
+    across = np.maximum(np.maximum(box.left - x, x - box.right), 0.0)
+    up = np.maximum(np.maximum(box.top - y, y - box.bottom), 0.0)
+    return float(np.sqrt((across**2 + up**2).min()))
+
+
+def _dense(x: Numbers, y: Numbers) -> Numbers:
+    """Points along a curve, a few pixels apart."""
+    known = np.isfinite(x) & np.isfinite(y)
+    across, up = x[known], y[known]
+    if across.size < 2:
+        return np.stack([across, up], axis=1)
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(across), np.diff(up)))])
+    at = np.arange(0.0, along[-1] + _STEP, _STEP)
+    return np.stack([np.interp(at, along, across), np.interp(at, along, up)], axis=1)

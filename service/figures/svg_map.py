@@ -1,0 +1,294 @@
+"""Maps as SVG: colours over two axes, lines of equal value, or the periods after which motions repeat."""
+
+from __future__ import annotations
+
+from html import escape
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final, cast
+
+import numpy as np
+
+from sprag.service.figures.curves import doubtful_marks, map_quantities
+from sprag.service.figures.figure import shade
+from sprag.service.figures.orders import TITLE, map_edges, motion_text, order_map
+from sprag.service.figures.painter.bitmap import data_address
+from sprag.service.figures.painter.elements import (
+    LINE,
+    SIZE,
+    SMALL,
+    colour_of,
+    element,
+    halo,
+    lines_of,
+    markers,
+    path_of,
+    short,
+    text_at,
+    text_width,
+)  # fmt: skip
+from sprag.service.figures.painter.legends import Entry, rows_of, sign_of
+from sprag.service.figures.painter.panels import MOST_LINKS, colour_scale, x_numbers
+from sprag.service.figures.painter.scales import Scale, step_of, tick_text
+from sprag.service.figures.svg import WIDE, as_file, title_of
+from sprag.service.languages import gettext
+from sprag.service.reading.reader import Phrase, plural, shown
+from sprag.service.reading.wording import number, unit_text
+from sprag.service.results.regimes import MARKS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from sprag.service.figures.figure import Quantity
+    from sprag.service.results.curves import Map
+
+    Numbers = NDArray[np.float64]
+
+#: Height of a map, and the same as a share of the width of a narrow one.
+_HIGH: Final = 400.0
+_SHARE: Final = 0.85
+#: Colours of a map, and the lines of equal value.
+_COLOURS: Final = 64
+_LEVELS: Final = 10
+#: Points of a map that are marked each, and of a refined one.
+_MARKED: Final = 600
+_REFINED: Final = 5_000
+_RIGHT: Final = 78.0
+
+
+def map_svg(
+    drawn: Map,
+    *,
+    contours: bool = False,
+    width: int = WIDE,
+    label: str = "",
+    cases: str = "",
+    head: Sequence[str] = (),
+    below: bool = False,
+) -> str:
+    """A map, already in its reader's units and words, as an element of a page; as `sprag.service.figures.svg.svg`.
+
+    Cells without a result are left blank. The outer cells are whole, as those between them.
+    """
+    return _MapPainting(drawn.run(), float(width), cases, contours=contours).element(label, head, below=below)
+
+
+def picture_map(drawn: Map, title: str, *, contours: bool = False) -> str:
+    """The same map as a file of its own."""
+    head = [line for line in (title, "; ".join(drawn.held)) if line]
+    return as_file(map_svg(drawn, contours=contours, label=title, head=head, below=True))
+
+
+class _MapPainting:
+    """One picture of a map."""
+
+    def __init__(self, drawn: Map, width: float, cases: str, *, contours: bool) -> None:
+        self._drawn, self._cases, self._width = drawn, cases, width
+        self._orders = order_map(drawn)
+        self._known = drawn.known() if self._orders is None else self._orders.places
+        self._levels = contours and self._orders is None and _has_levels(self._known)
+        self._edges = map_edges(drawn)
+        # Lines of equal value end at the outer values; cells are around them.
+        across, up = (drawn.x_values, drawn.y_values) if self._levels else self._edges
+        self._high = min(_HIGH, _SHARE * width)
+        self._y = Scale(float(up[0]), float(up[-1]), self._high, 0.0)
+        self._left = max(text_width(tick_text(value), SMALL) for value in self._y.rising()) + 16.0
+        self._plot = width - self._left - _RIGHT
+        self._x = Scale(float(across[0]), float(across[-1]), 0.0, self._plot)
+        self._top = 4.0
+        self._parts: list[str] = []
+
+    def element(self, label: str, head: Sequence[str], *, below: bool) -> str:
+        """The whole picture."""
+        x, y, z = map_quantities(self._drawn)
+        for place, text in enumerate((*head, title_of(z) if self._orders is None else shown(TITLE))):
+            self._text(text, bold=place in (0, len(head)))
+        self._text(f"↑ {title_of(y)}")
+        self._top += 10.0
+        known = self._known
+        cells = self._filled(known) if self._levels else self._cells(known, self._colours(known))
+        inside = [*cells, *self._points(), *self._marks()]
+        self._group(inside)
+        if self._orders is None and np.isfinite(known).any():
+            low, high = float(np.nanmin(known)), float(np.nanmax(known))
+            shift = f"translate({short(self._left + self._plot + 14.0)} {short(self._top)})"
+            self._parts.append(element("g", "".join(colour_scale(low, high, self._high, "")), transform=shift))
+        self._top += self._high
+        shift = f"translate({short(self._left)} {short(self._top)})"
+        self._parts.append(element("g", "".join(x_numbers(self._x, 0.0)), transform=shift))
+        for line in lines_of(title_of(x), self._width - _RIGHT, SMALL):
+            self._top += LINE
+            self._parts.append(
+                text_at(line, self._left + self._plot, self._top + LINE, text_anchor="end", font_size=SMALL)
+            )
+        self._top += LINE + 8.0
+        self._legend(known, below=below)
+        return self._whole(label or f"{title_of(z)}: {title_of(x)}, {title_of(y)}", z)
+
+    def _whole(self, label: str, z: Quantity) -> str:
+        known = self._drawn.known()
+        told = ""
+        if np.isfinite(known).any():
+            low, high = (number(float(end), 4) for end in (np.nanmin(known), np.nanmax(known)))
+            told = element("desc", escape(gettext("{name} from {low} to {high}", name=title_of(z), low=low, high=high)))
+        inside = "".join(self._parts)
+        return element(
+            "svg", told + inside, class_="figure", viewBox=f"0 0 {short(self._width)} {short(self._top + 4.0)}",
+            width=self._width, height=self._top + 4.0, role="group" if "<a " in inside else "img", aria_label=label,
+            font_size=SIZE, fill="var(--ink)",
+        )  # fmt: skip
+
+    def _text(self, text: str, *, bold: bool = False) -> None:
+        for line in lines_of(text, self._width - 4.0, bold=bold):
+            self._top += LINE
+            self._parts.append(text_at(line, 0.0, self._top - 4.0, font_weight=600 if bold else None))
+
+    def _group(self, inside: Sequence[str]) -> None:
+        """The cells with the numbers at their left."""
+        ticks = self._y.rising()
+        heights = self._y(np.array(ticks)).tolist()
+        numbers = "".join(text_at(tick_text(value), -9.0, at + 4.0) for value, at in zip(ticks, heights, strict=True))
+        strokes = element("path", d="".join(f"M-5 {short(at)}h5" for at in heights), stroke="var(--strong)")
+        around = element("rect", width=self._plot, height=self._high, fill="none", stroke="var(--strong)")
+        written = element("g", numbers, class_="y", text_anchor="end", font_size=SMALL, fill="var(--soft)")
+        ends = {"data_x": f"{self._x.low:.10g} {self._x.high:.10g} 0 {short(self._plot)}",
+                "data_y": f"{self._y.low:.10g} {self._y.high:.10g} {short(self._high)} 0"}  # fmt: skip
+        area = element("rect", class_="area", width=self._plot, height=self._high, fill="var(--grid)")
+        shift = f"translate({short(self._left)} {short(self._top)})"
+        self._parts.append(
+            element("g", area + "".join(inside) + strokes + around + written, class_="panel", transform=shift, **ends)
+        )
+
+    def _colours(self, known: Numbers) -> tuple[NDArray[np.int64], list[str]]:
+        """Which colour each cell has, -1 for none, and the colours."""
+        there = np.isfinite(known)
+        if self._orders is not None:
+            return np.where(there, np.nan_to_num(known), -1).astype(np.int64), self._orders.colours
+        places = np.full(known.shape, -1, dtype=np.int64)
+        if there.any():
+            low, high = float(known[there].min()), float(known[there].max())
+            shares = (known[there] - low) / ((high - low) or 1.0)
+            places[there] = np.minimum((shares * _COLOURS).astype(np.int64), _COLOURS - 1)
+        return places, [shade((place + 0.5) / _COLOURS) for place in range(_COLOURS)]
+
+    def _cells(self, known: Numbers, painted: tuple[NDArray[np.int64], list[str]]) -> Iterator[str]:
+        """The cells: links to their cases where there are few, otherwise a picture of pixels."""
+        places, colours = painted
+        across, up = self._x(self._edges[0]), self._y(self._edges[1])
+        if self._cases and self._drawn.refined is None and places.size <= MOST_LINKS:
+            yield from self._links(known, painted, (across, up))
+            return
+        # Every pixel has the colour of the cell in which its middle lies.
+        columns = np.searchsorted(np.sort(across), np.arange(0.5, self._plot), side="right") - 1
+        rows = np.searchsorted(-up, -np.arange(self._high - 0.5, 0.0, -1.0)[::-1], side="right") - 1
+        columns, rows = np.clip(columns, 0, places.shape[1] - 1), np.clip(rows, 0, places.shape[0] - 1)
+        yield element(
+            "image", width=self._plot, height=self._high, preserveAspectRatio="none",
+            href=data_address(places[np.ix_(rows, columns)], colours), image_rendering="pixelated",
+        )  # fmt: skip
+
+    def _links(
+        self, known: Numbers, painted: tuple[NDArray[np.int64], list[str]], edges: tuple[Numbers, Numbers]
+    ) -> Iterator[str]:
+        (places, colours), (across, up) = painted, edges
+        x, y, z = map_quantities(self._drawn)
+        for row, column in np.argwhere(places >= 0).tolist():
+            left, right = across[column], across[column + 1]
+            bottom, top = up[row], up[row + 1]
+            case, place = int(self._drawn.cases[row, column]), places[row, column]
+            names = self._orders.names if self._orders is not None else None
+            value = (motion_text(names[row][column] or "") if names is not None else
+                     f"{number(float(known[row, column]), 5)} {unit_text(z.unit)}")  # fmt: skip
+            told = (
+                value,
+                f"{x.name} {number(self._drawn.x_values[column], 5)} {unit_text(x.unit)}",
+                f"{y.name} {number(self._drawn.y_values[row], 5)} {unit_text(y.unit)}",
+                gettext("case {case}", case=case),
+            )
+            title = element("title", escape(", ".join(one.rstrip() for one in told)))
+            # Cells overlap a little, so that no line is seen between them.
+            cell = element(
+                "rect", x=float(left), y=float(top), width=float(right - left) + 0.4, height=float(bottom - top) + 0.4,
+                fill=colours[place],
+            )  # fmt: skip
+            yield element("a", title + cell, href=f"{self._cases}{case}", tabindex=-1, data_case=case)
+
+    def _filled(self, known: Numbers) -> Iterator[str]:
+        """Colours between lines of equal value, and the numbers of these."""
+        from contourpy import FillType, LineType, contour_generator
+
+        low, high = float(np.nanmin(known)), float(np.nanmax(known))
+        step = step_of(low, high, _LEVELS)
+        levels = [step * place for place in range(int(np.floor(low / step)), int(np.ceil(high / step)) + 1)]
+        values = np.ma.masked_invalid(known)
+        made = contour_generator(
+            self._x(np.array(self._drawn.x_values)), self._y(np.array(self._drawn.y_values)), values,
+            fill_type=FillType.OuterOffset, line_type=LineType.Separate,
+        )  # fmt: skip
+        for lower, upper in pairwise(levels):
+            points, offsets = cast("tuple[list[Numbers], list[NDArray[np.int64]]]", made.filled(lower, upper))
+            path = "".join(
+                path_of(*polygon[start:stop].T) + "z"
+                for polygon, starts in zip(points, offsets, strict=True)
+                for start, stop in zip(starts[:-1].tolist(), starts[1:].tolist(), strict=True)
+            )
+            colour = shade(((lower + upper) / 2.0 - low) / (high - low))
+            yield element("path", d=path, fill=colour, fill_rule="evenodd", stroke=colour, stroke_width=0.5)
+        written: list[tuple[float, float]] = []
+        for level in levels:
+            lines = cast("list[Numbers]", made.lines(level))
+            yield element("path", d="".join(path_of(*line.T) for line in lines), fill="none", stroke="#404040",
+                          stroke_width=0.8, class_="level")  # fmt: skip
+            longest = max(lines, key=len, default=None)
+            if longest is not None and len(longest) > 2:
+                x, y = longest[len(longest) // 2].tolist()
+                if all(abs(x - a) > 44.0 or abs(y - b) > 15.0 for a, b in written):
+                    written.append((x, y))
+                    inside = min(max(x, 18.0), self._plot - 18.0), min(max(y + 4.0, 12.0), self._high - 3.0)
+                    yield halo(tick_text(round(level, 12)), *inside, text_anchor="middle", font_size=SMALL)
+
+    def _points(self) -> Iterator[str]:
+        """The cases: of a grid the middles of its cells, of a refined map where they are."""
+        drawn = self._drawn
+        if drawn.refined is not None:
+            x, y, few = drawn.refined.x, drawn.refined.y, drawn.refined.x.size <= _REFINED
+        else:
+            across, up = np.meshgrid(drawn.x_values, drawn.y_values)
+            x, y, few = across.reshape(-1), up.reshape(-1), across.size <= _MARKED and not self._cases
+        if few:
+            known = {"data_cases": " ".join(map(str, drawn.refined.cases.tolist()))} if drawn.refined else {}
+            yield element("path", d=markers("circle", 1.1, self._x(x), self._y(y)), fill="#4d4d4d", **known)
+
+    def _marks(self) -> Iterator[str]:
+        for marks in doubtful_marks(self._drawn):
+            look = MARKS[marks.regime]
+            path = markers(look.symbol, 4.0, self._x(marks.x), self._y(marks.y))
+            yield element("path", d=path, fill=colour_of(look.colour), stroke="var(--paper)", stroke_width=0.7,
+                          pointer_events="none")  # fmt: skip
+
+    def _legend(self, known: Numbers, *, below: bool) -> None:
+        drawn = self._drawn
+        entries = [
+            Entry(sign_of(MARKS[marks.regime].symbol, colour_of(MARKS[marks.regime].colour)), motion_text(marks.regime))
+            for marks in doubtful_marks(drawn)
+        ]
+        for name, (colour, _, _) in self._orders.looks.items() if self._orders is not None else ():
+            entries.append(Entry(element("rect", x=2, y=-5, width=18, height=10, fill=colour), motion_text(name)))
+        missing = int(np.isnan(known).sum())
+        if missing:
+            text = plural("{count} case without a result", "{count} cases without a result", missing)
+            grey = element("rect", x=2, y=-5, width=18, height=10, fill="var(--grid)")
+            entries.append(Entry(grey, shown(Phrase("not interpolated") if drawn.refined else text)))
+        if entries:
+            rows = rows_of(entries, self._width - 8.0)
+            self._parts.append(element("g", "".join(rows.parts), transform=f"translate(0 {short(self._top)})"))
+            self._top += rows.height + 4.0
+        if below and drawn.refined is not None:
+            self._text(shown(drawn.refined.sentence))
+
+
+def _has_levels(values: Numbers) -> bool:
+    """Whether there are lines of equal value."""
+    known = values[np.isfinite(values)]
+    return min(values.shape) > 1 and known.size > 0 and bool(known.max() > known.min())

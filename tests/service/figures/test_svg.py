@@ -1,0 +1,117 @@
+"""Figures as SVG: nothing overlaps, points lead to their cases, a file is the picture of the page."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from itertools import pairwise
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity, line_colours
+from sprag.service.figures.painter.elements import SMALL, lines_of, text_width
+from sprag.service.figures.painter.scales import Scale, rounded_scale
+from sprag.service.figures.svg import picture_svg, spark, svg
+
+X = np.linspace(0.0, 1.6, 9)
+
+
+def figure(*slopes: float, scatter: int = 0) -> Figure:
+    """Straight curves, or so many points that nothing joins."""
+    colours = line_colours(max(len(slopes), 1))
+    lines = [
+        Line(f"{slope} mm", X, 100.0 * slope * X, colours[place], key=str(place), cases=np.arange(9))
+        for place, slope in enumerate(slopes)
+    ]
+    if scatter:
+        at = np.random.default_rng(1).random((2, scatter))
+        lines.append(Line("cases", at[0], at[1], PALETTE[0], key="0", cases=np.arange(scatter), joined=False))
+    return Figure(Quantity("load", "N*m"), (Panel(Quantity("speed", "rpm"), tuple(lines)),), most=200_000)
+
+
+def texts(drawn: str, kind: str) -> list[tuple[float, float, str]]:
+    """Place and text of the numbers of a kind of axis."""
+    (group,) = (part for part in ElementTree.fromstring(drawn).iter() if part.get("class") == kind)
+    return [(float(part.get("x", 0)), float(part.get("y", 0)), part.text or "") for part in group]
+
+
+@pytest.mark.parametrize("width", [240, 350, 720, 1100])
+@pytest.mark.parametrize("ends", [(0.0, 1.6), (0.0, 123_456_789.0), (-3e-7, 4e-7), (99.9, 100.1), (5.0, 5.0)])
+def test_numbers_of_axes_never_touch(width: int, ends: tuple[float, float]) -> None:
+    x = np.linspace(*ends, 9)
+    line = Line("one", x, x, PALETTE[0], key="0")
+    drawn = svg(Figure(Quantity("load", "N*m"), (Panel(Quantity("speed", "rpm"), (line,)),)), width=width)
+    across, up = texts(drawn, "x"), texts(drawn, "y")
+    for (left, _, text), (right, _, other) in pairwise(across):
+        assert right - left > (text_width(text, SMALL) + text_width(other, SMALL)) / 2.0
+    assert all(abs(one[1] - other[1]) > SMALL for one, other in pairwise(up))
+    assert len(across) == len({text for *_, text in across}) >= 1
+
+
+def test_names_stand_at_curves_that_are_apart() -> None:
+    apart = svg(figure(1.0, 2.0, 3.0))
+    assert re.findall(r'class="name"[^>]*>([^<]*)<', apart) == ["1.0 mm", "2.0 mm", "3.0 mm"]
+    assert len(re.findall("1.0 mm</text>", apart)) == 1
+
+
+def test_a_legend_names_curves_that_lie_on_each_other() -> None:
+    together = svg(figure(1.0, 1.001, 1.002))
+    assert 'class="name"' not in together
+    assert together.count("1.001 mm</text>") == 1
+
+
+def test_points_are_links_to_their_cases() -> None:
+    drawn = svg(figure(1.0, 2.0), cases="/studies/st_1/cases/")
+    assert 'href="/studies/st_1/cases/3" tabindex="-1" data-case="3"' in drawn
+    assert "<title>0.2 N·m, 40 rpm, 2.0 mm, case 1</title>" in drawn
+    assert 'role="group"' in drawn
+    assert "<a " not in svg(figure(1.0, 2.0))
+
+
+def test_many_points_are_drawn_once_for_each_pixel() -> None:
+    drawn = svg(figure(scatter=100_000), cases="/studies/st_1/cases/")
+    (found,) = re.findall(r'data-cases="([^"]*)"', drawn)
+    assert 10_000 < len(found.split()) == drawn.count("h0") < 100_000
+    assert "<a " not in drawn
+
+
+def test_a_file_is_the_picture_of_the_page_in_colours_of_its_own() -> None:
+    page, file = svg(figure(1.0, 2.0)), picture_svg(figure(1.0, 2.0), "")
+    paths = re.compile(r' d="([^"]*)"')
+    assert paths.findall(page) == paths.findall(file)
+    assert "var(--" in page
+    assert "var(--" not in file
+    assert PALETTE[1] in file
+    assert file == picture_svg(figure(1.0, 2.0), "")
+
+
+def test_titles_are_text_never_markup() -> None:
+    named = replace(
+        figure(1.0), heading='a < b & "c"', panels=(Panel(Quantity("<b>", "1"), figure(1.0).panels[0].lines),)
+    )
+    assert ElementTree.fromstring(picture_svg(named, "<script>")).tag.endswith("svg")
+
+
+def test_axes_can_be_logarithmic_and_run_backwards() -> None:
+    drawn = svg(replace(figure(1.0, 10.0), log=("y",), flipped=("x",)))
+    assert [text for *_, text in texts(drawn, "y")][::3] == ["10", "100", "1000", "10\u202f000"]
+    numbers = texts(drawn, "x")
+    assert [at for at, *_ in numbers] == sorted((at for at, *_ in numbers), reverse=True)
+
+
+def test_a_thumbnail_has_no_numbers() -> None:
+    small = spark(figure(1.0, 2.0))
+    assert "<text" not in small
+    assert small.count("<path") == 3
+
+
+def test_degrees_are_parts_of_a_turn() -> None:
+    assert Scale(0.0, 360.0, 0.0, 500.0, unit="°").ticks() == [0, 45, 90, 135, 180, 225, 270, 315, 360]
+    assert rounded_scale((3.0, 97.0), 180.0, zero=True, log=False, unit="rpm").high == 100.0
+
+
+def test_a_text_breaks_between_words() -> None:
+    assert lines_of("one two three", text_width("one two ")) == ["one two", "three"]
+    assert lines_of("", 10.0) == []
