@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 MOST_LINKS: Final = 600
 #: Points from which on dots stand in the place of markers of a shape.
 _DOTS: Final = 1_500
+_CROWDED: Final = 10_000
 #: Points of a line for each pixel of its width.
 _DENSE: Final = 3
 #: Different colours of points that are coloured by numbers.
@@ -199,19 +200,20 @@ def _points(line: Line, placed: Placed, colour: str, kept: NDArray[np.int64], x:
     look: dict[str, Any] = {"fill": "none", "stroke": colour, "stroke_width": 2} if line.ring else {"fill": colour}
     size = 5.0 if line.ring else 2.9 if line.joined else 3.3
     name = line.name or placed.panel.y.name
-    if line.cases is None or not placed.cases:
-        return _many(line.marker, size, x, y, look) if kept.size <= _DOTS else _dots(x, y, colour, {})
-    cases = line.cases[kept]
-    if linked(placed.figure):
+    cases = None if line.cases is None else line.cases[kept]
+    if cases is not None and placed.cases and linked(placed.figure):
         links = _links(placed, line.marker, size, (x, y), (line.x[kept], line.y[kept]), cases, name)
         # An invisible edge is part of what can be clicked.
         edge = look if line.ring else {**look, "stroke": "var(--ink)", "stroke_opacity": 0, "stroke_width": 9}
         return element("g", "".join(links), **edge)
-    if kept.size > _DOTS:
+    many = kept.size > _DOTS
+    if many:
         x, y, places = _different(x, y)
-        cases = cases[places]
-    known = {"data_cases": " ".join(map(str, cases.tolist())), "data_line": name}
-    return _dots(x, y, colour, known) if kept.size > _DOTS else _many(line.marker, size, x, y, {**look, **known})
+        cases = None if cases is None else cases[places]
+    known: dict[str, Any] = {"data_line": name}
+    if cases is not None and placed.cases:
+        known["data_cases"] = " ".join(map(str, cases.tolist()))
+    return _dots(x, y, colour, known) if many else _many(line.marker, size, x, y, {**look, **known})
 
 
 def _many(shape: str, size: float, x: Numbers, y: Numbers, look: Mapping[str, Any]) -> str:
@@ -223,10 +225,11 @@ def _dots(x: Numbers, y: Numbers, colour: str, known: Mapping[str, Any]) -> str:
 
 
 def _different(x: Numbers, y: Numbers) -> tuple[Numbers, Numbers, NDArray[np.int64]]:
-    """One of the points on each pixel, and which these are: more cannot be seen."""
-    pixels = np.round(x).astype(np.int64) * 100_000 + np.round(y).astype(np.int64)
-    places = np.sort(np.unique(pixels, return_index=True)[1])
-    return np.round(x[places]), np.round(y[places]), places
+    """One of the points on each pixel, of very many on each square of four, and which these are: more is not seen."""
+    side = 2.0 if x.size > _CROWDED else 1.0
+    across, up = np.round(x / side), np.round(y / side)
+    places = np.sort(np.unique(across * 100_000.0 + up, return_index=True)[1])
+    return side * across[places], side * up[places], places
 
 
 def linked(figure: Figure) -> bool:
