@@ -2,9 +2,9 @@
 
     import sprag
 
-    table = sprag.run("study.toml")  # run here; needs sprag[server]
+    study = sprag.run("study.toml")  # run here; needs sprag[server]
     with sprag.Client("http://sprag.example:8000") as client:  # the base installation
-        table = client.submit("study.toml").wait().table()
+        study = client.submit("study.toml").wait()  # the same study, with the same methods
 
 Everything is loaded on first use. Where an extra is missing, `MissingExtraError` names it.
 """
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         Study,
         StudyTimeoutError,
         UnreachableError,
+        preset,
         with_units,
     )
     from sprag.service.extras import MissingExtraError
@@ -48,6 +49,7 @@ _OF_CLIENT: Final = (
     "Study",
     "StudyTimeoutError",
     "UnreachableError",
+    "preset",
     "with_units",
 )
 #: Errors that need nothing but the base installation, and their modules.
@@ -76,6 +78,7 @@ __all__ = [
     "UnreachableError",
     "__version__",
     "engine",
+    "preset",
     "run",
     "simulate",
     "with_units",

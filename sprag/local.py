@@ -1,27 +1,146 @@
-"""A study run here, without a service: its rows as a frame with units."""
+"""A study run here, without a service: the study that a service has, with the same methods and results."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import tempfile
+import weakref
+from contextlib import ExitStack
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
-import pandas as pd
-
-from sprag.service.client.frames import table_of
+from sprag.here import Here
 from sprag.service.client.queries import spec_of
-from sprag.service.exports import export, stored
-from sprag.service.jobs.local import pool_size, run_here
+from sprag.service.client.synchronous.study import Study
+from sprag.service.jobs.local import opened, pool_size, run_stored
 from sprag.service.plain_data import plain
-from sprag.service.reading.catalogue import unit_of
 from sprag.service.settings import Settings
 from sprag.service.spec.document import SpecError, parse_spec
+from sprag.worker.chunking import Chunking
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from datetime import datetime
     from os import PathLike
 
+    import numpy as np
+    import pandas as pd
+
     from sprag.service.client.queries import Spec
-    from sprag.service.storage.studies.records import Progress
+    from sprag.service.storage.studies.records import Progress, StudyRecord
+
+#: How other libraries ask an object for its table.
+_AS_TABLE: Final = ("__dataframe__", "__arrow_c_stream__")
+
+
+class LocalStudy(Study):
+    """A study that was run here. It has every method of a study of a service that makes sense of one that has ended.
+
+    It is its own table, too: ``study["efficiency"]``, ``len(study)``, ``study.attrs["units"]``, ``study.head()`` and
+    whatever else a pandas table has and a study has not are those of one table, which is read once; `table` gives a new
+    one. Without a database of its own it lasts as long as this object, or until `close`; a pickle of it has its rows.
+    """
+
+    _client: _Local
+
+    def __repr__(self) -> str:
+        detail = self.detail()
+        progress = detail["progress"]
+        return f"Study({detail['name'] or self.id!r}: {progress['total']:,} cases, {progress['ok']:,} ok)"
+
+    def table(self, units: str | None = None) -> pd.DataFrame:
+        """All rows with all results as a new pandas table, as of a service; `Study.table`."""
+        table = super().table(units)
+        table.attrs["warnings"] = list(self._client.library.store.studies.get(self.id).warnings)
+        return table
+
+    def close(self) -> None:
+        """Close the database; a temporary one is deleted."""
+        self._client.close()
+
+    def __enter__(self) -> LocalStudy:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (self._client.content(), self.id)
+
+    @cached_property
+    def _table(self) -> pd.DataFrame:
+        return self.table()
+
+    def __len__(self) -> int:
+        return len(self._table)
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(self._table)
+
+    def __contains__(self, column: object) -> bool:
+        return column in self._table
+
+    def __getitem__(self, key: Any) -> Any:
+        return self._table[key]
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        self._table[key] = value
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return self._table.to_numpy(dtype)
+
+    if not TYPE_CHECKING:  # a type checker knows the methods of a study only
+
+        def __getattr__(self, name: str) -> Any:
+            if name.startswith("_") and name not in _AS_TABLE:
+                raise AttributeError(f"a study has no {name!r}")
+            return getattr(self._table, name)
+
+
+class _Local(Here):
+    """A database that is open as long as somebody has it; studies run in it with so many processes."""
+
+    def __init__(self, database: str | None = None, processes: int | None = None, content: bytes | None = None) -> None:
+        given = {"database": database, "processes": processes}
+        known = {name: value for name, value in given.items() if value is not None}
+        self._settings = settings = Settings(**known)  # type: ignore[arg-type]
+        self._processes, self._kept = processes, database is not None
+        stack = ExitStack()
+        url = settings.database_url if self._kept else None
+        if content is not None:
+            file = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sprag-study-"))) / "study.sqlite3"
+            file.write_bytes(content)
+            url = f"sqlite:///{file}"
+        chunking = Chunking(settings.chunk_cases, settings.pool_processes, settings.chunk_timeout)
+        super().__init__(stack.enter_context(opened(url, chunking)), settings)
+        # After those of the folders, so that it comes before them where the program ends.
+        self._release = weakref.finalize(self, stack.close)
+
+    def close(self) -> None:
+        """Close the database; a temporary one is deleted."""
+        self._release()
+
+    def run(self, record: StudyRecord, on_progress: Callable[[Progress], None] | None = None) -> StudyRecord:
+        """Run a study to its end; StoreError and ExecutorError."""
+        store, settings = self.library.store, self._settings
+        most, asked = settings.pool_processes, self._processes is not None
+        size = 0 if self._processes == 0 else pool_size(store.studies.study(record.id), most, asked=asked)
+        timeout = settings.chunk_timeout
+        return run_stored(
+            store, record, processes=size, chunk_timeout=timeout, kept=self._kept, on_progress=on_progress
+        )
+
+    def content(self) -> bytes:
+        """A copy of the database."""
+        with tempfile.TemporaryDirectory() as folder:
+            copy = Path(folder) / "copy.sqlite3"
+            self.library.store.backup(copy)
+            return copy.read_bytes()
+
+
+def _restored(content: bytes, study_id: str) -> LocalStudy:
+    """The study of a pickle."""
+    return LocalStudy(_Local(content=content), study_id)
 
 
 def run(
@@ -32,14 +151,15 @@ def run(
     fresh: bool = False,
     finish_by: datetime | None = None,
     on_progress: Callable[[Progress], None] | None = None,
-) -> pd.DataFrame:
+) -> LocalStudy:
     """Run a study here, to its end.
 
     Parameters
     ----------
     spec : mapping, str or path
-        A spec, or the name of a JSON or TOML file with one. Values may be numbers of numpy and decimal, arrays, columns
-        of pandas and quantities of pint.
+        A spec, the name of a JSON or TOML file with one, or the name of a study that comes with Sprag. Values may be
+        numbers of numpy and decimal, arrays, columns of pandas and quantities of pint, and ``axes`` a pandas table with
+        a column for each parameter and a row for each case.
     processes : int, optional
         Number of processes; 0 runs the cases in this process. By default one per core, or 0 where the study takes about
         a second. A script that starts processes needs ``if __name__ == "__main__":`` around its own code.
@@ -53,10 +173,10 @@ def run(
 
     Returns
     -------
-    DataFrame
-        A row for each case: ``case``, the parameters that vary, ``ending``, ``flags``, the results. Numbers are in SI
-        units, and missing where a result could not be computed. ``attrs["units"]`` has the unit of each parameter and
-        result, ``attrs["warnings"]`` the warnings about the spec.
+    Study
+        The study as `Client.submit` gives it once it has ended: ``curves``, ``map``, ``answers``, ``explore``,
+        ``table``, ``grid``, ``export``, ``plot`` and so on. It has the columns, ``attrs`` and methods of its table,
+        too; ``attrs["warnings"]`` has the warnings about the spec.
 
     Raises
     ------
@@ -69,24 +189,13 @@ def run(
     if faults:
         raise SpecError(faults)
     parsed = parse_spec(data)
-    study = parsed.study
-    given = {"database": database, "processes": processes}
-    settings = Settings(**{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
-    with run_here(
-        parsed.spec,
-        study,
-        processes=0 if processes == 0 else pool_size(study, settings.pool_processes, asked=processes is not None),
-        database_url=None if database is None else settings.database_url,
-        chunk_cases=settings.chunk_cases,
-        chunk_timeout=settings.chunk_timeout,
-        warnings=parsed.warnings,
-        fresh=fresh,
-        finish_by=finish_by,
-        on_progress=on_progress,
-    ) as done:
-        source = stored(done.store, done.record, done.store.studies.study(done.record.id))
-        table = table_of(b"".join(export(source, "parquet")))
-    units = {path: unit_of(study, path) for path in study.column_paths}
-    table.attrs["units"] = units | {info.name: info.unit for info in source.infos}
-    table.attrs["warnings"] = list(parsed.warnings)
-    return table
+    here = _Local(database, processes)
+    try:
+        record = here.library.store.studies.create(
+            parsed.spec, parsed.study, warnings=parsed.warnings, fresh=fresh, finish_by=finish_by
+        )
+        here.run(record, on_progress)
+    except BaseException:
+        here.close()
+        raise
+    return LocalStudy(here, record.id)

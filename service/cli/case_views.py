@@ -154,7 +154,7 @@ def option(asked: NamedSetting) -> Any:
         ]
     if setting.positional:
         return Annotated[list[str], typer.Argument(metavar=f"{setting.metavar}...", help=meaning)]
-    texts = list[str] if "list" in str(asked.type) else asked.type
+    texts = list[str] if asked.several else asked.type
     given = texts if asked.default is ... else texts | None
     return Annotated[
         given,

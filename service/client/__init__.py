@@ -27,6 +27,7 @@ from sprag.service.client.errors import (
 from sprag.service.client.events import StudyEvent
 from sprag.service.client.frames import Curves
 from sprag.service.client.motions import Engagements, Motion
+from sprag.service.client.queries import preset
 from sprag.service.client.synchronous.client import Client
 from sprag.service.client.synchronous.study import Study
 from sprag.service.client.tabular import with_units
@@ -51,5 +52,6 @@ __all__ = [
     "StudyTimeoutError",
     "UnreachableError",
     "UntrustedError",
+    "preset",
     "with_units",
 ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 from collections.abc import Mapping, Sequence
 from os import PathLike
@@ -9,6 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from sprag.service.client.errors import SpecFileError
+from sprag.service.plain_data import plain
+from sprag.service.presets import preset_names, preset_text
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -19,21 +23,49 @@ Spec = Mapping[str, Any]
 
 
 def spec_of(spec: Spec | str | PathLike[str]) -> Spec:
-    """A spec given as data, or the data of the JSON or TOML file of that name; raises SpecFileError about the file."""
+    """A spec given as data, as the name of a JSON or TOML file, or as that of a preset; SpecFileError about the file.
+
+    ``axes`` of data can be a table of pandas or polars: a column for each parameter, a row for each case.
+    """
     if isinstance(spec, Mapping):
-        return spec
+        axes: Any = spec.get("axes")
+        return {**spec, "axes": [{"points": _csv(axes)}]} if hasattr(axes, "columns") else spec
     path = Path(spec)
+    if str(spec) in preset_names() and not path.exists():
+        return preset(str(spec))
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or error
         raise SpecFileError(f"cannot read a spec from the file {str(path)!r}: {reason}") from error
+    return _read(path, text)
+
+
+def _csv(table: Any) -> str:
+    """The text of a CSV file of a table of cases."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(table.columns)
+    writer.writerows(zip(*(plain(table[name])[0] for name in table.columns), strict=True))
+    return text.getvalue()
+
+
+def preset(name: str) -> dict[str, Any]:
+    """The spec of a study that comes with Sprag, to be changed and run; SpecFileError where there is none."""
+    if name not in preset_names():
+        raise SpecFileError(f"no study {name!r} comes with Sprag; these do: {', '.join(preset_names())}")
+    file, text = preset_text(name)
+    return _read(Path(file), text)
+
+
+def _read(path: Path, text: str) -> dict[str, Any]:
+    """The spec in the text of a file."""
     try:
         if path.suffix.lower() == ".toml":
             import tomllib
 
             return tomllib.loads(text)
-        return cast("Spec", json.loads(text))
+        return cast("dict[str, Any]", json.loads(text))
     except ValueError as error:
         kind = "TOML" if path.suffix.lower() == ".toml" else "JSON"
         raise SpecFileError(f"the file {str(path)!r} is not valid {kind}: {error}") from error

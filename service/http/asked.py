@@ -45,13 +45,12 @@ def asking(
 
 def _parameter(asked: NamedSetting) -> Parameter:
     setting = asked.setting
-    limits = {"ge": setting.low, "le": setting.high, "min_length": setting.least, "max_length": setting.longest}
     query = Query(
         alias=setting.alias or None,
         description=setting.meaning,
         examples=list(setting.examples) or None,
         json_schema_extra=one_of(setting.choices) if setting.choices else None,
-        **{name: limit for name, limit in limits.items() if limit is not None},  # type: ignore[arg-type]
+        **setting.limits,  # type: ignore[arg-type]
     )
     default = Parameter.empty if asked.default is ... else asked.default
     return Parameter(asked.name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[asked.type, query])

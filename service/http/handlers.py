@@ -14,17 +14,16 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 
 from sprag.sentences import Sentence, Whole, joined, whole
-from sprag.service.faults import Code, Fault, FaultError, Kind, ParameterFault, parameter_error, shown
+from sprag.service.faults import FaultError, Kind, parameter_error, shown
 from sprag.service.http.problems import PROBLEM_TYPES, ApiError, api_error, problem_response
 from sprag.service.http.web.problem_page import problem_page
 from sprag.service.storage.errors import PageTokenError, StoreError
+from sprag.service.views.queries import parameter_fault
 from sprag.worker.states import TransitionError
 
 _log = logging.getLogger("sprag.service")
 
 _LATER = {"Retry-After": "5"}
-#: Descriptions of the patterns of texts.
-_PATTERNS = {r"^[!-~]+$": "printable ASCII characters without blanks"}
 
 
 def as_api_error(error: Exception) -> ApiError | None:
@@ -99,46 +98,9 @@ def _methods_at(app: FastAPI, path: str) -> set[str]:
 
 def _invalid(request: Request, error: Exception) -> Response:
     raised = cast("RequestValidationError", error)
-    items = tuple(_parameter_item(fault) for fault in raised.errors())
+    items = tuple(parameter_fault(fault) for fault in raised.errors())
     detail = "; ".join(f"{item.where}: {item.message}" for item in items)
     return _answer(request, ApiError("invalid-parameter", detail, items))
-
-
-def _parameter_item(fault: dict[str, Any]) -> Fault:
-    _place, *name = fault["loc"]
-    bounds = fault.get("ctx", {})
-    value = fault.get("input")
-    message = str(fault["msg"]).removeprefix("Value error, ")
-    if "pattern" in bounds:
-        message = "has characters that are not allowed here"
-    return ParameterFault(
-        str(name[0]) if name else _place,
-        _code(str(fault["type"])),
-        message[:1].lower() + message[1:],
-        value=shown(value) if isinstance(value, str) else None,
-        allowed=_allowed(bounds),
-    )
-
-
-def _code(kind: str) -> Code:
-    """The code of a pydantic error."""
-    if kind == "missing":
-        return "required"
-    if kind in ("literal_error", "enum"):
-        return "invalid-choice"
-    if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
-        return "out-of-range"
-    if kind in ("too_long", "string_too_long"):
-        return "too-long"
-    return "invalid-text" if kind.startswith(("string", "value_error")) else "wrong-type"
-
-
-def _allowed(bounds: dict[str, Any]) -> str | None:
-    signs = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<", "expected": "one of"}
-    parts = [f"{signs[name]} {value}" for name, value in bounds.items() if name in signs]
-    if "pattern" in bounds:
-        parts.append(_PATTERNS.get(bounds["pattern"], f"a text like {bounds['pattern']}"))
-    return " and ".join(parts) or None
 
 
 def install(app: FastAPI) -> None:

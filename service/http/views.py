@@ -8,21 +8,30 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 from sprag.service.answers import filled
 from sprag.service.answers.catalogue import Preset
+from sprag.service.answers.results import CaseDetail, RegimeRow
 from sprag.service.answers.studies import FullProgress, Origin, StudyDetail, StudySummary
+from sprag.service.exports import row_json
 from sprag.service.faults import warned
 from sprag.service.http.prefix import here
 from sprag.service.http.respond import edition_tag
 from sprag.service.presets import ABOUT, preset_text
 from sprag.service.reading.catalogue import axes_json
+from sprag.service.reading.directions import case_units, case_values
 from sprag.service.results.fronts import goal_units
 from sprag.service.results.rounds import rounds_json
 from sprag.service.spec.document import format_of, load_spec
+from sprag.service.storage.studies.records import CaseRow
+from sprag.worker import models
+from sprag.worker.codes import PENDING
+from sprag.worker.models.abilities import has_transients
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from sprag.service.storage.rows.origins import Origin as OriginRecord
+    from sprag.service.storage.store import Store
     from sprag.service.storage.studies.records import Kinds, Progress, StudyRecord
+    from sprag.service.views.library import Library
     from sprag.worker.study import Study
 
 API_PREFIX: Final = "/api/v1"
@@ -73,6 +82,15 @@ def progress_json(progress: Progress, units: Sequence[str] = ()) -> FullProgress
     )
 
 
+def whole_detail(library: Library, record: StudyRecord, progress: Progress) -> StudyDetail:
+    """A study with everything, as of `detail`, and with warnings of parameters without effect."""
+    store, study_id = library.store, record.id
+    parts = store.studies.study(study_id), store.studies.spec(study_id), store.rows.kinds(study_id)
+    data = detail(record, progress, *parts, store.rows.origins(study_id))
+    unaffected = warned((*record.warnings, *library.unaffected.of(store, record)))
+    return cast("StudyDetail", {**data, **unaffected})
+
+
 def detail(
     record: StudyRecord,
     progress: Progress,
@@ -94,6 +112,42 @@ def detail(
         "computed_by": [filled(Origin, origin) for origin in origins],
         "spec": spec,
     }
+
+
+def case_detail(store: Store, study_id: str, study: Study, case: int) -> CaseDetail:
+    """A case with its parameters, results and regimes; "pending" while it has not been run."""
+    row = store.rows.case(study_id, case)
+    parameters = case_values(study, case)
+    if row is None:
+        names = [info.name for info in models.study_results(study)]
+        row = CaseRow(case, PENDING, (), dict.fromkeys(names))
+    own = f"{study_address(study_id)}/cases/{case}"
+    links = {"self": own, "study": study_address(study_id), "trajectory": f"{own}/trajectory"}
+    if has_transients(study):
+        links["transient"] = f"{own}/transient"
+    if models.has_clutches(study):
+        links["engagements"] = f"{own}/engagements"
+    if models.has_strobes(study):
+        links["strobes"] = f"{own}/strobes"
+        links |= {name: f"{own}/{name}" for name in ("branch", "diagram", "section")}
+    return cast(
+        "CaseDetail",
+        {
+            **row_json(row, parameters),
+            "units": case_units(study),
+            "ending_meaning": models.ENDING_SENTENCES.get(row.ending, "The case has not been run yet."),
+            "flag_meanings": {flag: models.flags_of(study.model).get(flag, "") for flag in row.flags},
+            "regimes": _regimes(store, study_id, study, case),
+            "links": links,
+        },
+    )
+
+
+def _regimes(store: Store, study_id: str, study: Study, case: int) -> list[RegimeRow]:
+    """The rows of a case that can have several."""
+    numbered = models.numbered_by(study.model, models.variant_of(study))
+    rows = () if numbered is None else store.rows.of_case(study_id, case)
+    return [{"number": number, "flags": list(row.flags), "results": row.results} for number, row in enumerate(rows)]
 
 
 @lru_cache

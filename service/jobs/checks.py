@@ -16,6 +16,7 @@ from sprag.service.jobs.submission import Submission, hash_of, submission
 from sprag.service.json_text import to_bytes
 from sprag.service.reading import units
 from sprag.service.results.fits import fit_json, read_fit
+from sprag.service.results.regimes import UNSETTLED
 from sprag.service.results.selection import locate_axes
 from sprag.service.schedules.fields import ScheduleFields, change_fields, read_fields
 from sprag.service.spec.components import Component, read_components
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from sprag.sentences import WarningText
     from sprag.service.results.explore import ExploreQuery
     from sprag.service.spec.text import Format
+    from sprag.service.storage.store import Store
 
 #: Fields of a schedule by which it is paused and resumed, and the most bytes of a body with them.
 _PAUSING: Final = frozenset({"enabled", "paused_until"})
@@ -108,6 +110,22 @@ def extended_study(
     parsed = parse_extended(accepted(store.studies.spec(study_id), study), study, load_spec(content, form))
     parsed = replace(parsed, warnings=(*warnings, *parsed.warnings))
     return submission(parsed, store, now, finish_by=finish, given=given)
+
+
+def kind_to_run_longer(store: Store, study_id: str, regime: str | None) -> str:
+    """The regime or flag of the cases to run longer; FaultError where no case has it."""
+    study, kinds = store.studies.study(study_id), store.rows.kinds(study_id)
+    if models.is_settled(study.run):
+        if (wanted := regime or UNSETTLED) in kinds.regimes:
+            return wanted
+        raise parameter_error(
+            "regime", "unknown-name", "no case of this study has it", wanted, ", ".join(kinds.regimes)
+        )
+    if regime is not None:
+        raise parameter_error("regime", "unknown-name", "runs of a given time have no regime", regime, "no `regime`")
+    if models.NOT_SETTLED in kinds.flags:
+        return models.NOT_SETTLED
+    raise parameter_error("regime", "unknown-name", "no case of this study has the flag `not_settled`")
 
 
 def longer_study(

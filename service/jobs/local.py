@@ -73,6 +73,16 @@ class LocalRun:
 
 
 @contextmanager
+def opened(database_url: str | None, chunking: Chunking) -> Iterator[Store]:
+    """The store of a database, or of a temporary one, which is deleted with the context."""
+    sweep(Path(tempfile.gettempdir()).glob(f"{_FOLDER_PREFIX}*"))
+    with tempfile.TemporaryDirectory(prefix=_FOLDER_PREFIX) as folder, marked(Path(folder)):
+        url = database_url or f"sqlite:///{Path(folder) / 'run.sqlite3'}"
+        with Store.open(url, chunking=chunking) as store:
+            yield store
+
+
+@contextmanager
 def run_here(
     spec: Mapping[str, Any],
     study: Study,
@@ -90,43 +100,76 @@ def run_here(
 ) -> Iterator[LocalRun]:
     """Run ``study`` to its end on ``processes`` processes and return its rows.
 
-    Without ``database_url`` the database is temporary and is deleted with the context. When another dispatcher is
-    active on the given database, it runs the study while this process waits. ``processes`` 0 runs the cases in this
-    process, which suits small studies; 1 or more start a pool, or use the cluster that ``setting`` names
-    (`Settings.executor`). At ``finish_by`` it ends with what is done. Raises
-    StoreError and ExecutorError, each with one sentence, and RunInterruptedError on Ctrl-C; the study is then
-    cancelled, so that no later worker continues it.
+    Without ``database_url`` the database is temporary and is deleted with the context. Otherwise as `run_stored`, whose
+    errors it raises.
     """
-    sweep(Path(tempfile.gettempdir()).glob(f"{_FOLDER_PREFIX}*"))
-    with tempfile.TemporaryDirectory(prefix=_FOLDER_PREFIX) as folder, marked(Path(folder)), _noted() as interrupted:
-        url = database_url or f"sqlite:///{Path(folder) / 'run.sqlite3'}"
-        with Store.open(url, chunking=Chunking(chunk_cases, max(processes, 1), chunk_timeout)) as store:
-            record = store.studies.create(spec, study, warnings=warnings, fresh=fresh, finish_by=finish_by)
-            settings = WorkerSettings(url, processes, chunk_timeout, executor=setting)
-            watch = _Watch(store, record.id, on_progress, interrupted)
-            lock = lock_of(store)
-            owner = run_owner(owner_name(), record.id)
-            try:
-                while not watch.ended():
-                    if lock.take():
-                        runner = executor or (pool(settings) if processes else InlineExecutor())
-                        renew = None if executor or not processes else partial(renewed_pool, settings)
-                        news = store.session.news()
-                        Dispatcher(
-                            store.work, runner, SystemClock(), owner=owner, only=record.number, renew=renew, news=news
-                        ).run(watch.ended)
-                    else:
-                        time.sleep(STANDBY_SECONDS)
-            except (KeyboardInterrupt, ExecutorError) as error:
-                ended = _cancelled(store, record.id, ours=lock.take())
-                if isinstance(error, KeyboardInterrupt) and database_url is not None:
-                    raise RunInterruptedError(ended) from None
-                raise
-            finally:
-                lock.release()
-            yield LocalRun(store, watch.final(passing=database_url is None))
-            if interrupted():
-                raise KeyboardInterrupt
+    with opened(database_url, Chunking(chunk_cases, max(processes, 1), chunk_timeout)) as store, _noted() as noted:
+        record = store.studies.create(spec, study, warnings=warnings, fresh=fresh, finish_by=finish_by)
+        kept, settings = database_url is not None, _settings(store, processes, chunk_timeout, setting)
+        yield LocalRun(store, _run(store, record, settings, noted, kept, on_progress, executor))
+        if noted():
+            raise KeyboardInterrupt
+
+
+def run_stored(
+    store: Store,
+    record: StudyRecord,
+    *,
+    processes: int,
+    chunk_timeout: float,
+    kept: bool,
+    on_progress: Callable[[Progress], None] | None = None,
+    setting: str = "pool",
+) -> StudyRecord:
+    """Run a study of a database to its end; ``kept``: the database outlives this process.
+
+    When another dispatcher is active on the database, it runs the study while this process waits. ``processes`` 0 runs
+    the cases in this process, which suits small studies; 1 or more start a pool, or use the cluster that ``setting``
+    names (`Settings.executor`). At its deadline the study ends with what is done. Raises StoreError and ExecutorError,
+    each with one sentence, and RunInterruptedError on Ctrl-C; the study is then cancelled, so that no later worker
+    continues it.
+    """
+    with _noted() as noted:
+        return _run(store, record, _settings(store, processes, chunk_timeout, setting), noted, kept, on_progress, None)
+
+
+def _settings(store: Store, processes: int, chunk_timeout: float, setting: str) -> WorkerSettings:
+    url = store.session.url.render_as_string(hide_password=False)
+    return WorkerSettings(url, processes, chunk_timeout, executor=setting)
+
+
+def _run(
+    store: Store,
+    record: StudyRecord,
+    settings: WorkerSettings,
+    noted: Callable[[], bool],
+    kept: bool,
+    on_progress: Callable[[Progress], None] | None,
+    executor: Executor | None,
+) -> StudyRecord:
+    watch = _Watch(store, record.id, on_progress, noted)
+    lock = lock_of(store)
+    owner = run_owner(owner_name(), record.id)
+    pooled = executor is None and settings.processes > 0
+    try:
+        while not watch.ended():
+            if lock.take():
+                runner = executor or (pool(settings) if pooled else InlineExecutor())
+                renew = partial(renewed_pool, settings) if pooled else None
+                news = store.session.news()
+                Dispatcher(
+                    store.work, runner, SystemClock(), owner=owner, only=record.number, renew=renew, news=news
+                ).run(watch.ended)
+            else:
+                time.sleep(STANDBY_SECONDS)
+    except (KeyboardInterrupt, ExecutorError) as error:
+        ended = _cancelled(store, record.id, ours=lock.take())
+        if isinstance(error, KeyboardInterrupt) and kept:
+            raise RunInterruptedError(ended) from None
+        raise
+    finally:
+        lock.release()
+    return watch.final(passing=not kept)
 
 
 @contextmanager

@@ -8,14 +8,32 @@ from typing import TYPE_CHECKING, Final
 from sprag.service.formats import REPORT_FORMATS, ReportFormat
 
 if TYPE_CHECKING:
+    from sprag.service.reading.reader import Choice
     from sprag.service.report.content import Report
     from sprag.service.report.document import TitleBlock
+    from sprag.service.storage.store import Store
+    from sprag.service.views.study_questions import ReportQuestion
 
-__all__ = ["MEDIA_TYPES", "REPORT_FORMATS", "ReportFormat", "write_report"]
+__all__ = ["MEDIA_TYPES", "REPORT_FORMATS", "ReportFormat", "asked_report", "write_report"]
 
 MEDIA_TYPES: Final[dict[ReportFormat, str]] = {"html": "text/html; charset=utf-8", "pdf": "application/pdf"}
 #: Files that may be the logo in the folder of an office's templates, and their media types.
 _LOGOS: Final = (("logo.svg", "image/svg+xml"), ("logo.png", "image/png"))
+
+
+def asked_report(
+    store: Store, study_id: str, choice: Choice, question: ReportQuestion, office: str
+) -> tuple[Report, TitleBlock]:
+    """The report that is asked for, with its title block in the language of the task; raises what `report_of` does."""
+    from sprag.service.report.content import report_of
+    from sprag.service.report.document import TitleBlock, today
+    from sprag.service.views.curves import completed_query
+
+    curves = question.x, question.y, question.by, question.at, question.of
+    query = completed_query(store.studies.study(study_id), *curves) if any(curves) else None
+    date = today() if question.date is None else question.date
+    block = TitleBlock(office, question.project, question.author, question.number, date)
+    return report_of(store, study_id, choice, query, question.point, saved=not question.y), block
 
 
 def write_report(report: Report, block: TitleBlock, folder: str, form: ReportFormat) -> bytes:

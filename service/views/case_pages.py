@@ -9,17 +9,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sprag.service.exports import rows_json
 from sprag.service.faults import choice_of, parameter_error
+from sprag.service.reading.directions import case_units
 from sprag.service.results.explore import After, ExploreQuery
 from sprag.service.storage.studies.records import RowBlock
-from sprag.service.views.explore import explored
+from sprag.service.views.curves import pairs
+from sprag.service.views.explore import explored, selection
 from sprag.worker import models
 from sprag.worker.codes import FLAG_MASKS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from sprag.service.answers import results as m
     from sprag.service.views.library import Library
+    from sprag.service.views.study_questions import CasesQuestion
+    from sprag.worker.study import Study
 
 _ALLOWED = "`next_page_token` of a page of the same order"
 
@@ -31,6 +37,19 @@ class CasePage:
     block: RowBlock
     next_token: str | None
     matching: int | None
+
+
+def wanted(question: CasesQuestion) -> ExploreQuery:
+    """The cases of a question, as many as a page has."""
+    for name in ("ending", "regime", "flag"):
+        if getattr(question, name) == "":
+            raise parameter_error(name, "invalid-choice", "is empty", "", "a name, or no parameter for any")
+    return replace(selection(question, question.page_size), at=pairs(question.at))
+
+
+def page_json(study: Study, page: CasePage) -> m.CasePage:
+    """A page as JSON data."""
+    return {"cases": list(rows_json(study, page.block)), "units": case_units(study), "next_page_token": page.next_token}
 
 
 def by_number(query: ExploreQuery) -> bool:

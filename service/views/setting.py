@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from sprag.service.faults import parameter_error
 from sprag.service.reading.limits import span
@@ -54,6 +54,12 @@ class Setting:
     metavar: str = "VALUE"
     positional: bool = False
 
+    @property
+    def limits(self) -> dict[str, int]:
+        """Its limits as pydantic names them."""
+        limits = {"ge": self.low, "le": self.high, "min_length": self.least, "max_length": self.longest}
+        return {name: limit for name, limit in limits.items() if limit is not None}
+
 
 @dataclass(frozen=True, slots=True)
 class NamedSetting:
@@ -68,6 +74,11 @@ class NamedSetting:
     def alias(self) -> str:
         """Its name in addresses."""
         return self.setting.alias or self.name
+
+    @property
+    def several(self) -> bool:
+        """Whether it is a list."""
+        return any(get_origin(kind) is list for kind in (self.type, *get_args(self.type)))
 
     @property
     def option(self) -> str:

@@ -149,8 +149,8 @@ def with_values(**others: Any) -> dict[str, Any]:
 
 
 def test_a_study_run_here_takes_them() -> None:
-    expected = sprag.run(SPEC, processes=0)
-    pd.testing.assert_frame_equal(sprag.run(with_values(), processes=0), expected)
+    expected = sprag.run(SPEC, processes=0).table()
+    pd.testing.assert_frame_equal(sprag.run(with_values(), processes=0).table(), expected)
     with pytest.raises(SpecError) as caught:
         sprag.run(with_values(values=np.array([0.1, np.nan])), processes=0)
     assert [(fault.where, fault.code) for fault in caught.value.faults] == [("/axes/0/values/1", "not-finite")]

@@ -68,7 +68,7 @@ def test_the_example_of_derived_parameters_has_the_numbers_of_the_guide() -> Non
     spec = json.loads((ROOT / "examples" / "one_pendulum.json").read_text(encoding="utf-8"))
     del spec["base"]["pendulums"][0]["inertia"]
     spec |= json.loads(f"{{{fields}}}")
-    table = sprag.run(spec, processes=0)
+    table = sprag.run(spec, processes=0).table()
     head, _, *rows = [
         [cell.strip() for cell in line.strip("|").split("|")] for line in page.split("\n") if line.startswith("|")
     ]
@@ -84,7 +84,7 @@ def test_the_example_of_derived_parameters_has_the_numbers_of_the_guide() -> Non
     base, axes = spec["base"]["pendulums"][0], spec["axes"]
     base["inertia"] = 1e-3
     axes.append({"path": "pendulums.0.inertia", "values": table["pendulums.0.inertia"].tolist()})
-    plain = sprag.run({**spec, "derive": {}, "axes": axes, "combine": "zip"}, processes=0)
+    plain = sprag.run({**spec, "derive": {}, "axes": axes, "combine": "zip"}, processes=0).table()
     pd.testing.assert_frame_equal(plain[table.columns], table)
 
 
@@ -105,8 +105,8 @@ def test_a_study_of_a_file_and_a_database(tmp_path: Path) -> None:
     path = tmp_path / "study.json"
     path.write_text(json.dumps(SPEC), encoding="utf-8")
     database = str(tmp_path / "kept.sqlite3")
-    first = sprag.run(path, processes=0, database=database)
-    pd.testing.assert_frame_equal(first, sprag.run(str(path), processes=0, database=database))
+    first = sprag.run(path, processes=0, database=database).table()
+    pd.testing.assert_frame_equal(first, sprag.run(str(path), processes=0, database=database).table())
 
 
 def test_what_is_wrong_with_a_study_is_named() -> None:

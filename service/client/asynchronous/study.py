@@ -109,7 +109,7 @@ class AsyncStudy(AsyncStudyAnswers, AsyncStudyTables, AsyncStudyCases, AsyncShow
 
     async def _further(self, verb: str, key: str | None, **arguments: Any) -> AsyncStudy:
         made = await self._client.request("POST", f"{self._path}:{verb}", key=key or "", **arguments)
-        return AsyncStudy(self._client, made["id"])
+        return type(self)(self._client, made["id"])
 
     async def pause(self) -> StudySummary:
         """Hold the study: no new cases are started until it is resumed."""

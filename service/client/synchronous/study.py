@@ -106,7 +106,7 @@ class Study(StudyAnswers, StudyTables, StudyCases, Shown):
 
     def _further(self, verb: str, key: str | None, **arguments: Any) -> Study:
         made = self._client.request("POST", f"{self._path}:{verb}", key=key or "", **arguments)
-        return Study(self._client, made["id"])
+        return type(self)(self._client, made["id"])
 
     def pause(self) -> StudySummary:
         """Hold the study: no new cases are started until it is resumed."""

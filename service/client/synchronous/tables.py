@@ -59,11 +59,12 @@ class StudyTables(StudyPart):
         """All rows with all results as a pandas table, NaN for missing values; ``units`` such as "rpm, mm", or "typed".
 
         ``attrs["units"]`` has the unit of each column, by default SI, ``attrs["endings"]`` the number of cases of each
-        ending.
+        ending, ``attrs["warnings"]`` the warnings about the spec.
         """
-        least = self._client.ended_cases(self._path)
+        detail = self._get("")
         table = table_of(self.download("parquet", units))
-        self._client.require_cases(self._path, least, table["case"].nunique())
+        self._client.require_cases(self._path, detail["progress"]["done"], table["case"].nunique())
+        table.attrs["warnings"] = detail["warnings"]
         return table
 
     def side_by_side(self, cases: Sequence[int]) -> pd.DataFrame:

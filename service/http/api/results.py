@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Final
 
 from fastapi import Query
@@ -25,10 +26,8 @@ from sprag.service.http.routers import api_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
 from sprag.service.reading.quantities import SI
-from sprag.service.report.content import report_of
-from sprag.service.report.document import TitleBlock, today
+from sprag.service.report.document import today
 from sprag.service.views import row_files
-from sprag.service.views.curves import completed_query
 from sprag.service.views.study_questions import ReportQuestion
 
 if TYPE_CHECKING:
@@ -144,18 +143,14 @@ async def get_report(
 
     def make(_record: StudyRecord) -> Drawing:
         policy = {"Content-Security-Policy": _REPORT_POLICY} if chosen == "html" else {}
-        study = work.context.store.studies.study(study_id)
-        curves = question.x, question.y, question.by, question.at, question.of
-        query = completed_query(study, *curves) if any(curves) else None
-        content = report_of(work.context.store, study_id, choice, query, question.point, saved=not question.y)
-        shown = content, block, settings.report_folder, chosen
+        document = report.asked_report(work.context.store, study_id, choice, dated, settings.report_office)
+        shown = *document, settings.report_folder, chosen
         return Drawing(report.write_report, shown, report.MEDIA_TYPES[chosen], policy)
 
     choice_of("language", language, languages.available())
     with languages.language(language):
-        date = today() if question.date is None else question.date
-        block = TitleBlock(settings.report_office, question.project, question.author, question.number, date)
-        return await conditional(work, study_id, f"{chosen} {block.date}", make)
+        dated = replace(question, date=today() if question.date is None else question.date)
+        return await conditional(work, study_id, f"{chosen} {dated.date}", make)
 
 
 router.get(

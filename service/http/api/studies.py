@@ -10,7 +10,7 @@ from pydantic import Field
 from starlette.responses import Response
 
 from sprag.service.answers import studies as m
-from sprag.service.faults import parameter_error, warned
+from sprag.service.faults import parameter_error
 from sprag.service.http import views
 from sprag.service.http.api import examples
 from sprag.service.http.api.document import body, key_header, located, problems
@@ -24,7 +24,6 @@ from sprag.service.http.threads import in_thread
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import checks
 from sprag.service.jobs.submission import Submission, take_in
-from sprag.service.results.regimes import UNSETTLED
 from sprag.service.results.rounds import round_json
 from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
 from sprag.service.views.curves import pairs
@@ -36,7 +35,7 @@ from sprag.worker.limits import (
     MIN_SETTLED_PERIODS,
     NARROW_STEPS,
 )
-from sprag.worker.models import ENDING_SENTENCES, NOT_SETTLED, OK, REGIME_SENTENCES, WorkerEnding, is_settled
+from sprag.worker.models import ENDING_SENTENCES, OK, REGIME_SENTENCES, WorkerEnding
 
 router = api_router("studies")
 
@@ -149,17 +148,7 @@ def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
     tag = views.study_tag(record)
     if record.state.terminal and (unchanged := not_modified(request, tag)):
         return unchanged
-    study = context.store.studies.study(study_id)
-    data = views.detail(
-        record,
-        progress,
-        study,
-        context.store.studies.spec(study_id),
-        context.store.rows.kinds(study_id),
-        context.store.rows.origins(study_id),
-    )
-    unaffected = warned((*record.warnings, *context.library.unaffected.of(context.store, record)))
-    return tagged(json_response({**data, **unaffected}), tag)
+    return tagged(json_response(views.whole_detail(context.library, record, progress)), tag)
 
 
 @router.get(
@@ -292,27 +281,11 @@ async def run_longer(
     idempotency_key: ExtensionKey = None,
 ) -> Response:
     """Submit a study of the unsettled cases of a study, with more time for each."""
-    kind = await in_thread(_to_run_longer, context, study_id, regime)
+    kind = await in_thread(checks.kind_to_run_longer, context.store, study_id, regime)
     given = given_options(regime=regime, at_most=at_most)
     now = context.store.clock.now()
     made = await work.check(checks.longer_study, context.library, study_id, kind, at_most, now, given)
     return await in_thread(taken_in, context, made, idempotency_key, 0)
-
-
-def _to_run_longer(context: Context, study_id: str, regime: str | None) -> str:
-    """The regime or flag of the cases to run longer; FaultError where no case has it."""
-    study, kinds = context.store.studies.study(study_id), context.store.rows.kinds(study_id)
-    if is_settled(study.run):
-        if (wanted := regime or UNSETTLED) in kinds.regimes:
-            return wanted
-        raise parameter_error(
-            "regime", "unknown-name", "no case of this study has it", wanted, ", ".join(kinds.regimes)
-        )
-    if regime is not None:
-        raise parameter_error("regime", "unknown-name", "runs of a given time have no regime", regime, "no `regime`")
-    if NOT_SETTLED in kinds.flags:
-        return NOT_SETTLED
-    raise parameter_error("regime", "unknown-name", "no case of this study has the flag `not_settled`")
 
 
 @router.post(

@@ -1,0 +1,184 @@
+"""What a study asks of a service, answered in this process: the same views of the same rows, without HTTP."""
+
+from __future__ import annotations
+
+import json
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Generator, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Final
+
+from sprag.service import languages
+from sprag.service.client.errors import RefusedError
+from sprag.service.client.events import StudyEvent
+from sprag.service.client.synchronous.connection import Connection
+from sprag.service.faults import FaultError, choice_of
+from sprag.service.figures.pictures.curves import PICTURES
+from sprag.service.formats import FORMATS, HEADERS
+from sprag.service.http.views import case_detail, whole_detail
+from sprag.service.jobs import checks
+from sprag.service.jobs.submission import take_in
+from sprag.service.json_text import to_bytes
+from sprag.service.reading.quantities import SI, TYPED
+from sprag.service.reading.reader import CAPTIONS, Choice
+from sprag.service.report import REPORT_FORMATS, asked_report, write_report
+from sprag.service.results.rounds import round_json
+from sprag.service.results.start_states import check_start
+from sprag.service.storage.errors import StoreError
+from sprag.service.views import row_files
+from sprag.service.views.case_pages import case_page, page_json, wanted
+from sprag.service.views.case_view import drawn, see, written
+from sprag.service.views.cases import CASE_VIEWS
+from sprag.service.views.curves import pairs
+from sprag.service.views.explore import selection
+from sprag.service.views.library import Library
+from sprag.service.views.queries import asked
+from sprag.service.views.studies import STUDY_VIEWS
+from sprag.service.views.study_questions import CasesQuestion, ReportQuestion, SelectQuestion
+from sprag.service.views.study_view import study_file
+from sprag.worker.limits import NARROW_STEPS
+from sprag.worker.states import TransitionError
+
+if TYPE_CHECKING:
+    from sprag.service.client.wire import Query
+    from sprag.service.jobs.submission import Submission
+    from sprag.service.settings import Settings
+    from sprag.service.storage.store import Store
+    from sprag.service.storage.studies.records import StudyRecord
+    from sprag.worker.study import Study
+
+_STUDY: Final = re.compile(r"/studies/([^/:]+)(.*)")
+_CASE: Final = re.compile(r"/cases/(\d+)(?:/(\w+))?")
+#: Formats of rows in the order of a service.
+_ROWS: Final = tuple(dict.fromkeys(("json", *FORMATS)))
+#: Statuses of what is refused, where it is not 422 as for wrong input.
+_STATUSES: Final = {"wrong-state": 409, "method-not-allowed": 405, "storage-full": 507}
+
+
+class Here(Connection, ABC):
+    """The studies of a database, as a connection to a service has them.
+
+    Parameters
+    ----------
+    store : Store
+    settings : Settings
+        Whose office and templates reports have.
+    """
+
+    def __init__(self, store: Store, settings: Settings) -> None:
+        self.server, self.retry, self._answered = "this process", 0.0, True
+        self.library = Library(store)
+        self._settings = settings
+
+    @abstractmethod
+    def run(self, record: StudyRecord) -> StudyRecord:
+        """Run a study of the database to its end."""
+
+    def request(self, method: str, path: str, **arguments: Any) -> dict[str, Any]:
+        """The JSON object that a service answers; RefusedError."""
+        study_id, part = _parts(path)
+        with _refusing():
+            if method != "GET":
+                made = self._further(study_id, part, list(arguments.get("params", ())), arguments.get("json"))
+                record = take_in(self.library.store, made)
+                self.run(record)
+                return {"id": record.id}
+            answer: dict[str, Any] = json.loads(b"".join(self._content(study_id, part, arguments.get("params", ()))))
+        return answer
+
+    def delete(self, path: str, *_: Any, **__: Any) -> None:
+        """Refused, as what else changes a study that has ended."""
+        self.request("DELETE", path)
+
+    @contextmanager
+    def pieces(self, path: str, query: Query) -> Iterator[Iterator[bytes]]:
+        """The bytes of a document, piece by piece."""
+        with _refusing():
+            yield iter(self._content(*_parts(path), query))
+
+    def events(self, study_id: str, *_: Any, **__: Any) -> Generator[StudyEvent | None, None, None]:
+        """The last event of a study: it has ended."""
+        detail: Any = self.request("GET", f"/studies/{study_id}")
+        yield StudyEvent("1", "end", detail["state"], detail["reason"], detail["progress"])
+
+    def _further(self, study_id: str, verb: str, query: Query, body: Any) -> Submission:
+        """The study that a verb makes of another one."""
+        library, now, given = self.library, self.library.store.clock.now(), dict(query)
+        if verb == ":extend":
+            return checks.extended_study(library, study_id, to_bytes(body), "json", None, now, {})
+        if verb == ":longer":
+            kind = checks.kind_to_run_longer(library.store, study_id, given.get("regime"))
+            most = given.get("at_most")
+            return checks.longer_study(library, study_id, kind, None if most is None else int(most), now, {})
+        if verb == ":narrow":
+            held = pairs([text for name, text in query if name == "at"])
+            return checks.narrowed_study(library, study_id, int(given.get("steps", NARROW_STEPS)), held, now, {})
+        if verb == ":select":
+            question = asked(SelectQuestion, query)
+            return checks.selected_study(library, study_id, selection(question, question.limit), now, {})
+        raise FaultError("method-not-allowed", "This is for studies of a service: one that was run here has ended.")
+
+    def _content(self, study_id: str, part: str, query: Query) -> Iterable[bytes]:
+        """What lies at an address, as JSON unless the query has another ``format``."""
+        given, library = dict(query), self.library
+        form = given.get("format", "json")
+        study = library.store.studies.study(study_id)
+        choice = Choice(given.get("units", TYPED if part == "/report" else SI), given.get("names", CAPTIONS))
+        language = choice_of("language", given.get("language", languages.ENGLISH), languages.available())
+        with languages.language(language):
+            if part == "":
+                return [to_bytes(whole_detail(library, *library.store.studies.look(study_id)))]
+            if part == "/rounds":
+                rounds = map(round_json, library.store.studies.rounds(study_id))
+                return [to_bytes({"study": study_id, "rounds": list(rounds)})]
+            if part == "/results":
+                header = choice_of("header", given.get("header", "names"), HEADERS)
+                rows = choice_of("format", form, _ROWS)
+                return row_files.pieces(library, study_id, rows, choice.units, header, "")
+            if part == "/report":
+                question, settings = asked(ReportQuestion, query), self._settings
+                document = asked_report(library.store, study_id, choice, question, settings.report_office)
+                return [write_report(*document, settings.report_folder, choice_of("format", form, REPORT_FORMATS))]
+            if part == "/cases":
+                cases = asked(CasesQuestion, query)
+                page = case_page(library, study_id, wanted(cases), cases.page_token)
+                return [to_bytes(page_json(study, page))]
+            if of_case := _CASE.fullmatch(part):
+                return [self._case(study_id, study, int(of_case[1]), of_case[2], form, query)]
+            view = STUDY_VIEWS[part[1:]]
+            choice_of("format", form, ("json", "csv", *PICTURES))
+            chosen, title = view.choose(study, asked(view.about.question, query)), study.name or study.model
+            return [study_file(library, study_id, view, chosen, choice, title, form)]
+
+    def _case(self, study_id: str, study: Study, case: int, name: str | None, form: Any, query: Query) -> bytes:
+        if case >= study.cases:
+            raise FaultError("case-not-found", f"The cases of this study are 0 .. {study.cases - 1}.")
+        if name is None:
+            return to_bytes(case_detail(self.library.store, study_id, study, case))
+        view = CASE_VIEWS[name]
+        choice_of("format", form, ("json", "csv", *(PICTURES if view.about.pictures else ())))
+        start = next((int(text) for key, text in query if key == "start"), None)
+        check_start(study, start)
+        answer = see(study, case, view, view.choose(study, case, asked(view.about.question, query)), start)
+        return drawn(view, answer, form) if form in PICTURES else written(view, answer, form)
+
+
+def _parts(path: str) -> tuple[str, str]:
+    """The study of an address, and the part of it."""
+    found = _STUDY.fullmatch(path)
+    assert found is not None
+    return found[1], found[2]
+
+
+@contextmanager
+def _refusing() -> Iterator[None]:
+    """Refuse as a service does, so that a script catches one error for both."""
+    try:
+        yield
+    except (FaultError, StoreError, TransitionError) as error:
+        faults: Sequence[Any] = getattr(error, "faults", ())
+        detail = getattr(error, "detail", str(error))
+        status = 404 if error.code.endswith("not-found") else _STATUSES.get(error.code, 422)
+        problem = {"type": f"/problems/{error.code}", "title": detail, "status": status, "detail": detail}
+        raise RefusedError(status, problem | {"errors": [fault.to_json() for fault in faults]}) from error

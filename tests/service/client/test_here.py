@@ -1,0 +1,205 @@
+"""A study that was run here answers as the same study of a service does: every method, file and refusal."""
+
+from __future__ import annotations
+
+import io
+import json
+import pickle
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from anyio.from_thread import BlockingPortal
+
+import sprag
+from sprag.here import Here
+from sprag.service.client import Client, RefusedError, Study
+from sprag.service.settings import Settings
+from sprag.service.storage.studies.records import StudyRecord
+from tests.service.conftest import PortalTransport, Service
+
+LOAD, SPEED, FREQUENCY = "shaft.load", "shaft.speed.mean", "excitation.frequency"
+
+
+class OfService(Here):
+    """The database of a service of a test."""
+
+    def run(self, record: StudyRecord) -> StudyRecord:
+        """Nothing: the test fills in the rows."""
+        return record
+
+
+@pytest.fixture
+def pair(service: Service, portal: BlockingPortal, settings: Settings, spec: dict[str, Any]) -> tuple[Study, Study]:
+    """A study of a service, and the same one here."""
+    study_id = service.submit(spec)
+    service.fill(study_id)
+    client = Client("http://localhost", transport=PortalTransport(service.app, portal))
+    return Study(client, study_id), Study(OfService(service.store, settings), study_id)
+
+
+#: What one asks of a study.
+ASKED: dict[str, Callable[[Study], Any]] = {
+    "detail": lambda study: study.detail(),
+    "curves": lambda study: study.curves(LOAD, [SPEED, "efficiency"], by=FREQUENCY),
+    "usual curves": lambda study: study.curves(),
+    "map": lambda study: study.map(LOAD, FREQUENCY, SPEED),
+    "answers": lambda study: study.answers("0.1 N*m"),
+    "explore": lambda study: study.explore("shaft.load <= 2 N*m", sort="-efficiency", limit=3),
+    "sensitivity": lambda study: study.sensitivity(SPEED),
+    "rounds": lambda study: study.rounds(),
+    "case": lambda study: study.case(3),
+    "regimes": lambda study: study.regimes(3),
+    "cases": lambda study: list(study.cases(ending="ok", sort=f"-{LOAD}")),
+    "table": lambda study: study.table("rpm").to_json(),
+    "side by side": lambda study: study.side_by_side([1, 2]).to_json(),
+    "grid": lambda study: study.grid().to_dict(),
+    "csv": lambda study: study.download("csv", header="units"),
+    "report": lambda study: study.download("html", language="uk"),
+    "no such axis": lambda study: study.curves("nonsense"),
+    "no such case": lambda study: study.case(99),
+    "no such start": lambda study: study.strobes(1, start=5),
+    "no tolerances": lambda study: study.ribbon(),
+    "no conditions": lambda study: study.yields([]),
+    "no calibration": lambda study: study.calibration(),
+    "no goal": lambda study: study.front(),
+    "too many rows": lambda study: study.explore(limit=10**6),
+    "not a number": lambda study: study.explore(limit="many"),  # type: ignore[arg-type]
+    "no such language": lambda study: study.download("pdf", language="xx"),
+    "no such format": lambda study: study.download("docx"),
+    "no such units": lambda study: study.table("bogus"),
+    "nothing to narrow": lambda study: study.narrow(),
+}
+
+
+@pytest.mark.parametrize("name", ASKED)
+def test_the_answer_is_that_of_a_service(pair: tuple[Study, Study], name: str) -> None:
+    there, here = (_answer(ASKED[name], study) for study in pair)
+    assert here == there
+
+
+def _answer(ask: Callable[[Study], Any], study: Study) -> Any:
+    """The answer as it can be compared, or how it was refused."""
+    try:
+        answer = ask(study)
+    except RefusedError as error:
+        return error.status, error.code, error.faults
+    return json.loads(json.dumps(answer.data if is_dataclass(answer) else answer, default=str))
+
+
+def test_pictures_are_those_of_a_service(pair: tuple[Study, Study], tmp_path: Path) -> None:
+    there, here = (
+        study.picture(tmp_path / f"{place}.svg", LOAD, SPEED, by=FREQUENCY, units="rpm", language="uk").read_bytes()
+        for place, study in enumerate(pair)
+    )
+    assert here == there
+
+
+def test_further_studies_are_made_as_a_service_makes_them(pair: tuple[Study, Study]) -> None:
+    for further in (
+        lambda study: study.select("shaft.load <= 2 N*m", limit=2),
+        lambda study: study.extend([{"path": LOAD, "values": ["3 N*m"]}]),
+    ):
+        there, here = (further(study).detail() for study in pair)
+        assert (there["spec"], there["cases"]) == (here["spec"], here["cases"])
+    with pytest.raises(RefusedError) as refused:
+        pair[1].pause()
+    assert (refused.value.status, refused.value.code) == (405, "method-not-allowed")
+
+
+@pytest.fixture(scope="module")
+def run() -> sprag.Study:
+    """A small study, run here."""
+    return sprag.run(_small(), processes=0)
+
+
+def _small() -> dict[str, Any]:
+    spec = sprag.preset("one_pendulum")
+    spec["axes"] = [{"path": LOAD, "values": ["0 N*m", "0.1 N*m", "0.2 N*m"]}]
+    spec["run"] = {"duration": "12 periods", "window": ["8 periods", "12 periods"]}
+    return spec
+
+
+def test_a_study_run_here_is_a_study(run: sprag.Study, tmp_path: Path) -> None:
+    assert isinstance(run, sprag.Study)
+    assert run.wait() is run
+    assert [event.kind for event in run.events()] == ["end"]
+    assert run.curves(LOAD, SPEED).to_pandas()[SPEED].tolist() == run.table()[SPEED].tolist()
+    assert run.trajectory(1, points=20).to_pandas().shape[0] == 20
+    assert run.export(tmp_path / "report.pdf").read_bytes().startswith(b"%PDF")
+    assert repr(run) == f"Study({_small()['name']!r}: 3 cases, 3 ok)"
+    assert "<svg" in run._repr_html_()  # type: ignore[operator]
+    more = run.extend([{"path": LOAD, "values": ["0.3 N*m"]}])
+    assert more.table()[LOAD].tolist() == [0.0, 0.1, 0.2, 0.3]
+
+
+def test_it_is_its_own_table(run: Any) -> None:
+    table = run.table()
+    assert list(run) == list(table.columns)
+    assert len(run) == 3
+    assert LOAD in run
+    assert run.attrs["units"][SPEED] == "rad/s"
+    assert run.attrs["warnings"] == []
+    pd.testing.assert_frame_equal(run.loc[:, [LOAD, SPEED]], table[[LOAD, SPEED]])
+    np.testing.assert_array_equal(np.asarray(run[SPEED]), table[SPEED])
+    run["double"] = 2 * run[SPEED]
+    assert run["double"].tolist() == (2 * table[SPEED]).tolist()
+    assert "double" not in run.table()
+    text = io.StringIO()
+    run[[LOAD]].to_csv(text)
+    assert text.getvalue().startswith(",shaft.load")
+    assert np.asarray(run).shape == (3, len(run.columns))
+    with pytest.raises(AttributeError, match="nothing"):
+        run.nothing  # noqa: B018
+
+
+def test_a_study_and_what_it_gives_can_be_pickled(run: sprag.Study) -> None:
+    again = pickle.loads(pickle.dumps(run))
+    curves = run.curves(LOAD, SPEED)
+    assert again.curves(LOAD, SPEED) == pickle.loads(pickle.dumps(curves)) == curves
+    assert repr(again) == repr(run)
+
+
+def test_a_temporary_database_is_deleted_with_its_study() -> None:
+    program = f"""
+import glob, sprag, tempfile
+study = sprag.run({_small()!r}, processes=0)
+(folder,) = glob.glob(tempfile.gettempdir() + "/sprag-run-*")
+with sprag.run({_small()!r}, processes=0) as other: pass
+print(glob.glob(tempfile.gettempdir() + "/sprag-run-*") == [folder])
+del study
+print(glob.glob(tempfile.gettempdir() + "/sprag-run-*"))
+left = sprag.run({_small()!r}, processes=0)
+"""
+    with tempfile.TemporaryDirectory() as folder:
+        done = subprocess.run(
+            [sys.executable, "-W", "error", "-c", program],
+            env={"TMPDIR": folder, "PATH": "/usr/bin:/bin"}, capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        assert (done.stdout, done.stderr) == ("True\n[]\n", "")
+        assert not list(Path(folder).glob("sprag-*"))
+
+
+def test_a_preset_is_named_and_a_file_of_that_name_comes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from sprag.service.client.queries import spec_of
+
+    assert spec_of("one_pendulum") == sprag.preset("one_pendulum")
+    monkeypatch.chdir(tmp_path)
+    Path("one_pendulum").write_text('{"sprag": 1}')
+    assert spec_of("one_pendulum") == {"sprag": 1}
+    with pytest.raises(sprag.SpecFileError, match="two_pendulums"):
+        sprag.preset("two_pendulum")
+
+
+def test_axes_are_a_table_too(run: sprag.Study) -> None:
+    frame = pd.DataFrame({LOAD: [0.0, 0.1, 0.2], FREQUENCY: [25.0, 25.0, 25.0]})
+    table = sprag.run({**_small(), "axes": frame}, processes=0)
+    assert table[FREQUENCY].tolist() == [25.0] * 3
+    np.testing.assert_allclose(table[SPEED], run.table()[SPEED], rtol=1e-9)
