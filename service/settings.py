@@ -193,7 +193,16 @@ class Settings(DeliverySettings):
     )
     audit_days: int = Field(default=0, ge=0, le=36_500, description="days for which the audit log is kept; 0: for ever")
     nightly_at: str = Field(default="02:30", description="time of day for the backup and for deleting old studies")
-    zone: str = Field(default="UTC", description="time zone of `SPRAG_NIGHTLY_AT`, such as `Europe/Berlin`")
+    zone: str = Field(
+        default="UTC",
+        description="time zone of the office, such as `Europe/Berlin`: of `SPRAG_NIGHTLY_AT`, and of pages until a "
+        "browser says its own",
+    )
+    units: str = Field(
+        default="workshop",
+        description="units of pages and documents until somebody chooses others: `workshop` (rpm, mm, deg, %), `typed` "
+        "(those of each study), `si`, or a list such as `workshop,N*mm`",
+    )
 
     @classmethod
     def settings_customise_sources(
@@ -219,6 +228,19 @@ class Settings(DeliverySettings):
     def _known_zone(cls, value: str) -> str:
         if value not in zones():
             raise ValueError("the name of a time zone is needed, such as Europe/Berlin")
+        return value
+
+    @field_validator("units")
+    @classmethod
+    def _known_units(cls, value: str) -> str:
+        if value not in {"workshop", "typed", "si"}:
+            from sprag.service.faults import SelectionError
+            from sprag.service.reading.quantities import read_units
+
+            try:
+                read_units(value)
+            except SelectionError as error:
+                raise ValueError(str(error)) from None
         return value
 
     @field_validator("allowed_hosts", "trusted_proxies", mode="before")

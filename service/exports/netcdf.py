@@ -169,7 +169,8 @@ def _about(source: Source) -> dict[str, Any]:
 
 def _attributes(name: str, unit: str, meaning: str) -> dict[str, Any]:
     """The attributes of a number, among them its name outside of the file."""
-    return {NAME_ATTRIBUTE: name, "units": unit, "long_name": meaning or name}
+    # HDF5 takes no subclass of str, which the unit of a share is.
+    return {NAME_ATTRIBUTE: name, "units": str(unit), "long_name": meaning or name}
 
 
 def _ending_attributes() -> dict[str, Any]:

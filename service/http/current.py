@@ -7,7 +7,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.reading.quantities import TYPED
+from sprag.service.reading.quantities import WORKSHOP
 from sprag.service.reading.reader import Choice
 
 if TYPE_CHECKING:
@@ -29,14 +29,18 @@ class Current:
     moment : when what it reads is read; None where each reading has its own moment
     choice : of units and names on a page
     page : address of the page that is made; "" for one that answers a form
+    usual : the choice of the service, which a page has where nobody chose another
+    zone : time zone of the reader of a page
     """
 
     grant: Grant | None = None
     prefix: str = ""
     changing: bool = False
     moment: Moment | None = None
-    choice: Choice = Choice(TYPED)  # noqa: RUF009 - frozen
+    choice: Choice = Choice(WORKSHOP)  # noqa: RUF009 - frozen
     page: str = ""
+    usual: str = WORKSHOP
+    zone: str = "UTC"
 
 
 _CURRENT: ContextVar[Current] = ContextVar("current", default=Current())  # noqa: B039 - frozen

@@ -1,4 +1,4 @@
-"""Which units and names somebody wants to read: in the address, otherwise in a cookie of the browser."""
+"""How somebody wants to read: units, names and time zone, in the address, otherwise in a cookie of the browser."""
 
 from __future__ import annotations
 
@@ -9,21 +9,27 @@ from urllib.parse import quote, unquote, urlencode, urlsplit
 from fastapi import Depends, Query, Request
 
 from sprag.service.faults import SelectionError
+from sprag.service.http.context import Ctx
 from sprag.service.http.current import current, learn
 from sprag.service.http.language import language_pairs
-from sprag.service.reading.quantities import SI, TYPED, UNITS_PATTERN, read_units
+from sprag.service.reading.quantities import SI, UNITS_PATTERN, read_units
 from sprag.service.reading.reader import CAPTIONS, CODES, Choice
+from sprag.service.zones import is_zone
 
 if TYPE_CHECKING:
     from starlette.responses import Response
 
 UNITS_COOKIE: Final = "sprag_units"
 NAMES_COOKIE: Final = "sprag_names"
+#: The time zone that somebody chose, and that in which the browser is (static/reader.js).
+ZONE_COOKIE: Final = "sprag_zone"
+HERE_COOKIE: Final = "sprag_here"
 _YEAR: Final = 365 * 24 * 3600
 
 
-async def page_choice(request: Request) -> Choice:
-    """The choice of a page: that of its address, of the browser, or as typed. Raises SelectionError."""
+async def page_choice(request: Request, context: Ctx) -> Choice:
+    """The choice of a page: that of its address, of the browser, or of the service. Raises SelectionError."""
+    usual, office = context.settings.units, context.settings.zone
     given, kept = request.query_params, request.cookies
     units, names = given.get("units"), given.get("names")
     if units is None:
@@ -31,8 +37,9 @@ async def page_choice(request: Request) -> Choice:
     if names is None:
         names = CODES if kept.get(NAMES_COOKIE) == CODES else CAPTIONS
     read_units(units)
-    choice = Choice(units or TYPED, names or CAPTIONS)
-    learn(choice=choice)
+    choice = Choice(units or usual, names or CAPTIONS)
+    zones_kept = (unquote(kept.get(name, "")) for name in (ZONE_COOKIE, HERE_COOKIE))
+    learn(choice=choice, usual=usual, zone=next((zone for zone in zones_kept if zone and is_zone(zone)), office))
     if request.method == "GET":  # the address of a page that answers a form may have no page of its own
         # What the address says would hide what is chosen next.
         own = request.url.remove_query_params(["units", "names", "language"])
@@ -53,8 +60,8 @@ TableUnits = Annotated[
     str | None,
     Query(
         max_length=400,
-        description="units of tables and pictures: `si`, `typed` (those of the spec), or a list such as "
-        "`rpm,mm,torque=N*mm`, with `typed` in it where the rest is as typed; JSON is always in SI",
+        description="units of tables and pictures: `si`, `workshop` (rpm, mm, deg, %), `typed` (those of the spec), or "
+        "a list such as `rpm,mm,torque=N*mm`, with one of these words in it for the rest; JSON is always in SI",
         examples=["rpm,mm"],
         json_schema_extra={"pattern": UNITS_PATTERN},
     ),
@@ -78,9 +85,11 @@ async def file_choice(
     return Choice(units or SI, CAPTIONS if names is None else names)
 
 
-async def report_choice(choice: Annotated[Choice, Depends(file_choice)], units: TableUnits = None) -> Choice:
-    """The choice of a document for people: as typed unless its address says otherwise."""
-    return replace(choice, units=units or TYPED)
+async def report_choice(
+    context: Ctx, choice: Annotated[Choice, Depends(file_choice)], units: TableUnits = None
+) -> Choice:
+    """The choice of a document for people: that of the service unless its address says otherwise."""
+    return replace(choice, units=units or context.settings.units)
 
 
 PageChoice = Annotated[Choice, Depends(page_choice)]

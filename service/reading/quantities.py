@@ -1,7 +1,8 @@
 """Kinds of quantities and the units in which people can have them shown: the only place that converts for display.
 
-A choice of units is a text: ``si``; ``typed``, the units in which the study was written; or a list such as
-``rpm, mm, N*mm`` or ``speed=rpm, frequency=rpm``, with ``typed`` in it where the rest is to be as typed, otherwise SI.
+A choice of units is a text: ``si``; ``workshop``, the units that a workshop has for machines of the model; ``typed``,
+those in which the study was written; or a list such as ``rpm, mm, N*mm`` or ``speed=rpm, frequency=rpm``, with
+``workshop`` or ``typed`` in it for the rest, which is in SI otherwise.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 SI: Final = "si"
 TYPED: Final = "typed"
+WORKSHOP: Final = "workshop"
 _LONGEST: Final = 400
 #: Keys of a spec beside which values of a parameter or of a result stand.
 _NAMING: Final = ("path", "paths", "result")
@@ -64,6 +66,7 @@ KINDS: Final = (
     Kind("pressure", "Pressure", "Pa", ("kPa", "MPa", "bar")),
     Kind("spring_rate", "Spring rate", "N/m", ("N/mm", "kN/m")),
     Kind("damping", "Damping", "N*m*s/rad", ("N*mm*s/rad",)),
+    Kind("share", "Efficiencies and shares", models.SHARE, ("%",)),
 )
 _TORQUE: Final = "N*m"
 #: SI units of the coefficients of a torque over an angle: N*m/rad, N*m/rad^2.
@@ -75,7 +78,7 @@ _BY_UNIT: Final = {kind.unit: kind for kind in KINDS}
 def _pattern() -> str:
     """A regular expression of ECMA 262 for choices of units as `read_units` takes them."""
     units = {kind.name: [re.escape(unit) for unit in (kind.unit, *kind.others)] for kind in KINDS}
-    alone = dict.fromkeys((SI, TYPED, *(unit for some in units.values() for unit in some)))
+    alone = dict.fromkeys((SI, TYPED, WORKSHOP, *(unit for some in units.values() for unit in some)))
     part = "|".join((*alone, *(f"{name}=({'|'.join(some)})" for name, some in units.items())))
     return f"^(({part})(,({part}))*)?$"
 
@@ -91,7 +94,10 @@ def _size(unit: str, si: str) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """The unit in which each kind is shown: ``chosen`` maps SI units to others; what it lacks is shown in SI."""
+    """The unit in which each kind is shown: ``chosen`` maps SI units to others; what it lacks is shown in SI.
+
+    A share has the unit `models.SHARE`, which tells it from other numbers without a unit.
+    """
 
     chosen: Mapping[str, str] = field(default_factory=dict)
 
@@ -100,7 +106,7 @@ class Units:
         of_torque = _COEFFICIENT.fullmatch(si)
         if of_torque is not None:
             return f"{self.unit(_TORQUE)}{of_torque[1]}"
-        return self.chosen.get(si, si)
+        return si if si == "1" and not isinstance(si, models.Share) else self.chosen.get(si, si)
 
     def value(self, value: float, si: str) -> float:
         """A number in SI in the unit in which it is shown."""
@@ -122,8 +128,8 @@ class Units:
         return ",".join(f"{_BY_UNIT[si].name}={unit}" for si, unit in self.chosen.items()) or SI
 
 
-def read_units(text: str) -> tuple[bool, dict[str, str]]:
-    """Whether the rest is as typed, and the chosen units by SI unit.
+def read_units(text: str) -> tuple[str, dict[str, str]]:
+    """How the rest is shown, `SI`, `TYPED` or `WORKSHOP`, and the chosen units by SI unit.
 
     Raises
     ------
@@ -134,12 +140,12 @@ def read_units(text: str) -> tuple[bool, dict[str, str]]:
         raise refused(
             "units", "too-long", "is too long", allowed=Sentence("<= {count} characters", count=str(_LONGEST))
         )
-    typed, chosen = False, dict[str, str]()
+    rest, chosen = SI, dict[str, str]()
     for part in latin(plain_signs(text)).replace("rev/min", "rpm").split(","):
         name, separator, unit = (piece.strip() for piece in part.partition("="))
         if not separator:
-            if name.lower() in ("", SI, TYPED):
-                typed |= name.lower() == TYPED
+            if (own := name.lower()) in ("", SI, TYPED, WORKSHOP):
+                rest = rest if own in ("", SI) else own
                 continue
             kind, unit = _kind_with(name, part.strip()), name
         elif name in _BY_NAME:
@@ -150,7 +156,7 @@ def read_units(text: str) -> tuple[bool, dict[str, str]]:
             message = f"is not a unit that {kind.title.lower()} is shown in"
             raise refused("units", "invalid-choice", message, unit, allowed=", ".join((kind.unit, *kind.others)))
         chosen[kind.unit] = unit
-    return typed, chosen
+    return rest, chosen
 
 
 def _kind_with(unit: str, given: str) -> Kind:
@@ -159,23 +165,31 @@ def _kind_with(unit: str, given: str) -> Kind:
     if found is None:
         known = ", ".join(dict.fromkeys(unit for kind in KINDS for unit in (kind.unit, *kind.others)))
         raise refused(
-            "units", "invalid-choice", "is neither si, typed nor a unit that quantities are shown in", given,
-            allowed=f"si, typed, {known}",
+            "units", "invalid-choice", "is neither si, workshop, typed nor a unit that quantities are shown in", given,
+            allowed=f"si, workshop, typed, {known}",
         )  # fmt: skip
     return found
 
 
 def units_for(study: Study, spec: Mapping[str, Any], text: str) -> Units:
     """The units of a choice for a study; raises SelectionError as `read_units` does."""
-    typed, chosen = read_units(text)
-    every = {**(typed_units(study, spec) if typed else {}), **chosen}
-    return Units({si: unit for si, unit in every.items() if unit != si})
+    rest, chosen = read_units(text)
+    others = typed_units(study, spec) if rest == TYPED else workshop_units(study.model) if rest == WORKSHOP else {}
+    return Units({si: unit for si, unit in {**others, **chosen}.items() if unit != si})
+
+
+def workshop_units(model: str) -> dict[str, str]:
+    """The units of a workshop for machines of a model, by SI unit."""
+    units = models.model_of(model).presentation.workshop
+    return {_kind_with(unit, unit).unit: unit for unit in units}
 
 
 def typed_units(study: Study, spec: Mapping[str, Any]) -> dict[str, str]:
     """The unit in which most quantities of each kind were typed, by SI unit; the first one where several tie."""
     votes: dict[str, Counter[str]] = {}
     for si, text in _quantities(study, spec):
+        if si == "1" and not isinstance(si, models.Share):
+            continue
         try:
             size = _size(split_quantity(text)[1], si)
         except QuantityError:

@@ -18,6 +18,7 @@ from sprag.service.languages import N_
 TWO_PI: Final = "6.2831853071795864769252867665590057683943387987502"
 
 DEFINITIONS: Final = (
+    "percent = 0.01 = %",
     *("nano- = 1e-9 = n-", "micro- = 1e-6 = µ- = u-", "milli- = 1e-3 = m-", "centi- = 1e-2 = c-", "deci- = 1e-1 = d-"),
     *("kilo- = 1e3 = k-", "mega- = 1e6 = M-", "giga- = 1e9 = G-"),
     *("meter = [length] = m = metre", "gram = [mass] = g", "second = [time] = s = sec", "radian = [angle] = rad"),

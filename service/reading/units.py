@@ -52,9 +52,11 @@ _EXAMPLES: Final = {
     "1": ("0.05",),
 }
 
+#: How people write per cent.
+PERCENT: Final = frozenset({"%", "percent", "per cent"})
 _PER_MINUTE: Final = Fraction(1, 60)
 _QUANTITY: Final = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?)\s*(.*)", re.DOTALL)
-_LETTERS: Final = "A-Za-zµ°А-Яа-яЁёІіЇїЄєҐґ"
+_LETTERS: Final = "%A-Za-zµ°А-Яа-яЁёІіЇїЄєҐґ"
 _TOKEN: Final = re.compile(
     rf"\s*(?:(?P<name>[{_LETTERS}][{_LETTERS}_0]*)|(?:\*\*|\^)\s*(?P<power>[+-]?[0-9]{{1,2}})(?![0-9])"
     r"|(?P<operator>[*/()])|(?P<one>1)(?![0-9]))"
@@ -143,7 +145,9 @@ def parse_quantity(value: object, unit: str) -> float:
 def parse_exact(value: object, unit: str) -> Fraction:
     """As `parse_quantity`, but exact: the decimal number as written, times the exact factor of its unit."""
     if isinstance(value, str) and unit == "1":
-        _refuse_ambiguous(value)
+        number, text = split_quantity(value)
+        if text in PERCENT:
+            return number / 100
         raise QuantityError("wrong-type", "must be a plain number, without a unit or quotation marks")
     if isinstance(value, str):
         number, text = split_quantity(value)

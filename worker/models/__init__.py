@@ -56,6 +56,7 @@ from sprag.worker.models.common import (
 from sprag.worker.models.model import Model
 from sprag.worker.models.presentation import Panel, Presentation, Reference
 from sprag.worker.models.registry import all_models, model_names, model_of, register, unregister
+from sprag.worker.models.shares import SHARE, Share, with_shares
 from sprag.worker.models.tasks import chunk_task, run_chunk, run_task
 from sprag.worker.models.usable import half_width, unsettled, usable, usable_each, with_half_widths
 from sprag.worker.models.vibration_drive import (
@@ -95,6 +96,7 @@ __all__ = [
     "OK",
     "REGIME_SENTENCES",
     "SETTLED",
+    "SHARE",
     "START_STATES",
     "VIBRATION_DRIVE",
     "WINDUP_OUT_OF_DATA",
@@ -123,6 +125,7 @@ __all__ = [
     "Reference",
     "ResultInfo",
     "Run",
+    "Share",
     "Span",
     "TableError",
     "Trajectory",
@@ -259,7 +262,8 @@ def variant_of(study: Study) -> str:
 
 def result_infos(model: str, variant: str) -> tuple[ResultInfo, ...]:
     """Every result of that variant of ``model``, in the order of the columns of `ChunkResult.values`."""
-    return model_of(model).results(variant)
+    known = model_of(model)
+    return with_shares(known.results(variant), known.presentation.shares)
 
 
 def numbered_by(model: str, variant: str) -> str | None:
@@ -269,7 +273,8 @@ def numbered_by(model: str, variant: str) -> str | None:
 
 def result_catalogue(model: str) -> tuple[ResultInfo, ...]:
     """Every result of ``model``, with placeholders as in `parameter_catalogue`."""
-    return model_of(model).result_catalogue()
+    known = model_of(model)
+    return with_shares(known.result_catalogue(), known.presentation.shares)
 
 
 def study_results(study: Study) -> tuple[ResultInfo, ...]:

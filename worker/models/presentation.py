@@ -118,7 +118,8 @@ class Presentation:
     main : the main results of a machine; ``heading`` is their common title
     answers : what a page says first; where there are none, the largest and smallest values of the drawn results
     clauses : what is said of a case in a sentence
-    shares : results that people read in per cent
+    shares : results that are a share of something, with N and K for indices: people may read them in per cent
+    workshop : units in which a workshop reads its quantities; SI where it has none
     columns : results that the table of cases shows first
     operating_point : paths of parameters that every picture must state
     checks : first parts of the names of results that describe the computation rather than the machine
@@ -145,6 +146,7 @@ class Presentation:
     answers: tuple[Answer, ...] = ()
     clauses: Clauses = field(default_factory=Clauses)
     shares: tuple[str, ...] = ()
+    workshop: tuple[str, ...] = ("deg", "rpm", "mm", "bar", "N/mm", "%")
     columns: tuple[str, ...] = ()
     operating_point: tuple[str, ...] = ()
     checks: tuple[str, ...] = ()

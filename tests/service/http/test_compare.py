@@ -55,7 +55,7 @@ def curve(service: Service, study_id: str, frequency: str) -> tuple[list[float],
 
 
 def test_the_page_lists_the_inputs_that_differ(service: Service, three: list[str]) -> None:
-    page = service.http.get("/compare", params={"study": three})
+    page = service.http.get("/compare", params={"study": three, "units": "typed"})
     assert page.status_code == 200
     table = page.text[page.text.index('id="inputs"') :]
     mass = '<th scope="row" title="base.pendulums.0.mass">Mass, pendulum 0</th>'

@@ -23,6 +23,7 @@ from sprag.service.http.web.figures.maps import map_figure
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.reading.quantities import KINDS, UNITS_PATTERN, Units, read_units, typed_units, units_for
 from sprag.service.reading.reader import CODES, Choice, Phrase, Reading, reading_for
+from sprag.service.reading.units import parse_quantity
 from sprag.service.reading.wording import unit_text
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import CurveQuery
@@ -47,7 +48,7 @@ BY_HAND = {
     "mm^2": 1e-6, "cm^2": 1e-4, "g": 1e-3, "t": 1e3, "lb": 0.45359237, "g/cm^3": 1e3, "kg*cm^2": 1e-4,
     "kg*mm^2": 1e-6, "g*cm^2": 1e-7, "kN": 1e3, "lbf": 4.4482216152605, "N*mm": 1e-3, "N*cm": 1e-2, "kN*m": 1e3,
     "lbf*ft": 1.3558179483314, "lbf*in": 0.11298482902762, "mJ": 1e-3, "kJ": 1e3, "mW": 1e-3, "kW": 1e3, "kPa": 1e3,
-    "MPa": 1e6, "bar": 1e5, "N/mm": 1e3, "kN/m": 1e3, "N*mm*s/rad": 1e-3,
+    "MPa": 1e6, "bar": 1e5, "N/mm": 1e3, "kN/m": 1e3, "N*mm*s/rad": 1e-3, "%": 1e-2,
 }  # fmt: skip
 LOADS = [0.0, 0.2, 0.4]
 AXES = [
@@ -171,9 +172,26 @@ def test_coefficients_of_a_torque_have_its_unit() -> None:
 
 
 def test_a_bare_unit_is_of_the_first_kind_that_has_it() -> None:
-    assert read_units("rpm, mm, N·mm") == (False, {"rad/s": "rpm", "m": "mm", "N*m": "N*mm"})
-    assert read_units("typed") == (True, {})
-    assert read_units(reading().units.text) == (False, {"rad/s": "rpm", "N*m": "N*mm", "Hz": "rpm", "W": "mW"})
+    assert read_units("rpm, mm, N·mm") == ("si", {"rad/s": "rpm", "m": "mm", "N*m": "N*mm"})
+    assert read_units("typed") == ("typed", {})
+    assert read_units("N*mm, workshop") == ("workshop", {"N*m": "N*mm"})
+    assert read_units(reading().units.text) == ("si", {"rad/s": "rpm", "N*m": "N*mm", "Hz": "rpm", "W": "mW"})
+
+
+def test_a_workshop_reads_shares_in_per_cent_and_no_other_number_without_a_unit() -> None:
+    workshop = reading(Choice("workshop"))
+    share, speed = (
+        next(info for info in models.study_results(study_of()[0]) if info.name == name)
+        for name in ("efficiency", SPEED)
+    )
+    assert share.unit == "1"
+    assert workshop.quantity(0.8113, share.unit, 3) == "81.1 %"
+    assert workshop.typed("81", share.unit) == "81 %"
+    assert parse_quantity("81,1 %", share.unit) == 0.811
+    assert workshop.quantity(0.8113, "1", 3) == "0.811"
+    assert workshop.quantity(math.pi, speed.unit, 3) == "30 rpm"
+    assert reading(Choice("si")).quantity(0.8113, share.unit, 3) == "0.811"
+    assert reading(Choice("workshop,N*mm")).quantity(0.3, "N*m", 3) == "300 N·mm"
 
 
 @pytest.mark.parametrize("text", ["furlong", "speed=mm", "pace=rpm", "rpm;mm", "x" * 500])

@@ -31,7 +31,7 @@ MEANING: Final[dict[str, tuple[Fraction | int | str, str]]] = {
     "hp": (550 * _FOOT * _LBF, "kg*m^2/s^3"), "PS": (75 * _KGF, "kg*m^2/s^3"), "Ws": (1, "kg*m^2/s^2"),
     "Wh": (3600, "kg*m^2/s^2"), "g0": (_KGF, "m/s^2"), "Nm": (1, "kg*m^2/s^2"), "Ncm": ("0.01", "kg*m^2/s^2"),
     "Nmm": ("0.001", "kg*m^2/s^2"), "Nms": (1, "kg*m^2/s"), "Ncms": ("0.01", "kg*m^2/s"),
-    "Nmms": ("0.001", "kg*m^2/s"),
+    "Nmms": ("0.001", "kg*m^2/s"), "%": ("0.01", "1"),
 }  # fmt: skip
 PREFIX: Final = {"n": "1e-9", "u": "1e-6", "µ": "1e-6", "m": "1e-3", "c": "1e-2", "d": "0.1", "k": "1e3", "M": "1e6",
                  "G": "1e9"}  # fmt: skip

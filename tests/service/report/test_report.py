@@ -76,7 +76,7 @@ def test_the_page_holds_everything_and_needs_nothing_else(service: Service, spec
     spec["name"] = "<script>alert(1)</script>"
     study_id = service.submit(spec)
     service.fill(study_id)
-    response = service.http.get(f"{API}/studies/{study_id}/report")
+    response = service.http.get(f"{API}/studies/{study_id}/report?units=si")
     assert response.headers["content-type"] == "text/html; charset=utf-8"
     assert "default-src 'none'" in response.headers["content-security-policy"]
     page = response.text

@@ -102,6 +102,7 @@ PRESENTATION: Final = Presentation(
         still="it runs evenly",
         batch="half of the machines have an irregularity above {middle}, 9 of 10 between {low} and {high}",
     ),
+    shares=("s1.share", "s2.share", "s3.share", "s4.share"),
     operating_point=("mean_speed", "drive.inertia"),
     checks=("balance",),
     panels=_panels,

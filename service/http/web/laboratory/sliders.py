@@ -11,7 +11,7 @@ from sprag.service.http.web.form.machine import group_of, row_of
 from sprag.service.languages import _
 from sprag.service.reading.faults import message
 from sprag.service.reading.numbers import in_language, parse_number
-from sprag.service.reading.quantities import read_units
+from sprag.service.reading.quantities import SI, read_units
 from sprag.service.reading.units import QuantityError, has_unit, parse_quantity, split_quantity
 from sprag.service.reading.wording import words
 from sprag.worker import models
@@ -165,7 +165,7 @@ def _scale(own: Study, path: str, si: str, reading: Reading, choice: Choice) -> 
     if shown != si:
         return shown, parse_quantity(f"1 {shown}", si)
     for pattern, unit in (
-        models.model_of(own.model).presentation.laboratory.shown_in if read_units(choice.units)[0] else ()
+        models.model_of(own.model).presentation.laboratory.shown_in if read_units(choice.units)[0] != SI else ()
     ):
         if re.fullmatch(pattern, path):
             try:

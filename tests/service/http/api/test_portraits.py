@@ -77,7 +77,7 @@ def test_what_there_is_none_of_is_refused(service: Service, settled: str) -> Non
 @pytest.mark.parametrize("columns", [1, 2])
 def test_the_page_of_a_case_draws_the_orbit_and_its_strobes(service: Service, settled: str, columns: int) -> None:
     own = f"/studies/{settled}/cases/0"
-    assert f'data-figure="{own}/strobes/figure?columns=2&units=typed"' in service.http.get(own).text
+    assert f'data-figure="{own}/strobes/figure?columns=2&units=workshop"' in service.http.get(own).text
     response = service.http.get(f"{own}/strobes/figure?columns={columns}")
     orbit, strobes, rings, levels, along = response.json()["data"]
     assert (orbit["x"][0], orbit["y"][0]) == pytest.approx((orbit["x"][-1], orbit["y"][-1]), abs=1e-6)

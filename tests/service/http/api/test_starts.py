@@ -265,7 +265,7 @@ def test_a_basin_is_a_grid_of_two_initial_values(
     monkeypatch.undo()
     # This one is run: all four starts come to the motion of two periods.
     (line,) = service.http.get(figure).json()["data"]
-    assert (line["name"], len(line["x"])) == ("0: 100 %, 22.84 rad/s, order 2", 4)
+    assert (line["name"], len(line["x"])) == ("0: 100 %, 218.1 rpm, order 2", 4)
 
 
 def test_the_page_of_a_basin_keeps_its_form(service: Service, started: str) -> None:

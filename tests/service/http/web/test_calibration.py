@@ -15,7 +15,7 @@ def test_the_page_shows_values_points_and_figure(service: Service) -> None:
         assert service.http.get(address).status_code == 200, address
     overview = service.http.get(f"/studies/{study_id}").text
     assert f'href="/studies/{study_id}/calibration"' in overview
-    assert f'data-figure="/studies/{study_id}/figures/calibration?columns=2&amp;units=typed"' in overview
+    assert f'data-figure="/studies/{study_id}/figures/calibration?columns=2&amp;units=workshop"' in overview
     answer = service.http.get(f"/studies/{study_id}/calibration")
     assert answer.status_code == 200
     found = service.get(f"/studies/{study_id}/calibration")
@@ -27,7 +27,7 @@ def test_the_page_shows_values_points_and_figure(service: Service) -> None:
     assert "pendulums.0.damping" in found["sentences"][-1]
     assert "pendulums.0.damping" not in listed[1]
     assert len(re.findall(r"<tr><td class=\"num\">\d+</td>", answer.text)) == len(found["points"])
-    assert f'<img src="{API}/studies/{study_id}/calibration?units=typed&amp;format=svg"' in answer.text
+    assert f'<img src="{API}/studies/{study_id}/calibration?units=workshop&amp;format=svg"' in answer.text
     figure = service.http.get(f"/studies/{study_id}/figures/calibration").json()
     measured = [trace for trace in figure["data"] if trace.get("name", "").endswith("measured")]
     assert sum(len(trace["y"]) for trace in measured) == 2 * len(found["points"])

@@ -21,7 +21,7 @@ from tests.service.searching import rows_of, search
 def test_the_page_shows_the_best_designs_with_their_links(service: Service) -> None:
     study_id = search(service)
     overview = service.http.get(f"/studies/{study_id}").text
-    assert f'data-figure="/studies/{study_id}/figures/front?units=typed"' in overview
+    assert f'data-figure="/studies/{study_id}/figures/front?units=workshop"' in overview
     assert f'href="/studies/{study_id}/front"' in overview
     answer = service.http.get(f"/studies/{study_id}/front")
     assert answer.status_code == 200
@@ -31,7 +31,7 @@ def test_the_page_shows_the_best_designs_with_their_links(service: Service) -> N
     for link in (f"/studies/{study_id}/cases/{first}", f"/new?clone={study_id}&amp;case={first}&amp;along=shaft.load"):
         assert f'href="{link}"' in answer.text
     assert (
-        f'<img src="{API}/studies/{study_id}/front?x=efficiency&amp;y=shaft.irregularity&amp;units=typed&amp;'
+        f'<img src="{API}/studies/{study_id}/front?x=efficiency&amp;y=shaft.irregularity&amp;units=workshop&amp;'
         'format=svg"' in answer.text
     )
     for path in (f"{API}/studies/{study_id}/front?format=svg", f"/studies/{study_id}/front/search.svg"):
