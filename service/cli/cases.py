@@ -54,13 +54,14 @@ def cases(
     as_json: JsonFlag = False,
 ) -> None:
     """List finished cases of a study, in order of their numbers or sorted over all of them."""
-    from sprag.service.client.queries import cases_query
+    from sprag.service.client.queries import query_of
     from sprag.service.client.wire import study_path
 
     held = dict(pair(text) for text in at or ())
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
-        query = [*cases_query(ending, regime, flag, where or (), held, sort), ("page_size", str(min(limit, _PAGE)))]
+        chosen = {"ending": ending, "regime": regime, "flag": flag, "where": where, "at": held, "sort": sort}
+        query = query_of({**chosen, "page_size": min(limit, _PAGE)})
         found, units = _first(client.pages(f"{study_path(study_id)}/cases", query), limit)
     if as_json:
         write_json({"cases": found})

@@ -56,9 +56,10 @@ def select(
     as_json: JsonFlag = False,
 ) -> None:
     """Submit a study of the first cases within ranges of parameters and results, as points."""
-    from sprag.service.client.queries import explore_query
+    from sprag.service.client.queries import query_of
 
-    query = explore_query(where or (), sort, limit, (), ending, regime, flag)
+    kinds = {"ending": ending, "regime": regime, "flag": flag}
+    query = query_of({"where": where, "sort": sort, "limit": limit, **kinds})
     with connection(server, token) as client:
         study = further(client, study_of(client, study_id), "select", params=query)
         submitted(client, study, wait, timeout, as_json)

@@ -87,10 +87,12 @@ def longer(
     as_json: JsonFlag = False,
 ) -> None:
     """Submit a study of the unsettled cases of another, with more time for each."""
-    from sprag.service.client.queries import longer_query
+    from sprag.service.client.queries import query_of
 
     with connection(server, token) as client:
-        study = further(client, study_of(client, study_id), "longer", params=longer_query(regime, at_most))
+        study = further(
+            client, study_of(client, study_id), "longer", params=query_of({"regime": regime, "at_most": at_most})
+        )
         submitted(client, study, wait, timeout, as_json)
 
 

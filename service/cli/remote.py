@@ -152,10 +152,10 @@ def submit(
     as_json: JsonFlag = False,
 ) -> None:
     """Submit a study to the service and print its id."""
-    from sprag.service.client.queries import given
+    from sprag.service.client.queries import query_of
 
     data = read_spec(spec, points, MAX_BODY_BYTES, tables)
-    query = given({"priority": priority or None, "fresh": "true" if fresh else None, "finish_by": finish_by})
+    query = query_of({"priority": priority or None, "fresh": fresh, "finish_by": finish_by})
     with naming_points(points), connection(server, token) as client:
         with submitting():
             study = client.request("POST", "/studies", json=data, key=key or "", params=query)

@@ -100,8 +100,8 @@ def _made(command: Command) -> Callable[..., None]:
         as_json: bool, **settings: Any,
     ) -> None:  # fmt: skip
         form = None if file is None else file_format(file, _FORMATS)
-        if settings.get("quantile"):
-            settings["quantile"] = list(map(_probability, settings["quantile"]))
+        if settings.get("quantiles"):
+            settings["quantiles"] = list(map(_probability, settings["quantiles"]))
         whole, most = settings, None
         if command.few is not None:
             most = _most_rows(about.question)

@@ -8,16 +8,21 @@ from typing import TYPE_CHECKING, Any
 from sprag.service.extras import naming_extra
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pandas as pd
 
     from sprag.service.answers.tolerances import CausesInfo, RibbonReport, YieldReport
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Ribbon:
     """Quantiles over the drives along an axis; ``data`` is the answer of the service. SI units."""
 
     data: RibbonReport
+
+    def __repr__(self) -> str:
+        return f"Ribbon({_shown(self.data['lines'])}, quantiles {', '.join(map(str, self.data['quantiles']))})"
 
     def to_pandas(self) -> pd.DataFrame:
         """A row for each place, result and quantile: parameters, nominal, value, low, high, drives, failed, case."""
@@ -45,11 +50,14 @@ class Ribbon:
                         for line in self.data["lines"] for name, result in line["results"].items()])  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Yield:
     """Yields along an axis; ``data`` is the answer of the service. SI units."""
 
     data: YieldReport
+
+    def __repr__(self) -> str:
+        return f"Yield({_shown(self.data['lines'])})"
 
     def to_pandas(self) -> pd.DataFrame:
         """A row for each place: parameters, reached, drives, yield, low, high, failed, case of the nominal drive."""
@@ -87,6 +95,11 @@ class Yield:
             for line in self.data["lines"] for one in line["worst"]
         ]  # fmt: skip
         return pd.DataFrame(rows)
+
+
+def _shown(lines: Sequence[Any]) -> str:
+    """How many lines an answer has, with how many places."""
+    return f"{len(lines)} lines of {len(lines[0]['x']) if lines else 0} places"
 
 
 def _place(data: YieldReport, one: Any) -> dict[str, float]:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from sprag.service.client.sketch import Line
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Comparison(Tabular):
     """Studies side by side. ``names`` are unique; ``inputs`` has, by JSON Pointer into the spec, what differs.
 

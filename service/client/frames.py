@@ -56,7 +56,7 @@ _CODED: Final = {
 _ORDER_MEANING: Final = "excitation periods after which the motion repeats itself"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Curves(Tabular):
     """Curves of results against one axis; ``data`` is the answer of the service. SI units."""
 

@@ -19,7 +19,7 @@ _ENGAGEMENT_UNITS: Final = {"start": "s", "end": "s", "torque_max": "N*m", "work
 _PERIOD_UNITS: Final = {"start": "s", "speed_mean": "rad/s", "speed_max": "rad/s", "torque_mean": "N*m"}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Motion(Tabular):
     """Instantaneous values of one case over time, or over the angle; ``data`` is the answer of the service."""
 
@@ -53,11 +53,14 @@ class Motion(Tabular):
         return f"{axis['name']} in {axis['unit']}", f"{name} in {unit}", [(self._places(), self.data["values"][name])]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Engagements:
     """The engagements of one case, and the means of its periods; ``data`` is the answer of the service. SI units."""
 
     data: EngagementTables
+
+    def __repr__(self) -> str:
+        return f"Engagements(case {self.data['case']}: {len(self.data['engagements'])} engagements)"
 
     def to_pandas(self) -> pd.DataFrame:
         """A row for each engagement: clutch, start, end, order, torque, work; ``attrs`` has units and the ending."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, KeysView, Mapping, Sequence, Set, ValuesView
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from sprag.service.client.errors import SpecFileError
+from sprag.service.client.errors import ArgumentError, SpecFileError
 from sprag.service.plain_data import plain
 from sprag.service.presets import preset_names, preset_text
 
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 Value = float | int | str
 Ends = tuple[Value, Value]
+#: Paths of axes and their values.
+Held = Mapping[str, Value | Sequence[Value]]
 Spec = Mapping[str, Any]
 
 
@@ -71,138 +73,28 @@ def _read(path: Path, text: str) -> dict[str, Any]:
         raise SpecFileError(f"the file {str(path)!r} is not valid {kind}: {error}") from error
 
 
-def curve_query(
-    x: str | None,
-    y: str | Sequence[str],
-    by: str | Sequence[str],
-    at: Mapping[str, Value] | None,
-    number: int | None = None,
-    of: Mapping[str, Sequence[Value]] | None = None,
-) -> list[tuple[str, str]]:
-    """Query of curves: ``at`` maps paths to values, SI numbers or texts with a unit, ``of`` to several."""
-    query = [
-        *([] if x is None else [("x", x)]),
-        *(("y", name) for name in _listed(y)),
-        *(("by", path) for path in _listed(by)),
-    ]
-    query += [("at", f"{path}={value}") for path, value in (at or {}).items()]
-    query += [("of", f"{path}={value}") for path, values in (of or {}).items() for value in values]
-    return query + given({"number": number})
+def query_of(settings: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """The query of settings by their names in addresses; what is None, False or empty is left to the service.
+
+    A mapping of paths becomes texts such as "shaft.load=0.3 N*m"; numbers of numpy and quantities of pint become
+    texts with their units. ArgumentError for what has no form as a text.
+    """
+    return [(name, text) for name, value in settings.items() for text in _texts(name, value)]
 
 
-def answers_query(
-    point: Value | None,
-    x: str | None,
-    by: str | Sequence[str],
-    at: Mapping[str, Value] | None,
-    of: Mapping[str, Sequence[Value]] | None,
-) -> list[tuple[str, str]]:
-    """Query of the answers of a study: as of curves, and a working point; None leaves that to the service."""
-    return [*curve_query(x, (), by, at, of=of), *given({"point": point})]
-
-
-def explore_query(
-    where: str | Sequence[str],
-    sort: str | None,
-    limit: int | None,
-    show: str | Sequence[str],
-    ending: str | None,
-    regime: str | None,
-    flag: str | None,
-) -> list[tuple[str, str]]:
-    """Query of a selection of cases; None leaves a parameter to the service."""
-    query = [*(("where", text) for text in _listed(where)), *(("show", name) for name in _listed(show))]
-    return [*query, *case_query(ending, regime, flag), *given({"sort": sort, "limit": limit})]
-
-
-def ribbon_query(
-    x: str | None,
-    y: str | Sequence[str],
-    by: str | Sequence[str],
-    at: Mapping[str, Value] | None,
-    quantiles: Sequence[float],
-) -> list[tuple[str, str]]:
-    """Query of a ribbon: as of curves, and probabilities of quantiles (none leaves them to the service)."""
-    return [*curve_query(x, y, by, at), *(("quantile", repr(float(value))) for value in quantiles)]
-
-
-def yield_query(
-    conditions: str | Sequence[str],
-    x: str | None,
-    by: str | Sequence[str],
-    at: Mapping[str, Value] | None,
-    worst: int | None,
-) -> list[tuple[str, str]]:
-    """Query of a yield; None leaves the number of worst drives to the service."""
-    more = [] if worst is None else [("worst", str(worst))]
-    return [*(("condition", text) for text in _listed(conditions)), *curve_query(x, (), by, at), *more]
-
-
-def case_query(ending: str | None, regime: str | None, flag: str | None) -> list[tuple[str, str]]:
-    """Query of the cases with an ending, a regime and a flag; None leaves that open."""
-    given = (("ending", ending), ("regime", regime), ("flag", flag))
-    return [(name, value) for name, value in given if value is not None]
-
-
-def cases_query(
-    ending: str | None,
-    regime: str | None,
-    flag: str | None,
-    where: str | Sequence[str],
-    at: Mapping[str, Value] | None,
-    sort: str | None,
-) -> list[tuple[str, str]]:
-    """Query of a list of cases; None leaves a parameter to the service."""
-    query = [*case_query(ending, regime, flag), *(("where", text) for text in _listed(where))]
-    return [*query, *(("at", f"{path}={value}") for path, value in (at or {}).items()), *given({"sort": sort})]
-
-
-def longer_query(regime: str | None, at_most: int | None) -> list[tuple[str, str]]:
-    """Query of a longer study; None leaves a parameter to the service."""
-    given = (("regime", regime), ("at_most", at_most))
-    return [(name, str(value)) for name, value in given if value is not None]
-
-
-def narrow_query(steps: int | None, at: Mapping[str, Value] | None) -> list[tuple[str, str]]:
-    """Query of a narrowed sweep; None leaves the steps to the service."""
-    return [*given({"steps": steps}), *(("at", f"{path}={value}") for path, value in (at or {}).items())]
-
-
-def branch_query(along: str, low: Value | None, high: Value | None, **more: Value | None) -> list[tuple[str, str]]:
-    """Query of a branch, or of a diagram with ``more`` parameters; None leaves one to the service."""
-    return [("along", along), *given({"from": low, "to": high, **more})]
-
-
-def transient_query(kind: str, points: int | None, **settings: Value | None) -> list[tuple[str, str]]:
-    """Query of a transient; None leaves a parameter to the service."""
-    return [("kind", kind), *given({**settings, "points": points})]
-
-
-def basin_query(
-    x: str | None, y: str | None, x_range: Ends | None, y_range: Ends | None, points: int | None
-) -> list[tuple[str, str]]:
-    """Query of a basin; None leaves a parameter to the service."""
-    ends = {
-        f"{name}_{place}": value
-        for name, values in (("x", x_range), ("y", y_range))
-        for place, value in zip(("from", "to"), values or (None, None), strict=True)
-    }
-    return given({"x": x, "y": y, **ends, "points": points})
-
-
-def given(query: Mapping[str, Value | None]) -> list[tuple[str, str]]:
-    """Those parameters of a query that are not None."""
-    return [(name, str(value)) for name, value in query.items() if value is not None]
-
-
-def result_query(y: str | Sequence[str]) -> list[tuple[str, str]]:
-    """Query of results by their names."""
-    return [("y", name) for name in _listed(y)]
-
-
-def front_query(limit: int | None, exact: bool) -> list[tuple[str, str]]:
-    """Query of the designs of a study with a goal; None leaves the number of designs to the service."""
-    return [("exact", str(exact).lower()), *([] if limit is None else [("limit", str(limit))])]
+def _texts(name: str, value: object) -> list[str]:
+    if value is None or value is False:
+        return []
+    if isinstance(value, Set | Iterator | KeysView | ValuesView):
+        value = list(value)
+    data, faults = plain(value)
+    if faults:
+        raise ArgumentError(name, value, "texts, numbers, and lists and mappings of them")
+    if isinstance(data, dict):
+        return [f"{path}={text}" for path, item in data.items() for text in _texts(name, item)]
+    if isinstance(data, list):
+        return [text for item in data for text in _texts(name, item)]
+    return [str(data).lower() if isinstance(data, bool) else str(data)]
 
 
 def extension(
@@ -226,7 +118,3 @@ def form_of(path: Path) -> str:
     if form is None:
         raise ValueError(f"cannot tell the format from the name {path.name!r}; pass it as `form`")
     return form
-
-
-def _listed(names: str | Sequence[str]) -> list[str]:
-    return [names] if isinstance(names, str) else list(names)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from html import escape
+from os import PathLike
+from pathlib import Path
 from typing import Final
 
 #: x and y of one curve; None and NaN leave a gap.
@@ -15,6 +18,23 @@ _LEFT, _RIGHT, _TOP, _BOTTOM = 62, 10, 10, 34
 _COLOURS: Final = ("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd", "#8c564b")
 #: More curves would be a smear.
 _MOST: Final = 12
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Picture:
+    """A picture as SVG, which notebooks show."""
+
+    svg: bytes
+
+    def __repr__(self) -> str:
+        return f"Picture(SVG, {len(self.svg):,} bytes)"
+
+    def _repr_svg_(self) -> str:
+        return self.svg.decode()
+
+    def save(self, file: str | PathLike[str]) -> None:
+        """Write the SVG to a file."""
+        Path(file).write_bytes(self.svg)
 
 
 def sketch(x_caption: str, y_caption: str, lines: Sequence[Line]) -> str:

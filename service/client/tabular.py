@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 #: Units of columns that are no quantities of physics.
 _COUNTED: Final = frozenset({"", "1"})
+#: Most columns that are named where an answer is printed.
+_SHOWN: Final = 6
 
 
 class Tabular(ABC):
@@ -34,6 +36,11 @@ class Tabular(ABC):
     @abstractmethod
     def _lines(self) -> tuple[str, str, list[Line]]:
         """Captions of the axes and the curves of a small picture; no curves for none."""
+
+    def __repr__(self) -> str:
+        names = list(self.units)
+        more = f", and {len(names) - _SHOWN} more columns" if len(names) > _SHOWN else ""
+        return f"{type(self).__name__}({', '.join(names[:_SHOWN])}{more})"
 
     def to_polars(self) -> pl.DataFrame:
         """The same as a polars table, whose missing values are null."""

@@ -43,7 +43,7 @@ End = Annotated[str | None, Setting("SI or with a unit; by default as in the stu
 class TrajectoryQuestion:
     """Which part of a motion, and at how many places."""
 
-    low: Annotated[
+    begin: Annotated[
         str | None,
         Setting(
             "first time, in s or with a unit (s, periods), or angle, in rad or with a unit; by default 0, of a settled "
@@ -53,7 +53,7 @@ class TrajectoryQuestion:
             metavar="TIME",
         ),
     ] = None
-    high: Annotated[
+    end: Annotated[
         str | None,
         Setting(
             "last time or angle, with the same units; by default the end of the run (`at_most` of a settled study) or "
@@ -81,7 +81,9 @@ class EngagementsQuestion:
 
     table: Annotated[
         str,
-        Setting("the table of a CSV file; JSON has both", choices=("engagements", "periods"), metavar="TABLE"),
+        Setting(
+            "the table of a CSV file; JSON has both", choices=("engagements", "periods"), metavar="TABLE", of_files=True
+        ),
     ] = "engagements"
 
 
@@ -91,7 +93,12 @@ class StrobesQuestion:
 
     table: Annotated[
         str,
-        Setting("the table of a CSV file; JSON and pictures have both", choices=("strobes", "orbit"), metavar="TABLE"),
+        Setting(
+            "the table of a CSV file; JSON and pictures have both",
+            choices=("strobes", "orbit"),
+            metavar="TABLE",
+            of_files=True,
+        ),
     ] = "strobes"
 
 
@@ -102,7 +109,7 @@ class BranchQuestion:
     along: Along
     low: Low = None
     high: High = None
-    y: Annotated[str | None, Setting("the result that a picture shows", metavar="RESULT")] = None
+    y: Annotated[str | None, Setting("the result that a picture shows", metavar="RESULT", of_files=True)] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +134,7 @@ class DiagramQuestion:
     strobes: Annotated[
         int, Setting("most strobes of each motion", examples=(16,), low=1, high=MAX_DIAGRAM_STROBES, metavar="N")
     ] = 64
-    y: Annotated[str | None, Setting("the variable that a picture shows", metavar="VARIABLE")] = None
+    y: Annotated[str | None, Setting("the variable that a picture shows", metavar="VARIABLE", of_files=True)] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,6 +215,7 @@ TRAJECTORY: Final = ViewInfo(
     TrajectoryQuestion,
     "Compute every variable, torque, power and state of one case over time, or over the angle.",
     pictures=False,
+    leading=2,
 )
 ENGAGEMENTS: Final = ViewInfo(
     "engagements",
@@ -224,28 +232,33 @@ BRANCH: Final = ViewInfo(
     "branch",
     BranchQuestion,
     "Follow the periodic motion of one case along a parameter: stable and unstable orbits, folds, doublings, grazings.",
+    leading=3,
 )
 DIAGRAM: Final = ViewInfo(
     "diagram",
     DiagramQuestion,
     "Compute a bifurcation diagram: the strobes of the settled motions of one case along a parameter.",
+    leading=3,
 )
 SECTION: Final = ViewInfo(
     "section",
     SectionQuestion,
     "Compute a Poincare section: the strobes of the settled motion of one case at a phase of the excitation.",
+    leading=2,
 )
 BASIN: Final = ViewInfo(
     "basin",
     BasinQuestion,
     "Compute a basin: the regime to which one case comes from each start of a grid of two initial values.",
     starts=False,
+    leading=2,
 )
 TRANSIENT: Final = ViewInfo(
     "transient",
     TransientQuestion,
     "Compute the run-up from rest of a machine shaft, a step of its load, or its coasting, over time.",
     starts=False,
+    leading=1,
 )
 #: Every view of a case, in the order of the API.
 CASE_VIEWS: Final = (TRAJECTORY, ENGAGEMENTS, STROBES, BRANCH, DIAGRAM, SECTION, BASIN, TRANSIENT)

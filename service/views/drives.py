@@ -63,7 +63,7 @@ class RibbonView(StudyView[RibbonQuestion, RibbonQuery, Ribbon]):
 
     def choose(self, study: Study, question: RibbonQuestion) -> RibbonQuery:
         """The query; a fault for several quantiles of a map."""
-        given = question.quantile
+        given = question.quantiles
         if question.mapped and given is not None and len(given) > 1:
             raise parameter_error("quantile", "too-many", "a map shows one quantile", given, "one")
         quantiles = tuple(given) if given else (0.5,) if question.mapped else QUANTILES
@@ -108,7 +108,7 @@ class YieldView(StudyView[YieldQuestion, YieldQuery, Yield]):
 
     def choose(self, study: Study, question: YieldQuestion) -> YieldQuery:
         """The query."""
-        return YieldQuery(tuple(question.condition), _asked(question), question.worst, question.mapped)
+        return YieldQuery(tuple(question.conditions), _asked(question), question.worst, question.mapped)
 
     def small(self, study: Study, chosen: YieldQuery) -> bool:
         """By the cases of the study."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
+from keyword import iskeyword
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from sprag.service.faults import parameter_error
@@ -40,6 +41,8 @@ class Setting:
         What stands for the value in the help of a command.
     positional : bool
         Whether it is an argument of the command rather than an option.
+    of_files : bool
+        Whether only its pictures, or its CSV, have it.
     """
 
     meaning: str
@@ -53,6 +56,7 @@ class Setting:
     option: str = ""
     metavar: str = "VALUE"
     positional: bool = False
+    of_files: bool = False
 
     @property
     def limits(self) -> dict[str, int]:
@@ -136,6 +140,8 @@ class ViewInfo:
         Whether it is a picture as well; otherwise only JSON and CSV.
     starts : bool
         Whether it is that of one start where the case has several.
+    leading : int
+        How many of its settings stand without their names in calls of the client.
     """
 
     name: str
@@ -143,3 +149,9 @@ class ViewInfo:
     summary: str
     pictures: bool = True
     starts: bool = True
+    leading: int = 0
+
+    @property
+    def method(self) -> str:
+        """The name of its method of a study."""
+        return f"{self.name}s" if iskeyword(self.name) else self.name

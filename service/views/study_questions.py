@@ -124,15 +124,16 @@ class MapQuestion:
     z: Annotated[str, Setting("the result", examples=("shaft.speed.mean",), metavar="RESULT")]
     at: Held = None
     number: Number = 0
-    kind: Annotated[Literal["heatmap", "contour"], Setting("of a picture: colours, or lines of equal value")] = (
-        "heatmap"
-    )
+    kind: Annotated[
+        Literal["heatmap", "contour"], Setting("of a picture: colours, or lines of equal value", of_files=True)
+    ] = "heatmap"
 
 
 @dataclass(frozen=True, slots=True)
 class AnswersQuestion:
     """Of which curves, and at which working point."""
 
+    point: Point = None
     x: Annotated[
         str | None,
         Setting(
@@ -144,7 +145,6 @@ class AnswersQuestion:
     ] = None
     at: Held = None
     of: Of = None
-    point: Point = None
 
 
 Where = Annotated[
@@ -230,8 +230,10 @@ class ExploreQuestion(SelectionQuestion):
             metavar="NAME",
         ),
     ] = None
-    x: Annotated[str, Setting("of a picture: shown quantity to the right", longest=100, metavar="NAME")] = ""
-    y: Annotated[str, Setting("of a picture: the same upwards", longest=100, metavar="NAME")] = ""
+    x: Annotated[
+        str, Setting("of a picture: shown quantity to the right", longest=100, metavar="NAME", of_files=True)
+    ] = ""
+    y: Annotated[str, Setting("of a picture: the same upwards", longest=100, metavar="NAME", of_files=True)] = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,28 +244,32 @@ class RibbonQuestion:
     y: Result = None
     by: LineBy = None
     at: Held = None
-    quantile: Annotated[
+    quantiles: Annotated[
         list[Annotated[float, Interval(gt=0.0, lt=1.0)]] | None,
         Setting(
             "probability of a quantile; may be repeated; default: 0.05, 0.5 and 0.95",
             examples=([0.05, 0.5, 0.95],),
+            alias="quantile",
             longest=MAX_QUANTILES,
             metavar="P",
         ),
     ] = None
-    mapped: Annotated[bool, Setting("of a picture: a map of the quantile over `x` and `by`", alias="map")] = False
+    mapped: Annotated[
+        bool, Setting("of a picture: a map of the quantile over `x` and `by`", alias="map", of_files=True)
+    ] = False
 
 
 @dataclass(frozen=True, slots=True)
 class YieldQuestion:
     """Which conditions, along which axis, and how many of the worst drives."""
 
-    condition: Annotated[
+    conditions: Annotated[
         list[str],
         Setting(
             "`RESULT >= VALUE`, `<=` or `=`, the value with a unit or as `N % of nominal`; may be repeated: all must "
             "hold",
             examples=(["shaft.speed.mean >= 90 % of nominal"],),
+            alias="condition",
             least=1,
             metavar="CONDITION",
             positional=True,
@@ -273,19 +279,24 @@ class YieldQuestion:
     by: LineBy = None
     at: Held = None
     worst: Annotated[int, Setting("most drives in the list of the worst", low=0, high=MAX_WORST, metavar="N")] = 10
-    mapped: Annotated[bool, Setting("of a picture: a map of the yield over `x` and `by`", alias="map")] = False
+    mapped: Annotated[
+        bool, Setting("of a picture: a map of the yield over `x` and `by`", alias="map", of_files=True)
+    ] = False
 
 
 @dataclass(frozen=True, slots=True)
 class FrontQuestion:
     """Which designs, how many, and what a picture shows."""
 
-    exact: Annotated[bool, Setting("designs must meet equalities of real numbers to 1e-6 to be feasible")] = False
     limit: Annotated[int, Setting("most designs", examples=(100,), low=1, high=MAX_DESIGNS, metavar="N")] = 2000
-    x: Annotated[str | None, Setting("of a picture: goal, variable or limited result to the right", metavar="NAME")] = (
-        None
-    )
-    y: Annotated[str | None, Setting("of a picture: the same upwards; by default two goals", metavar="NAME")] = None
+    exact: Annotated[bool, Setting("designs must meet equalities of real numbers to 1e-6 to be feasible")] = False
+    x: Annotated[
+        str | None,
+        Setting("of a picture: goal, variable or limited result to the right", metavar="NAME", of_files=True),
+    ] = None
+    y: Annotated[
+        str | None, Setting("of a picture: the same upwards; by default two goals", metavar="NAME", of_files=True)
+    ] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -337,32 +348,38 @@ CURVES: Final = ViewInfo(
     "in `by` needs its value in `at`, or `rest=usual`.\n\n"
     "Without `x` or `y` they are the curves that the page of the study shows first. Refined curves tell their error "
     "and their jumps.",
+    leading=2,
 )
-MAP: Final = ViewInfo("map", MapQuestion, "One result over two axes.")
+MAP: Final = ViewInfo("map", MapQuestion, "One result over two axes.", leading=3)
 ANSWERS: Final = ViewInfo(
     "answers",
     AnswersQuestion,
     "The main answers of a study: no-load speed, largest power, best efficiency, stall torque, a working point.",
+    leading=2,
 )
 EXPLORE: Final = ViewInfo(
     "explore",
     ExploreQuestion,
     "Cases within ranges of parameters and results, sorted over all rows, with a histogram of each quantity.",
+    leading=1,
 )
 RIBBON: Final = ViewInfo(
     "ribbon",
     RibbonQuestion,
     "Quantiles of results over the drives along an axis, with 95 % intervals, the nominal drive, and the causes.",
+    leading=2,
 )
 YIELD: Final = ViewInfo(
     "yield",
     YieldQuestion,
     "The share of drives that reach conditions, at each place and at all places, its causes, and the worst drives.",
+    leading=2,
 )
 FRONT: Final = ViewInfo(
     "front",
     FrontQuestion,
     "The designs of a study with a goal, the best first: variables, goals, limits, ranks, and the search's history.",
+    leading=1,
 )
 CALIBRATION: Final = ViewInfo(
     "calibration",
@@ -373,4 +390,7 @@ SENSITIVITY: Final = ViewInfo(
     "sensitivity",
     SensitivityQuestion,
     "Main effects of every axis on results, and shares of their variance (Sobol indices) or elementary effects.",
+    leading=1,
 )
+#: Every view of a study, in the order of the API.
+STUDY_VIEWS: Final = (CURVES, MAP, SENSITIVITY, RIBBON, YIELD, CALIBRATION, FRONT, EXPLORE, ANSWERS)

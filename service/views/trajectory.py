@@ -116,7 +116,7 @@ class TrajectoryView(CaseView[TrajectoryQuestion, tuple[float, float, int], Traj
 
     def choose(self, study: Study, case: int, question: TrajectoryQuestion) -> tuple[float, float, int]:
         """First and last place, and their number."""
-        return *span(study, case, question.low, question.high), question.points
+        return *span(study, case, question.begin, question.end), question.points
 
     def compute(self, study: Study, case: int, chosen: tuple[float, float, int]) -> Trajectory:
         """Run the case."""

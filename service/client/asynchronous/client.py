@@ -9,7 +9,7 @@ from sprag.service.client.asynchronous.comparing import compare_studies
 from sprag.service.client.asynchronous.connection import AsyncConnection
 from sprag.service.client.asynchronous.naming import schedule_of, study_of
 from sprag.service.client.asynchronous.study import AsyncStudy
-from sprag.service.client.queries import finish_text, given, spec_of
+from sprag.service.client.queries import finish_text, query_of, spec_of
 from sprag.service.client.wire import component_path, model_path, preset_path, schedule_path, study_path, view_path
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class AsyncClient(AsyncConnection):
 
     async def preview(self, spec: Spec | str | PathLike[str], *, finish_by: str | datetime | None = None) -> Preview:
         """Preview of a study: cases, how many of them can be reused, time, size, warnings."""
-        query = given({"finish_by": None if finish_by is None else finish_text(finish_by)})
+        query = query_of({"finish_by": None if finish_by is None else finish_text(finish_by)})
         return cast("Preview", await self.request("POST", "/studies:preview", json=spec_of(spec), params=query))
 
     async def submit(
@@ -54,7 +54,7 @@ class AsyncClient(AsyncConnection):
         held then.
         """
         finish = None if finish_by is None else finish_text(finish_by)
-        query = given({"priority": priority or None, "fresh": "true" if fresh else None, "finish_by": finish})
+        query = query_of({"priority": priority or None, "fresh": fresh, "finish_by": finish})
         made = await self.request("POST", "/studies", key=key or "", json=spec_of(spec), params=query)
         return AsyncStudy(self, made["id"])
 
@@ -93,7 +93,7 @@ class AsyncClient(AsyncConnection):
             "newest" (the default), "name", "state", "cases" or "ended".
         """
         words = {"state": state, "search": search, "tag": tag, "owner": owner, "model": model, "sort": sort}
-        query = given({**words, "archived": "true" if archived else None, "deleted": "true" if deleted else None})
+        query = query_of({**words, "archived": archived, "deleted": deleted})
         async for study in self.items("/studies", "studies", query):
             yield cast("StudySummary", study)
 
@@ -164,7 +164,7 @@ class AsyncClient(AsyncConnection):
 
     async def components(self, kind: str | None = None) -> list[ComponentEntry]:
         """The office's own springs, clutches and motors, or those of a kind, by kind and name."""
-        found = await self.request("GET", "/components", params=given({"kind": kind}))
+        found = await self.request("GET", "/components", params=query_of({"kind": kind}))
         return cast("list[ComponentEntry]", found["components"])
 
     async def put_components(self, components: Sequence[Mapping[str, Any]] | str) -> list[ComponentEntry]:
@@ -205,7 +205,7 @@ class AsyncClient(AsyncConnection):
 
     async def views(self, study: str | None = None) -> list[SavedViewEntry]:
         """Saved views of pages, or those of the study of that id: first the figures of its report, in order."""
-        found = await self.request("GET", "/views", params=given({"study": study}))
+        found = await self.request("GET", "/views", params=query_of({"study": study}))
         return cast("list[SavedViewEntry]", found["views"])
 
     async def save_view(
@@ -267,7 +267,7 @@ class AsyncClient(AsyncConnection):
         target: str | None = None,
     ) -> AsyncIterator[AuditEntry]:
         """Every change, latest first, or those of a time, a user, an action, a study; for administrators."""
-        query = given({"since": since, "until": until, "actor": actor, "action": action, "target": target})
+        query = query_of({"since": since, "until": until, "actor": actor, "action": action, "target": target})
         async for entry in self.items("/audit", "entries", query):
             yield cast("AuditEntry", entry)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.client.wire import study_path
+from sprag.service.client.wire import case_path, study_path
 
 if TYPE_CHECKING:
     from sprag.service.client.asynchronous.connection import AsyncConnection
@@ -18,6 +18,9 @@ class AsyncStudyPart:
         self._client = client
         self._path = study_path(study_id)
         self.id = study_id
+
+    async def _of_case(self, case: int, part: str = "", query: Query = ()) -> dict[str, Any]:
+        return await self._client.request("GET", case_path(self.id, case, part), params=list(query))
 
     async def _get(self, part: str, query: Query = ()) -> dict[str, Any]:
         return await self._client.request("GET", self._path + part, params=list(query))

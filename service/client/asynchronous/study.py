@@ -6,24 +6,23 @@ from collections.abc import AsyncGenerator, Mapping, Sequence
 from contextlib import aclosing
 from typing import TYPE_CHECKING, Any, cast
 
-from sprag.service.client.asynchronous.answers import AsyncStudyAnswers
-from sprag.service.client.asynchronous.case import AsyncStudyCases
 from sprag.service.client.asynchronous.following import events_of, wait_for
 from sprag.service.client.asynchronous.tables import AsyncStudyTables
+from sprag.service.client.asynchronous.views import AsyncStudyViews
 from sprag.service.client.bars import reporting
-from sprag.service.client.queries import explore_query, extension, longer_query, narrow_query
+from sprag.service.client.queries import extension, query_of
 from sprag.service.client.shown import AsyncShown
 from sprag.service.client.waiting import Waiting
 
 if TYPE_CHECKING:
-    from sprag.service.answers.studies import StudyDetail, StudySummary
+    from sprag.service.answers.studies import Round, StudyDetail, StudySummary
     from sprag.service.client.bars import Progressing
     from sprag.service.client.events import StudyEvent
     from sprag.service.client.queries import Value
     from sprag.service.client.wire import Query
 
 
-class AsyncStudy(AsyncStudyAnswers, AsyncStudyTables, AsyncStudyCases, AsyncShown):
+class AsyncStudy(AsyncStudyViews, AsyncStudyTables, AsyncShown):
     """One study of the service. ``id`` is its public name."""
 
     def __repr__(self) -> str:
@@ -32,6 +31,10 @@ class AsyncStudy(AsyncStudyAnswers, AsyncStudyTables, AsyncStudyCases, AsyncShow
     async def detail(self) -> StudyDetail:
         """The current study, with its progress and its spec."""
         return cast("StudyDetail", await self._get(""))
+
+    async def rounds(self) -> list[Round]:
+        """The rounds of a study that chooses its own cases, each with what was known before it; [] of others."""
+        return cast("list[Round]", (await self._get("/rounds"))["rounds"])
 
     async def wait(self, *, progress: bool | Progressing | None = None, timeout: float | None = None) -> AsyncStudy:
         """Wait until the study has ended or reached its deadline; returns the study itself.
@@ -79,7 +82,7 @@ class AsyncStudy(AsyncStudyAnswers, AsyncStudyTables, AsyncStudyCases, AsyncShow
         For a settled study, the cases of a regime, by default the unsettled ones; otherwise those with the flag
         ``not_settled``.
         """
-        return await self._further("longer", key, params=longer_query(regime, at_most))
+        return await self._further("longer", key, params=query_of({"regime": regime, "at_most": at_most}))
 
     async def narrow(
         self, steps: int | None = None, at: Mapping[str, Value] | None = None, *, key: str | None = None
@@ -88,7 +91,7 @@ class AsyncStudy(AsyncStudyAnswers, AsyncStudyTables, AsyncStudyCases, AsyncShow
 
         Each of these steps is split into ``steps`` (16). ``at`` maps paths of other axes to their only values.
         """
-        return await self._further("narrow", key, params=narrow_query(steps, at))
+        return await self._further("narrow", key, params=query_of({"steps": steps, "at": at}))
 
     async def select(
         self,
@@ -105,7 +108,8 @@ class AsyncStudy(AsyncStudyAnswers, AsyncStudyTables, AsyncStudyCases, AsyncShow
 
         Derived parameters follow from the others; a case of a drive with tolerances keeps the values of its drive.
         """
-        return await self._further("select", key, params=explore_query(where, sort, limit, (), ending, regime, flag))
+        asked = {"where": where, "sort": sort, "limit": limit, "ending": ending, "regime": regime, "flag": flag}
+        return await self._further("select", key, params=query_of(asked))
 
     async def _further(self, verb: str, key: str | None, **arguments: Any) -> AsyncStudy:
         made = await self._client.request("POST", f"{self._path}:{verb}", key=key or "", **arguments)
@@ -125,7 +129,7 @@ class AsyncStudy(AsyncStudyAnswers, AsyncStudyTables, AsyncStudyCases, AsyncShow
 
     async def retry(self, endings: Sequence[str] = ()) -> StudySummary:
         """Run those cases again that did not end ok, or only those with one of the ``endings``."""
-        return await self._act("retry", [("ending", name) for name in endings])
+        return await self._act("retry", query_of({"ending": endings}))
 
     async def prioritize(self, priority: int) -> StudySummary:
         """Change the priority of the study: among the waiting ones of one user the highest runs first."""

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from sprag.service.client.asynchronous.part import AsyncStudyPart
 from sprag.service.client.frames import beside, grid_of, polars_of, table_of
-from sprag.service.client.queries import cases_query, curve_query, form_of, given
-from sprag.service.client.wire import whole_file
+from sprag.service.client.queries import form_of, query_of
+from sprag.service.client.sketch import Picture
+from sprag.service.client.wire import case_path, whole_file
 from sprag.worker.codes import ENDING_CODES, PENDING
 
 if TYPE_CHECKING:
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
     import polars as pl
     import xarray as xr
 
-    from sprag.service.answers.results import Case, CaseDetail
-    from sprag.service.client.queries import Value
+    from sprag.service.answers.results import Case, CaseDetail, RegimeRow
+    from sprag.service.client.queries import Held, Value
     from sprag.service.formats import Header
 
 
@@ -35,7 +36,7 @@ class AsyncStudyTables(AsyncStudyPart):
         regime: str | None = None,
         flag: str | None = None,
         where: str | Sequence[str] = (),
-        at: Mapping[str, Value] | None = None,
+        at: Held | None = None,
         sort: str | None = None,
     ) -> AsyncIterator[Case]:
         """Finished cases, in order of their numbers, or those that are asked for.
@@ -51,9 +52,20 @@ class AsyncStudyTables(AsyncStudyPart):
         sort : str, optional
             A parameter, a result, "case", "ending", "flags" or "regime"; "-" before it: from the largest down.
         """
-        query = cases_query(ending, regime, flag, where, at, sort)
-        async for case in self._client.items(f"{self._path}/cases", "cases", query):
+        asked = {"ending": ending, "regime": regime, "flag": flag, "where": where, "at": at, "sort": sort}
+        async for case in self._client.items(f"{self._path}/cases", "cases", query_of(asked)):
             yield cast("Case", case)
+
+    async def case(self, case: int) -> CaseDetail:
+        """One case: parameters, ending, flags, results; "pending" while it has not been run."""
+        return cast("CaseDetail", await self._of_case(case))
+
+    async def regimes(self, case: int) -> list[RegimeRow]:
+        """The regimes to which the starts of a case come, the most frequent one first; [] of a case with one start.
+
+        Their results have the share of the starts and its interval, and "regime.start", a start that comes to it.
+        """
+        return cast("list[RegimeRow]", (await self._of_case(case))["regimes"])
 
     async def table(self, units: str | None = None) -> pd.DataFrame:
         """All rows with all results as a pandas table, NaN for missing values; ``units`` such as "rpm, mm", or "typed".
@@ -72,7 +84,7 @@ class AsyncStudyTables(AsyncStudyPart):
 
         SI; the column ``unit`` has the units. RefusedError for a number that is not that of a case.
         """
-        return beside([cast("CaseDetail", await self._get(f"/cases/{int(case)}")) for case in cases])
+        return beside([await self.case(case) for case in cases])
 
     async def polars(self, units: str | None = None) -> pl.DataFrame:
         """All rows with all results as a polars table, null for missing values; ``units`` as for `table`."""
@@ -129,7 +141,7 @@ class AsyncStudyTables(AsyncStudyPart):
     async def _pieces(
         self, form: str, units: str | None, header: Header | None, language: str | None, point: Value | None
     ) -> AsyncIterator[AsyncIterator[bytes]]:
-        query = given({"units": units, "header": header, "language": language, "point": point})
+        query = query_of({"units": units, "header": header, "language": language, "point": point})
         if form in ("html", "pdf"):
             opened = self._client.pieces(f"{self._path}/report", [*query, ("format", form)])
         else:
@@ -144,16 +156,57 @@ class AsyncStudyTables(AsyncStudyPart):
         y: str | Sequence[str] = (),
         *,
         by: str | Sequence[str] = (),
-        at: Mapping[str, Value] | None = None,
+        at: Held | None = None,
         units: str | None = None,
         language: str | None = None,
+        view: str = "curves",
+        case: int | None = None,
+        **settings: Any,
     ) -> Path:
-        """Write curves as a picture: .svg, .png or .pdf; ``language`` a code such as "uk", English without it."""
+        """Write curves, or what else has a picture, to a file: .svg, .png or .pdf.
+
+        Parameters
+        ----------
+        file : str or path
+        x, y, by, at : optional
+            As for `curves`, or as the ``view`` has them.
+        units : str, optional
+            Such as "rpm, mm", or "typed"; by default SI. Views of a case are in SI.
+        language : str, optional
+            A code such as "uk"; English without it.
+        view : str
+            Name of the view as in its address: "map", "front", "ribbon", of a case "branch" and so on.
+        case : int, optional
+            Number of the case, for a view of a case.
+        settings
+            Further settings of the view, by their names in its address: ``z="efficiency"``, ``along="shaft.load"``.
+        """
         path = Path(file)
-        drawing = {"format": path.suffix[1:].lower(), "units": units, "language": language}
-        query = [*curve_query(x, y, by, at), *given(drawing)]
-        path.write_bytes(await self._client.read(f"{self._path}/curves", query))
+        asked = {"x": x, "y": y, "by": by, "at": at, "units": units, "language": language, **settings}
+        query = query_of({**asked, "format": path.suffix[1:].lower()})
+        path.write_bytes(await self._client.read(self._address(view, case), query))
         return path
+
+    async def plot(
+        self,
+        x: str | None = None,
+        y: str | Sequence[str] = (),
+        *,
+        by: str | Sequence[str] = (),
+        at: Held | None = None,
+        units: str | None = None,
+        language: str | None = None,
+        view: str = "curves",
+        case: int | None = None,
+        **settings: Any,
+    ) -> Picture:
+        """Curves, or what else has a picture, as one that notebooks show; arguments as for `picture`."""
+        asked = {"x": x, "y": y, "by": by, "at": at, "units": units, "language": language, **settings}
+        query = query_of({**asked, "format": "svg"})
+        return Picture(await self._client.read(self._address(view, case), query))
+
+    def _address(self, view: str, case: int | None) -> str:
+        return f"{self._path}/{view}" if case is None else case_path(self.id, case, f"/{view}")
 
 
 async def _written(pieces: AsyncIterator[bytes], path: Path) -> None:

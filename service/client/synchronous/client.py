@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
-from sprag.service.client.queries import finish_text, given, spec_of
+from sprag.service.client.queries import finish_text, query_of, spec_of
 from sprag.service.client.synchronous.comparing import compare_studies
 from sprag.service.client.synchronous.connection import Connection
 from sprag.service.client.synchronous.naming import schedule_of, study_of
@@ -35,7 +35,7 @@ class Client(Connection):
 
     def preview(self, spec: Spec | str | PathLike[str], *, finish_by: str | datetime | None = None) -> Preview:
         """Preview of a study: cases, how many of them can be reused, time, size, warnings."""
-        query = given({"finish_by": None if finish_by is None else finish_text(finish_by)})
+        query = query_of({"finish_by": None if finish_by is None else finish_text(finish_by)})
         return cast("Preview", self.request("POST", "/studies:preview", json=spec_of(spec), params=query))
 
     def submit(
@@ -54,7 +54,7 @@ class Client(Connection):
         held then.
         """
         finish = None if finish_by is None else finish_text(finish_by)
-        query = given({"priority": priority or None, "fresh": "true" if fresh else None, "finish_by": finish})
+        query = query_of({"priority": priority or None, "fresh": fresh, "finish_by": finish})
         made = self.request("POST", "/studies", key=key or "", json=spec_of(spec), params=query)
         return Study(self, made["id"])
 
@@ -93,7 +93,7 @@ class Client(Connection):
             "newest" (the default), "name", "state", "cases" or "ended".
         """
         words = {"state": state, "search": search, "tag": tag, "owner": owner, "model": model, "sort": sort}
-        query = given({**words, "archived": "true" if archived else None, "deleted": "true" if deleted else None})
+        query = query_of({**words, "archived": archived, "deleted": deleted})
         for study in self.items("/studies", "studies", query):
             yield cast("StudySummary", study)
 
@@ -164,7 +164,7 @@ class Client(Connection):
 
     def components(self, kind: str | None = None) -> list[ComponentEntry]:
         """The office's own springs, clutches and motors, or those of a kind, by kind and name."""
-        found = self.request("GET", "/components", params=given({"kind": kind}))
+        found = self.request("GET", "/components", params=query_of({"kind": kind}))
         return cast("list[ComponentEntry]", found["components"])
 
     def put_components(self, components: Sequence[Mapping[str, Any]] | str) -> list[ComponentEntry]:
@@ -205,7 +205,7 @@ class Client(Connection):
 
     def views(self, study: str | None = None) -> list[SavedViewEntry]:
         """Saved views of pages, or those of the study of that id: first the figures of its report, in order."""
-        found = self.request("GET", "/views", params=given({"study": study}))
+        found = self.request("GET", "/views", params=query_of({"study": study}))
         return cast("list[SavedViewEntry]", found["views"])
 
     def save_view(
@@ -267,7 +267,7 @@ class Client(Connection):
         target: str | None = None,
     ) -> Iterator[AuditEntry]:
         """Every change, latest first, or those of a time, a user, an action, a study; for administrators."""
-        query = given({"since": since, "until": until, "actor": actor, "action": action, "target": target})
+        query = query_of({"since": since, "until": until, "actor": actor, "action": action, "target": target})
         for entry in self.items("/audit", "entries", query):
             yield cast("AuditEntry", entry)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 from sprag.service.answers.differing import MOST_COMPARED, common_axes
 from sprag.service.client.comparison import Comparison, compared, held_in
 from sprag.service.client.frames import Curves
-from sprag.service.client.queries import curve_query
+from sprag.service.client.queries import query_of
 from sprag.service.client.synchronous.study import Study
 
 if TYPE_CHECKING:
@@ -56,5 +56,5 @@ def _curves(
     by: str | Sequence[str],
     at: Mapping[str, Value],
 ) -> Curves:
-    query = [*curve_query(x, y, by, at), ("rest", "usual")]
+    query = query_of({"x": x, "y": y, "by": by, "at": at, "rest": "usual"})
     return Curves(cast("Any", connection.request("GET", f"/studies/{study_id}/curves", params=query)))

@@ -7,23 +7,22 @@ from contextlib import closing
 from typing import TYPE_CHECKING, Any, cast
 
 from sprag.service.client.bars import reporting
-from sprag.service.client.queries import explore_query, extension, longer_query, narrow_query
+from sprag.service.client.queries import extension, query_of
 from sprag.service.client.shown import Shown
-from sprag.service.client.synchronous.answers import StudyAnswers
-from sprag.service.client.synchronous.case import StudyCases
 from sprag.service.client.synchronous.following import events_of, wait_for
 from sprag.service.client.synchronous.tables import StudyTables
+from sprag.service.client.synchronous.views import StudyViews
 from sprag.service.client.waiting import Waiting
 
 if TYPE_CHECKING:
-    from sprag.service.answers.studies import StudyDetail, StudySummary
+    from sprag.service.answers.studies import Round, StudyDetail, StudySummary
     from sprag.service.client.bars import Progressing
     from sprag.service.client.events import StudyEvent
     from sprag.service.client.queries import Value
     from sprag.service.client.wire import Query
 
 
-class Study(StudyAnswers, StudyTables, StudyCases, Shown):
+class Study(StudyViews, StudyTables, Shown):
     """One study of the service. ``id`` is its public name."""
 
     def __repr__(self) -> str:
@@ -32,6 +31,10 @@ class Study(StudyAnswers, StudyTables, StudyCases, Shown):
     def detail(self) -> StudyDetail:
         """The current study, with its progress and its spec."""
         return cast("StudyDetail", self._get(""))
+
+    def rounds(self) -> list[Round]:
+        """The rounds of a study that chooses its own cases, each with what was known before it; [] of others."""
+        return cast("list[Round]", (self._get("/rounds"))["rounds"])
 
     def wait(self, *, progress: bool | Progressing | None = None, timeout: float | None = None) -> Study:
         """Wait until the study has ended or reached its deadline; returns the study itself.
@@ -76,7 +79,7 @@ class Study(StudyAnswers, StudyTables, StudyCases, Shown):
         For a settled study, the cases of a regime, by default the unsettled ones; otherwise those with the flag
         ``not_settled``.
         """
-        return self._further("longer", key, params=longer_query(regime, at_most))
+        return self._further("longer", key, params=query_of({"regime": regime, "at_most": at_most}))
 
     def narrow(
         self, steps: int | None = None, at: Mapping[str, Value] | None = None, *, key: str | None = None
@@ -85,7 +88,7 @@ class Study(StudyAnswers, StudyTables, StudyCases, Shown):
 
         Each of these steps is split into ``steps`` (16). ``at`` maps paths of other axes to their only values.
         """
-        return self._further("narrow", key, params=narrow_query(steps, at))
+        return self._further("narrow", key, params=query_of({"steps": steps, "at": at}))
 
     def select(
         self,
@@ -102,7 +105,8 @@ class Study(StudyAnswers, StudyTables, StudyCases, Shown):
 
         Derived parameters follow from the others; a case of a drive with tolerances keeps the values of its drive.
         """
-        return self._further("select", key, params=explore_query(where, sort, limit, (), ending, regime, flag))
+        asked = {"where": where, "sort": sort, "limit": limit, "ending": ending, "regime": regime, "flag": flag}
+        return self._further("select", key, params=query_of(asked))
 
     def _further(self, verb: str, key: str | None, **arguments: Any) -> Study:
         made = self._client.request("POST", f"{self._path}:{verb}", key=key or "", **arguments)
@@ -122,7 +126,7 @@ class Study(StudyAnswers, StudyTables, StudyCases, Shown):
 
     def retry(self, endings: Sequence[str] = ()) -> StudySummary:
         """Run those cases again that did not end ok, or only those with one of the ``endings``."""
-        return self._act("retry", [("ending", name) for name in endings])
+        return self._act("retry", query_of({"ending": endings}))
 
     def prioritize(self, priority: int) -> StudySummary:
         """Change the priority of the study: among the waiting ones of one user the highest runs first."""

@@ -76,7 +76,7 @@ async def front_of(
     work: Attended, study_id: StudyId, choice: FileChoice, x: X = "", y: X = "", exact: Exact = ""
 ) -> Response:
     """The figure of all designs over two quantities."""
-    question = FrontQuestion(bool(exact), x=x or None, y=y or None)
+    question = FrontQuestion(exact=bool(exact), x=x or None, y=y or None)
     return await figure_of(work, study_id, "front", lambda study: FrontView().choose(study, question), choice)
 
 

@@ -1,4 +1,8 @@
-"""Makes the synchronous client of the asynchronous one: ``python -m tests.service.client.generate``."""
+"""Makes what of the client is not written by hand: ``python -m tests.service.client.generate``.
+
+Its methods of views are made of the descriptions of the views (`tests.service.client.view_methods`), the synchronous
+client of the asynchronous one.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +11,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.service.client import view_methods
+
 ROOT = Path(__file__).resolve().parents[3]
 SOURCE = ROOT / "service" / "client" / "asynchronous"
 TARGET = SOURCE.with_name("synchronous")
+VIEWS = SOURCE / "views.py"
 #: Words and what stands for them, in this order.
 WORDS = (
     (r"\basync (def|for|with)\b", r"\1"),
@@ -36,11 +43,19 @@ def synchronous(text: str) -> str:
     return text
 
 
-def write(folder: Path) -> None:
-    """Write the modules of the synchronous client but its first one, ordered and laid out by ruff."""
+def write(folder: Path, views: Path = VIEWS) -> None:
+    """Write the methods of views, and the modules of the synchronous client but its first one."""
+    views.write_text(view_methods.module(), encoding="utf-8")
+    laid_out([views])
     made = [folder / path.name for path in sorted(SOURCE.glob("[a-z]*.py"))]
     for path in made:
-        path.write_text(synchronous((SOURCE / path.name).read_text(encoding="utf-8")), encoding="utf-8")
+        source = views if path.name == VIEWS.name else SOURCE / path.name
+        path.write_text(synchronous(source.read_text(encoding="utf-8")), encoding="utf-8")
+    laid_out(made)
+
+
+def laid_out(made: list[Path]) -> None:
+    """Order and lay out modules by ruff."""
     for command in (["check", "--fix-only", "--unsafe-fixes", "--select", "I,SIM117,UP028,C416,PIE790"], ["format"]):
         run = [
             sys.executable,

@@ -70,6 +70,7 @@ ASKED: dict[str, Callable[[Study], Any]] = {
     "no conditions": lambda study: study.yields([]),
     "no calibration": lambda study: study.calibration(),
     "no goal": lambda study: study.front(),
+    "repr of curves": lambda study: repr(study.curves(LOAD, [SPEED, "efficiency"], by=FREQUENCY)),
     "too many rows": lambda study: study.explore(limit=10**6),
     "not a number": lambda study: study.explore(limit="many"),  # type: ignore[arg-type]
     "no such language": lambda study: study.download("pdf", language="xx"),
@@ -158,6 +159,23 @@ def test_it_is_its_own_table(run: Any) -> None:
     assert np.asarray(run).shape == (3, len(run.columns))
     with pytest.raises(AttributeError, match="nothing"):
         run.nothing  # noqa: B018
+
+
+def test_what_a_study_gives_is_printed_in_short(run: sprag.Study) -> None:
+    assert repr(run.curves(LOAD, SPEED)) == f"Curves({LOAD}, {SPEED})"
+    assert repr(run.trajectory(1, points=20)).startswith("Motion(times, ")
+    assert repr(run.trajectory(1, points=20)).endswith(" more columns)")
+    assert repr(run.engagements(1)) == f"Engagements(case 1: {len(run.engagements(1).to_pandas())} engagements)"
+    picture = run.plot(LOAD, SPEED)
+    assert picture._repr_svg_().lstrip().startswith(("<?xml", "<svg"))
+    assert repr(picture) == f"Picture(SVG, {len(picture.svg):,} bytes)"
+
+
+def test_any_view_can_be_a_picture(run: sprag.Study, tmp_path: Path) -> None:
+    assert b"<svg" in run.plot(LOAD, SPEED, view="curves", units="rpm", language="uk").svg
+    assert run.picture(tmp_path / "a.png", view="strobes", case=1).read_bytes().startswith(b"\x89PNG")
+    with pytest.raises(RefusedError):
+        run.plot(view="front")
 
 
 def test_a_study_and_what_it_gives_can_be_pickled(run: sprag.Study) -> None:
