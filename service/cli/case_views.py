@@ -36,7 +36,7 @@ from sprag.service.cli.options import (
     in_language,
 )
 from sprag.service.cli.remote import connection
-from sprag.service.faults import Fault, FaultError
+from sprag.service.faults import Fault, FaultError, choice_of
 from sprag.service.languages import N_, _
 from sprag.service.views.case_questions import CASE_VIEWS, TRANSIENT
 from sprag.service.views.setting import NamedSetting, ViewInfo, settings_of
@@ -80,6 +80,7 @@ def command(about: ViewInfo) -> Callable[..., None]:
                 path = case_path(study_of(client, spec), case, f"/{about.name}")
                 with client.pieces(path, [*query, ("format", written)]) as pieces:
                     write_pieces(file, pieces)
+            _say_written(file, written, case, as_json, {})
             return
         from sprag.service.views import cases
 
@@ -92,6 +93,7 @@ def command(about: ViewInfo) -> Callable[..., None]:
             )
         with naming_options(study, asked, view.lacks):
             _check_start(study, start)
+            require_language(dict(drawing))
             chosen = view.choose(study, case, about.question(**settings))
         if every:
             _write_all(study, chosen[0], file, as_json=written == "json")
@@ -113,6 +115,21 @@ def command(about: ViewInfo) -> Callable[..., None]:
     run.__doc__ = about.summary
     run.__signature__ = Signature([parameter("spec", SpecOrStudy, ...), *options, *last])  # type: ignore[attr-defined]
     return run
+
+
+def say_file(file: str, form: str | None, first: int | None = None) -> None:
+    """Say what was written; of a selection that is larger than a file only the ``first`` cases."""
+    if form in PICTURES:
+        say(_("picture: {file}", file=file))
+    elif first is None:
+        say(_("table: {file}", file=file))
+    else:
+        say(_("table: {file}, the first {count} cases of the selection", file=file, count=f"{first:,}"))
+
+
+def require_language(drawing: Mapping[str, str]) -> None:
+    """Refuse a language of a picture that there is not; FaultError."""
+    choice_of("language", drawing.get("language", languages.ENGLISH), languages.available())
 
 
 def _refuse_local(**given: Any) -> None:
@@ -156,12 +173,18 @@ def option(asked: NamedSetting) -> Any:
         return Annotated[list[str], typer.Argument(metavar=f"{setting.metavar}...", help=meaning)]
     texts = list[str] if asked.several else asked.type
     given = texts if asked.default is ... else texts | None
-    return Annotated[
-        given,
-        typer.Option(
-            asked.option, metavar=setting.metavar, help=meaning, autocompletion=_COMPLETED.get(setting.metavar)
-        ),
-    ]
+    metavar = f"[{'|'.join(asked.choices)}]" if asked.choices else setting.metavar
+    offered = _offering(asked.choices) if asked.choices else _COMPLETED.get(setting.metavar)
+    return Annotated[given, typer.Option(asked.option, metavar=metavar, help=meaning, autocompletion=offered)]
+
+
+def _offering(choices: Sequence[str]) -> Callable[[str], list[str]]:
+    """Completion of a value by its choices."""
+
+    def offered(incomplete: str) -> list[str]:
+        return [choice for choice in choices if choice.startswith(incomplete)]
+
+    return offered
 
 
 def query_of(asked: Sequence[NamedSetting], settings: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -220,13 +243,20 @@ def _write(
             content = written(view, answer, form)
         write(content if content.endswith(b"\n") or form in PICTURES else content + b"\n")
     said = view.said(answer)
-    if said is None:
-        return
-    say(*said.lines)
-    if as_json and to_file(file):
-        write_json({"file": file, "case": case, **said.data})
-    if not said.ok:
+    if said is not None:
+        say(*said.lines)
+    _say_written(file, form, case, as_json, {} if said is None else said.data)
+    if said is not None and not said.ok:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
+
+
+def _say_written(file: str | None, form: str, case: int, as_json: bool, data: Mapping[str, Any]) -> None:
+    """Say which file was written, for people and where asked for programs."""
+    if file is None or not to_file(file):
+        return
+    say_file(file, form)
+    if as_json:
+        write_json({"file": file, "case": case, **data})
 
 
 def _write_all(study: Study, course: Course, file: str | None, *, as_json: bool) -> None:

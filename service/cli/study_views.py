@@ -14,7 +14,16 @@ from inspect import Signature
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from sprag.service import languages
-from sprag.service.cli.case_views import SpecOrStudy, is_study, naming_options, option, parameter, query_of
+from sprag.service.cli.case_views import (
+    SpecOrStudy,
+    is_study,
+    naming_options,
+    option,
+    parameter,
+    query_of,
+    require_language,
+    say_file,
+)
 from sprag.service.cli.configured import read_settings
 from sprag.service.cli.console import say, warning_lines, write_json, wrong_option
 from sprag.service.cli.file_formats import PICTURES, file_format
@@ -87,7 +96,7 @@ class _Source:
     """Where a view comes from: the answer as data, the pieces of a file, and the model of the study."""
 
     answer: Callable[[dict[str, Any]], dict[str, Any]]
-    pieces: Callable[[dict[str, Any], str, list[tuple[str, str]]], Iterable[bytes]]
+    pieces: Callable[[dict[str, Any], str], Iterable[bytes]]
     model: Callable[[], str]
 
 
@@ -107,20 +116,22 @@ def _made(command: Command) -> Callable[..., None]:
             most = _most_rows(about.question)
             settings = {**settings, "limit": settings["limit"] or command.few}
             whole = {**settings, "limit": most}
-        drawing = [*in_units(units), *in_language(language)]
+        drawing = dict([*in_units(units), *in_language(language)])
         opened = (
-            _remote(study, server, token, about, asked) if is_study(study) else _local(study, about, asked, settings)
+            _remote(study, server, token, about, asked, drawing)
+            if is_study(study)
+            else _local(study, about, asked, settings, drawing)
         )
         with opened as source:
             found = source.answer(settings)
             if file is not None and form is not None:
-                write_pieces(file, source.pieces(whole, form, drawing))
+                write_pieces(file, source.pieces(whole, form))
             if as_json:
                 write_json(found)
             else:
                 command.show(found, source.model)
         if file is not None:
-            _say_file(file, form, None if most is None or found.get("selected", 0) <= most else most)
+            say_file(file, form, None if most is None or found.get("selected", 0) <= most else most)
 
     run.__doc__ = about.summary
     own = [
@@ -142,16 +153,6 @@ def _most_rows(question: type) -> int | None:
     return next(asked.setting.high for asked in settings_of(question) if asked.name == "limit")
 
 
-def _say_file(file: str, form: str | None, first: int | None) -> None:
-    """Say what was written; of a selection that is larger than a file only the ``first`` cases."""
-    if form != "csv":
-        say(_("picture: {file}", file=file))
-    elif first is None:
-        say(_("table: {file}", file=file))
-    else:
-        say(_("table: {file}, the first {count} cases of the selection", file=file, count=f"{first:,}"))
-
-
 def _probability(text: str) -> float:
     """The probability of ``5%`` or ``0.05``."""
     number, percent, rest = text.partition("%")
@@ -168,7 +169,7 @@ def _probability(text: str) -> float:
 
 @contextmanager
 def _remote(
-    text: str, server: str, token: str | None, about: ViewInfo, asked: tuple[NamedSetting, ...]
+    text: str, server: str, token: str | None, about: ViewInfo, asked: tuple[NamedSetting, ...], drawing: dict[str, str]
 ) -> Iterator[_Source]:
     """The view of a study of a running service."""
     from sprag.service.client.wire import study_path
@@ -177,8 +178,8 @@ def _remote(
         path = study_path(study_of(client, text))
         view = f"{path}/{about.name}"
 
-        def pieces(settings: dict[str, Any], form: str, drawing: list[tuple[str, str]]) -> Iterator[bytes]:
-            with client.pieces(view, [*query_of(asked, settings), *drawing, ("format", form)]) as found:
+        def pieces(settings: dict[str, Any], form: str) -> Iterator[bytes]:
+            with client.pieces(view, [*query_of(asked, settings), *drawing.items(), ("format", form)]) as found:
                 yield from found
 
         yield _Source(
@@ -189,34 +190,47 @@ def _remote(
 
 
 @contextmanager
-def _local(path: str, about: ViewInfo, asked: tuple[NamedSetting, ...], first: dict[str, Any]) -> Iterator[_Source]:
+def _local(
+    path: str, about: ViewInfo, asked: tuple[NamedSetting, ...], first: dict[str, Any], drawing: dict[str, str]
+) -> Iterator[_Source]:
     """The view of the study of a spec, which is run here first."""
     from sprag.service.reading.quantities import SI
-    from sprag.service.reading.reader import CAPTIONS, Choice
+    from sprag.service.reading.reader import CAPTIONS, Choice, reading_for
     from sprag.service.views.library import Library
     from sprag.service.views.studies import STUDY_VIEWS
-    from sprag.service.views.study_view import study_file
+    from sprag.service.views.study_view import StudyAnswer, found, is_drawn, written
 
     parsed = read_study(path)
     say(*warning_lines(parsed.warnings))
     view = STUDY_VIEWS[about.name]
-    if parsed.study.plan is None:  # otherwise the cases that it chooses decide what can be asked
-        with naming_options(parsed.study, asked, ""):
-            view.choose(parsed.study, about.question(**first))
+    choice = Choice(drawing.get("units", SI), CAPTIONS)
+    with naming_options(parsed.study, asked, ""):
+        require_language(drawing)
+        reading_for(parsed.study, parsed.spec, choice)
+        if parsed.study.plan is None:  # otherwise the cases that it chooses decide what can be asked
+            view.check(parsed.study, view.choose(parsed.study, about.question(**first)))
+    known: list[tuple[Any, bool, StudyAnswer[Any, Any]]] = []
 
-    def file_of(settings: dict[str, Any], form: str, drawing: dict[str, str]) -> bytes:
+    def answer_of(settings: dict[str, Any], form: str) -> StudyAnswer[Any, Any]:
+        """The view, found once for all its forms where these have the same."""
+        chosen, drawn = view.choose(study, about.question(**settings)), view.drawn_differs and is_drawn(form)
+        for other, other_drawn, answer in known:
+            if (chosen, drawn) == (other, other_drawn):
+                return answer
+        known.append((chosen, drawn, found(library, done.record.id, view, chosen, drawn=drawn)))
+        return known[-1][-1]
+
+    def file_of(settings: dict[str, Any], form: str) -> bytes:
         with naming_options(study, asked, ""):
-            chosen = view.choose(study, about.question(**settings))
-            choice = Choice(drawing.get("units", SI), CAPTIONS)
+            answer = answer_of(settings, form)
             with languages.language(drawing.get("language", languages.ENGLISH)):
-                title = study.name or study.model
-                return study_file(library, done.record.id, view, chosen, choice, title, form)
+                return written(view, answer, choice, study.name or study.model, form)
 
     with run_parsed(parsed, read_settings(), lambda _now: "", db=None, processes=None) as done:
         library, study = Library(done.store), done.store.studies.study(done.record.id)
         yield _Source(
-            lambda settings: cast("dict[str, Any]", json.loads(file_of(settings, "json", {}))),
-            lambda settings, form, drawing: [file_of(settings, form, dict(drawing))],
+            lambda settings: cast("dict[str, Any]", json.loads(file_of(settings, "json"))),
+            lambda settings, form: [file_of(settings, form)],
             lambda: study.model,
         )
 

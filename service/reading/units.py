@@ -184,6 +184,12 @@ def exact_number(value: object, unit: str) -> Fraction:
     return Fraction(repr(value))
 
 
+def typed_value(text: str, unit: str) -> float:
+    """The value (SI) of a text that is in ``unit`` where it has no unit of its own; QuantityError."""
+    number, own = split_quantity(text)
+    return parse_quantity(text, unit) if own else to_float(number)
+
+
 def has_unit(text: str) -> bool:
     """Whether a text is a number with a unit."""
     try:

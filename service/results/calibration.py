@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         CalibrationReport,
         NextMeasurement,
     )
+    from sprag.service.reading.quantities import Units
     from sprag.service.results.curves import Fetch
     from sprag.service.storage.studies.records import RoundRecord
     from sprag.worker.models import ResultInfo
@@ -233,8 +234,11 @@ def _curve(found: Calibration) -> list[CalibrationCurvePoint]:
     ]
 
 
-def calibration_csv(found: Calibration) -> bytes:
-    """A row for each measured value: its condition, measured and fitted value, residual; SI numbers."""
+def calibration_csv(found: Calibration, shown: Units) -> bytes:
+    """A row for each measured value: its condition, measured and fitted value, residual.
+
+    In a reader's units; measured values of several units are in SI.
+    """
     points = [_point(found, index) for index in range(found.plan.count)]
     ends: list[Any] = [point["interval"] or (None, None) for point in points]
     columns: dict[str, list[Any]] = {
@@ -248,7 +252,12 @@ def calibration_csv(found: Calibration) -> bytes:
         "residual": [point["residual"] for point in points],
         "leverage": [point["leverage"] for point in points],
     }
-    return exports.table_csv(list(columns), list(columns.values()))
+    of_result = {info.name: info.unit for info in models.study_results(found.study)}
+    measured = {of_result[point["result"]] for point in points}
+    units = {path: unit_of(found.study, path) for path in found.plan.paths_at}
+    if len(measured) == 1:
+        units |= dict.fromkeys(("measured", "sigma", "fitted", "fitted.low", "fitted.high", "residual"), measured.pop())
+    return exports.read_table(columns, units, shown)
 
 
 #: Probability below which a chi-square is not explained by chance.

@@ -125,13 +125,10 @@ def _with_kinds(names: list[str], regime: ResultInfo | None) -> list[str]:
     return list(dict.fromkeys([*names, *kind_columns(regime)]))
 
 
-def draw_map(
-    study: Study, infos: Sequence[ResultInfo], x: str, y: str, z: str, at: Sequence[tuple[str, str]], fetch: Fetch
-) -> Map:
-    """One result over two axes of a grid, or of a refined map; raises SelectionError as `select` does."""
-    plan = map_plan(study)
-    if plan is not None:
-        return draw_refined_map(study, infos, plan, (x, y, z), at, fetch)
+def check_map(
+    study: Study, infos: Sequence[ResultInfo], x: str, y: str, z: str, at: Sequence[tuple[str, str]]
+) -> tuple[ResultInfo, tuple[tuple[float, ...], Iterator[Line]]]:
+    """The result and the rows of the map of a grid; SelectionError as of `select`."""
     (result,) = numeric_results(infos, "z", (z,))
     if study.combine == "zip":
         raise refused("x", "not-a-grid", "a map needs a grid; the axes of this study are zipped")
@@ -139,7 +136,17 @@ def draw_map(
     fixed = locate_axes(study, at)
     _no_axis_twice({x: x_axis}, "y", {y: y_axis}, fixed)
     fixed = with_nominal(study, fixed, {x_axis, y_axis})
-    x_values, lines = _grid_lines(study, x_axis, {y: y_axis}, fixed, 1, way_out=LEFT_OPEN)
+    return result, _grid_lines(study, x_axis, {y: y_axis}, fixed, 1, way_out=LEFT_OPEN)
+
+
+def draw_map(
+    study: Study, infos: Sequence[ResultInfo], x: str, y: str, z: str, at: Sequence[tuple[str, str]], fetch: Fetch
+) -> Map:
+    """One result over two axes of a grid, or of a refined map; raises SelectionError as `select` does."""
+    plan = map_plan(study)
+    if plan is not None:
+        return draw_refined_map(study, infos, plan, (x, y, z), at, fetch)
+    result, (x_values, lines) = check_map(study, infos, x, y, z, at)
     rows = list(lines)
     cases = np.stack([row.cases for row in rows])
     regime = models.regime_info(infos)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from sprag.service.reading.quantities import Units
     from sprag.service.results.curves import Fetch
     from sprag.service.storage.studies.records import RoundRecord
     from sprag.worker.models import ResultInfo
@@ -278,11 +279,11 @@ def history(rounds: Sequence[RoundRecord]) -> list[Generation]:
     ]
 
 
-def front_csv(found: Designs, limit: int = DESIGNS) -> bytes:
-    """A row for each design, at most ``limit``: SI numbers, those of several operating points by their number."""
+def front_csv(found: Designs, study: Study, shown: Units, limit: int = DESIGNS) -> bytes:
+    """A row for each design, at most ``limit``, in a reader's units; several operating points are numbered."""
     plan, points = found.plan, range(1, len(found.plan.at) + 1)
-    columns = ("round", "phase", "rank", "feasible", "failed", "exact", "violation", "miss")
-    header = ["design", "case", *columns, *(one.paths[0] for one in plan.vary)]
+    about = ("round", "phase", "rank", "feasible", "failed", "exact", "violation", "miss")
+    header = ["design", "case", *about, *(one.paths[0] for one in plan.vary)]
     header += [f"{plan.over}.{goal.name}" for goal in plan.best if len(points) > 1]
     header += [name if len(points) == 1 else f"{name}.{number}" for name in found.values for number in points]
     own = found.regimes is not None and not any(item.result == "regime" for item in plan.items)
@@ -290,8 +291,16 @@ def front_csv(found: Designs, limit: int = DESIGNS) -> bytes:
     rows: list[list[Any]] = []
     for position in found.order[:limit].tolist():
         design = cast("dict[str, Any]", design_json(found, position))
-        row = [design["design"], design["cases"][0], *(design[name] for name in columns), *design["variables"].values()]
+        row = [design["design"], design["cases"][0], *(design[name] for name in about), *design["variables"].values()]
         row += design["goals"].values() if len(points) > 1 else ()
         row += chain.from_iterable(design["results"].values())
         rows.append([*row, *(design["regimes"] if own else ()), " ".join(design["flags"])])
-    return exports.table_csv(header, zip(*rows, strict=True) if rows else [[] for _ in header])
+    columns = dict(zip(header, zip(*rows, strict=True) if rows else [()] * len(header), strict=True))
+    units = {one.paths[0]: unit_of(study, one.paths[0]) for one in plan.vary}
+    units |= dict(zip((f"{plan.over}.{goal.name}" for goal in plan.best), goal_units(study), strict=True))
+    units |= {
+        name: found.infos[name.removesuffix(f".{number}")].unit
+        for number in points
+        for name in (*found.values, *(f"{one}.{number}" for one in found.values))
+    }
+    return exports.read_table(columns, units, shown)

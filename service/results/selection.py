@@ -16,7 +16,7 @@ from sprag.service.reading.numbers import in_language
 from sprag.service.reading.reader import Phrase, term
 from sprag.service.reading.texts import did_you_mean
 from sprag.service.reading.together import AMBIGUOUS_UNIT, question, with_unit_of_end
-from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
+from sprag.service.reading.units import QuantityError, typed_value
 from sprag.worker import models
 from sprag.worker.directions import DIRECTIONS, SWEEP, direction
 from sprag.worker.spread import DRIVE
@@ -198,8 +198,7 @@ def value_of(path: str, text: str, unit: str, parameter: str = "at") -> float:
         return float(DIRECTIONS.index(text))
     text = in_language(text)
     try:
-        number, unit_text = split_quantity(text)
-        return parse_quantity(text, unit) if unit_text else to_float(number)
+        return typed_value(text, unit)
     except QuantityError as error:
         if path == SWEEP:
             allowed = ", ".join(DIRECTIONS)

@@ -10,9 +10,10 @@ from sprag.service.answers import key as m
 from sprag.service.faults import refused
 from sprag.service.figures.answers import answers_figure
 from sprag.service.figures.pictures.curves import Picture, require_drawable
+from sprag.service.results.curve_cases import select
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.key_answer_words import answers_csv, curve_name, curve_named, report
-from sprag.service.results.key_answers import StudyAnswers, answers_query, find_answers
+from sprag.service.results.key_answers import StudyAnswers, answers_query, find_answers, read_point
 from sprag.service.storage.studies.records import CaseColumns
 from sprag.service.views import study_view
 from sprag.service.views.curves import completed_query
@@ -71,6 +72,14 @@ class AnswersView(StudyView[AnswersQuestion, AnswersChoice, StudyAnswers]):
         """The curves where some are chosen, and the working point."""
         chosen = question.x, (), question.by, question.at, question.of
         return AnswersChoice(completed_query(study, *chosen) if any(chosen) else None, question.point)
+
+    def check(self, study: Study, chosen: AnswersChoice) -> None:
+        """The axes and the working point."""
+        infos = models.study_results(study)
+        query = answers_query(study, infos, chosen.query)
+        if query is not None:
+            select(study, infos, query)
+            read_point(study, query, chosen.point)
 
     def small(self, study: Study, chosen: AnswersChoice) -> bool:
         """By the cases of the study."""

@@ -16,7 +16,7 @@ from sprag.service.figures.basin import basin_figure
 from sprag.service.languages import N_
 from sprag.service.reading.catalogue import range_sentence
 from sprag.service.reading.texts import quantity_text
-from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
+from sprag.service.reading.units import QuantityError, typed_value
 from sprag.service.results.selection import ends_of_range
 from sprag.service.results.start_states import refuse_impossible
 from sprag.service.views.case_questions import BASIN, BasinQuestion
@@ -128,8 +128,7 @@ def _ends(
             values.append(drawn[len(values)])
             continue
         try:
-            number, unit = split_quantity(text)
-            value = parse_quantity(text, entry.unit) if unit else to_float(number)
+            value = typed_value(text, entry.unit)
         except QuantityError as error:
             raise parameter_error(f"{name}_{place}", error.code, error.message, text, range_sentence(entry)) from error
         if not entry.accepts(value):

@@ -17,7 +17,7 @@ from sprag.service.json_text import numbers
 from sprag.service.languages import N_, _
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.directions import case_values
-from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
+from sprag.service.reading.units import QuantityError, typed_value
 from sprag.service.results.selection import ends_of_range
 from sprag.service.views.case_questions import BRANCH, BranchQuestion
 from sprag.service.views.case_view import CaseAnswer, CaseView, Said
@@ -156,8 +156,7 @@ def _value(name: str, text: str | None, unit: str, usual: float | None) -> float
             )  # fmt: skip
         return usual
     try:
-        number, given = split_quantity(text)
-        return parse_quantity(text, unit) if given else to_float(number)
+        return typed_value(text, unit)
     except QuantityError as error:
         raise parameter_error(name, error.code, error.message, text, _value_in(unit)) from error
 

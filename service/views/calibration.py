@@ -38,7 +38,7 @@ class CalibrationView(StudyView[CalibrationQuestion, None, Calibration]):
 
     def csv(self, answer: StudyAnswer[None, Calibration], reading: Reading) -> bytes:
         """The measured points beside the fit."""
-        return calibration_csv(answer.result)
+        return calibration_csv(answer.result, reading.units)
 
     def figure(self, answer: StudyAnswer[None, Calibration], columns: int = 2) -> Figure:
         """The measured points on the fitted curves, and the residuals."""

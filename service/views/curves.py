@@ -16,6 +16,7 @@ from sprag.service.figures.read import read_map
 from sprag.service.json_text import numbers
 from sprag.service.reading.directions import in_words
 from sprag.service.results.choice import held
+from sprag.service.results.curve_cases import check_map, select
 from sprag.service.results.curves import CurveQuery, Curves, Map, flag_names
 from sprag.service.results.defaults import completed, drawn_numbers
 from sprag.service.results.refined import not_joined
@@ -76,6 +77,7 @@ class CurvesView(StudyView[CurvesQuestion, CurveQuery, Curves]):
     about = CURVES
     content = "Curves, as JSON, a table or a picture."
     shape = m.Curves
+    drawn_differs = True
 
     def choose(self, study: Study, question: CurvesQuestion) -> CurveQuery:
         """The query, with the axes held at their usual value if that is wanted."""
@@ -84,6 +86,10 @@ class CurvesView(StudyView[CurvesQuestion, CurveQuery, Curves]):
             given = [f"{path}={value}" for path, value in query.at]
             query = replace(query, at=held(study, given, (query.x, *query.by)))
         return _numbered(study, query, question.number)
+
+    def check(self, study: Study, chosen: CurveQuery) -> None:
+        """The axes and the results."""
+        select(study, models.study_results(study), chosen)
 
     def small(self, study: Study, chosen: CurveQuery) -> bool:
         """By the numbers of the curves."""
@@ -166,6 +172,11 @@ class MapView(StudyView[MapQuestion, tuple[CurveQuery, bool], Map]):
         """The query, and the kind of picture."""
         query = CurveQuery(question.x, (question.z,), (question.y,), pairs(question.at))
         return _numbered(study, query, question.number), question.kind == "contour"
+
+    def check(self, study: Study, chosen: tuple[CurveQuery, bool]) -> None:
+        """The axes and the result."""
+        query, _ = chosen
+        check_map(study, models.study_results(study), query.x, query.by[0], query.y[0], query.at)
 
     def small(self, study: Study, chosen: tuple[CurveQuery, bool]) -> bool:
         """By the numbers of the map."""

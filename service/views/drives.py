@@ -13,14 +13,16 @@ from sprag.service.figures.pictures.maps import draw_map
 from sprag.service.figures.read import read_map
 from sprag.service.figures.ribbons import ribbon_figure, ribbon_map, yield_figure, yield_map
 from sprag.service.results.defaults import drawn_results
-from sprag.service.results.tolerances.batch import Asked
+from sprag.service.results.selection import numeric_results
+from sprag.service.results.tolerances.batch import Asked, places_of
+from sprag.service.results.tolerances.conditions import read_conditions
 from sprag.service.results.tolerances.ribbons import QUANTILES, Ribbon, ribbon
 from sprag.service.results.tolerances.written import ribbon_csv, ribbon_json, yield_csv, yield_json
 from sprag.service.results.tolerances.yields import Yield, yields
 from sprag.service.views import study_view
 from sprag.service.views.curves import pairs
 from sprag.service.views.study_questions import RIBBON, YIELD, RibbonQuestion, YieldQuestion
-from sprag.service.views.study_view import StudyAnswer, StudyView
+from sprag.service.views.study_view import StudyAnswer, StudyView, found
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -69,6 +71,12 @@ class RibbonView(StudyView[RibbonQuestion, RibbonQuery, Ribbon]):
         quantiles = tuple(given) if given else (0.5,) if question.mapped else QUANTILES
         return RibbonQuery(tuple(dict.fromkeys(question.y or ())), _asked(question), quantiles, question.mapped)
 
+    def check(self, study: Study, chosen: RibbonQuery) -> None:
+        """The results and the axes."""
+        infos = models.study_results(study)
+        numeric_results(infos, "y", chosen.y)
+        places_of(study, infos, chosen.asked)
+
     def small(self, study: Study, chosen: RibbonQuery) -> bool:
         """By the cases of the study."""
         return study.cases <= study_view.FEW // 10
@@ -86,7 +94,7 @@ class RibbonView(StudyView[RibbonQuestion, RibbonQuery, Ribbon]):
 
     def csv(self, answer: StudyAnswer[RibbonQuery, Ribbon], reading: Reading) -> bytes:
         """A row for each place and quantile."""
-        return ribbon_csv(answer.result)
+        return ribbon_csv(answer.result, reading.units)
 
     def figure(self, answer: StudyAnswer[RibbonQuery, Ribbon], columns: int = 2) -> Figure:
         """The quantiles over the places."""
@@ -110,6 +118,12 @@ class YieldView(StudyView[YieldQuestion, YieldQuery, Yield]):
         """The query."""
         return YieldQuery(tuple(question.conditions), _asked(question), question.worst, question.mapped)
 
+    def check(self, study: Study, chosen: YieldQuery) -> None:
+        """The conditions and the axes."""
+        infos = models.study_results(study)
+        read_conditions(infos, chosen.conditions)
+        places_of(study, infos, chosen.asked)
+
     def small(self, study: Study, chosen: YieldQuery) -> bool:
         """By the cases of the study."""
         return study.cases <= study_view.FEW // 10
@@ -126,7 +140,7 @@ class YieldView(StudyView[YieldQuestion, YieldQuery, Yield]):
 
     def csv(self, answer: StudyAnswer[YieldQuery, Yield], reading: Reading) -> bytes:
         """A row for each place."""
-        return yield_csv(answer.result)
+        return yield_csv(answer.result, reading.units)
 
     def figure(self, answer: StudyAnswer[YieldQuery, Yield], columns: int = 2) -> Figure:
         """The yield over the places."""
@@ -145,6 +159,6 @@ def both(
     """The answers with ribbons and yields, for a page."""
     ribbon, reached = RibbonView(), YieldView()
     return (
-        ribbon.json(StudyAnswer(library, study_id, ribbons, ribbon.find(library, study_id, ribbons))),
-        reached.json(StudyAnswer(library, study_id, wanted, reached.find(library, study_id, wanted))),
+        ribbon.json(found(library, study_id, ribbon, ribbons)),
+        reached.json(found(library, study_id, reached, wanted)),
     )

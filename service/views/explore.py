@@ -69,6 +69,10 @@ class ExploreView(StudyView[ExploreQuestion, Chosen, Explored]):
         query = selection(question, question.limit, tuple(question.show or ()))
         return query, (question.x, question.y)
 
+    def check(self, study: Study, chosen: Chosen) -> None:
+        """The ranges and the names."""
+        plan_of(study, chosen[0])
+
     def small(self, study: Study, chosen: Chosen) -> bool:
         """By the cases of the study and the rows that are wanted."""
         return study.cases <= study_view.FEW and chosen[0].limit <= study_view.FEW // 10

@@ -46,7 +46,7 @@ class FrontView(StudyView[FrontQuestion, FrontQuestion, Designs]):
 
     def csv(self, answer: StudyAnswer[FrontQuestion, Designs], reading: Reading) -> bytes:
         """A row for each design."""
-        return front_csv(answer.result, answer.chosen.limit)
+        return front_csv(answer.result, answer.study, reading.units, answer.chosen.limit)
 
     def figure(self, answer: StudyAnswer[FrontQuestion, Designs], columns: int = 2) -> Figure:
         """The designs over two quantities."""

@@ -16,7 +16,7 @@ from sprag.service.languages import N_
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.directions import case_values
 from sprag.service.reading.numbers import in_language
-from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
+from sprag.service.reading.units import QuantityError, typed_value
 from sprag.service.results.start_states import refuse_impossible
 from sprag.service.views.branch import range_of
 from sprag.service.views.case_questions import DIAGRAM, SECTION, DiagramQuestion, SectionQuestion
@@ -37,8 +37,7 @@ def phase_of(text: str | None) -> float:
         return 0.0
     try:
         text = in_language(text)
-        number, given = split_quantity(text)
-        angle = parse_quantity(text, "rad") if given else to_float(number)
+        angle = typed_value(text, "rad")
     except QuantityError as error:
         raise parameter_error("phase", error.code, error.message, text, "an angle in rad or deg") from error
     if not 0.0 <= angle <= 2.0 * math.pi * (1.0 + 1e-12):

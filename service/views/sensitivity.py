@@ -10,10 +10,12 @@ from sprag.service import exports
 from sprag.service.answers import results as m
 from sprag.service.faults import warned
 from sprag.service.figures.pictures.sensitivity import draw_sensitivity
+from sprag.service.results.selection import numeric_results
 from sprag.service.results.sensitivity import Sensitivity, sensitivity
 from sprag.service.results.sensitivity_indices import Indices
 from sprag.service.views.study_questions import SENSITIVITY, SensitivityQuestion
 from sprag.service.views.study_view import StudyAnswer, StudyView
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -35,6 +37,10 @@ class SensitivityView(StudyView[SensitivityQuestion, tuple[str, ...], list[Sensi
     def choose(self, study: Study, question: SensitivityQuestion) -> tuple[str, ...]:
         """The names of the results."""
         return tuple(dict.fromkeys(question.y))
+
+    def check(self, study: Study, chosen: tuple[str, ...]) -> None:
+        """The names of the results."""
+        numeric_results(models.study_results(study), "y", chosen)
 
     def find(
         self, library: Library, study_id: str, chosen: tuple[str, ...], *, drawn: bool = False

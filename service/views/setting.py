@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from keyword import iskeyword
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from sprag.service.faults import parameter_error
 from sprag.service.reading.limits import span
@@ -78,6 +78,11 @@ class NamedSetting:
     def alias(self) -> str:
         """Its name in addresses."""
         return self.setting.alias or self.name
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """Its only values; none where it can be anything."""
+        return get_args(self.type) if get_origin(self.type) is Literal else self.setting.choices
 
     @property
     def several(self) -> bool:

@@ -61,6 +61,8 @@ class StudyView(ABC, Generic[Question, Chosen, Result]):
         That of its JSON.
     file : str
         The last part of the name of its file, where that is not its name.
+    drawn_differs : bool
+        Whether what is found to be drawn is more than the numbers.
     selects : bool
         Whether dragging in its figure selects what is drawn there.
     """
@@ -69,11 +71,15 @@ class StudyView(ABC, Generic[Question, Chosen, Result]):
     content: ClassVar[str]
     shape: ClassVar[Any]
     file: ClassVar[str] = ""
+    drawn_differs: ClassVar[bool] = False
     selects: ClassVar[bool] = False
 
     @abstractmethod
     def choose(self, study: Study, question: Question) -> Chosen:
         """What a question means for a study; FaultError about a setting, or where the study has no such view."""
+
+    def check(self, study: Study, chosen: Chosen) -> None:
+        """Refuse what the study has not, before its cases are run; `find` refuses it as well. FaultError."""
 
     def small(self, study: Study, chosen: Chosen) -> bool:
         """Whether the service itself may find and write it."""
@@ -102,13 +108,30 @@ class StudyView(ABC, Generic[Question, Chosen, Result]):
         return draw_figure(read_figure(figure, reading), title, form)
 
 
+def found(
+    library: Library, study_id: str, view: StudyView[Any, Chosen, Result], chosen: Chosen, *, drawn: bool = False
+) -> StudyAnswer[Chosen, Result]:
+    """Find the view of a study, as numbers or to be ``drawn``."""
+    return StudyAnswer(library, study_id, chosen, view.find(library, study_id, chosen, drawn=drawn))
+
+
 def study_file(
     library: Library, study_id: str, view: StudyView[Any, Any, Any], chosen: Any, choice: Choice, title: str, form: str
 ) -> bytes:
     """Find the view of a study and write it as JSON, as CSV, or as a picture."""
-    drawn = form not in ("json", "csv")
-    answer = StudyAnswer(library, study_id, chosen, view.find(library, study_id, chosen, drawn=drawn))
+    return written(view, found(library, study_id, view, chosen, drawn=is_drawn(form)), choice, title, form)
+
+
+def is_drawn(form: str) -> bool:
+    """Whether a format is that of a picture."""
+    return form not in ("json", "csv")
+
+
+def written(
+    view: StudyView[Any, Any, Any], answer: StudyAnswer[Any, Any], choice: Choice, title: str, form: str
+) -> bytes:
+    """The view as JSON, as CSV, or as a picture."""
     if form == "json":
         return to_bytes(view.json(answer))
-    reading = reading_of(library.store, study_id, choice)
+    reading = reading_of(answer.library.store, answer.study_id, choice)
     return view.csv(answer, reading) if form == "csv" else view.picture(answer, reading, title, form)  # type: ignore[arg-type]

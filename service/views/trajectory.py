@@ -14,7 +14,7 @@ from sprag.service.json_text import numbers
 from sprag.service.languages import N_, _
 from sprag.service.reading.directions import case_values
 from sprag.service.reading.quantities import Units
-from sprag.service.reading.units import PERIOD_NAMES, QuantityError, parse_quantity, split_quantity, to_float
+from sprag.service.reading.units import PERIOD_NAMES, QuantityError, split_quantity, to_float, typed_value
 from sprag.service.results.selection import ends_of_range
 from sprag.service.views.case_questions import TRAJECTORY, TrajectoryQuestion
 from sprag.service.views.case_view import CaseAnswer, CaseView, Said
@@ -57,7 +57,7 @@ def _place(name: str, text: str, extent: Extent) -> float:
         number, unit = split_quantity(text)
         if unit in PERIOD_NAMES:
             return to_float(number) * extent.period
-        return parse_quantity(text, extent.unit) if unit else to_float(number)
+        return typed_value(text, extent.unit)
     except QuantityError as error:
         raise parameter_error(name, error.code, error.message, text, _ALLOWED[extent.along]) from error
 

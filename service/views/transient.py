@@ -12,7 +12,7 @@ from sprag.service.figures.transient import transient_figure
 from sprag.service.languages import N_, _
 from sprag.service.reading.limits import span
 from sprag.service.reading.numbers import in_language
-from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity, to_float
+from sprag.service.reading.units import QuantityError, typed_value
 from sprag.service.reading.wording import number, unit_text
 from sprag.service.views.case_questions import TRANSIENT, TransientQuestion
 from sprag.service.views.case_view import CaseAnswer, CaseView, Said
@@ -95,8 +95,7 @@ def _value(name: str, text: str | None, end: float, motor: bool) -> float:
     shown = Sentence("a number") if unit == "1" else Sentence("a value in {unit}", unit=Typed(unit))
     try:
         text = in_language(text or "")
-        number, own = split_quantity(text)
-        value = parse_quantity(text, unit) if own else to_float(number)
+        value = typed_value(text, unit)
     except QuantityError as error:
         raise parameter_error(name, error.code, error.message, text, shown) from error
     least = 1e-9 if name == "within" and motor else low

@@ -16,7 +16,7 @@ from sprag.service.reading.catalogue import result_of
 from sprag.service.reading.limits import at_most
 from sprag.service.reading.numbers import in_language
 from sprag.service.reading.reader import Phrase, term
-from sprag.service.reading.units import QuantityError, parse_quantity, plain_signs, split_quantity, to_float
+from sprag.service.reading.units import QuantityError, plain_signs, split_quantity, to_float, typed_value
 from sprag.service.results.selection import listed, numeric_results, of_name, refuse_mixed_texts
 from sprag.worker import models
 from sprag.worker.models.usable import against
@@ -127,8 +127,7 @@ def _read(infos: Sequence[ResultInfo], text: str) -> Condition:
             share = Amount(100.0 * part, "1", bare=True)
             shown = Phrase("{name} {sign} {share} % of nominal", name=_name(info), sign=_SHOWN[kind], share=share)
             return Condition(info, kind, part, True, shown)
-        number, unit = split_quantity(value)
-        limit = parse_quantity(value, info.unit) if unit else to_float(number)
+        limit = typed_value(value, info.unit)
     except QuantityError as error:
         raise refused("condition", error.code, of_name(name, error.message), text, unit=info.unit) from error
     amount = Amount(limit, info.unit, 6)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         YieldReport,
         YieldShare,
     )
+    from sprag.service.reading.quantities import Units
     from sprag.service.results.tolerances.batch import Places
     from sprag.service.results.tolerances.causes import Causes
     from sprag.service.results.tolerances.conditions import Condition
@@ -106,9 +107,11 @@ def percent(probability: float) -> str:
     return f"{100.0 * probability:.6g} %"
 
 
-def ribbon_csv(found: Ribbon) -> bytes:
+def ribbon_csv(found: Ribbon, shown: Units) -> bytes:
     """A row for each place: parameters, the nominal case and its results, quantiles with their intervals, counts."""
     columns: dict[str, list[Any]] = {}
+    units = dict(found.places.units)
+    of_result = {info.name: info.unit for info in found.results}
     for one in found.lines:
         parts = _place_columns(found.places, one)
         for name, spread in one.spreads.items():
@@ -119,9 +122,11 @@ def ribbon_csv(found: Ribbon) -> bytes:
                 parts[heading] = numbers(spread.quantiles.values[index])
                 parts[f"{heading} low"] = numbers(spread.quantiles.low[index])
                 parts[f"{heading} high"] = numbers(spread.quantiles.high[index])
+                units |= dict.fromkeys((heading, f"{heading} low", f"{heading} high"), of_result[name])
+            units[f"{name} nominal"] = of_result[name]
         for name, part in parts.items():
             columns.setdefault(name, []).extend(part)
-    return exports.table_csv(list(columns), list(columns.values()))
+    return exports.read_table(columns, units, shown)
 
 
 def _place_columns(places: Places, one: RibbonLine | YieldLine) -> dict[str, list[Any]]:
@@ -203,7 +208,7 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def yield_csv(found: Yield) -> bytes:
+def yield_csv(found: Yield, shown: Units) -> bytes:
     """A row for each place with its yield; of each line a last row, without a case, for all its places together."""
     columns: dict[str, list[Any]] = {}
     for one in found.lines:
@@ -219,4 +224,4 @@ def yield_csv(found: Yield) -> bytes:
             if len(part) == len(rows):
                 part.append(fixed.get(name))
             columns.setdefault(name, []).extend(part)
-    return exports.table_csv(list(columns), list(columns.values()))
+    return exports.read_table(columns, found.places.units, shown)

@@ -7,11 +7,13 @@ import re
 from typing import TYPE_CHECKING, Any
 
 import pytest
+import typer
 from typer.main import get_command
 
 from sprag.service import languages
 from sprag.service.cli import case_views, study_views
 from sprag.service.cli.app import app
+from sprag.service.views.answers import AnswersView
 from sprag.service.views.case_questions import CASE_VIEWS
 from sprag.service.views.cases import CASE_VIEWS as VIEWS_OF_CASES
 from sprag.service.views.setting import settings_of
@@ -110,6 +112,62 @@ def test_wrong_settings_name_their_options(
     monkeypatch.setattr(study_views, "run_parsed", run)
     done = sprag("front", sources[0])
     assert (done.code, "(the whole spec): the study has no goal" in done.err) == (2, True)
+    for arguments, named in (
+        (("curve", "--x", "nonsense"), "--x"), (("curve", "--y", "nonsense"), "--y"),
+        (("curve", "--at", "shaft.load=9 N*m"), "--at"), (("curve", "--rest", "bogus"), "--rest"),
+        (("map", "--x", "shaft.load", "--y", "nonsense", "--z", "efficiency"), "--y"),
+        (("answers", "--point", "3 kg"), "--point"), (("explore", "--where", "nonsense > 3"), "--where"),
+        (("sensitivity", "--y", "nonsense"), "--y"), (("ribbon", "--y", "nonsense"), "--y"),
+        (("yield", "nonsense > 3"), "--condition"), (("curve", "-o", "a.svg", "--language", "xx"), "--language"),
+        (("curve", "-o", "a.csv", "--units", "bogus"), "--units"),
+    ):  # fmt: skip
+        done = sprag(arguments[0], sources[0], *arguments[1:])
+        assert (done.code, named in done.err) == (2, True), (arguments, done.err)
+    monkeypatch.setattr("sprag.service.views.case_view.see", run)
+    done = sprag("strobes", sources[0], "-o", "a.svg", "--language", "xx")
+    assert (done.code, "--language: unknown language" in done.err) == (2, True), done.err
+
+
+def test_what_is_written_is_said_here_and_by_a_service(
+    sprag: Callable[..., Finished], sources: tuple[Path, str], tmp_path: Path
+) -> None:
+    for source in sources:
+        for name, form, said in (("strobes", "svg", "picture"), ("trajectory", "csv", "table")):
+            file = tmp_path / f"file.{form}"
+            done = sprag(name, source, "--case", 1, "-o", file, "--json")
+            assert done.err.splitlines()[-1] == f"{said}: {file}", source
+            told = json.loads(done.out)
+            assert (told["file"], told["case"]) == (str(file), 1)
+            assert sprag(name, source, "--case", 1, "-o", file).out == ""
+
+
+def test_a_view_of_a_spec_is_found_once_for_table_and_file(
+    sprag: Callable[..., Finished], sources: tuple[Path, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found: list[bool] = []
+    genuine = AnswersView.find
+
+    def find(self: AnswersView, *arguments: Any, **named: Any) -> Any:
+        found.append(True)
+        return genuine(self, *arguments, **named)
+
+    monkeypatch.setattr(AnswersView, "find", find)
+    for form in ("csv", "svg"):
+        found.clear()
+        assert sprag("answers", sources[0], "-o", tmp_path / f"file.{form}").code == 0
+        assert found == [True]
+
+
+def test_choices_are_in_the_help_and_completed(sprag: Callable[..., Finished]) -> None:
+    for command, name, choices in (
+        ("transient", "kind", ["run-up", "load-step", "coasting"]), ("strobes", "table", ["strobes", "orbit"]),
+        ("map", "kind", ["heatmap", "contour"]),
+    ):  # fmt: skip
+        assert f"[{'|'.join(choices)}]" in sprag(command, "--help").out
+        (option,) = (one for one in get_command(app).commands[command].params if one.name == name)  # type: ignore[attr-defined]
+        context = typer.Context(get_command(app))
+        first = choices[0]
+        assert [item.value for item in option.shell_complete(context, first[:2])] == [first]
 
 
 def test_every_view_has_a_command_with_its_settings() -> None:

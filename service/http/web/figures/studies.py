@@ -15,7 +15,7 @@ from sprag.service.json_text import to_bytes
 from sprag.service.results.curves import Map
 from sprag.service.views.library import reading_of
 from sprag.service.views.studies import STUDY_VIEWS
-from sprag.service.views.study_view import StudyAnswer
+from sprag.service.views.study_view import found
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,7 +34,7 @@ def study_plot(
     library: Library, study_id: str, view: StudyView[Any, Any, Any], chosen: Any, choice: Choice, columns: int
 ) -> bytes:
     """Find the view of a study and draw it for the browser."""
-    answer = StudyAnswer(library, study_id, chosen, view.find(library, study_id, chosen, drawn=True))
+    answer = found(library, study_id, view, chosen, drawn=True)
     reading = reading_of(library.store, study_id, choice)
     if isinstance(answer.result, Map):
         return to_bytes(map_figure(read_map(answer.result, reading), answer.chosen[1]))

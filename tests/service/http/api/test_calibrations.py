@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from functools import partial
 
 import pytest
@@ -96,6 +97,11 @@ def test_a_table_and_a_picture(service: Service) -> None:
     rows = list(csv.DictReader(io.StringIO(answer.text)))
     assert [float(row["fitted"]) for row in rows] == [point["fitted"] for point in points]
     assert list(rows[0])[:3] == ["shaft.load", "excitation.frequency", "result"]
+    read = csv.DictReader(
+        io.StringIO(service.http.get(f"{API}/studies/{study_id}/calibration?format=csv&units=rpm").text)
+    )
+    fitted = [float(row["fitted [rpm]"]) for row in read]
+    assert fitted == pytest.approx([point["fitted"] * 30.0 / math.pi for point in points])
     picture = service.http.get(f"{API}/studies/{study_id}/calibration?format=svg")
     assert picture.status_code == 200
     assert "Residual" in picture.text

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
 
 import pytest
@@ -91,6 +92,13 @@ def test_a_table_has_a_column_for_each_operating_point(service: Service) -> None
             assert float(row["efficiency.2"]) == float(row["worst.efficiency"]) == design["goals"]["efficiency"]
             assert float(row["shaft.inertia"]) == design["variables"]["shaft.inertia"]
     assert "attachment" in answer.headers["Content-Disposition"]
+    text = service.http.get(f"{API}/studies/{study_id}/front?format=csv&units=rpm,kg*cm^2").text
+    for row, read in zip(rows, csv.DictReader(io.StringIO(text)), strict=True):
+        assert float(read["shaft.inertia [kg*cm^2]"]) == pytest.approx(1e4 * float(row["shaft.inertia"]))
+        for name in ("shaft.speed.mean.1", "shaft.speed.mean.2"):
+            assert (read[f"{name} [rpm]"] == "") == (row[name] == "")
+            if row[name]:
+                assert float(read[f"{name} [rpm]"]) == pytest.approx(float(row[name]) * 30.0 / math.pi)
 
 
 def test_one_goal_and_a_study_without_any_row(service: Service) -> None:

@@ -11,6 +11,7 @@ from types import ModuleType
 from typing import Any
 
 import httpx
+import pytest
 from anyio.from_thread import BlockingPortal
 
 from sprag.service.cli import study_views
@@ -68,6 +69,13 @@ def test_the_commands_show_and_write_them(
     with file.open(newline="") as opened:
         rows = [float(row["speed 10 %"]) for row in csv.DictReader(opened)]
     assert rows == found["lines"][0]["results"]["speed"]["values"][0]
+    assert sprag("ribbon", study_id, "--y", "speed", "--quantile", "10%", "-o", file, "--units", "mm").code == 0
+    with file.open(newline="") as opened:
+        assert [float(row["speed 10 % [mm]"]) for row in csv.DictReader(opened)] == pytest.approx(
+            [1e3 * v for v in rows]
+        )
+    assert sprag("yield", study_id, CONDITION, "-o", file, "--units", "mm").code == 0
+    assert "load [mm]" in file.read_text().splitlines()[0]
     assert json.loads(sprag("ribbon", study_id, "--y", "speed", "--json").out)["quantiles"] == [0.05, 0.5, 0.95]
     shown = sprag("yield", study_id, CONDITION, "speed <= 70 m", "--worst", 2)
     line = service.get(f"{own}/yield", condition=[CONDITION, "speed <= 70 m"])["lines"][0]
