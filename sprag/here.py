@@ -22,7 +22,7 @@ from sprag.service.jobs.submission import take_in
 from sprag.service.json_text import to_bytes
 from sprag.service.reading.quantities import SI, TYPED
 from sprag.service.reading.reader import CAPTIONS, Choice
-from sprag.service.report import REPORT_FORMATS, asked_report, write_report
+from sprag.service.report import REPORT_FORMATS, report_file
 from sprag.service.results.rounds import round_json
 from sprag.service.results.start_states import check_start
 from sprag.service.storage.errors import StoreError
@@ -137,9 +137,9 @@ class Here(Connection, ABC):
                 rows = choice_of("format", form, _ROWS)
                 return row_files.pieces(library, study_id, rows, choice.units, header, "")
             if part == "/report":
-                question, settings = asked(ReportQuestion, query), self._settings
-                document = asked_report(library.store, study_id, choice, question, settings.report_office)
-                return [write_report(*document, settings.report_folder, choice_of("format", form, REPORT_FORMATS))]
+                question, chosen = asked(ReportQuestion, query), choice_of("format", form, REPORT_FORMATS)
+                office, folder = self._settings.report_office, self._settings.report_folder
+                return [report_file(library, study_id, choice, question, office, folder, chosen)]
             if part == "/cases":
                 cases = asked(CasesQuestion, query)
                 page = case_page(library, study_id, wanted(cases), cases.page_token)

@@ -53,6 +53,12 @@ def require_csv(header: Header | None, form: str) -> None:
         raise wrong_option("--header", "not-used", N_("only CSV files have it"), header, allowed="csv")
 
 
+def require_report(appendix: Sequence[str] | None, form: str) -> None:
+    """Raise WrongInputError for ``--appendix`` where the file is no report."""
+    if appendix and form not in REPORT_FORMATS:
+        raise wrong_option("--appendix", "not-used", N_("only reports have it"), appendix[0], allowed="pdf, html")
+
+
 def _has_ending(file: str) -> bool:
     return to_file(file) and PurePath(file).suffix not in ("", ".")
 

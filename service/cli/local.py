@@ -28,9 +28,10 @@ from sprag.service.cli.console import (
     write_text,
     wrong_option,
 )
-from sprag.service.cli.file_formats import TableFormat, require_csv, table_format
+from sprag.service.cli.file_formats import TableFormat, require_csv, require_report, table_format
 from sprag.service.cli.files import output, read_study, to_file
 from sprag.service.cli.options import (
+    Appendix,
     ChunkCases,
     CsvHeader,
     FinishBy,
@@ -202,6 +203,7 @@ def run(
         TableFormat | None, typer.Option("--format", help="Default: by the ending of FILE; csv where it has none.")
     ] = None,
     header: CsvHeader = None,
+    appendix: Appendix = None,
     db: Annotated[
         str | None,
         typer.Option("--db", metavar="URL", help="Database to keep the study in; default: a temporary database."),
@@ -217,6 +219,7 @@ def run(
 
     finish, written = _finish(finish_by), table_format(form, file, as_json)
     require_csv(header, written)
+    require_report(appendix, written)
     settings = read_settings(database=db, processes=processes, chunk_cases=chunk)
     parsed = read_study(spec, points, partial(_with_start, settings) if db is not None else None, tables)
     _say_warnings(parsed)
@@ -234,7 +237,7 @@ def run(
             finish_by=finish,
         ) as done,
     ):
-        for piece in _rows(done, written, header or "names"):
+        for piece in _rows(done, written, header or "names", appendix):
             write(piece)
         record, unaffecting = done.record, Unaffected().of(done.store, done.record)
         progress = done.store.studies.progress(record.id)
@@ -325,15 +328,18 @@ def _finish(text: str | None) -> datetime | None:
         raise wrong_option("--finish-by", error.code, error.message, text, allowed=ALLOWED) from None
 
 
-def _rows(done: LocalRun, form: Format | ReportFormat, header: Header) -> Iterator[bytes]:
+def _rows(done: LocalRun, form: Format | ReportFormat, header: Header, appendix: list[str] | None) -> Iterator[bytes]:
     """The rows of a finished study as the service exports them, or its report."""
     from sprag.service.exports import export, stored
-    from sprag.service.report import write_report
-    from sprag.service.report.content import report_of
-    from sprag.service.report.document import TitleBlock
+    from sprag.service.reading.quantities import TYPED
+    from sprag.service.reading.reader import Choice
+    from sprag.service.report import report_file
+    from sprag.service.views.library import Library
+    from sprag.service.views.study_questions import ReportQuestion
 
     if form == "html" or form == "pdf":  # noqa: PLR1714 - narrows the type
         settings = read_settings()
-        block = TitleBlock(office=settings.report_office)
-        return iter([write_report(report_of(done.store, done.record.id), block, settings.report_folder, form)])
+        asked = Choice(TYPED), ReportQuestion(appendix=appendix)
+        library, study_id, folder = Library(done.store), done.record.id, settings.report_folder
+        return iter([report_file(library, study_id, *asked, settings.report_office, folder, form)])
     return export(stored(done.store, done.record, done.store.studies.study(done.record.id), header=header), form)

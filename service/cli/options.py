@@ -10,6 +10,7 @@ import typer
 
 from sprag.service.cli import completion
 from sprag.service.formats import Header
+from sprag.service.views.study_questions import CHAPTERS
 from sprag.worker.limits import MAX_STARTS
 
 #: Default address of `sprag serve`.
@@ -62,6 +63,14 @@ CsvHeader = Annotated[
     Header | None,
     typer.Option(
         "--header", help="Heads of CSV columns: names, with units that are not SI, or every unit; default: names."
+    ),
+]
+Appendix = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--appendix",
+        metavar="CHAPTER",
+        help=f"Chapter after the two pages of a report: {', '.join(CHAPTERS)}, or all; may be repeated.",
     ),
 ]
 FileUnits = Annotated[

@@ -27,6 +27,7 @@ from sprag.service.cli.following import exit_as, follow, outlived, show_study, s
 from sprag.service.cli.names import study_of
 from sprag.service.cli.options import (
     DEFAULT_SERVER,
+    Appendix,
     CsvHeader,
     FileUnits,
     FinishBy,
@@ -276,9 +277,22 @@ def export(
     units: FileUnits = None,
     header: CsvHeader = None,
     project: Annotated[str | None, typer.Option("--project", metavar="TEXT", help="Project, of a report.")] = None,
+    customer: Annotated[str | None, typer.Option("--customer", metavar="TEXT", help="Customer, of a report.")] = None,
+    quote: Annotated[str | None, typer.Option("--quote", metavar="TEXT", help="Quote, of a report.")] = None,
     author: Annotated[str | None, typer.Option("--author", metavar="TEXT", help="Author, of a report.")] = None,
     number: Annotated[str | None, typer.Option("--number", metavar="TEXT", help="Number of a report.")] = None,
+    revision: Annotated[str | None, typer.Option("--revision", metavar="TEXT", help="Revision of a report.")] = None,
     date: Annotated[str | None, typer.Option("--date", metavar="TEXT", help="Date of a report.")] = None,
+    text: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--text",
+            metavar="TEXT",
+            help="Text of the author in a report: beside the drawing, below the "
+            "curves, above what is said of trust; may be repeated.",
+        ),
+    ] = None,
+    appendix: Appendix = None,
     point: Annotated[
         str | None, typer.Option("--point", metavar="VALUE", help='Working point of a report, such as "0.3 N*m".')
     ] = None,
@@ -295,9 +309,10 @@ def export(
     chosen = table_format(form, file, as_json)
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
-        block = {"project": project, "author": author, "number": number, "date": date}
-        every = {**block, "point": point, "language": language}
-        given = [(name, text) for name, text in every.items() if text is not None]
+        block = {"project": project, "customer": customer, "quote": quote, "author": author, "number": number}
+        every = {**block, "revision": revision, "date": date, "point": point, "language": language}
+        given = [(name, value) for name, value in every.items() if value is not None]
+        given += [("text", value) for value in text or ()] + [("appendix", name) for name in appendix or ()]
         table = chosen in get_args(Format)
         require_csv(header, chosen)
         if table and given:

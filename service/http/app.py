@@ -72,6 +72,7 @@ from sprag.service.http.web import (
 )
 from sprag.service.http.web import components as component_pages
 from sprag.service.http.web import diagram as diagram_pages
+from sprag.service.http.web import document as document_pages
 from sprag.service.http.web import engagements as engagement_pages
 from sprag.service.http.web import explore as explore_pages
 from sprag.service.http.web import language as language_pages
@@ -187,6 +188,7 @@ ROUTED = (
     laboratory,
     component_pages,
     view_pages,
+    document_pages,
     schedule_pages,
     worker_pages,
     people_pages,

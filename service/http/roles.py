@@ -60,7 +60,7 @@ _VIEWER: Final = (
         "delete", "extend", "labels", "front", "figures/front", "figures/search", "front/search.svg", "explore",
         "explore/new", "explore/compare", "figures/explore", "calibration", "figures/calibration", "drives",
         "figures/ribbon", "figures/yield", "sensitivity", "figures/sensitivity", "curves", "map", "figures/curves",
-        "figures/answers", "figures/map", "cases",
+        "figures/answers", "figures/map", "cases", "document",
     )),
     f"GET {_PAGE_CASE}",
     *(f"GET {_PAGE_CASE}/{part}" for part in (

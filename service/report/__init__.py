@@ -9,43 +9,43 @@ from sprag.service.formats import REPORT_FORMATS, ReportFormat
 
 if TYPE_CHECKING:
     from sprag.service.reading.reader import Choice
-    from sprag.service.report.content import Report
-    from sprag.service.report.document import TitleBlock
-    from sprag.service.storage.store import Store
+    from sprag.service.report.blocks import Document
+    from sprag.service.views.library import Library
     from sprag.service.views.study_questions import ReportQuestion
 
-__all__ = ["MEDIA_TYPES", "REPORT_FORMATS", "ReportFormat", "asked_report", "write_report"]
+__all__ = ["MEDIA_TYPES", "REPORT_FORMATS", "ReportFormat", "logo_of", "report_file", "write_report"]
 
 MEDIA_TYPES: Final[dict[ReportFormat, str]] = {"html": "text/html; charset=utf-8", "pdf": "application/pdf"}
 #: Files that may be the logo in the folder of an office's templates, and their media types.
 _LOGOS: Final = (("logo.svg", "image/svg+xml"), ("logo.png", "image/png"))
 
 
-def asked_report(
-    store: Store, study_id: str, choice: Choice, question: ReportQuestion, office: str
-) -> tuple[Report, TitleBlock]:
-    """The report that is asked for, with its title block in the language of the task; raises what `report_of` does."""
-    from sprag.service.report.content import report_of
-    from sprag.service.report.document import TitleBlock, today
-    from sprag.service.views.curves import completed_query
+def report_file(
+    library: Library, study_id: str, choice: Choice, question: ReportQuestion, office: str, folder: str,
+    form: ReportFormat,
+) -> bytes:  # fmt: skip
+    """The document of a study as a file; ``office`` and ``folder`` are those of the settings.
 
-    curves = question.x, question.y, question.by, question.at, question.of
-    query = completed_query(store.studies.study(study_id), *curves) if any(curves) else None
-    date = today() if question.date is None else question.date
-    block = TitleBlock(office, question.project, question.author, question.number, date)
-    return report_of(store, study_id, choice, query, question.point, saved=not question.y), block
-
-
-def write_report(report: Report, block: TitleBlock, folder: str, form: ReportFormat) -> bytes:
-    """The document; ``folder`` has the templates and the logo of an office, "" where it has none of its own."""
+    Raises as `document_of` does.
+    """
     from sprag.service.report.document import document_of
 
-    document, place = document_of(report, block), Path(folder) if folder else None
-    logo = None if place is None else next(((kind, (place / name).read_bytes()) for name, kind in _LOGOS
-                                            if (place / name).is_file()), None)  # fmt: skip
+    return write_report(document_of(library, study_id, choice, question, office), folder, form)
+
+
+def write_report(document: Document, folder: str, form: ReportFormat) -> bytes:
+    """The document; ``folder`` has the templates and the logo of an office, "" where it has none of its own."""
+    place = Path(folder) if folder else None
     # Only the libraries of the requested format are loaded.
     if form == "html":
         from sprag.service.report.html import html_report as writer
     else:
         from sprag.service.report.pdf import pdf_report as writer
-    return writer(document, place, logo)
+    return writer(document, place, logo_of(place))
+
+
+def logo_of(place: Path | None) -> tuple[str, bytes] | None:
+    """Media type and picture of the logo in the folder of an office; None where there is none."""
+    if place is None:
+        return None
+    return next(((kind, (place / name).read_bytes()) for name, kind in _LOGOS if (place / name).is_file()), None)

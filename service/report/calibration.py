@@ -9,23 +9,15 @@ from sprag.service.figures.calibration import calibration_figure
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.reader import Phrase, joined
 from sprag.service.report.drives import DrivesPart
-from sprag.service.results.calibration import calibration_of
-from sprag.worker.planning.calibrate.plan import CALIBRATE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from sprag.service.results.calibration import Calibration
-    from sprag.service.results.curves import Fetch
-    from sprag.service.storage.studies.records import RoundRecord
-    from sprag.worker.study import Study
 
 
-def calibration_part(study: Study, rounds: list[RoundRecord], fetch: Fetch) -> DrivesPart | None:
-    """The part about the calibration; None for a study without one."""
-    if study.plan is None or study.plan.get("kind") != CALIBRATE:
-        return None
-    found = calibration_of(study, rounds, fetch)
+def calibration_part(found: Calibration) -> DrivesPart:
+    """The part about the calibration."""
     if found.answer is None:
         return DrivesPart(None, (Phrase("The first fit has not ended yet."),))
     return DrivesPart(calibration_figure(found), (*_values(found), *found.sentences))

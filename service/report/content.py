@@ -1,51 +1,54 @@
-"""The content of a report as plain values, independent of its format."""
+"""What a document shows of a study, as plain values independent of its form; each part is read when it is asked for."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import chain, product
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from sprag.service.exports.inputs import Input, inputs
 from sprag.service.exports.source import StoredRows, given_texts
 from sprag.service.faults import SelectionError
-from sprag.service.figures.answers import answers_figure
 from sprag.service.figures.clutch import clutch_figure
 from sprag.service.figures.pictures.curves import require_drawable
 from sprag.service.figures.pictures.sensitivity import MOST_RESULTS
 from sprag.service.languages import _
-from sprag.service.reading.catalogue import axes_json
-from sprag.service.reading.directions import ends_in_words
+from sprag.service.reading.directions import case_values
 from sprag.service.reading.quantities import TYPED
-from sprag.service.reading.reader import Choice, Reading, model_title, reading_for, shown
+from sprag.service.reading.reader import Choice, Reading, model_title, reading_for
 from sprag.service.report.calibration import calibration_part
 from sprag.service.report.chosen_figures import ChosenFigure, chosen_figures
 from sprag.service.report.drives import DrivesPart, drives_part
-from sprag.service.report.facts import facts_of
 from sprag.service.results.curve_cases import draw, draw_map, select
-from sprag.service.results.curves import Curves, Fetch, Map
-from sprag.service.results.defaults import caption, drawn_results, main_query, no_curves, varying_axes
-from sprag.service.results.fronts import goal_units
-from sprag.service.results.key_answer_words import answer_facts, curve_name, note_of, said_title
-from sprag.service.results.key_answers import answers_query, find_answers
+from sprag.service.results.curves import Curves, Map
+from sprag.service.results.defaults import drawn_results, main_query, no_curves, varying_axes
+from sprag.service.results.key_answer_words import curve_name, curve_named
+from sprag.service.results.key_answers import answers_query, find_answers, usual_curve
 from sprag.service.results.refined import curve_plan
 from sprag.service.results.refined_maps import map_plan
-from sprag.service.results.regimes import counted
-from sprag.service.results.rounds import sentence
 from sprag.service.results.sensitivity import Sensitivity, sensitivity
-from sprag.service.results.shown_inputs import run_settings
+from sprag.service.views.curves import completed_query
+from sprag.service.views.headline import headline_of
+from sprag.service.views.study_questions import ReportQuestion
 from sprag.worker import models
+from sprag.worker.planning.calibrate.plan import CALIBRATE
+from sprag.worker.planning.goals.plan import GOAL
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from sprag.service.figures.figure import Figure
-    from sprag.service.results.curves import CurveQuery
-    from sprag.service.results.key_answers import Found, StudyAnswers
-    from sprag.service.storage.store import Store
-    from sprag.service.storage.studies.records import Kinds, RowBlock, StudyRecord
+    from sprag.service.results.calibration import Calibration
+    from sprag.service.results.curves import CurveQuery, Fetch
+    from sprag.service.results.fronts import Designs
+    from sprag.service.results.key_answers import StudyAnswers
+    from sprag.service.storage.studies.records import Kinds, RowBlock
+    from sprag.service.views.headline import Headline
+    from sprag.service.views.library import Library
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
 
@@ -63,17 +66,6 @@ AS_TYPED: Final = Choice(TYPED)
 
 
 @dataclass(frozen=True, slots=True)
-class AxisRow:
-    """One axis as a line of a table."""
-
-    paths: str
-    unit: str
-    values: int
-    least: float | str
-    largest: float | str
-
-
-@dataclass(frozen=True, slots=True)
 class Range:
     """The range of one result over all cases that have it; ``least`` and the others are None where no case has it."""
 
@@ -86,204 +78,164 @@ class Range:
     largest_case: int | None
 
 
-@dataclass(frozen=True, slots=True)
 class Report:
-    """The content of a report, in SI and code names; ``reading`` says how it is read.
+    """A study in its current state as a document shows it, in SI and code names; ``reading`` says how it is read.
 
-    ``main`` are the curves of the answers, with these marked on them; ``answers`` the rows of their table.
-    ``left_out`` are the cases that the ranges leave out because their motion is not settled. ``figures``
-    are those that somebody chose for the report, in the place of ``main``, of ``pictures`` and of the maps.
+    ``question`` has the curves, the working point and what its author wrote. The figures that are saved with the study
+    for its report stand in the place of its curves, unless the question names results.
     """
 
-    title: str
-    study: Study
-    facts: tuple[tuple[str, str], ...]
-    warnings: tuple[str, ...]
-    axes: tuple[AxisRow, ...]
-    run: list[tuple[str, str, Input]]
-    endings: tuple[tuple[str, int, str], ...]
-    inputs: tuple[Input, ...]
-    given: dict[str, str]
-    ranges: tuple[Range, ...]
-    pictures: tuple[Curves, ...]
-    maps: tuple[Map, ...]
-    note: str
-    drives: DrivesPart | None
-    reading: Reading
-    main: Figure | None
-    main_caption: str
-    answers: tuple[tuple[str, ...], ...]
-    clutch: Figure | None
-    left_out: int
-    kinds: tuple[tuple[str, int, str], ...]
-    calibration: DrivesPart | None = None
-    figures: tuple[ChosenFigure, ...] = ()
-    effects: tuple[Sensitivity, ...] = ()
+    def __init__(self, library: Library, study_id: str, choice: Choice, question: ReportQuestion) -> None:
+        store = library.store
+        store.digests.require_undamaged(study_id, anew=True)
+        self.library, self.study_id, self.choice, self.question = library, study_id, choice, question
+        self.record, self.progress = store.studies.look(study_id)
+        self.spec, self.study = store.studies.spec(study_id), store.studies.study(study_id)
+        self.infos = models.study_results(self.study)
+        self.reading: Reading = reading_for(self.study, self.spec, choice)
+        self.fetch: Fetch = partial(store.rows.for_cases, study_id)
+        self.title = self.record.name or model_title(self.record.model)
+        curves = question.x, question.y, question.by, question.at, question.of
+        self.chosen: CurveQuery | None = completed_query(self.study, *curves) if any(curves) else None
 
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What should be known of the study, for the reader."""
+        return tuple(map(self.reading.warning, self.record.warnings))
 
-def report_of(
-    store: Store,
-    study_id: str,
-    choice: Choice = AS_TYPED,
-    chosen: CurveQuery | None = None,
-    point: str | None = None,
-    *,
-    saved: bool = True,
-) -> Report:
-    """The report of a stored study, with the figures that are ``saved`` with the study for it; without them, or where
-    there are none, with the ``chosen`` curves, by default those of its page.
+    @cached_property
+    def kinds(self) -> Kinds:
+        """How many cases have which regime and which flags."""
+        return self.library.store.rows.kinds(self.study_id)
 
-    Its answers are those of the chosen curves, and at the working ``point`` as typed.
+    @cached_property
+    def figures(self) -> tuple[ChosenFigure, ...]:
+        """The figures that somebody chose for the report."""
+        return () if self.question.y else chosen_figures(self.library.store, self.study_id, self.choice)
 
-    Raises StudyNotFoundError, SelectionError for curves, points and units that the study does not have, and
-    DatabaseError where its rows are not those that were stored.
-    """
-    store.digests.require_undamaged(study_id, anew=True)
-    record, progress = store.studies.look(study_id)
-    spec, study = store.studies.spec(study_id), store.studies.study(study_id)
-    report = make_report(
-        record,
-        study,
-        progress.endings,
-        StoredRows(store, study_id),
-        partial(store.rows.for_cases, study_id),
-        spec,
-        store.rows.kinds(study_id),
-        reading_for(study, spec, choice),
-        chosen,
-        chosen_figures(store, study_id, choice) if saved else (),
-        point,
-    )
-    origins = "; ".join(origin.sentence for origin in store.rows.origins(study_id))
-    report = replace(report, facts=(*report.facts, (_("computed by"), origins or _("no host yet"))))
-    if progress.rounds is None:
-        return report
-    rows = partial(store.rows.for_cases, study_id)
-    return replace(
-        report,
-        facts=(
-            *report.facts,
-            (_("rounds"), report.reading.say(sentence(progress.rounds, record.state, goal_units(study)))),
-        ),
-        calibration=calibration_part(study, store.studies.rounds(study_id), rows),
-    )
+    @cached_property
+    def answers(self) -> StudyAnswers | None:
+        """The answers of the chosen curves, otherwise of those that its page shows first; None where they lie on none.
 
+        Raises SelectionError for chosen curves and for a working point that cannot be shown.
+        """
+        point = self.question.point
+        query = answers_query(self.study, self.infos, self.chosen)
+        if query is None and self.study.cases > 1 and not point:
+            return None
+        try:
+            found = find_answers(
+                self.study, self.infos, query if self.chosen is None else self.chosen, point, self.fetch
+            )
+            if found.drawn is not None:
+                require_drawable([found.drawn])
+        except SelectionError:
+            if self.chosen is not None or point:
+                raise
+            return None
+        return found
 
-def make_report(
-    record: StudyRecord,
-    study: Study,
-    endings: dict[str, int],
-    blocks: Iterable[RowBlock],
-    fetch: Fetch,
-    spec: Mapping[str, Any],
-    kinds: Kinds,
-    reading: Reading,
-    chosen: CurveQuery | None = None,
-    figures: tuple[ChosenFigure, ...] = (),
-    point: str | None = None,
-) -> Report:
-    """The report of a study in its current state; reads all its rows once. ``spec`` is the user's own."""
-    infos = models.study_results(study)
-    left_out = sum(count for name, count in kinds.flags.items() if models.unsettled(study.model, [name])[0])
-    every = ranges(study.model, infos, blocks)
-    found = _answers_of(study, infos, chosen, point, fetch)
-    drawn = None if found is None or figures else found.drawn
-    already = frozenset(() if drawn is None else (info.name for info in drawn.selection.results))
-    pictures, note = ((), "") if figures else _pictures(study, infos, already, fetch)
-    main = None if found is None or drawn is None else answers_figure(found, 2)
-    return Report(
-        record.name or model_title(record.model),
-        study,
-        facts_of(record, study, spec) + (((_("motions"), shown(counted(kinds.regimes))),) if kinds.regimes else ()),
-        record.warnings,
-        tuple(AxisRow(" = ".join(a["paths"]), a["unit"], a["values"], *ends_in_words(a)) for a in axes_json(study)),
-        run_settings(study, spec, reading),
-        tuple((name, count, _(models.ENDING_SENTENCES.get(name, ""))) for name, count in endings.items()),
-        inputs(study, spec),
-        {path: _shortened(text) for path, text in given_texts(spec).items()},
-        every,
-        pictures,
-        () if figures else _maps(study, infos, fetch),
-        note,
-        drives_part(study, infos, fetch),
-        reading,
-        main,
-        "" if found is None or found.query is None else caption(study, found.query).said(reading),
-        () if found is None else tuple(_answer_rows(found, study, reading)),
-        clutch_figure(study, spec, _largest_windup(every)),
-        left_out,
-        (*_kind_rows(kinds.regimes, models.REGIME_SENTENCES), *_flag_rows(study, kinds)),
-        figures=figures,
-        effects=_effects(study, infos, spec, fetch),
-    )
+    @cached_property
+    def curve(self) -> int | None:
+        """The place of the curve that is meant: the one that is named, otherwise that of the nominal machine."""
+        found = self.answers
+        if found is None or not found.curves:
+            return None
+        named = curve_named([curve_name(one, self.study) for one in found.curves], self.question.curve)
+        return usual_curve(self.study, found) if named is None else named
 
+    @cached_property
+    def headline(self) -> Headline:
+        """The answer in a sentence or two, and its numbers."""
+        curve = self.curve if self.question.curve else None
+        return headline_of(self.library, self.study_id, self.chosen, self.question.point, curve)
 
-def _answers_of(
-    study: Study, infos: tuple[ResultInfo, ...], chosen: CurveQuery | None, point: str | None, fetch: Fetch
-) -> StudyAnswers | None:
-    """The answers of the chosen curves, otherwise of those that the page shows first; None where they lie on none.
+    @cached_property
+    def effects(self) -> tuple[Sensitivity, ...]:
+        """What the main results depend on; none where a single axis varies, which is all of it."""
+        if len(varying_axes(self.study)) < 2 or self.study.plan is not None:
+            return ()
+        try:
+            found = sensitivity(self.study, self.spec, drawn_results(self.study, self.infos)[:MOST_RESULTS], self.fetch)
+        except SelectionError:  # too large a study
+            return ()
+        return tuple(item for item in found if item.cases)
 
-    Raises SelectionError for chosen curves and for a working point that cannot be shown.
-    """
-    query = answers_query(study, infos, chosen)
-    if query is None and study.cases > 1 and not point:
-        return None
-    try:
-        found = find_answers(study, infos, query if chosen is None else chosen, point, fetch)
-        if found.drawn is not None:
-            require_drawable([found.drawn])
-    except SelectionError:
-        if chosen is not None or point:
-            raise
-        return None
-    return found
+    @cached_property
+    def ranges(self) -> tuple[Range, ...]:
+        """The range of each result; reads all rows once."""
+        return ranges(self.study.model, self.infos, StoredRows(self.library.store, self.study_id))
 
+    @property
+    def left_out(self) -> int:
+        """Cases that the ranges leave out because their motion is not settled."""
+        flags = self.kinds.flags.items()
+        return sum(count for name, count in flags if models.unsettled(self.study.model, [name])[0])
 
-def _effects(
-    study: Study, infos: tuple[ResultInfo, ...], spec: Mapping[str, Any], fetch: Fetch
-) -> tuple[Sensitivity, ...]:
-    """What the results of the page "Sensitivity" depend on; none where a single axis varies, which is all of it."""
-    if len(varying_axes(study)) < 2 or study.plan is not None:
-        return ()
-    try:
-        found = sensitivity(study, spec, drawn_results(study, infos)[:MOST_RESULTS], fetch)
-    except SelectionError:  # too large a study
-        return ()
-    return tuple(item for item in found if item.cases)
+    @cached_property
+    def clutch(self) -> Figure | None:
+        """The law of the clutch up to the largest windup of any case; None for a machine without one."""
+        largest = max((row.largest or 0.0 for row in self.ranges if row.info.name.endswith("windup.max")), default=0.0)
+        return clutch_figure(self.study, self.spec, largest)
 
+    @cached_property
+    def drives(self) -> DrivesPart | None:
+        """What tolerances do; None for a study without them."""
+        return drives_part(self.study, self.infos, self.fetch)
 
-def _answer_rows(found: StudyAnswers, study: Study, reading: Reading) -> Iterator[tuple[str, ...]]:
-    """Title, value, place and note of each answer; a row with the curve before those of each of several."""
-    for one in found.curves:
-        name = curve_name(one, study).said(reading)
-        if name and len(found.curves) > 1:
-            yield (_("Curve {name}", name=name), "", "", "")
-        # Answers of a model may be among the main results at the working point.
-        yield from dict.fromkeys(_answer_row(item, found.unit, reading) for item in (*one.answers, *one.working_point))
+    @cached_property
+    def designs(self) -> Designs | None:
+        """The designs of a search, ranked; None for another study."""
+        searches = self.study.plan is not None and self.study.plan.get("kind") == GOAL
+        return self.library.fronts.of(self.study_id, exact=False) if searches else None
 
+    @property
+    def best(self) -> list[int]:
+        """The places of the feasible designs of a search, the best first."""
+        found = self.designs
+        return [] if found is None else [place for place in found.order.tolist() if found.front.feasible[place]]
 
-def _answer_row(item: Found, unit: str, reading: Reading) -> tuple[str, str, str, str]:
-    title = item.answer.title
-    title = reading.say_name(title) if title == item.answer.result else said_title(title, reading)
-    sign = "> " if item.above and item.value is not None else ""
-    value = "–" if item.value is None else sign + reading.quantity(item.value, item.unit)
-    place = "" if item.x is None else reading.quantity(item.x, unit)
-    return (title, value, place, note_of(answer_facts(item), unit).said(reading))
+    @property
+    def meant(self) -> dict[str, float | str]:
+        """The parameters that a study has found, by their paths: of the best design, or of the fit."""
+        if self.designs is not None and self.best:
+            return case_values(self.study, int(self.designs.front.cases[self.best[0]][0]))
+        if self.calibrated is not None and self.calibrated.answer is not None:
+            return dict(zip(self.calibrated.names, self.calibrated.answer.values.tolist(), strict=True))
+        return {}
 
+    @cached_property
+    def calibrated(self) -> Calibration | None:
+        """The calibration as far as it has come; None for another study."""
+        calibrates = self.study.plan is not None and self.study.plan.get("kind") == CALIBRATE
+        return self.library.calibrations.of(self.study_id) if calibrates else None
 
-def _largest_windup(every: Sequence[Range]) -> float:
-    """The largest windup of a clutch in any case (rad); 0 where none is known."""
-    return max((row.largest or 0.0 for row in every if row.info.name.endswith("windup.max")), default=0.0)
+    @property
+    def calibration(self) -> DrivesPart | None:
+        """What a calibration has found; None for another study."""
+        return None if self.calibrated is None else calibration_part(self.calibrated)
 
+    @cached_property
+    def inputs(self) -> tuple[Input, ...]:
+        """Every input, defaults included."""
+        return inputs(self.study, self.spec)
 
-def _kind_rows(counts: Mapping[str, int], meanings: Mapping[str, str]) -> Iterator[tuple[str, int, str]]:
-    return ((name, count, _(meanings.get(name, ""))) for name, count in counts.items())
+    @property
+    def given(self) -> dict[str, str]:
+        """The texts of the machine and of its run as they were given, long ones without their ends."""
+        return {path: _shortened(text) for path, text in given_texts(self.spec).items()}
 
+    @cached_property
+    def further(self) -> tuple[tuple[Curves, ...], str]:
+        """The curves of all results that the sheets do not draw, a page each; or why there are none."""
+        drawn = None if self.answers is None else self.answers.drawn
+        already = frozenset(() if drawn is None else (info.name for info in drawn.selection.results))
+        return _pictures(self.study, self.infos, already, self.fetch)
 
-def _flag_rows(study: Study, kinds: Kinds) -> Iterator[tuple[str, int, str]]:
-    """The flags; those of regimes stand with the regimes."""
-    flags = {name: count for name, count in kinds.flags.items() if name not in models.REGIME_SENTENCES}
-    return _kind_rows(flags, models.flags_of(study.model))
+    @cached_property
+    def maps(self) -> tuple[Map, ...]:
+        """The refined maps of a study."""
+        return _maps(self.study, self.infos, self.fetch)
 
 
 def _shortened(text: str) -> str:
@@ -348,7 +300,7 @@ def _pictures(
         return (), ""
     try:
         whole = draw(select(study, infos, replace(query, y=tuple(info.name for info in chosen))), fetch)
-        shown = [info for info in chosen if _varies(whole, info)][:_MOST_RESULTS]
+        shown = [info for info in chosen if varies(whole, info)][:_MOST_RESULTS]
         groups = [shown[start : start + _RESULTS_A_PICTURE] for start in range(0, len(shown), _RESULTS_A_PICTURE)]
         parts = tuple(replace(whole, selection=replace(whole.selection, results=tuple(group))) for group in groups)
         for part in parts:
@@ -358,7 +310,7 @@ def _pictures(
     return parts, ""
 
 
-def _varies(drawn: Curves, info: ResultInfo) -> bool:
+def varies(drawn: Curves, info: ResultInfo) -> bool:
     """Whether curves show more of a result than its value in the table of ranges."""
     values = np.concatenate([curve.y[info.name] for curve in drawn.curves])
     known = values[np.isfinite(values)]

@@ -1,18 +1,21 @@
-"""The report as one self-contained HTML file with embedded pictures, ready to be printed."""
+"""The document as HTML: one self-contained file with embedded pictures, ready to be printed."""
 
 from __future__ import annotations
 
 import base64
+from functools import cache
+from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
 from sprag.service.languages import _, current
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from sprag.service.report.document import Document
+    from sprag.service.report.blocks import Document
 
 
 def html_report(document: Document, folder: Path | None, logo: tuple[str, bytes] | None) -> bytes:
@@ -28,8 +31,21 @@ def html_report(document: Document, folder: Path | None, logo: tuple[str, bytes]
     environment.filters["embedded"] = embedded
     mark = None if logo is None else embedded(logo[1], logo[0])
     template = environment.get_template("report.html")
-    text = template.render(document=document, logo=mark, language=current(), page=page_numbers(), _=_)
+    text = template.render(
+        document=document, logo=mark, language=current(), page=page_numbers(), style=style(), sheet_of=sheet_of, _=_
+    )
     return text.encode("utf-8")
+
+
+@cache
+def style() -> Markup:
+    """The style of the sheets, which the page of a document has as a file."""
+    return Markup((files("sprag.service.report") / "static" / "document.css").read_text("utf-8"))  # noqa: S704 - ours
+
+
+def sheet_of(number: int, count: int) -> str:
+    """Which of the sheets it is."""
+    return _("{number} of {count}", number=number, count=count)
 
 
 def page_numbers() -> tuple[str, str, str]:

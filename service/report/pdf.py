@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 from collections.abc import Callable, Iterator
+from dataclasses import asdict
 from functools import partial
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -15,15 +16,18 @@ from typing import TYPE_CHECKING, Any, Final, cast
 from sprag.service.extras import naming_extra
 from sprag.service.faults import FaultError
 from sprag.service.languages import _, current
-from sprag.service.report.document import Document, Image, Section, Table
-from sprag.service.report.html import page_numbers
+from sprag.service.report.blocks import Document, Image, Section
+from sprag.service.report.html import page_numbers, sheet_of
 
 if TYPE_CHECKING:
-    from sprag.service.report.document import Block
+    from sprag.service.report.blocks import Block
 
 TEMPLATE: Final = "report.typ"
 #: The conformance asked for: PDF for everybody, with tags, a title, a language and descriptions of pictures.
 _STANDARD: Final = "ua-1"
+#: Fonts in their order: the first has Cyrillic and the signs of units, and matplotlib brings its files.
+FONTS: Final = ("DejaVu Sans", "Libertinus Serif")
+_FONT_FILES: Final = ("DejaVuSans.ttf", "DejaVuSans-Bold.ttf", "DejaVuSans-Oblique.ttf")
 _UNPRINTABLE: Final = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 _ENDINGS: Final = {"image/svg+xml": "svg", "image/png": "png"}
 
@@ -40,6 +44,8 @@ def pdf_report(document: Document, folder: Path | None, logo: tuple[str, bytes] 
     """
     with naming_extra("A report as PDF", "report"):
         import typst
+    import matplotlib as mpl
+
     with TemporaryDirectory(prefix="sprag-report-") as name:
         place = Path(name)
         own = None if folder is None else folder / TEMPLATE
@@ -50,17 +56,28 @@ def pdf_report(document: Document, folder: Path | None, logo: tuple[str, bytes] 
                 shutil.copy(template, place / TEMPLATE)
         data: dict[str, Any] = {
             "title": document.title,
+            "foot": document.foot,
+            "fonts": FONTS,
             "particulars": document.particulars,
             "sections": list(_sections(document.sections, place)),
             "logo": None,
             "language": current(),
-            "words": {"author": _("Author"), "logo": _("Logo"), "page": page_numbers()},
+            "words": {
+                "author": _("Author"),
+                "logo": _("Logo"),
+                "report": _("Report"),
+                "sheet": _("Sheet"),
+                "first": sheet_of(1, 2),
+                "page": page_numbers(),
+            },
         }
         if logo is not None:
             data["logo"] = f"logo.{_ENDINGS[logo[0]]}"
             (place / data["logo"]).write_bytes(logo[1])
         (place / "report.json").write_text(json.dumps(_printable(data), ensure_ascii=False), encoding="utf-8")
-        fonts = [] if folder is None else [str(folder)]
+        for font in _FONT_FILES:
+            shutil.copy(Path(mpl.get_data_path()) / "fonts" / "ttf" / font, place / font)
+        fonts = [str(place), *([] if folder is None else [str(folder)])]
         compiled: Callable[..., bytes] = partial(
             cast("Any", typst.compile), str(place / TEMPLATE), root=name, format="pdf", timestamp=0, font_paths=fonts
         )
@@ -94,12 +111,9 @@ def _sections(sections: tuple[Section, ...], place: Path) -> Iterator[dict[str, 
                 count += 1
                 (place / f"picture-{count}.svg").write_bytes(block.svg)
             blocks.append(_plain(block, f"picture-{count}.svg"))
-        yield {"title": section.title, "blocks": blocks}
+        yield {"title": section.title, "sheet": section.sheet, "blocks": blocks}
 
 
 def _plain(block: Block, file: str) -> dict[str, Any]:
-    if isinstance(block, Image):
-        return {"kind": block.kind, "file": file, "caption": block.caption, "alt": block.alt, "wide": block.wide}
-    if isinstance(block, Table):
-        return {"kind": block.kind, "heads": block.heads, "rows": block.rows, "numbers": block.numbers}
-    return {"kind": block.kind, "text": block.text, "warning": block.warning}
+    fields = {name: value for name, value in asdict(block).items() if name != "svg"}
+    return {**fields, "file": file} if isinstance(block, Image) else fields

@@ -318,19 +318,62 @@ def _particular(name: str) -> Setting:
     return Setting(f"{name}, in the title block", longest=200, metavar="TEXT")
 
 
+#: What the appendix of a report can have, in its order.
+CHAPTERS: Final = (
+    "warnings",
+    "answers",
+    "axes",
+    "curves",
+    "drawings",
+    "clutch",
+    "sensitivity",
+    "calibration",
+    "drives",
+    "endings",
+    "ranges",
+    "inputs",
+    "given",
+    "versions",
+    "results",
+)
+
+
 @dataclass(frozen=True, slots=True)
 class ReportQuestion:
-    """What the title block says, and which curves are drawn."""
+    """What the title block says, which curves are drawn, what its author writes, and what the appendix has."""
 
     project: Annotated[str, _particular("project")] = ""
+    customer: Annotated[str, _particular("customer")] = ""
+    quote: Annotated[str, _particular("number of the quote")] = ""
     author: Annotated[str, _particular("author")] = ""
     number: Annotated[str, _particular("number of the document")] = ""
+    revision: Annotated[str, _particular("revision of the document")] = ""
     date: Annotated[str | None, _particular("date, today if there is none")] = None
+    text: Annotated[
+        list[str] | None,
+        Setting(
+            "text of the author; may be repeated: beside the drawing, below the curves, above what is said of trust, "
+            "and before each further figure",
+            metavar="TEXT",
+        ),
+    ] = None
+    appendix: Annotated[
+        list[str] | None,
+        Setting(
+            f"chapter after the two pages; may be repeated: {', '.join(CHAPTERS)}; `all` for all of them",
+            examples=(["inputs", "versions"],),
+            metavar="CHAPTER",
+        ),
+    ] = None
     x: Annotated[str | None, Setting("path of the axis along the chosen curves", metavar="PATH")] = None
     by: Annotated[list[str] | None, Setting("axis with one curve for each of its values", metavar="PATH")] = None
     at: Held = None
     of: Of = None
     y: Annotated[list[str] | None, Setting("result of a chosen curve; may be repeated", metavar="RESULT")] = None
+    curve: Annotated[
+        str,
+        Setting("name of the curve that is meant, such as `2 mm`; default: the usual one", longest=200, metavar="NAME"),
+    ] = ""
     point: Point = None
 
 

@@ -10,10 +10,12 @@ import pytest
 from sprag.service.cli import saved_views as commands
 from sprag.service.client import Client
 from sprag.service.jobs.reports.curve import small_curve
-from sprag.service.report.content import report_of
-from sprag.service.report.document import Image, Text, TitleBlock, document_of
+from sprag.service.report.blocks import Image, Text
+from sprag.service.report.document import document_of, report_of
 from sprag.service.spec.report import SpecError
 from sprag.service.spec.saved_views import read_view, read_view_change
+from sprag.service.views.library import Library
+from sprag.service.views.study_questions import ReportQuestion
 from tests.service.conftest import PortalTransport, Service
 
 if TYPE_CHECKING:
@@ -116,15 +118,20 @@ def test_the_report_has_the_chosen_figures_in_order(service: Service, study: str
     save(service, page="map", study=study, name="Speeds", query=MAP, in_report=True)
     torque = save(service, page="curves", study=study, name="Torque of the clutch", query=TORQUE, in_report=True)
     assert service.http.patch(f"{API}/views/{torque['id']}", json={"place": 1}).status_code == 200
-    found = report_of(service.store, study)
+    found = report_of(Library(service.store), study)
     assert [(figure.name, figure.contours) for figure in found.figures] == [
         ("Torque of the clutch", False), ("Speeds", True),
     ]  # fmt: skip
-    assert found.main is None
-    assert found.pictures == ()  # the chosen figures replace all others
-    section = next(s for s in document_of(found, TitleBlock()).sections if s.title == "Figures")
-    captions = [block.caption for block in section.blocks if isinstance(block, Image)]
-    assert [text.partition(".")[0] for text in captions] == ["Torque of the clutch", "Speeds"]
+    asked = ReportQuestion(text=["", "", "", "Before the speeds."])
+    document = document_of(Library(service.store), study, question=asked)
+    first = [block.caption for section in document.sheets[0] for block in section.blocks if isinstance(block, Image)]
+    assert first[-1].startswith("Torque of the clutch. ")  # it stands in the place of the curves
+    (section,) = document.appendix
+    assert section.title == "Figures"
+    text, image = section.blocks
+    assert isinstance(text, Text)
+    assert isinstance(image, Image)
+    assert (text.text, image.caption.partition(".")[0]) == ("Before the speeds.", "Speeds")
     torque_figure = found.figures[0].shown
     assert torque_figure is not None
     assert torque_figure.panels[0].y.unit == "N*mm"  # type: ignore[union-attr] - curves, in the units of the view
@@ -140,11 +147,10 @@ def test_the_report_has_the_chosen_figures_in_order(service: Service, study: str
 def test_a_figure_that_cannot_be_drawn_says_so(service: Service, study: str) -> None:
     saved = save(service, page="curves", study=study, name="Broken", query=TORQUE, in_report=True)
     service.store.views.save(read_view({"page": "curves", "study": study, "name": "Broken", "query": "y=none"}))
-    (figure,) = report_of(service.store, study).figures
+    (figure,) = report_of(Library(service.store), study).figures
     assert (figure.shown, "Broken" in figure.caption) == (None, True)
-    sections = document_of(report_of(service.store, study), TitleBlock()).sections
-    section = next(section for section in sections if section.title == "Figures")
-    assert [block for block in section.blocks if isinstance(block, Text) and block.warning]
+    (first, _second) = document_of(Library(service.store), study).sheets
+    assert [block for section in first for block in section.blocks if isinstance(block, Text) and block.warning]
     assert saved["name"] in service.http.get(f"/studies/{study}").text
 
 

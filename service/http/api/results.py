@@ -133,19 +133,18 @@ async def get_report(
     language: Annotated[str, language_query("the document")] = languages.ENGLISH,
     form: Annotated[str | None, format_query(report.REPORT_FORMATS, "pdf")] = None,
 ) -> Response:
-    """A study as a printable page or a PDF: machine, answers, chosen curves, endings, ranges of results, inputs.
+    """A study as a printable page or a PDF of two pages: answer, machine, curves, conditions, how far to trust them.
 
-    Without `x`, `y`, `by`, `at` and `of` the curves are those that the page of the study shows first. Figures that
-    were put into the report are drawn in their place unless there is `y`.
+    Chapters of `appendix` follow. Without `x`, `y`, `by`, `at` and `of` the curves are those that the page of the study
+    shows first. Figures that were put into the report are drawn in their place unless there is `y`.
     """
     chosen = choose_format(work.request, form, report.MEDIA_TYPES)
-    settings = work.context.settings
+    settings, library = work.context.settings, work.context.library
 
     def make(_record: StudyRecord) -> Drawing:
         policy = {"Content-Security-Policy": _REPORT_POLICY} if chosen == "html" else {}
-        document = report.asked_report(work.context.store, study_id, choice, dated, settings.report_office)
-        shown = *document, settings.report_folder, chosen
-        return Drawing(report.write_report, shown, report.MEDIA_TYPES[chosen], policy)
+        asked = library, study_id, choice, dated, settings.report_office, settings.report_folder, chosen
+        return Drawing(report.report_file, asked, report.MEDIA_TYPES[chosen], policy)
 
     choice_of("language", language, languages.available())
     with languages.language(language):

@@ -102,7 +102,7 @@ class _Files(StaticFiles):
         return response
 
 
-_FILES: Final = _Files(packages=[("sprag.service.http.web", "static")])
+_FILES: Final = _Files(packages=[("sprag.service.http.web", "static"), ("sprag.service.report", "static")])
 
 
 class _SiteFiles(StaticFiles):

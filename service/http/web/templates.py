@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import Any, Final
 from urllib.parse import urlencode
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from jinja2.ext import Extension
 from markupsafe import Markup, escape
 from starlette.responses import Response
@@ -29,6 +29,7 @@ from sprag.service.languages import N_
 from sprag.service.reading.faults import allowed_text, fault_text, value_text
 from sprag.service.reading.reader import CLUTCH, Reading, model_title, shown, titled, told, word
 from sprag.service.reading.wording import counted, duration, number, symbol, typed_text, unit_text
+from sprag.service.report.html import embedded, sheet_of
 from sprag.service.schedules.times import wall_clock
 
 #: The beginning of an attribute that is an address: a path of this service, or an expression that may give one.
@@ -94,7 +95,8 @@ def _warning(text: str, reading: Reading) -> str:
 @lru_cache(maxsize=1)
 def _templates() -> Environment:
     environment = Environment(
-        loader=PackageLoader("sprag.service.http.web"),
+        # The sheets of a document are those of its files.
+        loader=ChoiceLoader([PackageLoader("sprag.service.http.web"), PackageLoader("sprag.service.report")]),
         autoescape=True,
         extensions=[Addresses, "jinja2.ext.i18n"],
         undefined=StrictUndefined,
@@ -134,7 +136,9 @@ def _templates() -> Environment:
         "query": urlencode,
         "here": here,
         "drawn": drawn,
+        "embedded": embedded,
     }
+    environment.globals["sheet_of"] = sheet_of
     environment.globals["here"] = here
     environment.globals["prefix_of_urls"] = lambda: current().prefix
     environment.globals["language"] = languages.current

@@ -15,8 +15,9 @@ import pytest
 import xarray as xr
 
 from sprag.service.exports.source import given_texts
-from sprag.service.report.content import report_of
+from sprag.service.report.document import report_of
 from sprag.service.spec.document import load_spec
+from sprag.service.views.library import Library
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
@@ -130,15 +131,17 @@ def test_a_fitted_clutch_is_told_from_a_given_one_and_the_run_has_its_defaults(s
     assert re.search(window, page)
 
 
-def test_the_report_says_it_too(service: Service) -> None:
-    page = got(service, press(mean_speed_is="time"), "html").decode()
-    assert '<th scope="row">base.mean_speed_is</th><td>time</td>' in page
+def test_the_report_says_it_too_in_words(service: Service) -> None:
+    study_id = service.submit(press(mean_speed_is="time"))
+    service.fill(study_id)
+    page = service.http.get(f"/api/v1/studies/{study_id}/report?format=html&appendix=given").text
+    assert '<th scope="row">Mean speed is</th><td>Time</td>' in page
 
 
 def test_a_long_table_is_whole_in_files_and_cut_in_the_report(service: Service) -> None:
     spec = json.loads((EXAMPLES / "measured_clutch.json").read_text(encoding="utf-8"))
     path, text = max(given_texts(spec).items(), key=lambda item: len(item[1]))
-    shown = report_of(service.store, service.submit(spec)).given[path]
+    shown = report_of(Library(service.store), service.submit(spec)).given[path]
     assert shown == text if len(text) <= 1000 else shown == f"{text[:1000]} ... ({len(text)} characters in all)"
 
 

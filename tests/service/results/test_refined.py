@@ -21,12 +21,13 @@ from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.reading.quantities import Units
 from sprag.service.reading.reader import Reading
 from sprag.service.reading.wording import percent
-from sprag.service.report.content import report_of
+from sprag.service.report.document import report_of
 from sprag.service.results.curve_cases import draw, select
 from sprag.service.results.curves import CurveQuery, Curves
 from sprag.service.results.defaults import completed, main_query
 from sprag.service.results.rounds import sentence
 from sprag.service.storage.studies.records import CaseColumns, RoundProgress, RoundRecord
+from sprag.service.views.library import Library
 from sprag.worker import models
 from sprag.worker.states import StudyState
 from sprag.worker.study import Study
@@ -207,7 +208,7 @@ def test_the_answers_of_a_service(service: Service) -> None:
     assert (axes[1]["first"], axes[1]["last"]) == (0.0, 1.0)
     for address in ("curves", "figures/curves"):
         assert service.http.get(f"/studies/{study_id}/{address}").status_code == 200
-    pictures = report_of(service.store, study_id).pictures
+    pictures, _ = report_of(Library(service.store), study_id).further
     told = [[len(curve.refined.jumps) if curve.refined else None for curve in part.curves] for part in pictures]
     assert told == [[1, 0]] * len(pictures)
 

@@ -17,11 +17,12 @@ from sprag.service.figures.orders import map_edges
 from sprag.service.figures.pictures.maps import draw_map as paint_map
 from sprag.service.http.web.figures.maps import map_figure
 from sprag.service.report import write_report
-from sprag.service.report.content import report_of
-from sprag.service.report.document import TitleBlock
+from sprag.service.report.document import made_document, report_of
 from sprag.service.results.curve_cases import draw_map
 from sprag.service.results.curves import Map
 from sprag.service.storage.studies.records import CaseColumns
+from sprag.service.views.library import Library
+from sprag.service.views.study_questions import ReportQuestion
 from sprag.worker import models
 from sprag.worker.study import Study
 from tests.service.conftest import API, Service
@@ -131,15 +132,19 @@ def test_the_pages_and_files_of_a_service(service: Service, capsys: pytest.Captu
     for address in ("", "/map"):
         page = service.http.get(f"/studies/{study_id}{address}").text
         assert f"/studies/{study_id}/figures/map?x=shaft.load&amp;y=excitation.frequency" in page
-    report = report_of(service.store, study_id)
-    assert report.note == ""
+    report = report_of(Library(service.store), study_id, question=ReportQuestion(appendix=["curves", "versions"]))
+    assert report.further == ((), "")
     expected = [(mass, name) for mass in (0.5, 0.4) for name in (SPEED, EFFICIENCY)]
     assert [(one.at[MASS], one.result.name) for one in report.maps] == expected
-    html = write_report(report, TitleBlock(), "", "html").decode()
-    assert html.count(' over load torque and excitation frequency"') == len(report.maps)
-    assert 'alt="Mean shaft speed over load torque and excitation frequency"' in html
-    assert write_report(report, TitleBlock(), "", "pdf").startswith(b"%PDF")
-    assert dict(report.facts)["rounds"] == service.get(f"/studies/{study_id}")["progress"]["rounds"]["sentence"]
+    document = made_document(report)
+    html = write_report(document, "", "html").decode()
+    # One is on the first sheet.
+    assert html.count('alt="Mean shaft speed over load torque and excitation frequency"') == 3
+    assert write_report(document, "", "pdf").startswith(b"%PDF")
+    assert (
+        dict(document.sections[-1].blocks[0].rows)["rounds"]
+        == service.get(f"/studies/{study_id}")["progress"]["rounds"]["sentence"]
+    )
     query = {"x": LOAD, "y": FREQUENCY, "z": EFFICIENCY, "at": f"{MASS}=0.4"}
     assert service.http.get(f"/studies/{study_id}/figures/map", params=query).json()["below"].startswith("Within 2 %")
     found = service.get(f"/studies/{study_id}/map", **query)

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 from sprag.service.jobs.reports.curve import small_curve
 from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.report.content import report_of
+from sprag.service.report.document import report_of
 from sprag.service.schedules.fields import read_fields
 from sprag.service.spec.saved_views import View
+from sprag.service.views.library import Library
 from tests.service.schedules.conftest import NEW_YEAR
 from tests.service.timed_spec import SPEC
 
@@ -31,7 +32,7 @@ def test_the_next_study_of_a_schedule_has_the_figures_of_the_one_before(service:
     assert len(set(studies)) == 3
     for study in studies[1:]:
         assert [(one.view.name, one.place) for one in service.store.views.all(study)] == [("Efficiency", 1)]
-        (figure,) = report_of(service.store, study).figures
+        (figure,) = report_of(Library(service.store), study).figures
         assert small_curve(service.store, study) == figure.draw("png", "Efficiency")
     (first, *_) = service.store.views.all(studies[1])
     service.store.views.remove(first.id)

@@ -10,11 +10,10 @@ from functools import partial
 import pytest
 
 from sprag.service.answers.calibration import CalibrationReport
-from sprag.service.report import write_report
-from sprag.service.report.content import report_of
-from sprag.service.report.document import TitleBlock
+from sprag.service.report.document import report_of
 from sprag.service.results import calibration as calibration_module
 from sprag.service.results.calibration import calibration_json, calibration_of
+from sprag.service.views.library import Library
 from tests.service.calibrating import DAMPING, INERTIA, calibration
 from tests.service.conftest import API, Service
 from tests.service.shapes import fits
@@ -109,16 +108,18 @@ def test_a_table_and_a_picture(service: Service) -> None:
 
 def test_the_report_has_the_calibration(service: Service) -> None:
     study_id = calibration(service)
-    report = report_of(service.store, study_id)
+    report = report_of(Library(service.store), study_id)
     assert report.calibration is not None
     assert report.calibration.figure is not None
     # Its cases lie on no curves; pictures of them took hundreds of megabytes.
-    assert (report.main, report.pictures, report.note) == (None, (), "")
+    assert (report.answers, report.further) == (None, ((), ""))
     sentences = service.get(f"/studies/{study_id}/calibration")["sentences"]
     assert set(sentences) < set(report.calibration.sentences)
     assert "pendulums.0.damping = " in report.calibration.sentences[0]
-    assert "<h2>Calibration</h2>" in write_report(report, TitleBlock(), "", "html").decode()
-    assert report_of(service.store, service.submit()).calibration is None
+    page = service.http.get(f"{API}/studies/{study_id}/report?format=html&appendix=calibration").text
+    assert "<h2>Fitted values</h2>" in page
+    assert "<h2>Calibration</h2>" in page
+    assert report_of(Library(service.store), service.submit()).calibration is None
 
 
 def test_a_calibration_that_was_killed_ends_as_an_undisturbed_one(service: Service) -> None:

@@ -14,9 +14,12 @@ from sprag.service.faults import WarningCode
 from sprag.service.http.views import preset_of
 from sprag.service.languages import language
 from sprag.service.reading.reader import Choice
-from sprag.service.report.content import report_of
-from sprag.service.report.document import TitleBlock, document_of
+from sprag.service.report.blocks import Text
+from sprag.service.report.content import AS_TYPED
+from sprag.service.report.document import document_of
 from sprag.service.spec.document import parse_spec
+from sprag.service.views.library import Library
+from sprag.service.views.study_questions import ReportQuestion
 from tests.service import warning_samples
 from tests.service.timed_spec import SPEC
 
@@ -96,6 +99,14 @@ def shown(service: Service, study_id: str, spoken: str, **params: str) -> list[s
     return [html.unescape(text) for text in re.findall(r'<p class="warning">(.*?)</p>', answer.text, re.DOTALL)]
 
 
+def told(service: Service, study_id: str, choice: Choice = AS_TYPED) -> list[str]:
+    """The warnings in the report of a study, its sheet and its appendix."""
+    asked = ReportQuestion(appendix=["warnings"])
+    document = document_of(Library(service.store), study_id, choice, asked)
+    (section,) = document.appendix
+    return [block.text for block in section.blocks if isinstance(block, Text)]
+
+
 @pytest.mark.parametrize("spoken", ["en", "uk"])
 @pytest.mark.parametrize("model", ["drive", "shaft"])
 def test_no_warning_shows_a_pointer_or_a_path(service: Service, model: str, spoken: str) -> None:
@@ -103,8 +114,7 @@ def test_no_warning_shows_a_pointer_or_a_path(service: Service, model: str, spok
     study_id = warned(service, spec, texts)
     on_page = shown(service, study_id, spoken)
     with language(spoken):
-        document = document_of(report_of(service.store, study_id), TitleBlock())
-    in_report = [block.text for block in document.sections[0].blocks if block.kind == "text"]
+        in_report = told(service, study_id)
     assert on_page == in_report
     assert len(on_page) == len(texts)
     for text in on_page:
@@ -123,8 +133,7 @@ def test_a_warning_is_a_whole_sentence_with_its_values(service: Service, model: 
     study_id = stored(service, SPEC if drive else preset_of("press")["spec"], warnings)
     on_page = shown(service, study_id, "uk", units="mm")
     with language("uk"):
-        document = document_of(report_of(service.store, study_id, Choice("mm")), TitleBlock())
-    assert on_page == [block.text for block in document.sections[0].blocks if block.kind == "text"]
+        assert on_page == told(service, study_id, Choice("mm"))
     assert len(on_page) == len(warnings)
     sentence = "1600 мм — це більше за 100 мм; чи не в мм його подано?" if drive else "(випадків: 2 з 3)"
     assert any(text.replace("\N{NO-BREAK SPACE}", " ").endswith(sentence) for text in on_page), on_page
@@ -139,9 +148,7 @@ def test_places_are_captions_in_the_units_of_the_reader(service: Service) -> Non
     names = shown(service, study_id, "en", names="codes")
     assert any(line.startswith("excitation.amplitude_x: ") for line in names)
     with language("uk"):
-        report = report_of(service.store, study_id, Choice("mm"))
-        first = document_of(report, TitleBlock()).sections[0].blocks
-    assert any("100 мм" in getattr(block, "text", "") for block in first)
+        assert any("100 мм" in text for text in told(service, study_id, Choice("mm")))
 
 
 def test_warnings_of_the_form_speak_captions(service: Service) -> None:

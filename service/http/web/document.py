@@ -1,0 +1,158 @@
+"""The document of a study as a page: the sheets that its files have, with fields for what its author writes."""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import suppress
+from contextvars import copy_context
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+from urllib.parse import urlencode
+
+from starlette.responses import RedirectResponse, Response, StreamingResponse
+
+from sprag.service.faults import FaultError
+from sprag.service.http import views
+from sprag.service.http.asked import asking
+from sprag.service.http.context import Ctx, StudyId
+from sprag.service.http.current import current
+from sprag.service.http.reading import page_query
+from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
+from sprag.service.http.web.saved_views import saved_here, view_actions
+from sprag.service.http.web.templates import fragment, page
+from sprag.service.http.work import Attended
+from sprag.service.languages import _, pgettext
+from sprag.service.report import logo_of
+from sprag.service.report.document import LONGEST_TEXT, today
+from sprag.service.report.html import embedded
+from sprag.service.report.page import Shown, shown_document
+from sprag.service.views.study_questions import ReportQuestion
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Callable
+
+    from sprag.service.faults import Fault
+    from sprag.service.http.context import Context
+
+    Render = Callable[[Shown | None, tuple[Fault, ...]], str]
+
+router = page_router()
+
+#: Seconds after which the page begins before its document is made.
+_SOON: Final = 1.0
+#: Where the document stands in the page.
+_HERE: Final = "<!-- document -->"
+#: Settings of the question that are fields in the sheets, or of the form beside them.
+_FIELDS: Final = ("customer", "quote", "number", "author", "date", "revision", "project", "text", "appendix", "point")
+
+
+async def document_page(*, context: Ctx, work: Attended, study_id: StudyId, question: ReportQuestion) -> Response:
+    """The document of a study; where it takes long to make, the page says so and goes on when it is made."""
+    given = work.request.query_params.multi_items()
+    kept = _kept(given)
+    if kept != given:
+        query = urlencode(kept)
+        return RedirectResponse(f"/studies/{study_id}/document{'?' if query else ''}{query}", status_code=303)
+    shell = await in_thread(_shell, context, study_id)
+    begin, end = shell.split(_HERE)
+    office = context.settings.report_office
+    making = asyncio.ensure_future(
+        work.check(shown_document, context.library, study_id, current().choice, question, office)
+    )
+    here = copy_context()
+
+    def render(shown: Shown | None, faults: tuple[Fault, ...]) -> str:
+        return here.run(_document, context, study_id, question, kept, shown, faults)
+
+    await asyncio.wait([making], timeout=_SOON)
+    if making.done():
+        text, status = await _made(making, render)
+        return Response(begin + text + end, status_code=status, media_type="text/html")
+
+    async def pieces() -> AsyncIterator[str]:
+        try:
+            yield begin + str(fragment("_making.html"))
+            text, _status = await _made(making, render)
+            yield text + end
+        finally:
+            making.cancel()
+            with suppress(asyncio.CancelledError, Exception):
+                await making
+
+    return StreamingResponse(pieces(), media_type="text/html")
+
+
+router.get("/studies/{study_id:study}/document")(asking(document_page, ReportQuestion))
+
+
+def _kept(given: list[tuple[str, str]]) -> list[tuple[str, str]]:
+    """The parameters of an address that say something: fields are sent empty too, but only of a date that means none.
+
+    Of the texts of the author the empty ones before another one count, because they have places.
+    """
+    last = max((place for place, (name, value) in enumerate(given) if name == "text" and value.strip()), default=-1)
+    return [
+        (name, value)
+        for place, (name, value) in enumerate(given)
+        if (place <= last if name == "text" else value != today() if name == "date" else value or name not in _FIELDS)
+    ]
+
+
+async def _made(making: asyncio.Future[Shown], render: Render) -> tuple[str, int]:
+    """The rest of the page, and the status that it would have."""
+    try:
+        return await in_thread(render, await making, ()), 200
+    except FaultError as error:
+        if not error.faults:
+            raise
+        return await in_thread(render, None, tuple(error.faults)), 422
+
+
+def _shell(context: Context, study_id: str) -> str:
+    """The page without its document."""
+    record = context.store.studies.get(study_id)
+    response = page("document.html", study=record, here_is=_HERE)
+    return bytes(response.body).decode()
+
+
+def _document(
+    context: Context,
+    study_id: str,
+    question: ReportQuestion,
+    kept: list[tuple[str, str]],
+    shown: Shown | None,
+    faults: tuple[Fault, ...],
+) -> str:
+    """The form of the document and its sheets."""
+    found = context.store.views.all(study_id)
+    name = question.number or _("Report")
+    text = fragment(
+        "_document_page.html",
+        study_id=study_id,
+        shown=shown,
+        faults=faults,
+        question=question,
+        fields={
+            _("Customer"): "customer",
+            _("Quote"): "quote",
+            pgettext("of a document", "Number"): "number",
+            _("Author"): "author",
+            _("Date"): "date",
+            _("Revision"): "revision",
+        },
+        others=[(key, value) for key, value in kept if key not in (*_FIELDS, "language")],
+        file=f"{views.study_address(study_id)}/report",
+        logo=_logo(context),
+        longest=LONGEST_TEXT,
+        figures=[saved for saved in found if saved.place is not None],
+        here_saved=saved_here(found, "document", study_id, page_query(), name),
+        view_actions=view_actions(),
+        choice=current().choice,
+    )
+    return str(text)
+
+
+def _logo(context: Context) -> str | None:
+    found = logo_of(Path(folder)) if (folder := context.settings.report_folder) else None
+    return None if found is None else embedded(found[1], found[0])

@@ -1,0 +1,311 @@
+"""The appendix of a document: chapters that are added by name, each with a part of what is known of a study."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Final
+
+from sprag.sentences import Place
+from sprag.service.exports.inputs import Input
+from sprag.service.figures.answers import answers_figure
+from sprag.service.figures.curves import curves_figure
+from sprag.service.figures.drawings import drawings
+from sprag.service.figures.pictures.sensitivity import draw_sensitivity
+from sprag.service.languages import N_, _, gettext
+from sprag.service.reading.catalogue import axes_json
+from sprag.service.reading.directions import ends_in_words
+from sprag.service.reading.part_names import lower_first, upper_first
+from sprag.service.reading.reader import CODES, shown, term, titled
+from sprag.service.reading.wording import number, unit_text, words
+from sprag.service.report.blocks import Block, Image, Section, Table, Text
+from sprag.service.report.conditions import in_captions
+from sprag.service.report.drawn import chosen_image, drawing_images, image, map_images
+from sprag.service.report.facts import facts_of
+from sprag.service.results.defaults import caption, varying_axes
+from sprag.service.results.fronts import goal_units
+from sprag.service.results.key_answer_words import answer_facts, curve_name, note_of, said_title
+from sprag.service.results.refined_maps import map_plan
+from sprag.service.results.regimes import counted, left_out
+from sprag.service.results.rounds import sentence
+from sprag.service.results.shown_inputs import choice_name, in_words, run_settings
+from sprag.service.views.study_questions import CHAPTERS
+from sprag.worker import models
+from sprag.worker.planning.calibrate.plan import CALIBRATE
+
+if TYPE_CHECKING:
+    from sprag.service.report.content import Report
+    from sprag.service.results.key_answers import Found
+
+Write = Callable[["Report"], Iterator[Block]]
+
+_MEASURED: Final = N_("Measured points on the fitted curve, and residuals")
+_ORIGINS: Final = {
+    "axes": N_("varies"), "given": "", "default": N_("default"), "derived": N_("derived"),
+    "fitted": N_("fitted"), "tolerance": N_("varies from drive to drive"),
+}  # fmt: skip
+
+
+def chapters_of(report: Report) -> dict[str, str]:
+    """The chapters that the study has, and their titles, in their order."""
+    study, plan = report.study, report.study.plan
+    varying = len(varying_axes(study))
+    without: set[str] = set()
+    if not report.warnings:
+        without.add("warnings")
+    if not varying:
+        without |= {"curves", "results", "axes"}
+    if plan is not None or varying < 2:
+        without.add("sensitivity")
+    if study.spread is None or plan is not None:
+        without.add("drives")
+    if plan is None or plan.get("kind") != CALIBRATE:
+        without.add("calibration")
+    if plan is not None and report.answers is None and map_plan(study) is None:
+        without |= {"curves", "results"}
+    if report.answers is None:
+        without.add("answers")
+    if not models.has_clutches(study):
+        without.add("clutch")
+    if len(drawings(study)) < 2:
+        without.add("drawings")
+    return {name: _(_TITLES[name]) for name in CHAPTERS if name not in without}
+
+
+def appendix(report: Report) -> Iterator[Section]:
+    """The chapters that are asked for, without those that have nothing to say."""
+    names = report.question.appendix or ()
+    for name, title in chapters_of(report).items():
+        if name in names or "all" in names:
+            blocks = tuple(_WRITERS[name](report))
+            if blocks:
+                yield Section(title, blocks)
+
+
+def _warnings(report: Report) -> Iterator[Block]:
+    for text in report.warnings:
+        yield Text(text, warning=True)
+
+
+def _answers(report: Report) -> Iterator[Block]:
+    rows = tuple(dict.fromkeys(_answer_rows(report)))
+    if rows:
+        yield Table(("", _("Value"), _("at"), _("Note")), rows, (1, 2))
+
+
+def _answer_rows(report: Report) -> Iterator[tuple[str, ...]]:
+    """Title, value, place and note of each answer; a row with the curve before those of each of several."""
+    found, read = report.answers, report.reading
+    for one in () if found is None else found.curves:
+        name = curve_name(one, report.study).said(read)
+        if name and len(found.curves) > 1:  # type: ignore[union-attr]
+            yield (_("Curve {name}", name=name), "", "", "")
+        # Answers of a model may be among the main results at the working point.
+        yield from dict.fromkeys(_answer_row(report, item) for item in (*one.answers, *one.working_point))
+
+
+def _answer_row(report: Report, item: Found) -> tuple[str, str, str, str]:
+    read, title, unit = report.reading, item.answer.title, "1" if report.answers is None else report.answers.unit
+    title = read.say_name(title) if title == item.answer.result else said_title(title, read)
+    sign = "> " if item.above and item.value is not None else ""
+    value = "–" if item.value is None else sign + read.quantity(item.value, item.unit)
+    place = "" if item.x is None else read.quantity(item.x, unit)
+    return (title, value, place, note_of(answer_facts(item), unit).said(read))
+
+
+def _axes(report: Report) -> Iterator[Block]:
+    read = report.reading
+    rows = []
+    for axis in axes_json(report.study):
+        least, largest = ends_in_words(axis)
+        rows.append(
+            (
+                read.caption(" = ".join(axis["paths"])),
+                number(axis["values"]),
+                *(number(read.value(end, axis["unit"])) for end in (least, largest)),
+                unit_text(read.unit(axis["unit"])),
+            )
+        )
+    if rows:
+        yield Table((_("Parameter"), _("Values"), _("Least"), _("Largest"), _("Unit")), tuple(rows), (1, 2, 3))
+
+
+def _curves(report: Report) -> Iterator[Block]:
+    found = report.answers
+    if found is not None and found.drawn is not None and found.query is not None:
+        text = caption(report.study, found.query).said(report.reading)
+        yield image(report, answers_figure(found, 2, chosen=report.curve), text)
+    yield from map_images(report, report.maps)
+
+
+def _clutch(report: Report) -> Iterator[Block]:
+    if report.clutch is not None:
+        yield replace(image(report, report.clutch, _("Law of the clutch")), wide=False)
+
+
+def _sensitivity(report: Report) -> Iterator[Block]:
+    for item in report.effects:
+        text = _("What {result} depends on", result=report.reading.within(item.info.name))
+        svg = draw_sensitivity([item], "", report.reading, "svg", noted=False)
+        yield Image(svg, ". ".join((text, *(upper_first(report.reading.say(note)) for note in item.notes))), text)
+
+
+def _part(report: Report, *, name: str) -> Iterator[Block]:
+    part = report.calibration if name == "calibration" else report.drives
+    if part is not None:
+        if part.figure is not None:
+            yield image(report, part.figure, _(_MEASURED) if name == "calibration" else _("Quantiles over the drives"))
+        for text in part.sentences:
+            yield Text(upper_first(report.reading.say(text)))
+
+
+def _endings(report: Report) -> Iterator[Block]:
+    rows = [
+        (shown(term(name)), number(count), gettext(models.ENDING_SENTENCES.get(name, "")))
+        for name, count in report.progress.endings.items()
+    ]
+    if rows:
+        yield Table((_("Ending"), _("Cases"), _("Meaning")), tuple(rows), (1,))
+    # The flags of regimes stand with the regimes.
+    flags = {name: count for name, count in report.kinds.flags.items() if name not in models.REGIME_SENTENCES}
+    kinds = [
+        *_kinds(report.kinds.regimes, models.REGIME_SENTENCES),
+        *_kinds(flags, models.flags_of(report.study.model)),
+    ]
+    if kinds:
+        yield Table((_("Regime or flag"), _("Cases"), _("Meaning")), tuple(kinds), (1,))
+
+
+def _kinds(counts: Mapping[str, int], meanings: Mapping[str, str]) -> Iterator[tuple[str, str, str]]:
+    for name, count in counts.items():
+        meaning = meanings.get(name, "")
+        yield titled(name), number(count), gettext(meaning) if meaning else ""
+
+
+def _ranges(report: Report) -> Iterator[Block]:
+    read = report.reading
+    rows = []
+    for row in report.ranges:
+        values = [number(read.value(value, row.info.unit), 6) for value in (row.least, row.mean, row.largest)]
+        cases = ["" if case is None else number(case) for case in (row.least_case, row.largest_case)]
+        unit = unit_text(read.unit(row.info.unit))
+        rows.append((read.caption(row.info.name), unit, values[0], cases[0], values[1], values[2], cases[1],
+                     number(row.known)))  # fmt: skip
+    heads = (_("Result"), _("Unit"), _("Least"), _("in case"), _("Mean"), _("Largest"), _("in case"), _("Cases"))
+    yield Table(heads, tuple(rows), (2, 3, 4, 5, 6, 7))
+    if report.left_out:
+        yield Text(f"{upper_first(shown(left_out(report.left_out)))}.")
+
+
+def _inputs(report: Report) -> Iterator[Block]:
+    read = report.reading
+    rows = []
+    for item in report.inputs:
+        name = read.caption(item.path) if item.unit else choice_name(item)
+        origin = _(_ORIGINS.get(item.origin, item.origin))
+        rows.append((name, input_value(report, item), unit_text(read.unit(item.unit)), origin, item.path))
+    rows += [(_("Run: {name}", name=lower_first(label)), value, "", _(_ORIGINS.get(item.origin, item.origin)),
+              f"run.{item.path}") for label, value, item in run_settings(report.study, report.spec, read)]  # fmt: skip
+    heads = (_("Parameter"), _("Value"), _("Unit"), _("Origin"), _("Name in specs"))
+    coded = read.names == CODES  # the names of files are for who has asked for them
+    yield Table(heads if coded else heads[:-1], tuple(row if coded else row[:-1] for row in rows), (1,))
+
+
+def input_value(report: Report, item: Input, digits: int = 8) -> str:
+    """The value of an input in its unit, that of one that varies in a word, a formula with names of quantities."""
+    if item.origin == "axes":
+        return _("varies")
+    if item.origin == "derived":
+        return in_captions(report, str(item.value))
+    value = report.reading.value(in_words(item), item.unit)
+    return value if isinstance(value, str) else number(value, digits)
+
+
+def _given(report: Report) -> Iterator[Block]:
+    rows = tuple((_place(report, path), _text(report, text)) for path, text in report.given.items())
+    if rows:
+        yield Table((_("Field"), _("As given")), rows)
+
+
+def _place(report: Report, path: str) -> str:
+    pointer = f"/{path.replace('.', '/')}"
+    return report.reading.place(Place(pointer, path.removeprefix("base.") if report.reading.names == CODES else ""))
+
+
+def _text(report: Report, text: str) -> str:
+    """What was given: a choice in words."""
+    return gettext(words(text)) if re.fullmatch("[a-z]+(_[a-z]+)*", text) else in_captions(report, text)
+
+
+def _further(report: Report) -> Iterator[Block]:
+    pictures, note = report.further
+    if note:
+        yield Text(note)
+    for curves in pictures:
+        names = ", ".join(report.reading.caption(info.name) for info in curves.selection.results)
+        across = lower_first(report.reading.caption(curves.selection.x))
+        found = image(report, curves_figure([("", curves)], 2), _("Further results against {x}", x=across))
+        yield replace(found, alt=_("{names} against {x}", names=names, x=across))
+    if pictures:
+        yield Text(_("A result that has the same value everywhere on these curves is in the table of ranges only."))
+
+
+def _facts(report: Report) -> Iterator[Block]:
+    facts = [*facts_of(report.record, report.study, report.spec)]
+    if report.kinds.regimes:
+        facts.append((_("motions"), shown(counted(report.kinds.regimes))))
+    origins = "; ".join(origin.sentence for origin in report.library.store.rows.origins(report.study_id))
+    facts.append((_("computed by"), origins or _("no host yet")))
+    if report.progress.rounds is not None:
+        said = report.reading.say(sentence(report.progress.rounds, report.record.state, goal_units(report.study)))
+        facts.append((_("rounds"), said))
+    yield Table(("", ""), tuple(facts))
+
+
+#: The further figures stand by themselves: they are chosen one by one.
+_TITLES: Final[dict[str, str]] = {
+    "warnings": N_("Warnings"),
+    "answers": N_("Answers"),
+    "axes": N_("What varies"),
+    "curves": N_("Curves"),
+    "drawings": N_("Drawings"),
+    "clutch": N_("Clutch"),
+    "sensitivity": N_("Sensitivity"),
+    "calibration": N_("Calibration"),
+    "drives": N_("Drives"),
+    "endings": N_("How the cases ended"),
+    "ranges": N_("Ranges of the results"),
+    "inputs": N_("Inputs"),
+    "given": N_("Machine and run as given"),
+    "versions": N_("Study and versions"),
+    "results": N_("Curves of further results"),
+}
+_WRITERS: Final[dict[str, Write]] = {
+    "warnings": _warnings,
+    "answers": _answers,
+    "axes": _axes,
+    "curves": _curves,
+    "drawings": drawing_images,
+    "clutch": _clutch,
+    "sensitivity": _sensitivity,
+    "calibration": partial(_part, name="calibration"),
+    "drives": partial(_part, name="drives"),
+    "endings": _endings,
+    "ranges": _ranges,
+    "inputs": _inputs,
+    "given": _given,
+    "versions": _facts,
+    "results": _further,
+}
+
+
+def further_figures(report: Report) -> Section | None:
+    """The figures that were put into the report after the first one, with the texts of the author before them."""
+    blocks: list[Block] = []
+    texts = report.question.text or []
+    for place, chosen in enumerate(report.figures[1:], start=3):
+        blocks.append(Text(texts[place] if place < len(texts) else "", look="own", place=place))
+        blocks.append(chosen_image(chosen))
+    return Section(_("Figures"), tuple(blocks)) if blocks else None

@@ -1,0 +1,62 @@
+"""The pictures of a document: described figures as SVG, which a page, a file and a sheet of paper share."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sprag.service.figures.drawing import svg as drawing_svg
+from sprag.service.figures.drawings import drawings
+from sprag.service.figures.read import read_figure, read_map
+from sprag.service.figures.svg import DOUBLE, WIDE, as_file, svg
+from sprag.service.figures.svg_map import map_svg
+from sprag.service.languages import _
+from sprag.service.reading.part_names import lower_first
+from sprag.service.report.blocks import Block, Image, Text, said
+from sprag.service.report.conditions import values_of
+from sprag.service.results.curves import Map
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from sprag.service.figures.figure import Figure
+    from sprag.service.report.chosen_figures import ChosenFigure
+    from sprag.service.report.content import Report
+
+
+def image(report: Report, figure: Figure, caption: str) -> Image:
+    """A described figure in the reader's units, the curve that is meant in ink."""
+    read = read_figure(figure, report.reading)
+    head = ["; ".join(read.held)] if read.held and read.studies == 1 else []
+    chosen = "" if report.curve is None else str(report.curve)
+    drawn = svg(read, width=WIDE if read.columns == 1 else DOUBLE, label=caption, chosen=chosen, head=head, below=True)
+    return Image(as_file(drawn).encode(), caption, caption)
+
+
+def drawing_images(report: Report) -> Iterator[Image]:
+    """The drawings of the machine to scale, with its numbers at their places."""
+    labels = {path: str(said((value,), report.reading)[0]) for path, value in values_of(report).items()}
+    for drawing in drawings(report.study):
+        text = _(drawing.title)
+        alt = _("Drawing of the machine: {title}", title=text)
+        yield Image(drawing_svg(drawing, labels, alone=True).encode(), text, alt, wide=False, look="half")
+
+
+def map_images(report: Report, maps: Iterable[Map]) -> Iterator[Image]:
+    """Maps in the reader's units."""
+    for drawn in maps:
+        read = read_map(drawn, report.reading)
+        text = _("{z} over {x} and {y}", z=read.title, x=lower_first(read.names[0]), y=lower_first(read.names[1]))
+        yield Image(as_file(map_svg(read, label=text, head=read.held, below=True)).encode(), text, text)
+
+
+def chosen_image(chosen: ChosenFigure) -> Block:
+    """A figure that somebody chose, with its name; or why it cannot be drawn."""
+    if chosen.shown is None:
+        return Text(chosen.caption, warning=True)
+    text = f"{chosen.name}. {chosen.caption}"
+    if isinstance(chosen.shown, Map):
+        drawn = map_svg(chosen.shown, contours=chosen.contours, label=text, head=chosen.shown.held, below=True)
+        return Image(as_file(drawn).encode(), text, text)
+    # It is read in units of its own already.
+    drawn = svg(chosen.shown, width=DOUBLE, label=text, head=["; ".join(chosen.shown.held)], below=True)
+    return Image(as_file(drawn).encode(), text, text)

@@ -1,0 +1,29 @@
+"""The document of a study with what its page asks beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from sprag.service.report.chapters import chapters_of
+from sprag.service.report.document import made_document, report_of
+
+if TYPE_CHECKING:
+    from sprag.service.reading.reader import Choice
+    from sprag.service.report.blocks import Document
+    from sprag.service.views.library import Library
+    from sprag.service.views.study_questions import ReportQuestion
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """A document, and the chapters that it can have with their titles."""
+
+    document: Document
+    chapters: dict[str, str]
+
+
+def shown_document(library: Library, study_id: str, choice: Choice, question: ReportQuestion, office: str) -> Shown:
+    """The document of a stored study with a place for each text of its author; raises as `document_of` does."""
+    report = report_of(library, study_id, choice, question)
+    return Shown(made_document(report, office, edited=True), chapters_of(report))

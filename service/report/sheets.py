@@ -1,0 +1,219 @@
+"""The two sheets of a document: the answer with the machine and its curves; conditions, answers and how far to trust.
+
+What a kind of study has found stands where the answers along an axis stand for a grid: the best designs of a search,
+the values of a calibration, the results of a single case.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sprag.sentences import Amount, Name
+from sprag.service.figures.answers import answers_figure
+from sprag.service.figures.front import NUMBER, front_figure, quantities
+from sprag.service.figures.orders import motion_name, motion_text
+from sprag.service.languages import _
+from sprag.service.reading.part_names import upper_first
+from sprag.service.reading.reader import joined, plural
+from sprag.service.report.blocks import Block, Section, Table, Text
+from sprag.service.report.conditions import conditions
+from sprag.service.report.content import varies
+from sprag.service.report.drawn import chosen_image, drawing_images, image, map_images
+from sprag.service.report.trust import trust
+from sprag.service.results.defaults import caption
+from sprag.service.results.key_answers import answers_of_model
+from sprag.service.results.selection import held_text
+from sprag.worker.spread import DRIVE
+
+if TYPE_CHECKING:
+    from sprag.service.report.blocks import Words
+    from sprag.service.report.content import Report
+    from sprag.service.results.curves import Curve
+
+#: Rows of the table of answers, curves above each other, drawings, columns of results, sentences about tolerances.
+_ROWS: Final = 10
+_PANELS: Final = 2
+_DRAWINGS: Final = 2
+_RESULTS: Final = 5
+_SENTENCES: Final = 4
+#: Designs, and their columns.
+_DESIGNS: Final = 6
+_COLUMNS: Final = 9
+#: Digits of results, and of what was typed.
+DIGITS: Final = 4
+
+
+def sheets(report: Report) -> Iterator[Section]:
+    """The sections of both sheets."""
+    texts = [*(report.question.text or []), "", "", ""]
+    own = [Text(text, look="own", place=place) for place, text in enumerate(texts[:3])]
+    yield Section("", tuple(_answer(report)), 1)
+    yield Section("", (*[*drawing_images(report)][:_DRAWINGS], own[0]), 1)
+    yield Section("", (*_curves(report), own[1]), 1)
+    yield from conditions(report)
+    yield from (_designs if report.designs else _values if report.calibrated else _along)(report)
+    yield from _tolerances(report)
+    yield Section("", (own[2],), 2)
+    yield Section(_("How far to trust this"), tuple(trust(report)), 2)
+    lines = (_("Author, date"), _("Checked, date"))
+    yield Section("", (Table(("", ""), (lines,), look="signatures"),), 2)
+
+
+def _answer(report: Report) -> Iterator[Block]:
+    """The answer of the study, and its key numbers with the places where they hold."""
+    read, found = report.reading, report.headline
+    if found.sentence:
+        yield Text(found.said(read), look="answer")
+    rows = tuple(
+        (one.title(read), f"{one.number(read)} {one.unit_text(read)}".strip(), read.say(one.where or one.note))
+        for one in found.numbers
+    )
+    if rows:
+        yield Table(("", "", ""), rows, look="numbers")
+
+
+def _curves(report: Report) -> Iterator[Block]:
+    """The figure of the first sheet: one that was put into the report, otherwise that of the kind of study."""
+    if report.figures:
+        yield chosen_image(report.figures[0])
+    elif report.designs is not None:
+        text = _("Every design of the search; grey ones are outside the limits")
+        yield image(report, front_figure(report.designs), text)
+    elif report.calibration is not None and report.calibration.figure is not None:
+        figure = replace(report.calibration.figure, panels=report.calibration.figure.panels[:_PANELS])
+        yield image(report, figure, _("Measured points on the fitted curve, and residuals"))
+    elif report.drives is not None and report.drives.figure is not None:
+        panels = report.drives.figure.panels[:_PANELS]
+        yield image(report, replace(report.drives.figure, panels=panels), _("Quantiles over the drives"))
+    elif report.maps:
+        yield from map_images(report, report.maps[:1])
+    else:
+        yield from _main(report)
+
+
+def _main(report: Report, begin: int = 0, end: int = _PANELS) -> Iterator[Block]:
+    """The curves of some of the results that are asked for, otherwise of those that the answers are about."""
+    found = report.answers
+    if found is None or found.drawn is None or found.query is None:
+        return
+    figure = answers_figure(found, 1, chosen=report.curve)
+    infos = found.drawn.selection.results
+    panels = {info.name: panel for info, panel in zip(infos, figure.panels, strict=False) if varies(found.drawn, info)}
+    shown = [name for name in _results(report) if name in panels][begin:end]
+    if shown:
+        figure = replace(figure, panels=tuple(panels[name] for name in shown))
+        yield image(report, figure, caption(report.study, replace(found.query, y=tuple(shown))).said(report.reading))
+
+
+def _results(report: Report) -> list[str]:
+    """The results that are asked for, otherwise those of the answers, then the main ones."""
+    found = report.answers
+    if report.question.y:
+        return list(report.question.y)
+    main = () if found is None or found.query is None else found.query.y
+    return list(dict.fromkeys((*(one.result for one in answers_of_model(report.study, report.infos)), *main)))
+
+
+def _along(report: Report) -> Iterator[Section]:
+    """The results along the axis of the curves, for the curve that is meant; of a single case its results."""
+    found, place = report.answers, report.curve
+    if found is None or place is None:
+        return
+    if found.drawn is None or found.query is None:
+        here = found.curves[place].working_point
+        own = tuple((Name(item.info.name), Amount(item.value, item.unit, DIGITS)) for item in here)
+        yield Section(_("Results"), (Table(("", ""), own, (1,)),), 2)
+        return
+    read, curve = report.reading, found.drawn.curves[place]
+    infos = {info.name: info for info in report.infos}
+    names = [name for name in _results(report) if name in curve.y][:_RESULTS]
+    units = {name: infos[name].unit for name in names}
+    moves = curve.regimes is not None
+    heads: list[Words] = [read.title(found.query.x, found.unit), *(read.title(name, units[name]) for name in names)]
+    heads += [_("Motion repeats after")] if moves else []
+    shown = _places(curve, found.point)
+    rows: list[tuple[Words, ...]] = []
+    for index in shown:
+        cells: list[Words] = [Amount(curve.line.x[index], found.unit, DIGITS, bare=True)]
+        for name in names:
+            value = float(curve.known(name)[index])
+            cells.append(Amount(value if np.isfinite(value) else None, units[name], DIGITS, bare=True))
+        if moves:
+            cells.append(_motion(curve, index))
+        rows.append(tuple(cells))
+    line = found.curves[place].line
+    held = joined(
+        "; ", (held_text(report.study, path, value) for path, value in {**line.by, **line.at}.items() if path != DRIVE)
+    )
+    title = _("Answers along the axis: {axis}", axis=read.within(found.query.x))
+    meant = next((row for row, index in enumerate(shown) if curve.line.x[index] == found.point), None)
+    table = Table(tuple(heads), tuple(rows), tuple(range(1 + len(names))), chosen=meant)
+    yield Section(title, (*([Text(held)] if held else []), table, *_main(report, _PANELS, _PANELS + 1)), 2)
+
+
+def _motion(curve: Curve, index: int) -> str:
+    name = motion_name((curve.regimes or [])[index], (curve.orders or [])[index])
+    return "–" if name is None else motion_text(name)
+
+
+def _places(curve: Curve, point: float | None) -> list[int]:
+    """The points of a curve that have a row: all of few, otherwise the ends, the working point and some between."""
+    run: list[int] = curve.run().tolist()
+    if len(run) <= _ROWS:
+        return run
+    chosen = {run[place] for place in np.linspace(0, len(run) - 1, _ROWS).round().astype(int).tolist()}
+    exact = [place for place in run if curve.line.x[place] == point]
+    if exact and exact[0] not in chosen:
+        inner = sorted(chosen)[1:-1]
+        chosen.discard(min(inner, key=lambda place: abs(place - exact[0])))
+        chosen.add(exact[0])
+    return sorted(chosen)
+
+
+def _designs(report: Report) -> Iterator[Section]:
+    """The best designs of a search."""
+    found = report.designs
+    if found is None:
+        return
+    known = {name: column for name, column in quantities(found).items() if name != NUMBER}
+    names = list(known)[:_COLUMNS]
+    heads = ("", *(report.reading.title(name, known[name][0]) for name in names))
+    rows: tuple[tuple[Words, ...], ...] = tuple(
+        (str(row), *(Amount(float(known[name][1][place]), known[name][0], DIGITS, bare=True) for name in names))
+        for row, place in enumerate(report.best[:_DESIGNS], start=1)
+    )
+    if rows:
+        table = Table(heads, rows, tuple(range(len(heads))), chosen=0)
+        yield Section(_("Best designs"), (table,), 2)
+
+
+def _values(report: Report) -> Iterator[Section]:
+    """The values of a calibration with their intervals."""
+    found = report.calibrated
+    known = None if found is None else found.answer
+    rows: list[tuple[Words, ...]] = []
+    for index, name in enumerate([] if known is None else found.names):  # type: ignore[union-attr]
+        unit = next(item.unit for item in report.inputs if item.path == name)
+        low, high = (None, None) if known.intervals is None else known.intervals[index].tolist()  # type: ignore[union-attr]
+        ends = (Amount(end, unit, DIGITS) for end in (low, high))
+        rows.append((Name(name), Amount(float(known.values[index]), unit, DIGITS), *ends))  # type: ignore[union-attr]
+    if rows:
+        heads = ("", _("Value"), _("95 % interval from"), _("to"))
+        yield Section(_("Fitted values"), (Table(heads, tuple(rows), (1, 2, 3)),), 2)
+
+
+def _tolerances(report: Report) -> Iterator[Section]:
+    """What tolerances do, in a few sentences."""
+    part = report.drives
+    if part is None:
+        return
+    said = [upper_first(report.reading.say(text)) for text in part.sentences[:_SENTENCES]]
+    more = len(part.sentences) - len(said)
+    if more:
+        said.append(plural("{count} more sentence is in the appendix on the drives.",
+                           "{count} more sentences are in the appendix on the drives.", more))  # fmt: skip
+    yield Section(_("What tolerances do"), tuple(map(Text, said)), 2)
