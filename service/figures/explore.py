@@ -9,7 +9,6 @@ import numpy as np
 from sprag.service.faults import refused
 from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
 from sprag.service.reading.reader import Phrase, plural
-from sprag.service.results.explore import quantities
 from sprag.service.results.selection import listed
 
 if TYPE_CHECKING:
@@ -26,7 +25,7 @@ def chosen_pair(found: Explored, x: str, y: str) -> tuple[str, str]:
     """Names of the two quantities; by default the first and the last shown one. Raises SelectionError for others."""
     shown = found.plan.shown
     for parameter, name in (("x", x), ("y", y)):
-        if name and name not in shown:
+        if name and name not in found.values:
             raise refused(parameter, "unknown-name", "is not a shown quantity", name, allowed=listed(shown))
     return x or shown[0], y or shown[-1]
 
@@ -34,7 +33,7 @@ def chosen_pair(found: Explored, x: str, y: str) -> tuple[str, str]:
 def explore_figure(found: Explored, x: str = "", y: str = "") -> Figure:
     """Every case as a point; of many cases, some evenly through the study, always with the first rows of the table."""
     first, second = chosen_pair(found, x, y)
-    units = quantities(found.study)
+    units = found.plan.units
     across, up = (Quantity(name, units.get(name, "1")) for name in (first, second))
     xs, ys = found.values[first], found.values[second]
     known = np.isfinite(xs) & np.isfinite(ys) if found.known else np.zeros(0, dtype=np.bool_)

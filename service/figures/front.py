@@ -11,7 +11,7 @@ from sprag.service.faults import refused
 from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.reader import Phrase, plural
-from sprag.service.results.fronts import history
+from sprag.service.results.fronts import history, worst_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,9 +36,7 @@ def quantities(found: Designs) -> dict[str, tuple[str, NDArray[np.float64]]]:
     for limit in found.plan.subject_to:
         info = found.infos[limit.name]
         if info.kind != "category" and info.name not in shown:
-            values = found.values[info.name]
-            worst = np.where(np.isnan(values), -np.inf, np.abs(values - limit.value)).argmax(axis=1)
-            shown[info.name] = (info.unit, values[np.arange(len(values)), worst])
+            shown[info.name] = (info.unit, worst_of(limit, found.values[info.name]))
     return {**shown, NUMBER: ("1", found.numbers.astype(np.float64))}
 
 

@@ -66,15 +66,12 @@ from sprag.service.http.web import (
     login,
     pages,
     results,
-    side_by_side,
     study,
-    table,
 )
 from sprag.service.http.web import components as component_pages
 from sprag.service.http.web import diagram as diagram_pages
 from sprag.service.http.web import document as document_pages
 from sprag.service.http.web import engagements as engagement_pages
-from sprag.service.http.web import explore as explore_pages
 from sprag.service.http.web import language as language_pages
 from sprag.service.http.web import live as live_pages
 from sprag.service.http.web import people as people_pages
@@ -89,6 +86,8 @@ from sprag.service.http.web import workers as worker_pages
 from sprag.service.http.web.figures import cases as case_figures
 from sprag.service.http.web.form import page as form
 from sprag.service.http.web.laboratory import pages as laboratory
+from sprag.service.http.web.rows import motion as row_motion
+from sprag.service.http.web.rows import pages as rows
 from sprag.service.jobs import checks
 from sprag.service.jobs.housekeeping import Housekeeping
 from sprag.service.jobs.reports.reporter import Reporter
@@ -169,14 +168,13 @@ ROUTED = (
     form,
     study,
     front,
-    explore_pages,
-    side_by_side,
+    rows,
+    row_motion,
     calibration,
     calibrate,
     drives,
     effects,
     results,
-    table,
     case,
     case_figures,
     engagement_pages,

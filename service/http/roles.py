@@ -57,8 +57,9 @@ _VIEWER: Final = (
     "GET /", "GET /new", "POST /new/check", "GET /calibrate",
     f"GET {_PAGE}",
     *(f"GET {_PAGE}/{part}" for part in (
-        "delete", "extend", "labels", "front", "figures/front", "figures/search", "front/search.svg", "explore",
-        "explore/new", "explore/compare", "figures/explore", "calibration", "figures/calibration", "drives",
+        "delete", "extend", "labels", "front", "figures/front", "explore", "explore/new", "explore/compare",
+        "rows", "rows/new", "rows/file", "rows/search.svg", "rows/{case}/motion.svg",
+        "calibration", "figures/calibration", "drives",
         "figures/ribbon", "figures/yield", "sensitivity", "figures/sensitivity", "curves", "map", "figures/curves",
         "figures/answers", "figures/map", "cases", "document",
     )),
@@ -88,6 +89,7 @@ _DESIGNER: Final = (
     "POST /new", "POST /calibrate", "POST /studies", f"POST {_PAGE}/labels", f"POST {_PAGE}/priority",
     f"POST {_PAGE}/extend",
     f"POST {_PAGE}/delete", f"POST {_PAGE}/longer/{{kind}}", f"POST {_PAGE}/narrow", f"POST {_PAGE}/{{verb}}",
+    f"POST {_PAGE}/rows/longer",
     "POST /schedules/new", "POST /schedules/{schedule_id}", "POST /schedules/{schedule_id}/{verb}",
 )  # fmt: skip
 _ADMINISTRATOR: Final = ("GET /api/v1/audit", "GET /api/v1/users", "GET /audit", "GET /users")

@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 from sprag.service.faults import FaultError, parameter_error
 from sprag.service.jobs.preview import preview_json
 from sprag.service.jobs.start_from import with_start
@@ -131,19 +133,23 @@ def kind_to_run_longer(store: Store, study_id: str, regime: str | None) -> str:
 def longer_study(
     library: Library,
     study_id: str,
-    kind: str,
+    kind: str | tuple[int, ...],
     at_most: int | None,
     now: datetime,
     given: Mapping[str, object],
 ) -> Submission:
     """The cases of a study with that regime, or with that flag where there are no regimes, with more time to settle.
 
-    There must be at least one. Raises SpecError and StudyNotFoundError.
+    Or the cases of those numbers. There must be at least one. Raises SpecError, StudyNotFoundError, and IndexError for
+    numbers of cases that there are not.
     """
     store = library.store
     study = store.studies.study(study_id)
-    named = {"regime" if models.is_settled(study.run) else "flag": kind}
-    cases = store.rows.cases_of_kind(study_id, **named)
+    if isinstance(kind, str):
+        named = {"regime" if models.is_settled(study.run) else "flag": kind}
+        cases = store.rows.cases_of_kind(study_id, **named)
+    else:
+        cases = np.array(kind, dtype=np.int64)
     parsed = parse_spec(longer_spec(accepted(store.studies.spec(study_id), study), study, cases, at_most))
     return submission(parsed, store, now, given=given)
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -43,7 +43,7 @@ BINS: Final = 24
 
 #: What every case can be sorted by.
 _ALWAYS: Final = ("case", "ending", "flags")
-_FORM: Final = re.compile(r"\s*([A-Za-z][\w.]*)\s*(>=|<=|≥|≤)\s*(.+?)\s*")
+_FORM: Final = re.compile(r"\s*([A-Za-z][\w.]*|[A-Za-z][^<>≥≤]*\))\s*(>=|<=|≥|≤)\s*(.+?)\s*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,8 @@ class ExploreQuery:
     Rows are ordered by ``sort``, a parameter, a result, "case", "ending", "flags" (none first) or the regime, with "-"
     before it from the largest down; cases without it come last, and equal ones in the order of their numbers. Only
     those ``after`` a case are ordered. ``show`` are the quantities of histograms and rows, by default the axes and the
-    model's own columns.
+    model's own columns; values are found of those ``also``. Where there is ``only`` some, other cases are left out, and
+    those ``without`` which the rest is wanted.
     """
 
     where: tuple[str, ...] = ()
@@ -66,6 +67,9 @@ class ExploreQuery:
     show: tuple[str, ...] = ()
     at: tuple[tuple[str, str], ...] = ()
     after: After | None = None
+    also: tuple[str, ...] = ()
+    only: tuple[int, ...] = ()
+    without: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,10 +90,45 @@ class Range:
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
-    """A question whose names and values have been checked; ``results`` are those that it needs.
+class Further:
+    """What is known of some cases beyond their rows: those of the designs of a search, which has no others then.
 
-    ``fixed`` are axes that are held, by their place, and the index of the value.
+    Attributes
+    ----------
+    infos : tuple of ResultInfo
+        What it is called; a result of this name is that of the case no more.
+    cases : int64 array, shape (m,)
+        Ascending.
+    values : dict of float64 arrays, each shape (m,)
+        SI, by name.
+    keys : dict of float64 arrays, each shape (m,)
+        What cases are sorted by in the place of a value.
+    """
+
+    infos: tuple[ResultInfo, ...]
+    cases: NDArray[np.int64]
+    values: dict[str, NDArray[np.float64]]
+    keys: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """What one condition does: ``kept`` cases are within it alone, and ``left_out`` ones miss no other one.
+
+    ``name`` is the quantity of ranges, or a parameter of the address such as "ending".
+    """
+
+    name: str
+    kept: int
+    left_out: int
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A question whose names and values have been checked; ``results`` are those that it needs of the rows.
+
+    ``fixed`` are axes that are held, by their place, and the index of the value; ``units`` those of all that can be
+    asked about.
     """
 
     query: ExploreQuery
@@ -100,6 +139,7 @@ class Plan:
     descending: bool
     regime: ResultInfo | None
     results: tuple[str, ...]
+    units: dict[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +154,8 @@ class Explored:
         Places of the first rows in their order, at most as many as asked for.
     keys : float64 array, shape (known,)
         What they are sorted by.
-    values : columns of the shown quantities over all finished cases
+    values : columns of the quantities that are shown, or wanted also, over all finished cases
+    conditions : what each condition of the question does alone
     """
 
     study: Study
@@ -125,6 +166,7 @@ class Explored:
     order: NDArray[np.int64]
     keys: NDArray[np.float64]
     values: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    conditions: tuple[Condition, ...] = ()
 
     @property
     def count(self) -> int:
@@ -137,10 +179,14 @@ class Explored:
         return tuple(models.study_results(self.study))
 
 
-def plan_of(study: Study, query: ExploreQuery) -> Plan:
-    """Check a question; raises SelectionError for unknown names, categories and values that cannot be read."""
-    infos = models.study_results(study)
-    regime = models.regime_info(infos)
+def plan_of(study: Study, query: ExploreQuery, further: Sequence[ResultInfo] = ()) -> Plan:
+    """Check a question; raises SelectionError for unknown names, categories and values that cannot be read.
+
+    ``further`` is what can be asked about beyond the results of cases, as in `Further`.
+    """
+    own = {info.name for info in further}
+    infos = [*further, *(info for info in models.study_results(study) if info.name not in own)]
+    units, regime = quantities(study, infos), models.regime_info(infos)
     if len(query.where) > MOST_RANGES:
         raise refused(
             "where",
@@ -156,8 +202,9 @@ def plan_of(study: Study, query: ExploreQuery) -> Plan:
             allowed=at_most(MOST_SHOWN),
         )
     pairs = [(parts[1], parts[3]) for text in query.where if (parts := _FORM.fullmatch(plain_signs(text)))]
-    refuse_mixed_texts("where", pairs, {name: unit for name, unit in quantities(study).items() if pairs})
-    ranges = tuple(_range(study, infos, text) for text in query.where)
+    if pairs:
+        refuse_mixed_texts("where", pairs, units)
+    ranges = tuple(_range(study, infos, units, text) for text in query.where)
     if query.regime and (regime is None or query.regime not in regime.categories):
         allowed = Sentence("no regime: this study has none") if regime is None else listed(regime.categories)
         raise refused("regime", "invalid-choice", "is not a regime", query.regime, allowed=allowed)
@@ -169,12 +216,12 @@ def plan_of(study: Study, query: ExploreQuery) -> Plan:
     if sort not in kinds:
         _require(study, infos, "sort", sort, kinds)
     shown = tuple(dict.fromkeys(query.show)) or usual_quantities(study, infos)
-    for name in shown:
+    for name in (*shown, *query.also):
         _require(study, infos, "show", name)
-    named = dict.fromkeys([*shown, *(one.name for one in ranges), sort])
-    needed = [name for name in named if result_of(infos, name)]
+    named = dict.fromkeys([*shown, *query.also, *(one.name for one in ranges), sort])
+    needed = [name for name in named if name not in own and result_of(infos, name)]
     needed += [regime.name] if regime is not None and regime.name not in needed else []
-    return Plan(query, ranges, fixed, shown, sort, descending, regime, tuple(needed))
+    return Plan(query, ranges, fixed, shown, sort, descending, regime, tuple(needed), units)
 
 
 def usual_quantities(study: Study, infos: Sequence[ResultInfo]) -> tuple[str, ...]:
@@ -184,15 +231,17 @@ def usual_quantities(study: Study, infos: Sequence[ResultInfo]) -> tuple[str, ..
     return (*own_paths(study), *results)[:MOST_SHOWN]
 
 
-def quantities(study: Study) -> dict[str, str]:
-    """Units of everything that ranges, order and histograms can be about, by name."""
-    infos = models.study_results(study)
+def quantities(study: Study, infos: Sequence[ResultInfo] | None = None) -> dict[str, str]:
+    """Units of everything that ranges, order and histograms can be about, by name: of ``infos`` or all results."""
+    infos = models.study_results(study) if infos is None else infos
     units = {path: unit_of(study, path) for path in own_paths(study)}
     return units | {info.name: info.unit for info in infos if info.kind != "category"}
 
 
-def explore(study: Study, plan: Plan, rows: RowColumns) -> Explored:
+def explore(study: Study, plan: Plan, rows: RowColumns, further: Further | None = None) -> Explored:
     """The cases that a checked question selects, of a study whose finished cases have these ``rows``."""
+    if further is not None:
+        rows = _of_cases(rows, further.cases)
     known = len(rows.cases)
     parameters = study.columns(rows.cases) if known else {}
     endings, flags = [ending for ending, _ in rows.kinds], [own for _, own in rows.kinds]
@@ -203,33 +252,64 @@ def explore(study: Study, plan: Plan, rows: RowColumns) -> Explored:
         else np.where(models.usable(study.model, endings, flags, name)[rows.kind], values, np.nan)
         for name, values in rows.values.items()
     }
-    every = {**results, **parameters}
+    every = {**results, **(further.values if further else {}), **parameters}
     empty = np.empty(0)
-    selected = np.ones(known, dtype=np.bool_)
-    for one in plan.ranges:
-        values = every.get(one.name, empty)
-        selected &= values >= one.limit if one.at_least else values <= one.limit
-    query = plan.query
-    if plan.fixed:
-        held = study.cases_at({study.axes[i].paths[0]: study.axes[i].value(index) for i, index in plan.fixed.items()})
-        selected &= np.isin(rows.cases, held)
-    kept = [
-        (not query.ending or ending == query.ending) and (not query.flag or query.flag in flags.split(","))
-        for ending, flags in rows.kinds
-    ]
-    if not all(kept):
-        selected &= np.array(kept, dtype=np.bool_)[rows.kind]
-    if query.regime and plan.regime is not None:
-        selected &= rows.values[plan.regime.name] == plan.regime.categories.index(query.regime)
+    masks = _masks(study, plan, rows, every)
+    selected = np.logical_and.reduce(list(masks.values())) if masks else np.ones(known, dtype=np.bool_)
     places = np.flatnonzero(selected).astype(np.int64)
     keys = rows.cases.astype(np.float64) if plan.sort == "case" else every.get(plan.sort, empty)
     if plan.sort in ("ending", "flags") and known:
         keys = np.array(_kind_keys(plan.sort, rows.kinds))[rows.kind]
+    elif further is not None:
+        keys = further.keys.get(plan.sort, keys)
+    query = plan.query
     if query.after is not None:
         places = _beyond(places, keys, rows.cases, query.after, descending=plan.descending)
     order = _first(places, keys, query.limit, descending=plan.descending)
-    shown = {name: every.get(name, empty) for name in plan.shown}
-    return Explored(study, plan, rows, known, selected, order, keys, shown)
+    shown = {name: every.get(name, empty) for name in (*plan.shown, *query.also)}
+    return Explored(study, plan, rows, known, selected, order, keys, shown, tuple(_alone(masks)))
+
+
+def _of_cases(rows: RowColumns, cases: NDArray[np.int64]) -> RowColumns:
+    """The rows of these cases, all of which have one."""
+    at = np.searchsorted(rows.cases, cases)
+    return replace(
+        rows, cases=cases, kind=rows.kind[at], values={name: values[at] for name, values in rows.values.items()}
+    )
+
+
+def _masks(
+    study: Study, plan: Plan, rows: RowColumns, every: Mapping[str, NDArray[np.float64]]
+) -> dict[str, NDArray[np.bool_]]:
+    """Which cases are within each condition: bool arrays, shape (known,)."""
+    query, empty = plan.query, np.empty(0)
+    found: dict[str, NDArray[np.bool_]] = {}
+    for one in plan.ranges:
+        values = every.get(one.name, empty)
+        within = values >= one.limit if one.at_least else values <= one.limit
+        found[one.name] = found[one.name] & within if one.name in found else within
+    if plan.fixed:
+        held = study.cases_at({study.axes[i].paths[0]: study.axes[i].value(index) for i, index in plan.fixed.items()})
+        found["at"] = np.isin(rows.cases, held)
+    of_kind = {
+        "ending": [not query.ending or ending == query.ending for ending, _ in rows.kinds],
+        "flag": [not query.flag or query.flag in flags.split(",") for _, flags in rows.kinds],
+    }
+    found |= {name: np.array(kept, dtype=np.bool_)[rows.kind] for name, kept in of_kind.items() if not all(kept)}
+    if query.regime and plan.regime is not None:
+        found["regime"] = rows.values[plan.regime.name] == plan.regime.categories.index(query.regime)
+    if query.only:
+        found["only"] = np.isin(rows.cases, query.only)
+    if query.without:
+        found["without"] = ~np.isin(rows.cases, query.without)
+    return found
+
+
+def _alone(masks: Mapping[str, NDArray[np.bool_]]) -> Iterator[Condition]:
+    """What each condition does alone."""
+    missed = sum((~mask for mask in masks.values()), np.zeros(1, dtype=np.int64))
+    for name, mask in masks.items():
+        yield Condition(name, int(np.count_nonzero(mask)), int(np.count_nonzero(~mask & (missed == 1))))
 
 
 def _kind_keys(sort: str, kinds: Sequence[tuple[str, str]]) -> list[float]:
@@ -294,7 +374,7 @@ def _kind(parameter: str, name: str, known: dict[str, str]) -> None:
         )  # fmt: skip
 
 
-def _range(study: Study, infos: Sequence[ResultInfo], text: str) -> Range:
+def _range(study: Study, infos: Sequence[ResultInfo], units: Mapping[str, str], text: str) -> Range:
     parts = _FORM.fullmatch(plain_signs(text))
     if parts is None:
         raise refused(
@@ -302,9 +382,7 @@ def _range(study: Study, infos: Sequence[ResultInfo], text: str) -> Range:
         )
     name, sign, value = parts.groups()
     _require(study, infos, "where", name)
-    info = result_of(infos, name)
-    unit = info.unit if info is not None else unit_of(study, name)
-    return Range(name, sign in (">=", "≥"), value_of(name, value, unit, "where"))
+    return Range(name, sign in (">=", "≥"), value_of(name, value, units[name], "where"))
 
 
 def histogram(values: NDArray[np.float64], selected: NDArray[np.bool_], bins: int = BINS) -> Histogram | None:
@@ -325,7 +403,7 @@ def histogram(values: NDArray[np.float64], selected: NDArray[np.bool_], bins: in
 
 def explored_json(study_id: str, found: Explored) -> Exploration:
     """The answer of the API."""
-    study, units = found.study, quantities(found.study)
+    study, units = found.study, found.plan.units
     return {
         "study": study_id,
         "known": found.known,
@@ -369,4 +447,4 @@ def explored_csv(study: Study, found: Explored, reading: Reading) -> bytes:
     for name in found.plan.shown:
         if name not in study.column_paths:
             columns[name] = [row["results"][name] for row in rows]
-    return exports.read_table(columns, quantities(study), reading.units)
+    return exports.read_table(columns, found.plan.units, reading.units)

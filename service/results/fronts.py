@@ -14,6 +14,7 @@ from sprag.service.faults import Fault, FaultError
 from sprag.service.json_text import numbers
 from sprag.service.languages import N_
 from sprag.service.reading.catalogue import unit_of
+from sprag.service.results.explore import Further
 from sprag.service.results.regimes import kind_columns
 from sprag.worker import models
 from sprag.worker.models import WorkerEnding
@@ -24,7 +25,7 @@ from sprag.worker.planning.goals.robust import Table
 from sprag.worker.planning.rounds import Rows
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -98,7 +99,7 @@ def goal_units(study: Study) -> tuple[str, ...]:
     if study.plan is None or study.plan["kind"] != GOAL:
         return ()
     plan = goal_of(study)
-    infos = _infos(study, plan)
+    infos = infos_of(study, plan)
     return tuple(infos[goal.name].unit for goal in plan.best)
 
 
@@ -151,7 +152,7 @@ def designs_of(study: Study, rounds: list[RoundRecord], fetch: Fetch, *, exact: 
     return Designs(
         study=study,
         plan=plan,
-        infos=_infos(study, plan),
+        infos=infos_of(study, plan),
         numbers=numbers_,
         front=found,
         exact=found.feasible & (found.miss <= MET),
@@ -179,7 +180,8 @@ def _for_derivatives(rounds: Sequence[RoundRecord], designs: int, each: int) -> 
     return marked
 
 
-def _infos(study: Study, plan: GoalPlan) -> dict[str, ResultInfo]:
+def infos_of(study: Study, plan: GoalPlan) -> dict[str, ResultInfo]:
+    """What goals and limits are about, by name: a result, its quantile over the drives, a yield."""
     known = {info.name: info for info in models.study_results(study)}
     found: dict[str, ResultInfo] = {}
     for item in plan.items:
@@ -263,6 +265,50 @@ def design_json(found: Designs, position: int) -> Design:
         "exact": bool(found.exact[position]),
         "rank": int(ranked.rank[position]),
     }
+
+
+def worst_of(limit: Limit, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What is farthest on the wrong side of a limit among the operating points of each design; shape (designs,).
+
+    ``values`` have the shape (designs, operating points); a missing one is the worst.
+    """
+    signs = {"at_least": -1.0, "at_most": 1.0}
+    off = signs[limit.kind] * values if limit.kind in signs else np.abs(values - limit.value)
+    return np.asarray(values[np.arange(len(values)), np.where(np.isnan(values), np.inf, off).argmax(axis=1)])
+
+
+def further_of(found: Designs) -> Further:
+    """What is known of each design beyond the row of its first case: goals, limits, and its place among all designs.
+
+    Sorted by their rank they are in the order of `Designs.order`.
+    """
+    ranked, plan = found.front, found.plan
+    values = {goal.name: ranked.goals[:, index] for index, goal in enumerate(plan.best)}
+    for limit in plan.subject_to:
+        if found.infos[limit.name].kind != "category":
+            values.setdefault(limit.name, worst_of(limit, found.values[limit.name]))
+    place = np.empty(len(found.numbers))
+    place[found.order] = np.arange(len(found.order))
+    own = {"rank": ranked.rank.astype(np.float64), "violation": ranked.violation, "miss": ranked.miss}
+    infos = [found.infos[name] for name in values] + [models.ResultInfo(name, "1", "") for name in own]
+    missing = {name: np.where(np.isfinite(column), column, np.nan) for name, column in (values | own).items()}
+    return Further(tuple(infos), ranked.cases[:, 0], missing, {"rank": place})
+
+
+def conditions_of(plan: GoalPlan, infos: Mapping[str, ResultInfo]) -> tuple[str, ...]:
+    """The limits of a search as ranges of an `ExploreQuery`; those of categories as "violation <= 0"."""
+    texts: dict[str, None] = {}
+    for limit in plan.subject_to:
+        info = infos[limit.name]
+        unit = "" if info.unit == "1" else f" {info.unit}"
+        if info.kind == "category":
+            texts["violation <= 0"] = None
+            continue
+        if limit.kind != "at_most":
+            texts[f"{limit.name} >= {limit.value - limit.within!r}{unit}"] = None
+        if limit.kind != "at_least":
+            texts[f"{limit.name} <= {limit.value + limit.within!r}{unit}"] = None
+    return tuple(texts)
 
 
 def _finite(value: float) -> float | None:

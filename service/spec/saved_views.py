@@ -18,7 +18,7 @@ from sprag.worker.limits import MAX_NAME_LENGTH, MAX_REPORT_FIGURES, MAX_VIEW_QU
 #: Pages whose views can be figures of the report.
 FIGURES: Final = ("curves", "map")
 #: Pages of a study, and those of the whole service.
-STUDY_PAGES: Final = (*FIGURES, "explore", "front", "drives", "sensitivity", "cases", "document")
+STUDY_PAGES: Final = (*FIGURES, "explore", "front", "drives", "sensitivity", "cases", "document", "rows")
 OWN_PAGES: Final = ("studies", "compare")
 PAGES: Final = (*STUDY_PAGES, *OWN_PAGES)
 #: Parameters of addresses that say what was done before, or where a list goes on.

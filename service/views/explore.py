@@ -15,6 +15,8 @@ from sprag.service.views.study_questions import EXPLORE, CasesQuestion, ExploreQ
 from sprag.service.views.study_view import StudyAnswer, StudyView
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from sprag.service.figures.figure import Figure
     from sprag.service.reading.reader import Reading
     from sprag.service.views.library import Library
@@ -43,9 +45,17 @@ def explored(library: Library, study_id: str, query: ExploreQuery) -> Explored:
     return explore(study, plan, library.columns.of(study_id, plan.results))
 
 
-def selection_spec(library: Library, study_id: str, query: ExploreQuery) -> dict[str, Any]:
-    """The spec of a study of the first rows; raises SelectionError where there are none, or nothing varies."""
-    found = explored(library, study_id, query)
+def selection_spec(
+    library: Library,
+    study_id: str,
+    query: ExploreQuery,
+    find: Callable[[Library, str, ExploreQuery], Explored] = explored,
+) -> dict[str, Any]:
+    """The spec of a study of the first rows that ``find`` finds.
+
+    Raises SelectionError where there are none, or nothing varies.
+    """
+    found = find(library, study_id, query)
     cases = found.rows.cases[found.order].tolist()
     if not cases:
         raise refused("where", "empty", "no case is selected")

@@ -39,7 +39,7 @@ def along_frame(
     return {
         **study_frame(context, study_id),
         **entered,
-        "tab": "/cases",
+        "tab": "/rows",
         "case": case,
         "start": "" if start is None else str(start),
         "read_as": read_as(),

@@ -48,7 +48,7 @@ def basin_page(context: Ctx, request: Request, study_id: StudyId, case: CaseNumb
         "basin.html",
         status=422 if faults else 200,
         **study_frame(context, study_id),
-        tab="/cases",
+        tab="/rows",
         case=case,
         given=texts,
         known=basins.initial_values(study),

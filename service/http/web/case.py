@@ -136,7 +136,7 @@ def case_page(
         "case.html",
         status=422 if faults else 200,
         **study_frame(context, study_id),
-        tab="/cases",
+        tab="/rows",
         case=case,
         row=row,
         regimes=[row for row in rows if row.results.get("regime.number") is not None],

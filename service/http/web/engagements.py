@@ -31,7 +31,7 @@ async def engagements_page(work: Attended, study_id: StudyId, case: CaseNumber, 
     return page(
         "engagements.html",
         **frame,
-        tab="/cases",
+        tab="/rows",
         case=case,
         made=made,
         rows=made.rows[:_SHOWN],

@@ -84,7 +84,6 @@ def study_frame(context: Context, study_id: str) -> dict[str, Any]:
     mapped = grid or map_plan(study) is not None
     tabs = [
         ("", N_("Overview")),
-        *([("/front", N_("Designs"))] if _has_goal(study) else []),
         *([("/calibration", N_("Calibration"))] if _calibrates(study) else []),
         *([("/drives", N_("Drives"))] if study.spread is not None and study.plan is None else []),
         *([("/curves", N_("Curves"))] if main_query(study, models.study_results(study)) is not None else []),
@@ -95,7 +94,7 @@ def study_frame(context: Context, study_id: str) -> dict[str, Any]:
         "study": shown,
         "live": not StudyState(shown["state"]).terminal,
         "verbs": {verb: VERBS[verb] for verb in _verbs(StudyState(shown["state"]), record.ok < record.done)},
-        "tabs": [*tabs, ("/explore", N_("Explore")), ("/cases", N_("Cases"))],
+        "tabs": [*tabs, ("/rows", N_("Rows"))],
         "endings": meanings(models.ENDING_SENTENCES),
         "formats": list(formats.MEDIA_TYPES),
         "now": timestamp(datetime.now(UTC)),
@@ -239,7 +238,7 @@ def _main_figure(
             "heading": _("Designs"),
             "figure": f"/studies/{study_id}/figures/front?{own}",
             "picture": f"{views.study_address(study_id)}/front?{picture}" if _drawable(study.cases) else None,
-            "others": f"/studies/{study_id}/front",
+            "others": f"/studies/{study_id}/rows",
             "kind": _("Designs"),
             "invitation": _("More on the page"),
             "caption": _("Every design of the search; grey ones are outside the limits"),

@@ -34,7 +34,7 @@ from sprag.service.schedules.times import wall_clock
 
 #: The beginning of an attribute that is an address: a path of this service, or an expression that may give one.
 _ADDRESS = re.compile(
-    r"""(?<=\s)(?P<name>href|src|action|formaction|data-(?:check|engagements|events|figure|front|motion))="
+    r"""(?<=\s)(?P<name>href|src|action|formaction|data-(?:address|check|engagements|events|figure|front|motion))="
     (?:(?P<path>/(?!/))|\{\{(?P<expression>.*?)\}\})""",
     re.VERBOSE,
 )

@@ -59,7 +59,7 @@ async def transient_page(
         "transient.html",
         status=422 if faults else 200,
         **frame,
-        tab="/cases",
+        tab="/rows",
         case=case,
         kinds=_KINDS,
         kind=kind or "coasting",

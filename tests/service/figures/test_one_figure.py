@@ -23,7 +23,6 @@ from sprag.service.views.curves import CurvesView
 from sprag.service.views.library import Library
 from sprag.service.views.study_view import study_file
 from sprag.worker import models
-from tests.service.searching import search
 from tests.service.spec_sample import changed
 
 if TYPE_CHECKING:
@@ -170,11 +169,3 @@ def test_downloaded_ribbons_are_those_of_the_page(service: Service) -> None:
     assert in_order([trace["name"] for trace in listed(page)], texts)
     assert in_order(titles(page, "y"), texts)
     assert set(titles(page, "x")) <= set(texts)
-
-
-def test_downloaded_designs_are_those_of_the_page(service: Service) -> None:
-    study_id = search(service)
-    page, texts, _ = downloaded(service, f"/studies/{study_id}/front", "figures/front", "front?")
-    assert listed(page)
-    assert in_order([trace["name"] for trace in listed(page)], texts)
-    assert set(titles(page, "x") + titles(page, "y")) <= set(texts)

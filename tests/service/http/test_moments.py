@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from tests.service.conftest import Service
 
-PAGES = ("", "/explore", "/cases", "/curves", "/cases/3")
+PAGES = ("", "/rows", "/curves", "/cases/3")
 ANSWERS = ("", "/curves", "/answers", "/explore")
 
 

@@ -89,23 +89,16 @@ def test_a_running_study_is_followed_on_every_page_and_through_a_lost_connection
     page.goto(f"/studies/{study_id}/map")
     page.wait_for_function("() => Number(document.querySelector('.plot')?.dataset.drawn) >= 3")
 
-    page.goto(f"/studies/{study_id}/cases?where=shaft.load+%3E%3D+0")
-    page.evaluate("() => { document.querySelector('#cases').dataset.mine = '1'; }")
-    page.wait_for_function("() => document.querySelector('#cases:not([data-mine])')")
-    # A view that is saved now has the present choices, under the name that is half typed.
-    name = page.get_by_label("Name of this view")
-    name.fill("Half")
-    named(page, "ending").select_option("ok")
-    expect(page.locator("#view-query input")).to_have_value(re.compile("ending=ok"))
-    expect(name).to_have_value("Half")
-
-    page.goto(f"/studies/{study_id}/explore")
-    page.evaluate("() => { document.querySelector('#selected').dataset.mine = '1'; }")
-    page.wait_for_function("() => document.querySelector('#selected:not([data-mine])')")
+    page.goto(f"/studies/{study_id}/rows?where=shaft.load+%3E%3D+0")
+    # What is half typed stays when the rows follow the run.
+    page.get_by_label("Name of this view").fill("Half")
+    page.evaluate("() => { document.querySelector('#rows').dataset.mine = '1'; }")
+    page.wait_for_function("() => document.querySelector('#rows:not([data-mine])')")
+    expect(page.get_by_label("Name of this view")).to_have_value("Half")
 
     for address, part in (
         (f"/studies/{study_id}/cases/249999", "#outcome"),
-        (f"/studies/{study_id}/explore/compare?case=0&case=249999", "#beside"),
+        (f"/studies/{study_id}/rows?case=0&case=249999", "#rows"),
         (f"/compare?study={example}&study={study_id}&x=shaft.load", "#head"),
     ):
         page.goto(address)

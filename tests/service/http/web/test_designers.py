@@ -148,7 +148,7 @@ def test_everything_works_without_javascript(visitor: Visitor, example: str) -> 
         expect(picture).to_be_visible()
         found = page.request.get(picture.evaluate("image => image.src"))
         assert found.headers["content-type"] == "image/svg+xml", address
-    page.goto(f"/studies/{study_id}/cases?sort=-shaft.load")
+    page.goto(f"/studies/{study_id}/rows?sort=-shaft.load&show=shaft.load")
     assert [cell.inner_text() for cell in page.locator("tbody td:nth-child(2)").all()] == ["0.2", "0.1", "0"]
 
 

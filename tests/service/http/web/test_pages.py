@@ -34,7 +34,7 @@ def test_every_shape_of_study_has_its_pages(service: Service, spec: dict[str, An
     for filled in (False, True):
         if filled:
             service.fill(study_id)
-        for part in ("", "/cases", "/cases?sort=-shaft.speed.mean&ending=ok", "/cases/0"):
+        for part in ("", "/rows", "/rows?sort=-shaft.speed.mean&ending=ok", "/cases/0"):
             assert service.http.get(f"/studies/{study_id}{part}").status_code == 200, part
         for part in ("/curves", "/map"):
             assert service.http.get(f"/studies/{study_id}{part}").status_code in (200, 303), part
@@ -153,9 +153,9 @@ def test_a_picture_without_rows_is_a_sentence_and_the_first_one_has_rows(
         ("curves?x=shaft.load&by=&at=excitation.frequency=99", "the axis has no such value"),
         ("curves?x=shaft.load&at=nonsense", "must be path=value"),
         ("map?z=none", "unknown result"),
-        ("cases?sort=nothing", "is neither a parameter that varies nor a numeric result"),
-        ("cases?ending=nothing", "unknown ending"),
-        ("cases?at=shaft.load=7", "the axis has no such value"),
+        ("rows?sort=nothing", "is neither a parameter that varies nor a numeric result"),
+        ("rows?ending=nothing", "is not an ending"),
+        ("rows?at=shaft.load=7", "the axis has no such value"),
         ("cases/0?from=9&to=3", "outside the run"),
     ],
 )

@@ -11,7 +11,6 @@ from playwright.sync_api import expect
 from sprag.service.figures.figure import NOTES
 from sprag.service.results.regimes import MARKS
 from tests.service.http.web.fields import drawn
-from tests.service.searching import spec_of
 
 if TYPE_CHECKING:
     from tests.service.http.web.conftest import Office, Visitor
@@ -200,28 +199,3 @@ def test_a_study_prints_as_a_report(visitor: Visitor, example: str) -> None:
     for shown in ("Mechanical characteristic", "Inputs", "engine version", "Printed"):
         expect(page.get_by_text(shown).first).to_be_visible()
     assert page.pdf(format="A4").startswith(b"%PDF")
-
-
-def test_ranges_select_designs_in_the_table_and_in_the_scatter(visitor: Visitor, office: Office) -> None:
-    limits = [{"result": "efficiency", "at_most": 1}]
-    spec = spec_of(population=4, generations=1, polish=False, subject_to=limits, at=[{"shaft.load": "0.2 N*m"}])
-    study_id = office.submit(spec)
-    page = visitor.page
-    page.goto(f"/studies/{study_id}/front")
-    expect(page.locator("#scatter")).to_have_attribute("data-drawn", re.compile(r"\d"))
-    told = page.locator("#parallel output")
-    expect(told).to_have_text("4 of 4 designs shown are selected.")
-    rows = page.locator("#designs tr[data-design]")
-    frequencies = [
-        item["variables"]["excitation.frequency"] for item in office.get(f"/studies/{study_id}/front")["designs"]
-    ]
-    inside = sum(value >= 26.0 for value in frequencies)
-    page.get_by_role("group", name="Excitation frequency (Hz)").get_by_label("from").fill("26")
-    expect(told).to_have_text(f"{inside} of 4 designs shown are selected.")
-    expect(rows).to_have_count(4)
-    expect(rows.filter(visible=True)).to_have_count(inside)
-    chosen = "document.querySelector('#scatter').data.map((trace) => (trace.selectedpoints ?? []).length)"
-    assert sum(page.evaluate(chosen)) == inside
-    page.get_by_role("button", name="Show all").click()
-    expect(told).to_have_text("4 of 4 designs shown are selected.")
-    assert page.evaluate("document.documentElement.scrollWidth") <= 1280

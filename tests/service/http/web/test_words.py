@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 #: What people read of a page: without the spec itself, code, scripts and attributes.
 _HIDDEN = re.compile(r"<(pre|code|style|script|title)\b.*?</\1>|<[^>]*>|Name in specs.*?</table>", re.DOTALL)
-_PARTS = ("", "/curves", "/map", "/cases", "/explore", "/cases/0")
-_FIGURES = ("figures/curves?y=shaft.speed.mean&y=torque.mean&", "figures/answers?", "figures/explore?")
+_PARTS = ("", "/curves", "/map", "/rows", "/rows?plot=points", "/cases/0")
+_FIGURES = ("figures/curves?y=shaft.speed.mean&y=torque.mean&", "figures/answers?")
 
 
 def names_of(service: Service, study_id: str) -> set[str]:
@@ -56,8 +56,7 @@ def test_no_code_name_stands_where_a_caption_should(service: Service, study_id: 
         seen = _HIDDEN.sub(" ", page.text)
         assert sorted(name for name in names if re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", seen)) == [], part
     for address in _FIGURES:
-        figure = service.http.get(f"/studies/{study_id}/{address}columns=1" if "explore" not in address else
-                                  f"/studies/{study_id}/{address}").json()  # fmt: skip
+        figure = service.http.get(f"/studies/{study_id}/{address}columns=1").json()
         seen = " ".join(texts(figure))
         assert seen
         assert sorted(name for name in names if name in seen) == [], address
@@ -131,7 +130,7 @@ def test_a_value_of_an_axis_with_many_is_typed_in_the_unit_beside_it(service: Se
     ]
     study_id = service.submit(spec)
     over = "x=excitation.frequency&units=torque%3DN*mm&at%3Apendulums.0.mass=0.5&at%3Ashaft.load="
-    for part in ("", "/curves", "/map", "/cases"):
+    for part in ("", "/curves", "/map"):
         for typed in ("105", "0.105 N*m"):
             answer = service.http.get(f"/studies/{study_id}{part}?{over}{typed}")
             assert answer.status_code == 200, part
@@ -147,8 +146,8 @@ def test_a_value_of_an_axis_with_many_is_typed_in_the_unit_beside_it(service: Se
 def test_a_bare_number_is_in_the_unit_beside_it(service: Service, study_id: str) -> None:
     page = service.http.get(f"/studies/{study_id}?units=torque%3DN*mm&point=100").text
     assert "100 N·mm" in page or "100 N*mm" in page
-    figure = service.http.get(f"/studies/{study_id}/explore?units=torque%3DN*mm&max%3Ashaft.load=150").text
-    stated = re.search(r"<strong>(\d+)</strong> of (\d+)", figure)
+    rows = service.http.get(f"/studies/{study_id}/rows?units=torque%3DN*mm&max%3Ashaft.load=150").text
+    stated = re.search(r"<b role=\"status\">(\d+) of (\d+)", rows)
     assert stated
     answer = service.get(f"/studies/{study_id}/explore", where="shaft.load <= 0.15")
     assert [int(number) for number in stated.groups()] == [answer["selected"], answer["known"]]

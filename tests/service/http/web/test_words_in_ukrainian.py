@@ -69,7 +69,7 @@ def test_choices_of_a_machine_are_in_words_with_their_code_names_in_titles(servi
 def test_what_only_scripts_can_do_is_told_where_scripts_run(service: Service) -> None:
     study_id = service.submit()
     service.fill(study_id)
-    page = service.http.get(f"/studies/{study_id}/explore", headers={"Accept": "text/html"}).text
+    page = service.http.get(f"/studies/{study_id}/rows", headers={"Accept": "text/html"}).text
     told = re.findall(r'<span class="([^"]*)">[^<]*(?:click|drag)[^<]*</span>', page)
     assert told
     assert all("script" in classes.split() for classes in told)

@@ -1,0 +1,264 @@
+"""The page of rows: its addresses, files of its rows, and studies that are made of them."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from urllib.parse import urlencode
+
+from fastapi import Query, Request
+from starlette.datastructures import QueryParams
+from starlette.responses import RedirectResponse, Response
+
+from sprag.service.faults import SelectionError, refused
+from sprag.service.http.context import Context, Ctx, StudyId
+from sprag.service.http.current import current
+from sprag.service.http.drawing import table
+from sprag.service.http.reading import FileChoice, PageChoice, file_pairs
+from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
+from sprag.service.http.web.form.page import spec_in_form
+from sprag.service.http.web.form.values import RepeatedForm
+from sprag.service.http.web.held import with_held
+from sprag.service.http.web.rows.asked import MOST_BESIDE, read_asked
+from sprag.service.http.web.rows.beside import lines_of
+from sprag.service.http.web.rows.chips import chips_of
+from sprag.service.http.web.rows.lines import BELOW, HEIGHT, SHADES, TOP
+from sprag.service.http.web.rows.view import RowsPage, rows_view
+from sprag.service.http.web.study import study_frame
+from sprag.service.http.web.templates import page
+from sprag.service.http.work import Attended
+from sprag.service.jobs import checks
+from sprag.service.jobs.submission import take_in
+from sprag.service.json_text import to_bytes
+from sprag.service.languages import _
+from sprag.service.reading.faults import message
+from sprag.service.reading.reader import meanings
+from sprag.service.results.explore import ExploreQuery, explored_csv, explored_json
+from sprag.service.results.selection import own_paths
+from sprag.service.views.explore import selection_spec
+from sprag.service.views.library import reading_of
+from sprag.service.views.rows import is_search, rows_of
+from sprag.service.views.study_view import FEW
+from sprag.worker import models
+from sprag.worker.limits import MAX_SELECTED
+from sprag.worker.study import SAME_VALUE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sprag.service.http.web.rows.view import Chosen
+    from sprag.service.reading.reader import Choice, Reading
+    from sprag.service.views.library import Library
+    from sprag.worker.study import Study
+
+router = page_router()
+
+#: Most cases of a new study of a selection: its form has them as text.
+MOST_POINTS: Final = 1_000
+#: Formats of the rows of the page.
+RowsForm = Literal["csv", "json"]
+
+
+@dataclass(frozen=True, slots=True)
+class Pane:
+    """The chosen row: its main number, other results, and its dimensions beside those of the base.
+
+    ``main`` and ``results`` are names with values (SI) and units; ``dimensions`` have the value of the base too, None
+    where it is the same or there is none.
+    """
+
+    case: int
+    place: int | None
+    main: tuple[str, Any, str] | None
+    results: list[tuple[str, Any, str]]
+    dimensions: list[tuple[str, Any, str, float | None]]
+    before: int | None
+    after: int | None
+
+
+@router.get("/studies/{study_id:study}/rows")
+async def rows_page(work: Attended, study_id: StudyId) -> Response:
+    """The rows within conditions; every choice is in the address."""
+    context, given = work.context, work.request.query_params.multi_items()
+    asked = (context.library, study_id, given, current().choice)
+    view = await (work.check(rows_view, *asked) if await in_thread(_many, context, study_id) else
+                  in_thread(rows_view, *asked))  # fmt: skip
+    passing = {"of", "do"} & {name for name, value in given if value.strip()}
+    if passing and not view.asked.faults:
+        changed = view.asked
+        if dict(given).get("do") == "without":
+            changed = changed.other(without=(*changed.query.without, *changed.beside), beside=())
+        return RedirectResponse(f"/studies/{study_id}/rows{changed.link()}", status_code=303)
+    return await in_thread(_page, context, study_id, view)
+
+
+def _many(context: Context, study_id: str) -> bool:
+    """Whether reading all rows takes so long that another process does it."""
+    return context.store.studies.study(study_id).cases > FEW
+
+
+def _page(context: Context, study_id: str, view: RowsPage) -> Response:
+    study, frame = context.store.studies.study(study_id), study_frame(context, study_id)
+    asked, infos, reading = view.asked, models.study_results(study), frame["reading"]
+    rows, missing = _beside(context, study_id, asked.beside[:MOST_BESIDE])
+    files = urlencode([*asked.other(row=None, skip=0, beside=()).pairs(), *file_pairs()])
+    return page(
+        "rows.html",
+        status=422 if asked.faults else 200,
+        **frame,
+        tab="/rows",
+        view=view,
+        asked=asked,
+        query=asked.query,
+        faults=asked.faults,
+        wrong={fault.where: message(fault) for fault in asked.faults},
+        field_names={"least": _("at least"), "most": _("at most")},
+        search=is_search(study),
+        chips=chips_of(view, reading),
+        pane=view.chosen and _pane(study, view, view.chosen),
+        plot={"top": TOP, "height": HEIGHT, "bottom": TOP + HEIGHT + BELOW, "shades": range(1, SHADES + 1)},
+        halves=halves,
+        own_endings=list(models.endings_of(study.model)),
+        paths=set(study.column_paths),
+        regimes=[] if (regime := models.regime_info(infos)) is None else regime.categories,
+        flags=meanings(models.flags_of(study.model)),
+        beside=rows,
+        missing=missing,
+        beside_lines=lines_of(study, rows),
+        most_in_file=MAX_SELECTED,
+        most_points=MOST_POINTS,
+        own_numbers=bool(own_paths(study)),
+        along=next(iter(models.presentation_of(study).along), "") if is_search(study) else "",
+        files=f"/studies/{study_id}/rows/file?{files}",
+        asked_as=f"?{urlencode(file_pairs())}",
+        points=f"/studies/{study_id}/rows/new{asked.link(row=None, skip=0, beside=())}",
+    )
+
+
+def _beside(context: Context, study_id: str, cases: Sequence[int]) -> tuple[list[Any], list[int]]:
+    """Rows of the finished cases, and numbers of the others."""
+    found = {case: context.store.rows.case(study_id, case) for case in cases}
+    return [row for row in found.values() if row is not None], [case for case, row in found.items() if row is None]
+
+
+def _pane(study: Study, view: RowsPage, chosen: Chosen) -> Pane:
+    row, query = chosen.row, view.asked.query
+    own = {**row["results"]}
+    main = query.sort.removeprefix("-")
+    main = main if main in own and main != "rank" else next((name for name in own if name != "rank"), "")
+    cases = [one["case"] for one, _shade in view.rows]
+    at = cases.index(row["case"]) if row["case"] in cases else None
+    return Pane(
+        row["case"],
+        chosen.place,
+        (main, own[main], view.units[main]) if main else None,
+        [(name, value, view.units[name]) for name, value in own.items() if name != main and value is not None],
+        [
+            (path, row["parameters"][path], view.units[path], _was(study, path, row["parameters"][path]))
+            for path in own_paths(study)
+        ],
+        cases[at - 1] if at else None,
+        cases[at + 1] if at is not None and at + 1 < len(cases) else None,
+    )
+
+
+def _was(study: Study, path: str, value: object) -> float | None:
+    """The value of the base, where a row has another one."""
+    base = study.base.get(path)
+    if base is None or not isinstance(value, float) or abs(value - base) <= SAME_VALUE * abs(base):
+        return None
+    return base
+
+
+def halves(text: str) -> list[str]:
+    """A title in two lines of about the same length, for the head of an axis."""
+    words = text.split()
+    pairs = [(" ".join(words[:cut]), " ".join(words[cut:])) for cut in range(1, len(words))]
+    return list(min(pairs, key=lambda pair: max(map(len, pair)))) if pairs else [text]
+
+
+def _asked(context: Context, study_id: str, given: QueryParams, reading: Reading, most: int) -> ExploreQuery:
+    """The rows of an address, or the ticked ones of them; raises SelectionError where some of it cannot be asked."""
+    asked = read_asked([*given.multi_items(), ("do", "take")], context.store.studies.study(study_id), reading)
+    if asked.faults:
+        raise SelectionError(asked.faults)
+    return replace(asked.query, limit=most, only=asked.beside)
+
+
+@router.get("/studies/{study_id:study}/rows/new")
+async def new_study_of_rows(work: Attended, study_id: StudyId) -> Response:
+    """The form for a study of the first rows."""
+    context, given, choice = work.context, work.request.query_params, current().choice
+
+    def asked() -> ExploreQuery:
+        return _asked(context, study_id, given, reading_of(context.store, study_id, choice), MOST_POINTS)
+
+    spec = await work.check(selection_spec, context.library, study_id, await in_thread(asked), rows_of)
+    return await spec_in_form(work, spec)
+
+
+@router.get("/studies/{study_id:study}/rows/file")
+async def file_of_rows(
+    work: Attended, study_id: StudyId, choice: FileChoice, form: Annotated[RowsForm, Query(alias="format")] = "csv"
+) -> Response:
+    """The rows of the page as a file, or the ticked ones of them."""
+    context, given = work.context, work.request.query_params
+
+    def asked() -> ExploreQuery:
+        return _asked(context, study_id, given, reading_of(context.store, study_id, choice), MAX_SELECTED)
+
+    content = await work.check(rows_file, context.library, study_id, await in_thread(asked), choice, form)
+    return table(content, form, f"{study_id}-rows")
+
+
+def rows_file(library: Library, study_id: str, query: ExploreQuery, choice: Choice, form: RowsForm) -> bytes:
+    """Rows as CSV, in a reader's units, or as JSON data."""
+    found = rows_of(library, study_id, query)
+    if form == "json":
+        return to_bytes(explored_json(study_id, found))
+    return explored_csv(found.study, found, reading_of(library.store, study_id, choice))
+
+
+@router.post("/studies/{study_id:study}/rows/longer")
+async def run_rows_longer(context: Ctx, work: Attended, study_id: StudyId, fields: RepeatedForm) -> Response:
+    """The button below ticked rows: submit a study of them with more time for each."""
+    study = await in_thread(context.store.studies.study, study_id)
+    cases = sorted({int(text) for name, text in fields if name == "case" and text.isdecimal()})
+    if not cases or cases[-1] >= study.cases:
+        raise refused("case", "required", "no case is selected")
+    now = context.store.clock.now()
+    made = await work.check(checks.longer_study, context.library, study_id, tuple(cases), None, now, {})
+    # Pressed twice, it submits one study.
+    digest = hashlib.sha256(repr(cases).encode()).hexdigest()[:32]
+    record = await in_thread(take_in, context.store, made, f"longer-{study_id}-{digest}")
+    return RedirectResponse(f"/studies/{record.id}", status_code=303)
+
+
+@router.get("/studies/{study_id:study}/explore")
+@router.get("/studies/{study_id:study}/cases")
+@router.get("/studies/{study_id:study}/front")
+@router.get("/studies/{study_id:study}/explore/compare")
+def earlier(context: Ctx, request: Request, study_id: StudyId, choice: PageChoice) -> Response:
+    """Where the pages of cases, ranges and designs are now, with their choices."""
+    study = context.store.studies.study(study_id)
+    given = with_held(request.query_params, study, reading_of(context.store, study_id, choice))
+    pairs = [
+        ("show" if name == "col" else name, value)
+        for name, value in given.multi_items()
+        if name not in ("after", "exact")
+    ]
+    if given.get("exact"):
+        pairs += [("where", "violation <= 0"), ("where", "miss <= 1e-6")]
+    elif pairs and not request.url.path.endswith("/front") and "where" not in dict(pairs):
+        pairs.append(("where", ""))  # their conditions were all in the address
+    if {"x", "y"} & set(dict(pairs)):
+        pairs.append(("plot", "points"))
+    return RedirectResponse(f"/studies/{study_id}/rows{f'?{urlencode(pairs)}' if pairs else ''}", status_code=308)
+
+
+@router.get("/studies/{study_id:study}/explore/new")
+def earlier_new(request: Request, study_id: StudyId) -> Response:
+    """Where a study of a selection is made now."""
+    return RedirectResponse(f"/studies/{study_id}/rows/new?{request.url.query}", status_code=308)

@@ -1,0 +1,59 @@
+"""Two quantities of rows as points, in the shades of a third one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sprag.service.figures.explore import chosen_pair
+from sprag.service.figures.figure import Direction, Figure, Line, Panel, Quantity
+from sprag.service.figures.read import read_figure
+from sprag.service.figures.svg import svg
+from sprag.service.http.web.rows.lines import SHADES
+from sprag.service.languages import _
+from sprag.service.reading.reader import Phrase
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from sprag.service.http.web.rows.asked import Asked
+    from sprag.service.reading.reader import Reading
+    from sprag.service.results.explore import Explored
+
+_WIDTH: Final = 960
+
+
+def points_of(
+    found: Explored, asked: Asked, shades: NDArray[np.int64], chosen: int | None, reading: Reading
+) -> tuple[tuple[str, str], str]:
+    """The two quantities, and their picture; ``chosen`` is the number of the row that stands out."""
+    pair = chosen_pair(found, asked.x, asked.y)
+    xs, ys = (found.values[name] for name in pair)
+    inside = np.where(found.selected, shades, 0)
+    kinds = [(inside == shade, f"var(--q{shade})", Phrase("row")) for shade in range(1, SHADES + 1)]
+    if asked.outside:
+        kinds.insert(0, (inside == 0, "var(--line)", Phrase("outside the conditions")))
+    lines = [
+        Line(name, xs[which], ys[which], colour, key="0", listed=False, cases=found.rows.cases[which],
+             joined=False)
+        for which, colour, name in kinds
+        if which.any()
+    ]  # fmt: skip
+    own = found.rows.cases == chosen
+    if own.any():
+        lines.append(Line(Phrase("the chosen row"), xs[own], ys[own], "var(--look)", key="0", listed=False,
+                          cases=found.rows.cases[own], joined=False, ring=True))  # fmt: skip
+    across, up = (Quantity(name, found.plan.units.get(name, "1")) for name in pair)
+    directions: tuple[tuple[Direction, str], ...] = (("x", pair[0]), ("y", pair[1]))
+    figure = Figure(
+        across,
+        (Panel(up, tuple(lines), x=across),),
+        most=len(xs) + 1,
+        note="" if lines else Phrase("No case has both numbers."),
+        log=tuple(direction for direction, name in directions if name in asked.log),
+        flipped=tuple(direction for direction, name in directions if name in asked.flip),
+    )
+    label = _("{y} against {x}", y=reading.caption(pair[1]), x=reading.within(pair[0]))
+    address = f"{asked.link(row=None)}&row=".replace("?&", "?")
+    return pair, svg(read_figure(figure, reading), width=_WIDTH, label=label, cases=address)
