@@ -47,7 +47,7 @@ def form_values() -> Iterator[str]:
 
 def _own(form: Form) -> Iterator[str]:
     """What the form of a model itself says."""
-    yield from (form.called, form.batch, form.normal, form.advice, *form.labels.values())
+    yield from (form.called, form.drawer, form.normal, form.advice, *form.labels.values())
     yield from (title for _, title in form.groups)
     for kind in form.components:
         yield from (

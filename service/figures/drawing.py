@@ -69,10 +69,11 @@ def svg(drawing: Drawing, labels: Mapping[str, str] | None = None, *, alone: boo
     """
     beside = 0.0 if labels is None else _LABEL
     text = _letters(drawing) if labels is None else _beside(drawing, labels)
-    head = f' xmlns="http://www.w3.org/2000/svg" width="{drawing.width + 2 * beside:g}" height="{drawing.height:g}"'
+    space = ' xmlns="http://www.w3.org/2000/svg"' if alone else ""
     frames = f' data-frames="{escape(drawing.frames)}"' if drawing.frames and not alone else ""
     return (
-        f'<svg{head if alone else ""} class="drawing" role="img" aria-label="{escape(drawing.about)}"{frames} '
+        f'<svg{space} width="{drawing.width + 2 * beside:g}" height="{drawing.height:g}" class="drawing" role="img" '
+        f'aria-label="{escape(drawing.about)}"{frames} '
         f'viewBox="{-beside:g} 0 {drawing.width + 2 * beside:g} {drawing.height:g}">'
         f"{_COLOURS if alone else ''}{drawing.shapes}{text}</svg>"
     )

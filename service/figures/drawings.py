@@ -8,9 +8,11 @@ from sprag.service.figures.drive_drawing import drive_drawings
 from sprag.service.figures.linkage import machine_drawings
 from sprag.worker import models
 from sprag.worker.models import machine_shaft
-from sprag.worker.models.parameters import parameter_of
+from sprag.worker.models.parameters import model_parameter
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from sprag.service.figures.drawing import Drawing
     from sprag.worker.study import Study
 
@@ -24,9 +26,16 @@ def drawings(study: Study, angle: float = USUAL_ANGLE) -> tuple[Drawing, ...]:
     Each has the dimensions that the machine has, with their symbols.
     """
     if models.has_clutches(study):
-        entries = {path: parameter_of(study, path) for path in study.base}
-        symbols = {path: entry.symbol for path, entry in entries.items() if entry is not None}
-        return tuple(drawing.labelled(symbols) for drawing in drive_drawings(study.base))
+        return rough_drawings(study.model, study.base)
     if study.model == machine_shaft.MODEL:
         return machine_drawings(study.structure or {}, study.base, angle)
     return ()
+
+
+def rough_drawings(model: str, base: Mapping[str, float]) -> tuple[Drawing, ...]:
+    """The drawings of a machine whose numbers (SI, by path) may be incomplete; none where that needs its structure."""
+    if models.model_of(model).clutches is None:
+        return ()
+    entries = {path: model_parameter(model, path) for path in base}
+    symbols = {path: entry.symbol for path, entry in entries.items() if entry is not None}
+    return tuple(drawing.labelled(symbols) for drawing in drive_drawings(base))

@@ -75,6 +75,18 @@ _BY_NAME: Final = {kind.name: kind for kind in KINDS}
 _BY_UNIT: Final = {kind.unit: kind for kind in KINDS}
 
 
+def offered(si: str) -> tuple[str, ...]:
+    """The units in which a quantity of the SI unit can be typed by a choice, that one first; none of a plain number."""
+    if si in ("", "1"):
+        return ()
+    return (si, *_BY_UNIT[si].others) if si in _BY_UNIT else (si,)
+
+
+def is_si(unit: str) -> bool:
+    """Whether plain numbers are in this unit, where it is one of those offered."""
+    return unit in _BY_UNIT or not any(unit in kind.others for kind in KINDS)
+
+
 def _pattern() -> str:
     """A regular expression of ECMA 262 for choices of units as `read_units` takes them."""
     units = {kind.name: [re.escape(unit) for unit in (kind.unit, *kind.others)] for kind in KINDS}

@@ -175,7 +175,9 @@ class Form:
     called : the model in a sentence, such as "a machine shaft"; "" for its title
     with_run : whether its studies have a run, so that cases can start from their neighbours
     examples : what fields of the study show while they are empty, and a formula
-    batch, normal : what is said about a batch of machines that differ
+    drawer : what the drawer with the other fields is about
+    front : patterns of the paths, with N for numbers, whose fields are always in sight; none: all of them
+    normal : what is said about a batch of machines that differ
     advice : what is said about axes
     groups : beginning of paths -> heading under which they are offered as axes; by default their first parts
     nameless : pattern of the beginning of paths that the labels of axes leave out
@@ -188,7 +190,8 @@ class Form:
     called: str = ""
     with_run: bool = False
     examples: Mapping[str, str] = field(default_factory=dict)
-    batch: str = "Built machines differ: a field “±” beside each parameter, a share of it or a quantity"
+    drawer: str = "More: rare numbers, cases, deadline"
+    front: tuple[str, ...] = ()
     normal: str = (
         "Normal: ± is three standard deviations, so that nearly all machines are within it. Each place of the study is "
         "run with the nominal machine and with the drawn ones."

@@ -181,6 +181,14 @@ FORM: Final = Form(
     ),
     new={"/base/mechanism": "slider_crank", "/base/operation": "steps", "/refine/results": "irregularity"},
     called="a machine shaft",
+    front=(
+        "mean_speed", "wanted_irregularity", "drive", r"drive\.(inertia|torque(\.\w+)?|flywheel)",
+        r"drive\.motor\.(?!inertia).*", r"drive\.flywheel\.(mass|diameter)",
+        r"drive\.stages\.N\.(kind|ratio|lead|radius)", r"(parts\.N\.)?(mechanism|operation|crank_angle)",
+        r"(parts\.N\.)?mechanism\.\w+\.(?!(kind|bodies|weights|rise|fall|inclination|.*_(centre|inertia|angle))$).*",
+        r"(parts\.N\.)?mechanism\.(formula|csv|cam\.\w+_angle)",
+        r"(parts\.N\.)?operation\.(quantity|over|value|steps|formula|csv|scale|gas\.\w+_(area|pressure)|indicator\.csv)",
+    ),
     examples={
         "formula": "2.5 * mechanism.slider_crank.crank",
         "values": "1; 2; 5 kg*m^2", "from": "200 rpm", "to": "400 rpm", "step": "50 rpm", "value": "300 rpm",

@@ -84,6 +84,11 @@ FORM: Final = Form(
     ),
     called="a vibration drive",
     with_run=True,
+    drawer="Clutch law, damping, phase, how long to run, further cases",
+    front=(
+        r"excitation\.(frequency|amplitude_[xy])",
+        r"pendulums\.N\.(mass|arm|inertia|spring_rate|spring_arm|backlash)", r"shaft\.(inertia|load)",
+    ),
     examples={
         "formula": "1.1 * pendulums.0.mass * pendulums.0.arm^2 + 2e-4 kg*m^2",
         "values": "0; 0.1; 0.2 N*m", "from": "20 Hz", "to": "35 Hz", "step": "1 Hz", "value": "0.2 N*m",
@@ -91,7 +96,6 @@ FORM: Final = Form(
         "columns": "shaft.load [N*mm]\texcitation.frequency [Hz]\n100\t25\n200\t30",
         "points": "shaft.load [N*mm],excitation.frequency [Hz]\n100,25\n200,30",
     },
-    batch="Built drives differ: a field “±” beside each parameter, a share of it or a quantity",
     normal="Normal: ± is three standard deviations, so that nearly all drives are within it. Each place of the study "
     "is run with the nominal drive and with the drawn ones.",
     advice="Start the load at 0: the main curve then begins at the no-load speed.",

@@ -19,7 +19,7 @@ from sprag.service.http.web.form.machine_spec import step_of
 from sprag.service.http.web.form.rows import WAYS
 from sprag.service.http.web.form.spec import field_of, spec_of
 from sprag.service.jobs.preview import preview_json
-from sprag.service.languages import _, gettext
+from sprag.service.languages import _, gettext, grouped, ngettext
 from sprag.service.reading.faults import message
 from sprag.service.reading.numbers import assumption, in_language, settle, settled
 from sprag.service.reading.quantities import TYPED
@@ -48,7 +48,8 @@ class Checked:
     ``faults`` contains the messages by field ("" for general ones); ``preview`` is None while there are any. ``fits``
     contains the report and the picture of each clutch that could be fitted, regardless of other faults; ``notes`` the
     assumptions about measured data. ``finish`` is the deadline, which is not part of the spec. ``sketch`` contains the
-    mechanisms of a machine shaft, ``words`` the study in a sentence, and ``warnings`` those of the preview for people.
+    drawings of the machine, ``words`` the study in a sentence, ``warnings`` those of the preview for people, and
+    ``beside`` those of them that are about a field, by its name.
     """
 
     spec: dict[str, Any]
@@ -63,6 +64,18 @@ class Checked:
     sketch: tuple[Drawing, ...] = ()
     words: str = ""
     warnings: tuple[str, ...] = ()
+    beside: dict[str, list[str]] = field(default_factory=dict)
+
+    @property
+    def run(self) -> str:
+        """What the button that submits the study says: how many cases, and how long they take."""
+        if self.preview is None:
+            return gettext("Run")
+        count, seconds = self.preview["most_cases"], self.preview["estimated_seconds"]
+        time = gettext("about {time}", time=duration(seconds)) if seconds >= 1.0 else duration(seconds)
+        if self.preview["most_rounds"] > 1:
+            return gettext("Run at most {n} cases, {time}", n=grouped(count), time=time)
+        return ngettext("Run {n} case, {time}", "Run {n} cases, {time}", count, n=grouped(count), time=time)
 
     @property
     def query(self) -> str:
@@ -107,8 +120,23 @@ def look_over(
     if checked.parsed is not None and checked.preview is not None:
         reading = reading_for(checked.parsed.study, checked.parsed.spec, choice or Choice(TYPED))
         checked.words = _words(checked.parsed, checked.preview, reading)
-        checked.warnings = tuple(reading.warning(text) for text in checked.preview["warnings"])
+        for text in checked.preview["warnings"]:
+            name, told = ("", None) if "/text" in values else _placed(text, values)
+            if name and told is not None:
+                checked.beside.setdefault(name, []).append(reading.warning(told))
+            else:
+                checked.warnings = (*checked.warnings, reading.warning(text))
     return checked
+
+
+def _placed(text: str, values: Mapping[str, str]) -> tuple[str, WarningText | None]:
+    """The field that a warning is about, "" for none, and what it says there."""
+    sentence = getattr(text, "sentence", None)
+    place = None if sentence is None else sentence.parts.get("part0")
+    told = None if sentence is None else sentence.parts.get("part1")
+    if not isinstance(place, Place) or not isinstance(told, str):
+        return "", None
+    return field_of(place.pointer, values), WarningText(told)
 
 
 def _words(parsed: ParsedSpec, preview: Preview, reading: Reading) -> str:

@@ -7,6 +7,7 @@ import json
 import re
 import secrets
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import lru_cache
 from typing import Annotated, Any, Final
 
@@ -15,6 +16,7 @@ from starlette.responses import RedirectResponse, Response
 
 from sprag.sentences import Place, Sentence
 from sprag.service.faults import FaultError
+from sprag.service.figures.drawings import rough_drawings
 from sprag.service.http.context import Context, Ctx, study_with
 from sprag.service.http.current import current
 from sprag.service.http.problems import ApiError, api_error
@@ -27,7 +29,7 @@ from sprag.service.http.web.form.cases import kinds, methods
 from sprag.service.http.web.form.check import Checked
 from sprag.service.http.web.form.columns import take_columns
 from sprag.service.http.web.form.components import component_groups, rows_with_components, take_component
-from sprag.service.http.web.form.entries import Values
+from sprag.service.http.web.form.entries import Values, plain, text_of
 from sprag.service.http.web.form.fields import (
     FORM_MODEL,
     Groups,
@@ -38,11 +40,13 @@ from sprag.service.http.web.form.fields import (
     search_fields,
 )
 from sprag.service.http.web.form.goal import GOAL_DEFAULTS
-from sprag.service.http.web.form.machine import BASE, blocks, choices_of, entries, form_of, model_name
+from sprag.service.http.web.form.machine import BASE, choices_of, entries, form_of, model_name
 from sprag.service.http.web.form.machine_spec import base_of, values_of_base
-from sprag.service.http.web.form.own_machine import laboratory_address
+from sprag.service.http.web.form.own_machine import example_spec, laboratory_address
 from sprag.service.http.web.form.parts import count_of, parts_of, reshape, share, unshared
 from sprag.service.http.web.form.rows import LIMITS
+from sprag.service.http.web.form.sent import settle
+from sprag.service.http.web.form.sheet import Sheet, sheet_of
 from sprag.service.http.web.form.spec import REFINE_DEFAULTS, is_search, values_of
 from sprag.service.http.web.form.tolerances import OWN, distributions, drive_fields, own_name, with_batch
 from sprag.service.http.web.form.undo import history_of, remember, undo
@@ -54,8 +58,10 @@ from sprag.service.languages import gettext
 from sprag.service.presets import preset_names
 from sprag.service.reading.faults import message
 from sprag.service.reading.reader import Reading
+from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.spec.design import design_spec
 from sprag.service.spec.document import UNNAMED
+from sprag.service.spec.kinds.registry import without_cases
 from sprag.service.spec.report import SpecError
 from sprag.service.spec.stored import accepted
 from sprag.worker import models
@@ -79,25 +85,40 @@ async def new_study(
     along: Annotated[str | None, Query(max_length=200)] = None,
     mode: Annotated[str, Query(max_length=10)] = "form",
     model: Annotated[str, Query(max_length=40)] = FORM_MODEL,
+    begin: Annotated[str, Query(max_length=10)] = "",
+    source: Annotated[str | None, Query(max_length=80, alias="from")] = None,
 ) -> Response:
-    """The form, empty or filled in from an example or from another study, or one case of it, alone or along a
-    parameter.
+    """The form: the first example of a model as it is drawn, empty, an example, or a variant of another study or of one
+    case of it, alone or along a parameter.
     """
+    clone = clone or source
     spec = await in_thread(_start, context, preset, clone, case, along)
     if spec is None:
         if model not in models.model_names():
             known = ", ".join(models.model_names())
             raise ApiError("not-found", Sentence("Unknown model; known models: {models}.", models=known))
-        return form_page(request, {"/text": "", "format": "json"} if mode == "text" else empty(model), None)
+        if mode == "text":
+            return form_page(request, {"/text": "", "format": "json"}, None)
+        if begin == "empty":
+            return await in_thread(form_page, request, empty(model), None)
+        spec = {**without_cases(await in_thread(_example, model)), "axes": []}
+        spec.pop("name", None)
     fields = True
     try:
         values = values_of(spec)
+        if clone is None and preset is None:
+            values |= {
+                name: f"{number:g}" if number.is_integer() else text_of(number)
+                for name, number in _read_numbers(values).items()
+            }
     except ValueError:
         fields = mode == "text"
     if mode == "text" or not fields:
         values = {"/text": spec_text(spec), "format": "json"}
     if clone is not None and case is None and "/name" in values:
         values["/name"] = f"{values['/name']} (copy)"
+    if clone is not None and "/text" not in values:
+        values["from"] = clone
     checked = await look_over(context, work, values)
     return await in_thread(form_page, request, values, checked, fields=fields)
 
@@ -107,9 +128,8 @@ def empty(model: str) -> Values:
     values: Values = {
         "model": model,
         "asks": "axes",
-        "axes": "1",
+        "axes": "0",
         "/combine": "grid",
-        "/axes/0/way": "linspace",
         **REFINE_DEFAULTS,
         **GOAL_DEFAULTS,
     }
@@ -149,9 +169,12 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
     wanted = values.pop("do", "check")
     if wanted == "undo":
         undo(values)
+        settle(values, with_ticks=False)
         return await in_thread(form_page, request, values, await look_over(context, work, values))
-    before = values if "/text" in values else unshared(values)
+    before = values
     if "/text" not in values:
+        before = unshared(_without_ticks(values))
+        settle(values)
         share(values)
     if wanted == "submit":
         checked, made = await work.check(study_check.form_study, context.library, values, context.store.clock.now())
@@ -190,19 +213,23 @@ def _submit(context: Context, request: Request, values: Values, checked: Checked
     except FaultError as error:
         checked.faults.setdefault("", []).append(error.detail)
         return form_page(request, values, checked, status=api_error(error).type.status)
-    return RedirectResponse(f"/studies/{record.id}", status_code=303)
+    asked = f"/calibrate?study={record.id}" if values.get("asks") == "match" else f"/studies/{record.id}"
+    return RedirectResponse(asked, status_code=303)
 
 
 @router.post("/new/check")
 async def check(context: Ctx, work: Attended, request: Request, values: Form) -> Response:
-    """The live preview: faults by field, and the panel with cases, time, size, warnings and fits."""
+    """The live preview: faults and warnings by field, and the panel with cases, time, size and fits."""
+    settle(values)
     checked = await look_over(context, work, values)
 
     def answer() -> dict[str, Any]:
         return {
             "faults": checked.faults,
+            "beside": checked.beside,
+            "run": checked.run,
             "panel": fragment("_form_panel.html", checked=checked, address=_address(request)),
-            "sketch": fragment("_drawings.html", drawings=checked.sketch) if checked.sketch else "",
+            "pictures": [] if "/text" in values else [plan.picture for plan in _sheet(request, values, checked).plans],
             "fits": {
                 pointer: fragment("_form_fit.html", fit=fit, chart=chart, pointer="")
                 for pointer, (fit, chart) in checked.fits.items()
@@ -224,8 +251,10 @@ def form_page(
 
     ``fields`` is False where the form has no fields for the study, so that its spec is shown as text.
     """
+    begun, checked = checked is not None, checked or Checked({})
     text_mode, model, own = "/text" in values, model_name(values), form_of(values)
     parts = parts_of(values)
+    sheet = None if text_mode else _sheet(request, values, checked)
     rows = {} if text_mode else {name: range(count_of(values, name)) for name in parts}
 
     def results(*, numbers: bool = False) -> Groups:
@@ -236,16 +265,16 @@ def form_page(
         status=status,
         values=values,
         with_fields=fields,
-        faults={} if checked is None else checked.faults,
-        checked=checked or Checked({}),
-        begun=checked is not None,
+        faults=checked.faults,
+        checked=checked,
+        begun=begun,
         address=_address(request),
         key=values.get("key") or secrets.token_hex(8),
         model=model,
         standard=model == FORM_MODEL,
         form=own,
         models=[(name, _called(name)) for name in models.model_names() if name != model],
-        blocks=[] if text_mode else blocks(values),
+        sheet=sheet,
         parts=parts,
         rows=rows,
         search=is_search(values),
@@ -269,6 +298,60 @@ def form_page(
         sample_methods=methods(),
         exclusion_kinds=kinds(),
     )
+
+
+def _sheet(request: Request, values: Values, checked: Checked) -> Sheet:
+    """The sheet of a form; a machine that has faults is drawn as far as its numbers are known."""
+    model, before = model_name(values), None
+    if source := values.get("from"):
+        try:
+            before = values_of(request.app.state.context.store.studies.spec(source))
+        except (FaultError, ValueError):
+            before = None
+    return sheet_of(
+        values,
+        checked.sketch or rough_drawings(model, _numbers(values)),
+        _choices(values),
+        current().choice.units,
+        tolerant=with_batch(values),
+        faulty=checked.faults,
+        before=before,
+        begun=_begun(model),
+    )
+
+
+def _numbers(values: Values) -> dict[str, float]:
+    """The numbers of a form (SI, by path) that can be read."""
+    return {name.removeprefix(f"{BASE}/").replace("/", "."): value for name, value in _read_numbers(values).items()}
+
+
+def _read_numbers(values: Values) -> dict[str, float]:
+    """The numbers of a form that can be read (SI), by the name of their field."""
+    found = {}
+    for entry in entries(values):
+        if entry.tolerant and (text := values.get(entry.name, "").strip()):
+            with suppress(QuantityError):
+                found[entry.name] = parse_quantity(plain(text), entry.field.unit or "1")
+    return found
+
+
+def _example(model: str) -> dict[str, Any]:
+    """The machine with which a form begins."""
+    names = _presets(model)
+    return dict(preset_of(names[0])["spec"]) if names else example_spec(model)
+
+
+@lru_cache(maxsize=8)
+def _begun(model: str) -> Values:
+    """The form of the example of a model."""
+    return values_of(_example(model))
+
+
+def _without_ticks(values: Values) -> Values:
+    """A form as it was before its ticks were pressed."""
+    found = dict(values)
+    settle(found, with_ticks=False)
+    return found
 
 
 async def spec_in_form(work: Work, spec: dict[str, Any]) -> Response:

@@ -1,4 +1,4 @@
-// The form for a new study: checked by the server while it is filled in; the sketch explains the current field.
+// The form for a new study: checked by the server while it is filled in; the drawing and one line explain the current field.
 "use strict";
 
 let form = document.getElementById("study-form");
@@ -63,8 +63,15 @@ const check = async () => {
     if (field) field.toggleAttribute("aria-invalid", messages.length > 0);
     if (field && messages.length) field.setAttribute("aria-invalid", "true");
   }
-  const sketch = document.getElementById("sketch");
-  if (sketch && found.sketch) sketch.innerHTML = found.sketch;
+  for (const place of form.querySelectorAll(".wrong")) {
+    const texts = (found.beside || {})[place.id.slice("wrong:".length)] || [];
+    if (place.nextElementSibling?.matches(".hint")) place.nextElementSibling.remove();
+    if (texts.length) place.after(Object.assign(document.createElement("span"), { className: "hint", textContent: texts.join(" ") }));
+  }
+  const pictures = form.querySelectorAll(".picture");
+  if (pictures.length === (found.pictures || []).length) pictures.forEach((place, index) => { place.innerHTML = found.pictures[index]; });
+  const go = document.getElementById("go");
+  if (go && found.run) go.textContent = found.run;
   const open = [...panel.querySelectorAll("details")].map((part) => part.open);
   panel.innerHTML = found.panel;
   panel.querySelectorAll("details").forEach((part, index) => { part.open = Boolean(open[index]); });
@@ -127,8 +134,11 @@ const newShape = async (extra, body = encoded(extra)) => {
   if (!fresh) { fail(page.querySelector("main p")?.textContent || sprag.refusal(answer)); return false; }
   const known = new Set([...form.elements].map((element) => element.id || element.value));
   const { name: chosen, type } = document.activeElement;
+  const named = (part) => `${part.closest("fieldset[id]")?.id} ${part.querySelector("summary").textContent}`;
+  const opened = new Set([...form.querySelectorAll("details[open]")].map(named));
   form.replaceWith(document.adoptNode(fresh));
   form = fresh;
+  for (const part of form.querySelectorAll("details")) part.open ||= opened.has(named(part));
   listen();
   focusAfter(extra[0]?.[1], known, chosen, type);
   const unused = form.querySelector('[id="wrong:/columns"]');
@@ -138,11 +148,42 @@ const newShape = async (extra, body = encoded(extra)) => {
   return true;
 };
 
-// The dimension of the field that has the focus stands out in the drawing.
-const mark = (event) => {
+// The dimension of the field that has the focus stands out in the drawing, and one line says what it means.
+const explain = (event) => {
   for (const part of document.querySelectorAll("[data-mark].shown")) part.classList.remove("shown");
   const path = (event.target.name ?? "").replace(/^\/base\//, "").replaceAll("/", ".");
   if (path) document.querySelector(`[data-mark="${CSS.escape(path)}"]`)?.classList.add("shown");
+  const line = document.getElementById("explain"), { help, more } = event.target.dataset;
+  if (!line || !(help || more)) return;
+  const [text, link] = line.children;
+  text.textContent = help || event.target.labels?.[0]?.textContent || "";
+  link.hidden = !more;
+  if (more) { link.href = more; link.setAttribute("aria-label", sprag.say("Explanation: {label}", { label: event.target.labels?.[0]?.textContent.trim() || "" })); }
+};
+
+// A dimension is one stop of the Tab key: Enter opens its unit and its ticks, Escape leads back.
+const GROUPS = ".dim, .axis .line";
+const ownOf = (group) => [...group.querySelectorAll("a.range, .entry:not(.tolerance) > input, .line > .way > input")];
+const othersOf = (group) => {
+  const all = group.matches(".line") ? group.closest(".axis") : group;
+  return [...all.querySelectorAll("select, summary, button, input:not([type=hidden])")].filter((one) => !ownOf(group).includes(one) && !one.closest("details:not([open]) > .fields"));
+};
+const close = (group) => { for (const one of othersOf(group)) one.tabIndex = -1; };
+const stops = () => { for (const group of form.querySelectorAll(GROUPS)) if (ownOf(group).length) close(group); };
+const open = (event) => {
+  const group = event.target.closest(".dim") || event.target.closest(".axis")?.querySelector(".line");
+  if (!group || !ownOf(group).length) return;
+  const own = ownOf(group);
+  if (event.key === "Escape" && !own.includes(event.target)) { close(group); own[0].focus(); }
+  if (event.key !== "Enter" || !own.includes(event.target) || event.target.matches("a")) return;
+  event.preventDefault();
+  const others = othersOf(group).filter((one) => one.checkVisibility());
+  for (const one of others) one.tabIndex = 0;
+  others[0]?.focus();
+};
+const left = (event) => {
+  const group = event.target.closest(".dim, .axis");
+  if (group && !group.contains(event.relatedTarget)) for (const one of group.matches(".dim") ? [group] : group.querySelectorAll(".line")) close(one);
 };
 
 // A pasted column or row of a spreadsheet becomes a list of values, several columns become axes.
@@ -187,7 +228,10 @@ function listen() {
   form.addEventListener("paste", paste);
   form.addEventListener("change", remember);
   form.addEventListener("input", (event) => { edited = event.target.name; soon(); sprag.drafts.keep(form); });
-  form.addEventListener("focusin", mark);
+  stops();
+  form.addEventListener("focusin", explain);
+  form.addEventListener("keydown", open);
+  form.addEventListener("focusout", left);
   form.addEventListener("focusout", (event) => { if (event.target.name) { touched.add(event.target.name); soon(); } });
   form.addEventListener("change", (event) => { if (event.target.matches("[data-shape]")) reshape([]); });
   form.addEventListener("change", takeFile);

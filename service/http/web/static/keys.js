@@ -51,12 +51,9 @@
     if (taken) event.preventDefault();
   });
 
-  // F1 opens the explanation of the current field; its link is no stop of the Tab key then, which would have twice as many.
-  document.addEventListener("focusin", (event) => {
-    for (const link of event.target.closest("form")?.querySelectorAll(".explained:not([tabindex])") ?? []) link.tabIndex = -1;
-  });
+  // F1 opens the explanation of the current field, whose link stands in the line that explains it.
   document.addEventListener("keydown", (event) => {
-    const link = event.key === "F1" && event.target.closest(".field, .slider")?.querySelector(".explained");
+    const link = event.key === "F1" && event.target.dataset?.more && document.querySelector("#explain a");
     if (!link) return;
     event.preventDefault();
     link.click();

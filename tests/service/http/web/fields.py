@@ -6,9 +6,17 @@ from typing import Any
 
 from playwright.sync_api import Page
 
+_OPEN = """name => {
+  const outer = (element) => element?.closest("details");
+  for (let part = outer([...document.getElementsByName(name)].at(-1)); part; part = outer(part.parentElement)) {
+    part.open = true;
+  }
+}"""
+
 
 def named(page: Page, name: str) -> Any:
-    """The field of that name."""
+    """The field of that name, in whatever drawer it is."""
+    page.evaluate(_OPEN, name)
     return page.locator(f'[name="{name}"]').last
 
 

@@ -157,7 +157,8 @@ def test_columns_that_are_not_axes_yet_are_not_ignored() -> None:
 def test_the_page_makes_axes_of_columns_without_scripts(service: Service) -> None:
     text = "shaft.load\texcitation.frequency [Hz]\n0.1\t20\n0.2\t25\n"
     page = service.http.post("/new", data={**values_of(SPEC), "/columns": text, "do": "take-columns"}).text
-    assert 'name="/axes/1/values" value="20 Hz; 25 Hz"' in page
+    assert 'name="/axes/1/values" value="20; 25"' in page
+    assert '<option value="Hz" selected>' in page
     assert "2 axes, value by value: load torque 0.1 to 0.2 N·m (2 values)" in page
     page = service.http.post("/new", data={**values_of(SPEC), "/columns": "x\n1", "do": "take-columns"}).text
     assert "names no parameter" in page

@@ -50,7 +50,7 @@ def test_a_study_of_the_model_from_the_laboratory_to_its_case(service: Service, 
         page.get_by_role("button", name="Add an axis").click()
         named(page, "/axes/0/path").select_option("damping")
         fill(page, {"/axes/0/from": "0", "/axes/0/to": "0.8", "/axes/0/count": "3"})
-        page.get_by_role("button", name="Submit the study").click()
+        page.locator("#go").click()
         page.wait_for_url("**/studies/st_*")
         study_id = page.url.rpartition("/")[2]
         store = service.store

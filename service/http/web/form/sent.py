@@ -1,0 +1,120 @@
+"""What a browser sends of the sheet, as the fields of the form: units beside numbers, ticks at what varies.
+
+Older drafts and other senders have neither: their fields stay as they are.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Final
+
+from sprag.service.http.web.form.entries import Values, names_of
+from sprag.service.http.web.form.machine import BASE, model_name, row_of
+from sprag.service.http.web.form.parts import PARTS, count_of, reshape
+from sprag.service.http.web.form.spec import is_search
+from sprag.service.reading.quantities import is_si
+from sprag.service.reading.units import QuantityError, split_quantity
+from sprag.worker import models
+
+#: Beginnings of the names of a unit beside a number, of the tick at a number that varies, of the one at numbers that
+#: vary alike and of those that it is about; of the numbers that have a tick, by the list of what varies.
+UNIT: Final = "unit:"
+VARY: Final = "vary:"
+ALIKE: Final = "alike:"
+ALIKES: Final = "alikes:"
+TICKS: Final = "ticks:"
+#: Numbers of a row that have the row's unit.
+IN_ROW: Final = ("from", "to", "step", "values", "value")
+_BARE: Final = re.compile(r"[-+\d.,;\seE\u00a0\u202f\u2212'’]*\d[-+\d.,;\seE\u00a0\u202f\u2212'’]*")
+#: Values between the ends that are proposed for a number.
+_VALUES: Final = "9"
+
+
+def settle(values: Values, *, with_ticks: bool = True) -> None:
+    """Read units and ticks into the fields that they are about; without ticks only take them away."""
+    for name in [name for name in values if name.startswith(UNIT)]:
+        unit, field = values.pop(name), name.removeprefix(UNIT)
+        for own in (field, *(f"{field}/{part}" for part in IN_ROW)):
+            values |= {own: with_unit(values[own], unit)} if own in values else {}
+    changed = set[str]()  # their own ticks still say what was before
+    for name in [name for name in values if name.startswith(ALIKES)]:
+        row, paths = name.removeprefix(ALIKES), names_of(values.pop(name))
+        before, ticked = values.pop(f"{ALIKE}was:{row}", ""), values.pop(f"{ALIKE}{row}", "")
+        others = [path for path in names_of(values.get(f"{row}/tied", "")) if path not in paths]
+        changed |= set(paths) if bool(before) != bool(ticked) else set()
+        values[f"{row}/tied"] = ", ".join([*(paths if ticked else ()), *others])
+    varying = {name.removeprefix(VARY) for name in values if name.startswith(VARY)}
+    known = [(part, names_of(values.pop(f"{TICKS}{part}", ""))) for part in PARTS]
+    for name in [name for name in values if name.startswith(VARY)]:
+        del values[name]
+    for part, paths in known if with_ticks else ():
+        for path in paths:
+            if path not in changed:
+                _vary(values, part, path, wanted=path in varying)
+
+
+def with_unit(text: str, unit: str) -> str:
+    """A text of bare numbers with the unit beside it; one with a unit of its own, or a formula, as it is."""
+    return f"{text.strip()} {unit}" if unit and not is_si(unit) and _BARE.fullmatch(text) else text
+
+
+def varied(values: Mapping[str, str], part: str = "") -> dict[str, int]:
+    """The numbers that vary, with those that do so together, and the row that says how."""
+    found: dict[str, int] = {}
+    part = part or part_of(values)
+    for index in range(count_of(values, part)):
+        row = f"{PARTS[part].pointer}/{index}"
+        for path in (values.get(f"{row}/path", "").strip(), *names_of(values.get(f"{row}/tied", ""))):
+            found |= {path: index} if path else {}
+    return found
+
+
+def part_of(values: Mapping[str, str]) -> str:
+    """The list of what varies: axes, or the variables of a search."""
+    return "vary" if is_search(values) else "axes"
+
+
+def _vary(values: Values, name: str, path: str, *, wanted: bool) -> None:
+    """Let a number of a list vary, or no longer; nothing where it is so."""
+    index = varied(values, name).get(path)
+    if wanted == (index is not None):
+        return
+    if index is not None:
+        row = f"{PARTS[name].pointer}/{index}"
+        others = [own for own in names_of(values.get(f"{row}/tied", "")) if own != path]
+        if values.get(f"{row}/path", "").strip() != path:
+            values[f"{row}/tied"] = ", ".join(others)
+        elif others:
+            values |= {f"{row}/path": others[0], f"{row}/tied": ", ".join(others[1:])}
+        else:
+            reshape(values, f"drop-{name} {index}")
+        return
+    before = count_of(values, name)
+    blank = (own for own in range(before) if not any(
+        values.get(f"{PARTS[name].pointer}/{own}/{part}", "").strip() for part in ("path", *IN_ROW)
+    ))  # fmt: skip
+    row_index = next(blank, before)
+    if row_index == before:
+        reshape(values, f"add-{name}")
+    if count_of(values, name) > row_index:
+        row = f"{PARTS[name].pointer}/{row_index}"
+        way = str(PARTS[name].new["way"])
+        values |= {f"{row}/path": path, f"{row}/way": way, f"{row}/count": _VALUES, **_ends(values, path, row)}
+
+
+def _ends(values: Mapping[str, str], path: str, row: str) -> Values:
+    """Ends proposed for a number: around its value, as far as its slider would go."""
+    text = values.get(f"{BASE}/{path.replace('.', '/')}", "").strip()
+    try:
+        number, unit = split_quantity(text)
+    except QuantityError:
+        return {}
+    kinds = models.model_of(model_name(values)).presentation.laboratory.sliders
+    own = row_of(model_name(values), path)[2]
+    low, high = next(((kind.low, kind.high) for kind in kinds if re.fullmatch(kind.path, own)), (0.5, 1.5))
+    if not number:
+        return {f"{row}/from": f"0 {unit}".strip()}
+    ends = sorted(float(number) * factor for factor in (low, high))
+    texts = (f"{float(f'{end:.2g}'):g} {unit}".strip() for end in ends)
+    return dict(zip((f"{row}/from", f"{row}/to"), texts, strict=True))

@@ -1,0 +1,350 @@
+"""The sheet of a machine: its drawing with a field at each dimension, what varies, and the rest in a drawer."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from markupsafe import Markup
+
+from sprag.service.figures.drawing import Drawing, rows_of, svg, with_leaders
+from sprag.service.http.web.form.entries import Values, names_of, plain
+from sprag.service.http.web.form.machine import BASE, Block, Entry, blocks, form_of, model_name
+from sprag.service.http.web.form.parts import PARTS, count_of
+from sprag.service.http.web.form.sent import IN_ROW, part_of, varied
+from sprag.service.languages import _
+from sprag.service.reading.cyrillic import latin
+from sprag.service.reading.numbers import parse_number
+from sprag.service.reading.quantities import SI, offered, read_units, workshop_units
+from sprag.service.reading.reader import Reading
+from sprag.service.reading.together import with_last_unit
+from sprag.service.reading.units import QuantityError, parse_quantity, plain_signs
+from sprag.worker.models.parameters import model_parameter
+
+if TYPE_CHECKING:
+    from sprag.service.http.web.form.fields import Groups
+
+#: A drawing at most so wide has its fields at both sides, so far apart from each other and from the drawing (px).
+_NARROW, _STEP, _STEP_TOLERANT, _GAP, _AT = 200.0, 76.0, 104.0, 14.0, 36.0
+_NUMBER: Final = re.compile(r"\s*([-+\u2212]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?)\s*(.*)", re.DOTALL)
+_LONGEST: Final = 9
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """Texts of fields that have one unit beside them.
+
+    Attributes
+    ----------
+    texts : as the fields show them
+    unit, units : the chosen one, and those offered; none where plain numbers have no unit
+    """
+
+    texts: tuple[str, ...]
+    unit: str = ""
+    units: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Spot:
+    """A number of the machine on the sheet.
+
+    Attributes
+    ----------
+    entry, label : its field, and what it is called there
+    path : of the number
+    quantity : its text with its unit; ``whole`` the text with that unit in it
+    may_vary, row : whether it has a tick, and the row that says how it varies, if it does
+    span : its values in that row, in words
+    was : what it is in the study that this one is a variant of, where it differs
+    """
+
+    entry: Entry
+    label: str
+    path: str
+    quantity: Quantity
+    whole: str
+    may_vary: bool
+    row: int | None = None
+    span: str = ""
+    was: str | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of its field."""
+        return self.entry.name
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A drawing with the numbers whose fields stand at its sides."""
+
+    drawing: Drawing
+    picture: Markup
+    left: tuple[Spot, ...] = ()
+    right: tuple[Spot, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A row of what varies: its place, label, numbers with their unit, and the numbers that could vary alike."""
+
+    index: int
+    pointer: str
+    path: str
+    label: str
+    quantity: Quantity
+    alikes: tuple[str, ...] = ()
+    alike: bool = False
+    tied: str = ""
+
+    def text(self, name: str) -> str:
+        """The text of one of its numbers."""
+        return self.quantity.texts[IN_ROW.index(name)]
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """The sheet of a filled form.
+
+    ``spots`` are all numbers by the name of their field, ``placed`` those beside a drawing, ``front`` those of fields
+    that are always in sight; ``opened`` is whether something in the drawer differs or is wrong.
+    """
+
+    plans: tuple[Plan, ...]
+    blocks: tuple[Block, ...]
+    spots: Mapping[str, Spot]
+    placed: frozenset[str]
+    front: frozenset[str]
+    rows: tuple[Row, ...]
+    ticks: str
+    opened: bool
+
+    def shown(self, block: Block, *, front: bool) -> tuple[Entry, ...]:
+        """The fields of a block in sight, or in the drawer."""
+        return tuple(entry for entry in block.entries if
+                     (entry.name in self.front) == front and entry.name not in self.placed)  # fmt: skip
+
+
+def sheet_of(
+    values: Mapping[str, str],
+    drawings: Sequence[Drawing],
+    choices: Groups,
+    units: str,
+    *,
+    tolerant: bool = False,
+    faulty: Iterable[str] = (),
+    before: Values | None = None,
+    begun: Values | None = None,
+) -> Sheet:
+    """The sheet of a form.
+
+    Parameters
+    ----------
+    drawings : of the machine, if it can be drawn
+    choices : numbers that can vary
+    units : choice of the reader, as `read_units` takes it
+    tolerant : whether numbers have a tolerance beside them
+    faulty : fields that something is wrong with
+    before : the form of the study of which this one is a variant
+    begun : the form with which an empty one begins
+    """
+    made = _Making(
+        values,
+        {choice.path: choice.label for _group, own in choices for choice in own},
+        preferred(units, model_name(values)),
+        before,
+    )
+    every, form = blocks(values), form_of(values)
+    found = [entry for block in every for own in (block, *block.within) for entry in _all(own.entries)]
+    repeated = {entry.field.label for entry in found if sum(own.field.label == entry.field.label for own in found) > 1}
+    spots = {entry.name: made.spot(entry, repeated) for entry in found if entry.control == "line"}
+    alone = {entry.name for block in every for own in (block, *block.within) for entry in own.entries}
+    front = frozenset(
+        entry.name for entry in found if not form.front or _fits(form.front, made.path(entry.name))
+        or (entry.name in alone & spots.keys() and _differs(values, begun, (entry,)))
+    )  # fmt: skip
+    by_path = {spot.path: spot for spot in spots.values() if spot.name in front}
+    plans, placed = [], set[str]()
+    step = _STEP_TOLERANT if tolerant else _STEP
+    for drawing in drawings:
+        narrow = drawing.width <= _NARROW and not drawing.frames
+        sides = [tuple(by_path[own.path] for own in rows_of(drawing, side) if narrow and own.path in by_path)
+                 for side in ("left", "right")]  # fmt: skip
+        placed |= {spot.name for side in sides for spot in side}
+        text = with_leaders(drawing, step, _GAP, _AT) if narrow else svg(drawing)
+        plans.append(Plan(drawing, Markup(text), *sides))  # noqa: S704 - its texts are escaped where it is made
+    inside = {entry.name for entry in found} - front
+    opened = any(name in inside for name in faulty) or _differs(
+        values, begun, (entry for entry in found if entry.name in inside)
+    )
+    return Sheet(
+        tuple(plans), tuple(every), spots, frozenset(placed), front, tuple(made.rows()),
+        " ".join(spot.path for spot in spots.values() if spot.may_vary), opened,
+    )  # fmt: skip
+
+
+def _differs(values: Mapping[str, str], begun: Values | None, entries: Iterable[Entry]) -> bool:
+    """Whether some fields have something else than those of an example that has them."""
+    return begun is not None and any(
+        not _same(values.get(entry.name, ""), begun[entry.name], entry.field.unit)
+        for entry in entries if entry.name in begun
+    )  # fmt: skip
+
+
+def _all(entries: Iterable[Entry]) -> list[Entry]:
+    """Entries with those of their groups."""
+    return [own for entry in entries for own in (entry, *_all(inner for _, group in entry.groups for inner in group))]
+
+
+def _fits(patterns: Iterable[str], path: str) -> bool:
+    """Whether a path, with letters for its numbers, is one of those of the patterns."""
+    general = re.sub(r"\.\d+(?=\.|$)", ".N", path)
+    return any(re.fullmatch(pattern, general) for pattern in patterns)
+
+
+def _same(first: str, second: str, si: str) -> bool:
+    """Whether two texts are the same, or the same quantity."""
+    try:
+        return first.strip() == second.strip() or (
+            parse_quantity(plain(first), si or "1") == parse_quantity(plain(second), si or "1")
+        )
+    except QuantityError:
+        return False
+
+
+@dataclass(slots=True)
+class _Making:
+    """What the parts of a sheet are made from."""
+
+    values: Mapping[str, str]
+    numbers: Mapping[str, str]
+    units: Mapping[str, str]
+    before: Values | None
+
+    def path(self, name: str) -> str:
+        """The path of the number of a field."""
+        return name.removeprefix(f"{BASE}/").replace("/", ".")
+
+    def spot(self, entry: Entry, repeated: set[str]) -> Spot:
+        field, path, text = entry.field, self.path(entry.name), self.values.get(entry.name, "")
+        label = _(field.label)
+        if field.label in repeated and path in self.numbers:
+            label = re.sub(r", [^,]*\d+$", "", Reading(model_name(self.values)).caption(path))
+        was = None if self.before is None else self.before.get(entry.name, "")
+        row = varied(self.values).get(path)
+        plain = not getattr(entry.item, "lines", 0) and getattr(entry.item, "kind", "") in ("", "number")
+        quantity = quantity_of([text], field.unit if plain else "", self.units)
+        return Spot(
+            entry, label, path, quantity, text, path in self.numbers, row, self._span(row) if row is not None else "",
+            was if was is not None and not _same(was, text, field.unit) else None,
+        )  # fmt: skip
+
+    def _span(self, row: int) -> str:
+        """The values of a row in words: ``0 … 1.6 N*m``."""
+        own = self._row(row)
+        way = self.values.get(f"{own.pointer}/way", "")
+        unit = f" {own.quantity.unit}" if own.quantity.unit else ""
+        if way == "values":
+            texts = [item for item in re.split(r"\s*;\s*", own.text("values")) if item]
+            span = f"{texts[0]} … {texts[-1]}" if len(texts) > 1 else "".join(texts)
+        else:
+            span = f"{own.text('from') or '?'} … {own.text('to') or '?'}"
+        return span + unit
+
+    def rows(self) -> Iterable[Row]:
+        return (self._row(index) for index in range(count_of(self.values, part_of(self.values))))
+
+    def _row(self, index: int) -> Row:
+        pointer = f"{PARTS[part_of(self.values)].pointer}/{index}"
+        path = self.values.get(f"{pointer}/path", "").strip()
+        tied = names_of(self.values.get(f"{pointer}/tied", ""))
+        alikes = tuple(other for other in self.numbers if other != path and path and _alike(path) == _alike(other))
+        alike = bool(alikes) and set(alikes) <= set(tied)
+        given = [self.values.get(f"{pointer}/{name}", "") for name in IN_ROW]
+        entry = model_parameter(model_name(self.values), path) if path else None
+        rest = ", ".join(own for own in tied if not alike or own not in alikes)
+        quantity = quantity_of(given, entry.unit if entry else "", self.units, listed=True)
+        return Row(index, pointer, path, self.numbers.get(path, path), quantity, alikes, alike, rest)
+
+
+def _alike(path: str) -> str:
+    """What numbers have in common that can vary alike: those of both directions, or of several rows of a list."""
+    return re.sub(r"\.\d+\.", ".*.", re.sub(r"_[xy]$", "", path))
+
+
+def preferred(choice: str, model: str) -> dict[str, str]:
+    """The unit in which plain numbers of each kind are shown, by SI unit; raises SelectionError as `read_units`."""
+    rest, chosen = read_units(choice)
+    return ({} if rest == SI else workshop_units(model)) | chosen
+
+
+def quantity_of(texts: Sequence[str], si: str, wanted_units: Mapping[str, str], *, listed: bool = False) -> Quantity:
+    """Texts with the unit that they have in common beside them, or as they are, where they have none.
+
+    Plain numbers are in the SI unit ``si``; they are shown in the unit that is wanted where that has them exactly.
+    """
+    units = offered(si)
+    if not units:
+        return Quantity(tuple(texts))
+    wanted = wanted_units.get(si, si)
+    split = _listed if listed else _single
+    parts = split(texts)
+    given = {unit for number, unit in parts if number} if parts else set()
+    if parts is None or len(given) > 1:
+        return Quantity(tuple(texts), si, units)
+    unit = next(iter(given), None)
+    if unit is None:
+        return Quantity(tuple(texts), wanted, units)
+    if unit:
+        unit = next((own for own in units if own == latin(plain_signs(unit))), unit)
+        return Quantity(tuple(number for number, _unit in parts), unit, units if unit in units else (*units, unit))
+    converted = [_converted(number, wanted, si) for number, _unit in parts] if wanted != si else [None]
+    if all(text is not None for text in converted):
+        return Quantity(tuple(text or "" for text in converted), wanted, units)
+    return Quantity(tuple(texts), si, units)
+
+
+def _single(texts: Sequence[str]) -> list[tuple[str, str]] | None:
+    """Number and unit of each text; None where one is neither blank nor a quantity."""
+    found = []
+    for text in texts:
+        match = _NUMBER.fullmatch(text)
+        if text.strip() and match is None:
+            return None
+        found.append((match[1], match[2].strip()) if match else ("", ""))
+    return found
+
+
+def _listed(texts: Sequence[str]) -> list[tuple[str, str]] | None:
+    """As `_single` for the numbers of a row, of which one is a list."""
+    ends, (listed, limit) = list(texts[:3]), texts[3:]
+    items = [item.strip() for item in listed.split(";") if item.strip()]
+    before = _single([*with_last_unit(ends[:2]), ends[2]])
+    inside = _single(with_last_unit(items))
+    last = _single([limit])
+    if before is None or inside is None or last is None:
+        return None
+    within = {unit for _number, unit in inside}
+    if len(within) > 1:
+        return None
+    return [*before, ("; ".join(number for number, _unit in inside), next(iter(within), "")), *last]
+
+
+def _converted(text: str, unit: str, si: str) -> str | None:
+    """A plain number, or a list of them, in another unit; None where that has no short exact text for it."""
+    found = []
+    for item in text.split("; ") if text else ():
+        number = parse_number(item)
+        if number is None:
+            return None
+        try:
+            shown = f"{number / parse_quantity(f'1 {unit}', si):.10g}"
+            if len(shown) > _LONGEST or parse_quantity(f"{shown} {unit}", si) != number:
+                return None
+        except QuantityError:
+            return None
+        found.append(shown)
+    return "; ".join(found)

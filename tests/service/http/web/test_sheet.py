@@ -1,0 +1,173 @@
+"""The sheet of a new study: units beside numbers, ticks at what varies, and how much one has to do and to read."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import pytest
+from playwright.sync_api import expect
+
+from sprag.service.http.views import preset_of
+from sprag.service.http.web.form.page import empty
+from sprag.service.http.web.form.sent import settle
+from sprag.service.http.web.form.sheet import preferred, quantity_of
+from sprag.service.http.web.form.spec import spec_of, values_of
+from sprag.service.spec.document import parse_spec
+from tests.service.http.web.controls import Controls
+from tests.service.http.web.fields import named
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+    from tests.service.conftest import Service
+    from tests.service.http.web.conftest import Office, Visitor
+
+DRIVE: Final = {**empty("vibration-drive"), "ticks:axes": "shaft.load excitation.amplitude_x pendulums.0.arm"}
+
+#: Words in sight within the form; a select has that of its choice.
+WORDS: Final = r"""() => {
+  const walk = (node) => {
+    if (node.nodeType === 3) return node.textContent;
+    if (node.nodeType !== 1 || !node.checkVisibility()) return " ";
+    if (node.matches("option:not(:checked), .hidden, .skip")) return " ";
+    const inside = node.matches("details:not([open])") ? [node.querySelector("summary")] : [...node.childNodes];
+    return inside.map(walk).join(" ");
+  };
+  return walk(document.getElementById("study-form")).split(/\s+/).filter((word) => /[\p{L}\p{N}]/u.test(word)).length;
+}"""
+
+
+@pytest.mark.parametrize(
+    ("texts", "si", "choice", "shown"),
+    [
+        (["30 mm"], "m", "typed", (("30",), "mm")),
+        (["0.03"], "m", "typed", (("30",), "mm")),
+        (["0.03"], "m", "si", (("0.03",), "m")),
+        (["0.005"], "rad", "typed", (("0.005",), "rad")),  # has no short text in degrees
+        (["1500 rpm"], "Hz", "typed", (("1500",), "rpm")),
+        (["2 ft"], "m", "typed", (("2",), "ft")),
+        (["= 2 * shaft.load"], "N*m", "typed", (("= 2 * shaft.load",), "N*m")),
+        ([""], "m", "typed", (("",), "mm")),
+        (["4"], "1", "typed", (("4",), "")),
+    ],
+)
+def test_the_unit_of_a_field(texts: list[str], si: str, choice: str, shown: tuple[tuple[str, ...], str]) -> None:
+    found = quantity_of(texts, si, preferred(choice, "vibration-drive"))
+    assert (found.texts, found.unit) == shown
+
+
+def test_a_row_has_one_unit() -> None:
+    found = quantity_of(["0", "400 N*mm", "", "1; 2; 5 N*mm", ""], "N*m", {}, listed=True)
+    assert (found.texts, found.unit) == (("0", "400", "", "1; 2; 5", ""), "N*mm")
+    mixed = ["0.1 N*m", "400 N*mm", "", "", ""]
+    assert quantity_of(mixed, "N*m", {}, listed=True).texts == tuple(mixed)
+
+
+def test_what_is_shown_is_sent_back_unchanged(service: Service) -> None:
+    """Every example, as its controls are sent: numbers beside units are the same numbers."""
+    for name in ("one_pendulum", "two_pendulums", "refined_characteristic", "press", "punching_press", "slotter"):
+        shown = Controls(service.http.get(f"/new?preset={name}").text).values
+        settle(shown)
+        spec, faults = spec_of(shown)
+        assert faults == {}
+        assert parse_spec(spec).study == parse_spec(preset_of(name)["spec"]).study, name
+
+
+def test_ticks_let_numbers_vary_and_stop_it() -> None:
+    values = DRIVE | {"/base/shaft/load": "0.2", "vary:shaft.load": "on", "vary:excitation.amplitude_x": "on"}
+    settle(values)
+    assert (values["axes"], values["/axes/0/path"], values["/axes/1/path"]) == (
+        "2", "shaft.load", "excitation.amplitude_x",
+    )  # fmt: skip
+    assert (values["/axes/0/from"], values["/axes/0/to"], values["/axes/0/count"]) == ("0", "0.8", "9")
+    again = dict(values) | {"alikes:/axes/1": "excitation.amplitude_y", "alike:/axes/1": "on", "unit:/axes/1": "mm"}
+    again |= {"/axes/1/from": "1", "/axes/1/to": "3", "ticks:axes": "shaft.load excitation.amplitude_x"}
+    settle(again | {})
+    sent = {**again, "vary:excitation.amplitude_x": "on"}
+    settle(sent)
+    assert spec_of(sent)[0]["axes"] == [
+        {"path": ["excitation.amplitude_x", "excitation.amplitude_y"], "linspace": ["1 mm", "3 mm", 9]}
+    ]
+
+
+def test_a_unit_that_is_typed_counts_more_than_the_one_beside_it() -> None:
+    values = DRIVE | {
+        "/base/excitation/frequency": "1500 rpm", "unit:/base/excitation/frequency": "Hz",
+        "/base/pendulums/0/arm": "3", "unit:/base/pendulums/0/arm": "cm", "/base/pendulums/0/mass": "0,5",
+        "unit:/base/pendulums/0/mass": "kg", "/base/pendulums/0/inertia": "= 2 kg*m^2",
+        "unit:/base/pendulums/0/inertia": "kg*cm^2",
+    }  # fmt: skip
+    settle(values)
+    base = spec_of(values)[0]["base"]
+    assert base["excitation"]["frequency"] == "1500 rpm"
+    assert (base["pendulums"][0]["arm"], base["pendulums"][0]["mass"]) == ("3 cm", 0.5)
+    assert spec_of(values)[0]["derive"] == {"pendulums.0.inertia": "2 kg*m^2"}
+
+
+def test_a_variant_says_what_differs(service: Service) -> None:
+    study = service.submit()
+    shown = Controls(service.http.get(f"/new?from={study}").text).values
+    assert shown["from"] == study
+    page = service.http.post("/new", data={**shown, "/base/shaft/inertia": "7 kg*cm^2", "do": "check"}).text
+    assert page.count('class="dim differs') == 1
+    assert "was 2e-3" in page
+
+
+def test_a_form_without_ticks_or_units_is_read_as_before() -> None:
+    spec = preset_of("one_pendulum")["spec"]
+    values = values_of(spec)
+    settled = dict(values)
+    settle(settled)
+    assert settled == values
+
+
+def stops(page: Page) -> int:
+    """Presses of the Tab key from the beginning of the form to the button that runs it."""
+    page.locator("#study-form").evaluate("form => { form.tabIndex = -1; form.focus(); }")
+    for count in range(1, 100):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.id") == "go":
+            return count
+    return 100
+
+
+def test_a_drive_of_ones_own_with_three_axes(visitor: Visitor, office: Office) -> None:
+    """From the empty page: at most 12 actions, 20 stops of the Tab key and 300 words."""
+    page, actions = visitor.page, 0
+    page.goto("/new")
+    expect(page.locator("#go")).to_contain_text("Run 1 case")
+    assert stops(page) <= 20
+    assert page.evaluate(WORDS) <= 300
+    for name, text in {"mass": "0.4", "arm": "36", "spring_rate": "11"}.items():
+        named(page, f"/base/pendulums/0/{name}").fill(text)
+        actions += 1
+    for path in ("shaft.load", "excitation.amplitude_x", "pendulums.0.arm"):
+        page.locator(f'[name="vary:{path}"]').check()
+        expect(page.locator(f'[name="vary:{path}"]')).to_be_checked()
+        expect(page.locator(".varies legend")).to_have_count(1 + (actions - 3) // 1)
+        actions += 1
+    named(page, "/axes/0/to").fill("1.6")
+    named(page, "/axes/1/count").fill("3")
+    named(page, "/axes/2/count").fill("3")
+    actions += 3
+    expect(page.locator("#go")).to_contain_text("Run 81 cases")
+    assert page.evaluate(WORDS) <= 300
+    page.locator("#go").click()
+    actions += 1
+    page.wait_for_url("**/studies/st_*")
+    assert actions <= 12
+    spec = office.get(f"/studies/{page.url.rpartition('/')[2]}")["spec"]
+    assert [axis["path"] for axis in spec["axes"]] == ["shaft.load", "excitation.amplitude_x", "pendulums.0.arm"]
+    assert spec["base"]["pendulums"][0]["mass"] == 0.4
+
+
+def test_enter_opens_the_unit_of_a_dimension(visitor: Visitor) -> None:
+    page = visitor.page
+    page.goto("/new")
+    arm = named(page, "/base/pendulums/0/arm")
+    arm.focus()
+    expect(page.locator("#explain")).to_contain_text("centre of mass")
+    page.keyboard.press("Enter")
+    expect(page.locator(":focus")).to_have_attribute("name", "vary:pendulums.0.arm")
+    page.keyboard.press("Escape")
+    expect(arm).to_be_focused()
