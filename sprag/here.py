@@ -20,7 +20,7 @@ from sprag.service.http.views import case_detail, whole_detail
 from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.json_text import to_bytes
-from sprag.service.reading.quantities import SI, TYPED
+from sprag.service.reading.quantities import SI
 from sprag.service.reading.reader import CAPTIONS, Choice
 from sprag.service.report import REPORT_FORMATS, report_file
 from sprag.service.results.rounds import round_json
@@ -71,12 +71,16 @@ class Here(Connection, ABC):
         self.library = Library(store)
         self._settings = settings
 
+    def require_open(self) -> None:
+        """Raise StoreError where the database is closed."""
+
     @abstractmethod
     def run(self, record: StudyRecord) -> StudyRecord:
         """Run a study of the database to its end."""
 
     def request(self, method: str, path: str, **arguments: Any) -> dict[str, Any]:
         """The JSON object that a service answers; RefusedError."""
+        self.require_open()
         study_id, part = _parts(path)
         with _refusing():
             if method != "GET":
@@ -94,6 +98,7 @@ class Here(Connection, ABC):
     @contextmanager
     def pieces(self, path: str, query: Query) -> Iterator[Iterator[bytes]]:
         """The bytes of a document, piece by piece."""
+        self.require_open()
         with _refusing():
             yield iter(self._content(*_parts(path), query))
 
@@ -124,7 +129,9 @@ class Here(Connection, ABC):
         given, library = dict(query), self.library
         form = given.get("format", "json")
         study = library.store.studies.study(study_id)
-        choice = Choice(given.get("units", TYPED if part == "/report" else SI), given.get("names", CAPTIONS))
+        choice = Choice(
+            given.get("units", self._settings.units if part == "/report" else SI), given.get("names", CAPTIONS)
+        )
         language = choice_of("language", given.get("language", languages.ENGLISH), languages.available())
         with languages.language(language):
             if part == "":

@@ -17,6 +17,7 @@ from sprag.service.plain_data import plain
 from sprag.service.settings import Settings
 from sprag.service.spec.document import SpecError, parse_spec
 from sprag.worker.chunking import Chunking
+from sprag.worker.ports import StoreError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -44,6 +45,8 @@ class LocalStudy(Study):
     _client: _Local
 
     def __repr__(self) -> str:
+        if not self._client.open:
+            return f"Study({self.id!r}, closed)"
         detail = self.detail()
         progress = detail["progress"]
         return f"Study({detail['name'] or self.id!r}: {progress['total']:,} cases, {progress['ok']:,} ok)"
@@ -115,6 +118,18 @@ class _Local(Here):
         super().__init__(stack.enter_context(opened(url, chunking)), settings)
         # After those of the folders, so that it comes before them where the program ends.
         self._release = weakref.finalize(self, stack.close)
+
+    @property
+    def open(self) -> bool:
+        """Whether the database is open."""
+        return self._release.alive
+
+    def require_open(self) -> None:
+        """Raise StoreError where it is not."""
+        if not self.open:
+            raise StoreError(
+                "the study is closed: use it inside `with`, or keep its rows in a database (`database=`)", "closed"
+            )
 
     def close(self) -> None:
         """Close the database; a temporary one is deleted."""

@@ -189,13 +189,9 @@ def _offering(choices: Sequence[str]) -> Callable[[str], list[str]]:
 
 def query_of(asked: Sequence[NamedSetting], settings: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Settings as the query of the view's address, without those that are as the service has them anyway."""
-    query: list[tuple[str, str]] = []
-    for one in asked:
-        value = settings[one.name]
-        if value is not None and value != one.default:
-            values = value if isinstance(value, list) else [value]
-            query += [(one.alias, str(item).lower() if isinstance(item, bool) else str(item)) for item in values]
-    return query
+    from sprag.service.client.queries import query_of as query
+
+    return query({one.alias: settings[one.name] for one in asked if settings[one.name] != one.default})
 
 
 def _check_start(study: Study, start: int | None) -> None:

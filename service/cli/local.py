@@ -331,7 +331,6 @@ def _finish(text: str | None) -> datetime | None:
 def _rows(done: LocalRun, form: Format | ReportFormat, header: Header, appendix: list[str] | None) -> Iterator[bytes]:
     """The rows of a finished study as the service exports them, or its report."""
     from sprag.service.exports import export, stored
-    from sprag.service.reading.quantities import TYPED
     from sprag.service.reading.reader import Choice
     from sprag.service.report import report_file
     from sprag.service.views.library import Library
@@ -339,7 +338,7 @@ def _rows(done: LocalRun, form: Format | ReportFormat, header: Header, appendix:
 
     if form == "html" or form == "pdf":  # noqa: PLR1714 - narrows the type
         settings = read_settings()
-        asked = Choice(TYPED), ReportQuestion(appendix=appendix)
+        asked = Choice(settings.units), ReportQuestion(appendix=appendix)
         library, study_id, folder = Library(done.store), done.record.id, settings.report_folder
         return iter([report_file(library, study_id, *asked, settings.report_office, folder, form)])
     return export(stored(done.store, done.record, done.store.studies.study(done.record.id), header=header), form)

@@ -23,7 +23,9 @@ from sprag.here import Here
 from sprag.service.client import Client, RefusedError, Study
 from sprag.service.settings import Settings
 from sprag.service.storage.studies.records import StudyRecord
+from tests.service.calibrating import calibration
 from tests.service.conftest import PortalTransport, Service
+from tests.service.searching import search
 
 LOAD, SPEED, FREQUENCY = "shaft.load", "shaft.speed.mean", "excitation.frequency"
 
@@ -63,6 +65,9 @@ ASKED: dict[str, Callable[[Study], Any]] = {
     "grid": lambda study: study.grid().to_dict(),
     "csv": lambda study: study.download("csv", header="units"),
     "report": lambda study: study.download("html", language="uk"),
+    "trajectory": lambda study: study.trajectory(3, "2 periods", "3 periods", points=5),
+    "transient of a drive": lambda study: study.transient(3, "run-up"),
+    "wrong points": lambda study: study.trajectory(3, points=1),
     "no such axis": lambda study: study.curves("nonsense"),
     "no such case": lambda study: study.case(99),
     "no such start": lambda study: study.strobes(1, start=5),
@@ -93,6 +98,31 @@ def _answer(ask: Callable[[Study], Any], study: Study) -> Any:
     except RefusedError as error:
         return error.status, error.code, error.faults
     return json.loads(json.dumps(answer.data if is_dataclass(answer) else answer, default=str))
+
+
+@pytest.mark.parametrize("kind", ["goal", "calibration", "tolerances"])
+def test_so_is_that_of_a_study_of_another_kind(
+    service: Service, portal: BlockingPortal, settings: Settings, spec: dict[str, Any], kind: str
+) -> None:
+    if kind == "tolerances":
+        study_id = service.submit({**spec, "tolerances": [{"path": "shaft.inertia", "plus_minus": "5 %"}], "drives": 8})
+        service.fill(study_id)
+    else:
+        study_id = search(service) if kind == "goal" else calibration(service)
+    client = Client("http://localhost", transport=PortalTransport(service.app, portal))
+    asked: dict[str, list[Callable[[Study], Any]]] = {
+        "goal": [lambda study: study.front(5, exact=True), lambda study: study.rounds()],
+        "calibration": [lambda study: study.calibration(), lambda study: study.rounds()],
+        "tolerances": [
+            lambda study: study.ribbon(LOAD, SPEED, quantiles=(0.1, 0.9), at={FREQUENCY: "20 Hz"}),
+            lambda study: study.yields(f"{SPEED} >= 90 % of nominal", LOAD, worst=2),
+        ],
+    }
+    for ask in asked[kind]:
+        there, here = (
+            _answer(ask, Study(client, study_id)), _answer(ask, Study(OfService(service.store, settings), study_id))
+        )  # fmt: skip
+        assert here == there
 
 
 def test_pictures_are_those_of_a_service(pair: tuple[Study, Study], tmp_path: Path) -> None:
@@ -214,6 +244,14 @@ def test_a_preset_is_named_and_a_file_of_that_name_comes_first(tmp_path: Path, m
     assert spec_of("one_pendulum") == {"sprag": 1}
     with pytest.raises(sprag.SpecFileError, match="two_pendulums"):
         sprag.preset("two_pendulum")
+
+
+def test_what_is_closed_says_so() -> None:
+    with sprag.run(_small(), processes=0) as study:
+        assert len(study.table()) == 3
+    assert repr(study) == f"Study({study.id!r}, closed)"
+    with pytest.raises(sprag.StoreError, match="the study is closed"):
+        study.curves()
 
 
 def test_axes_are_a_table_too(run: sprag.Study) -> None:

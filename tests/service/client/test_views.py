@@ -20,6 +20,7 @@ from sprag.service.client import ArgumentError, AsyncStudy, Client, Curves, Moti
 from sprag.service.client.queries import query_of
 from sprag.service.views import case_questions, study_questions
 from sprag.service.views.setting import Setting, ViewInfo
+from sprag.service.views.studies import STUDY_VIEWS
 from tests.service.client import view_methods
 
 LOAD, SPEED = "shaft.load", "shaft.speed.mean"
@@ -69,6 +70,7 @@ def test_calls_that_scripts_have_are_sent_as_ever(
 
 
 def test_every_view_has_a_method_with_a_docstring_in_both_clients() -> None:
+    assert {about.name for about in study_questions.STUDY_VIEWS} == set(STUDY_VIEWS)
     for about in (*study_questions.STUDY_VIEWS, *case_questions.CASE_VIEWS):
         for study in (Study, AsyncStudy):
             method = getattr(study, about.method)
