@@ -228,6 +228,7 @@ def _write(
     file: str | None, drawing: Mapping[str, str], as_json: bool,
 ) -> None:  # fmt: skip
     """Compute the view of a case, write it, and say what it has."""
+    from sprag.service.reading.reader import shown
     from sprag.service.views.case_view import drawn, see, written
 
     with output(file) as write:
@@ -240,7 +241,12 @@ def _write(
         write(content if content.endswith(b"\n") or form in PICTURES else content + b"\n")
     said = view.said(answer)
     if said is not None:
-        say(*said.lines)
+        told = view.shown(answer)
+        first, *rest = map(shown, told.sentences)
+        say(_("case {case}: {text}", case=case, text=first), *rest)
+        pairs = (row for one in told.tables if len(one.columns) == 2 for row in one.rows)  # others are the file itself
+        for row in pairs:
+            say("  " + ": ".join(shown(cell) for cell in row if isinstance(cell, str)))
     _say_written(file, form, case, as_json, {} if said is None else said.data)
     if said is not None and not said.ok:
         raise typer.Exit(ExitCode.NOT_ALL_OK)

@@ -54,6 +54,7 @@ from sprag.service.cli.shown import (
     show_yield,
 )
 from sprag.service.languages import N_, _
+from sprag.service.reading.numbers import probability_of
 from sprag.service.views import study_questions as questions
 from sprag.service.views.setting import settings_of
 
@@ -155,12 +156,8 @@ def _most_rows(question: type) -> int | None:
 
 def _probability(text: str) -> float:
     """The probability of ``5%`` or ``0.05``."""
-    number, percent, rest = text.partition("%")
-    try:
-        value = float(number) / (100.0 if percent else 1.0)
-    except ValueError:
-        value = -1.0
-    if rest.strip() or not 0.0 < value < 1.0:
+    value = probability_of(text)
+    if value is None:
         raise wrong_option(
             "--quantile", "out-of-range", N_("is no probability"), text, allowed=_("such as 5 % or 0.05")
         )

@@ -52,26 +52,19 @@ from sprag.service.http.read_ahead import keep_reading_ahead
 from sprag.service.http.request_log import Noted, RequestLog
 from sprag.service.http.shares import Shares
 from sprag.service.http.sound_store import sound_store
-from sprag.service.http.web import basin as basin_pages
-from sprag.service.http.web import branch as branch_pages
 from sprag.service.http.web import (
-    calibrate,
-    calibration,
-    case,
     compare,
-    drives,
-    effects,
     front,
     further,
     login,
+    matters,
+    motion,
     pages,
     results,
     study,
 )
 from sprag.service.http.web import components as component_pages
-from sprag.service.http.web import diagram as diagram_pages
 from sprag.service.http.web import document as document_pages
-from sprag.service.http.web import engagements as engagement_pages
 from sprag.service.http.web import language as language_pages
 from sprag.service.http.web import live as live_pages
 from sprag.service.http.web import people as people_pages
@@ -80,10 +73,8 @@ from sprag.service.http.web import schedules as schedule_pages
 from sprag.service.http.web import (
     study_list as list_pages,
 )
-from sprag.service.http.web import transient as transient_pages
 from sprag.service.http.web import units as unit_pages
 from sprag.service.http.web import workers as worker_pages
-from sprag.service.http.web.figures import cases as case_figures
 from sprag.service.http.web.form import page as form
 from sprag.service.http.web.laboratory import pages as laboratory
 from sprag.service.http.web.rows import motion as row_motion
@@ -170,18 +161,9 @@ ROUTED = (
     front,
     rows,
     row_motion,
-    calibration,
-    calibrate,
-    drives,
-    effects,
     results,
-    case,
-    case_figures,
-    engagement_pages,
-    branch_pages,
-    diagram_pages,
-    basin_pages,
-    transient_pages,
+    matters,
+    motion,
     compare,
     laboratory,
     component_pages,

@@ -59,14 +59,12 @@ _VIEWER: Final = (
     *(f"GET {_PAGE}/{part}" for part in (
         "delete", "extend", "labels", "front", "figures/front", "explore", "explore/new", "explore/compare",
         "rows", "rows/new", "rows/file", "rows/search.svg", "rows/{case}/motion.svg",
-        "calibration", "figures/calibration", "drives",
-        "figures/ribbon", "figures/yield", "sensitivity", "figures/sensitivity", "curves", "map", "figures/curves",
+        "matters", "calibration", "drives", "sensitivity", "figures/calibration", "curves", "map", "figures/curves",
         "figures/answers", "figures/map", "cases", "document",
     )),
     f"GET {_PAGE_CASE}",
     *(f"GET {_PAGE_CASE}/{part}" for part in (
-        "motion", "laboratory", "motion.svg", "strobes/figure", "engagements", "branch", "branch/figure", "diagram",
-        "diagram/figure", "section/figure", "basin", "basin/figure", "transient", "transient/figure",
+        "motion.svg", "laboratory", "engagements", "branch", "diagram", "basin", "transient",
     )),
     "GET /compare", "GET /compare/figure", "GET /compare/picture.{form}", "GET /compare/curves.csv",
     *(f"GET /laboratory{model}{part}" for model in ("", "/{model}") for part in (

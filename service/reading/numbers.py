@@ -217,3 +217,11 @@ def _written(text: str, separator: str) -> str:
     start, end = found.span(1)
     digits = found[1].replace(separator, "") if separator else found[1]
     return text[:start] + digits.replace(",", ".") + text[end:]
+
+
+def probability_of(text: str) -> float | None:
+    """The probability of ``5 %`` or ``0.05``, in the reader's language; None where it is none."""
+    plain, percent, rest = text.partition("%")
+    value = parse_number(in_language(plain.strip()))
+    found = None if value is None or rest.strip() else value / (100.0 if percent else 1.0)
+    return found if found is not None and 0.0 < found < 1.0 else None

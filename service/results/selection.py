@@ -97,6 +97,11 @@ def with_nominal(study: Study, fixed: Fixed, roles: Iterable[int]) -> Fixed:
     return {**fixed, position: (DRIVE, int(np.argmin(study.axes[position].array)))}
 
 
+def numeric_names(infos: Iterable[ResultInfo]) -> list[str]:
+    """The results that are numbers."""
+    return [info.name for info in infos if info.kind != "category"]
+
+
 def axis_name(study: Study, path: str) -> str:
     """``path`` with the paths tied to it: ``excitation.amplitude_x = excitation.amplitude_y``."""
     position = study.axis_of(path)

@@ -113,6 +113,33 @@ class Sensitivity:
         return filled(ResultSensitivity, self, **given, effects=effects, pairs=pairs)
 
 
+def weight(effect: Effect) -> float:
+    """How much an axis matters: its total index, its mean elementary effect, or how far the means along it reach."""
+    own = effect.indices
+    known = next((value for value in (own.total, own.mu_star, own.first_order) if value is not None), None)
+    means = effect.means[np.isfinite(effect.means)]
+    return known if known is not None else float(np.ptp(means)) if means.size else 0.0
+
+
+def in_order(item: Sensitivity) -> list[Effect]:
+    """The effects on a result, the largest first."""
+    return sorted(item.effects, key=weight, reverse=True)
+
+
+def per_tenth(effect: Effect, value: float) -> float | None:
+    """By how much the mean of the result changes for 10 % more of the parameter than ``value``; None beyond its axis.
+
+    It is the slope between the two neighbours of the value among the computed ones.
+    """
+    known = np.isfinite(effect.means)
+    x, y = effect.values[known], effect.means[known]
+    if x.size < 2 or not x[0] <= value <= x[-1] or value == 0.0:
+        return None
+    below = max(int(np.searchsorted(x, value, side="left")) - 1, 0)
+    above = min(max(int(np.searchsorted(x, value, side="right")), below + 1), x.size - 1)
+    return float((y[above] - y[below]) / (x[above] - x[below])) * 0.1 * value
+
+
 def sensitivity(study: Study, spec: Mapping[str, Any], names: Sequence[str], fetch: Fetch) -> list[Sensitivity]:
     """Effects of the axes of ``study`` on the results ``names``.
 

@@ -13,14 +13,19 @@ from sprag.service.answers.results import BasinData, RegimeRow
 from sprag.service.exports import table_csv
 from sprag.service.faults import FaultError, parameter_error
 from sprag.service.figures.basin import basin_figure
-from sprag.service.languages import N_
+from sprag.service.languages import N_, _
 from sprag.service.reading.catalogue import range_sentence
+from sprag.service.reading.reader import Phrase, term
 from sprag.service.reading.texts import quantity_text
 from sprag.service.reading.units import QuantityError, typed_value
+from sprag.service.reading.wording import percent
 from sprag.service.results.selection import ends_of_range
 from sprag.service.results.start_states import refuse_impossible
+from sprag.service.views.branch import named
 from sprag.service.views.case_questions import BASIN, BasinQuestion
 from sprag.service.views.case_view import CaseAnswer, CaseView
+from sprag.service.views.setting import Offered
+from sprag.service.views.shown import Column, Shown, ShownTable
 from sprag.worker import models
 from sprag.worker.models import Basin
 from sprag.worker.models.common import case_machine
@@ -35,6 +40,11 @@ if TYPE_CHECKING:
 INITIAL: Final = ("initial_angle", "initial_speed", "initial_windup")
 #: For "x" and "y" the first and the last value as text, None where they are those of the starts.
 Ends = dict[str, tuple[str | None, str | None]]
+#: Columns of the table of the regimes.
+_COLUMNS: Final = (
+    Column(Phrase("No.")), Column(Phrase("Regime")), Column(Phrase("Order")), Column(Phrase("Share of the starts")),
+    Column("shaft.speed.mean", "rad/s"),
+)  # fmt: skip
 #: What is reported of each regime besides its number.
 _SPEED: Final = "shaft.speed.mean"
 _SHOWN: Final = ("regime", "regime.order", "regime.share", _SPEED)
@@ -201,3 +211,32 @@ class BasinView(CaseView[BasinQuestion, BasinQuery, Basin]):
     def figure(self, answer: CaseAnswer[BasinQuery, Basin], columns: int = 2, rows: Any = None) -> Figure:
         """Points in the plane of both initial values, a colour for each regime."""
         return basin_figure(answer.result, answer.chosen.paths, units_of(answer.study, answer.chosen))
+
+    def has(self, study: Study) -> bool:
+        """Whether cases settle, and have initial values."""
+        return models.is_settled(study.run) and bool(initial_values(study))
+
+    def offered(self, study: Study, case: int) -> dict[str, Offered]:
+        """The initial values; ranges as in the study's starts, otherwise none."""
+        known, ends = initial_values(study), usual_ends(study)
+        x, y = basin_paths(study, None, None)
+        found = {"x": Offered((x,), groups=named(known)), "y": Offered((y,), groups=named(known))}
+        for name, path in (("x", x), ("y", y)):
+            hints = ends.get(path, (known[path].unit, known[path].unit))
+            found |= {f"{name}_{end}": Offered(hint=hint) for end, hint in zip(("from", "to"), hints, strict=True)}
+        return found
+
+    def shown(self, answer: CaseAnswer[BasinQuery, Basin]) -> Shown:
+        """The regimes to which the starts come."""
+        rows = [
+            [
+                row["number"],
+                term(str(own["regime"])),
+                own["regime.order"],
+                percent(float(own["regime.share"] or 0.0)),
+                own[_SPEED],
+            ]
+            for row in basin_json(answer.study, answer.chosen, answer.result)["regimes"]
+            for own in (row["results"],)
+        ]
+        return Shown(tables=(ShownTable(_("Regimes"), _COLUMNS, rows),))

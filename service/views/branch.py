@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -17,11 +17,14 @@ from sprag.service.json_text import numbers
 from sprag.service.languages import N_, _
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.directions import case_values
+from sprag.service.reading.reader import Phrase, plural
 from sprag.service.reading.units import QuantityError, typed_value
-from sprag.service.results.selection import ends_of_range
+from sprag.service.results.selection import axis_name, ends_of_range
 from sprag.service.views.case_questions import BRANCH, BranchQuestion
 from sprag.service.views.case_view import CaseAnswer, CaseView, Said
 from sprag.service.views.portrait import require_strobes
+from sprag.service.views.setting import Offered
+from sprag.service.views.shown import Shown
 from sprag.worker import models
 from sprag.worker.directions import SWEEP
 from sprag.worker.models.abilities import branch_results, run_branch
@@ -31,12 +34,16 @@ from sprag.worker.models.parameters import allowed_values
 from sprag.worker.models.vibration_drive.start_states import is_initial
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
     from sprag.service.figures.figure import Figure
     from sprag.service.storage.store import Store
     from sprag.worker.study import Study
 
+#: What stands in the empty fields of a range.
+ENDS_OFFERED: Final = {"from": Offered(hint=N_("start of its axis")), "to": Offered(hint=N_("end of its axis"))}
 _OUTSIDE = N_("outside the range of the parameter")
 
 
@@ -56,6 +63,20 @@ def usual_along(study: Study) -> str:
     """The parameter along which a branch is usually followed: the first axis with a range; "" where there is none."""
     wanted = ranged_axes(study)
     return next((path for path in models.presentation_of(study).along if path in wanted), wanted[0] if wanted else "")
+
+
+def along_offered(study: Study, case: int, *, initial: bool = False) -> Offered:
+    """The parameters along which a case can be followed, axes first; with the initial values if ``initial``."""
+    axes = {path: axis_name(study, path) for path in ranged_axes(study, initial=initial)}
+    on_axes = {path for name in axes.values() for path in name.split(" = ")}
+    others = [path for path in free_parameters(study, case, initial=initial) if path not in on_axes]
+    groups = {_("Axes of the study"): list(axes.items()), _("Other parameters"): [(path, path) for path in others]}
+    return Offered(tuple(filter(None, (usual_along(study),))), groups=groups)
+
+
+def named(names: Iterable[str]) -> dict[str, list[tuple[str, str]]]:
+    """Names of quantities to choose from, in one group."""
+    return {"": [(name, name) for name in names]}
 
 
 def along_of(study: Study, case: int, along: str, low: str | None = None, high: str | None = None) -> Along:
@@ -265,16 +286,33 @@ class BranchView(CaseView[BranchQuestion, tuple[Along, str], CaseBranch]):
         """One result over the parameter, with the study's own cases beside it."""
         return branch_figure(answer.result, answer.study, *answer.chosen, rows)
 
-    def said(self, answer: CaseAnswer[tuple[Along, str], CaseBranch]) -> Said:
-        """How far the branch goes, and what is special on it."""
-        data = {"points": len(answer.result.parameters), "specials": len(answer.result.specials)}
-        if answer.result.note:
-            why = _("case {case} has no branch: {why}", case=answer.case, why=_(answer.result.note))
-            return Said([why], data, ok=False)
-        sentence = _(
-            "case {case}: {count} orbits of order {order}; from {first} to {last}",
-            case=answer.case, count=len(answer.result.parameters), order=answer.result.order,
-            first=_(answer.result.ends[0]), last=_(answer.result.ends[1]),
+    def has(self, study: Study) -> bool:
+        """Whether there are strobes."""
+        return models.has_strobes(study)
+
+    def offered(self, study: Study, case: int) -> dict[str, Offered]:
+        """The parameters, and the results of an orbit."""
+        return {
+            "along": along_offered(study, case),
+            **ENDS_OFFERED,
+            "y": Offered((result_of(study, None),), groups=named(branch_results(study))),
+        }
+
+    def shown(self, answer: CaseAnswer[tuple[Along, str], CaseBranch]) -> Shown:
+        """How far the branch goes, and what is special on it; or why there is none."""
+        made = answer.result
+        if made.note:
+            return Shown((Phrase("This case has no branch: {why}", why=Phrase(made.note)),))
+        ends = {"first": Phrase(made.ends[0]), "last": Phrase(made.ends[1])}
+        sentence = plural(
+            "{count} orbit of order {order}; from {first} to {last}",
+            "{count} orbits of order {order}; from {first} to {last}",
+            len(made.parameters), order=made.order, **ends,
         )  # fmt: skip
         unit = unit_of(answer.study, answer.chosen[0].paths[0])
-        return Said([sentence, *(special_text(special, unit) for special in answer.result.specials)], data)
+        return Shown((sentence, *(special_text(special, unit) for special in made.specials)))
+
+    def said(self, answer: CaseAnswer[tuple[Along, str], CaseBranch]) -> Said:
+        """How many orbits there are."""
+        data = {"points": len(answer.result.parameters), "specials": len(answer.result.specials)}
+        return Said(data, not answer.result.note)

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from sprag.sentences import Amount, Name
 from sprag.service.answers.calibration import CalibrationReport
 from sprag.service.figures.calibration import calibration_figure
+from sprag.service.languages import N_
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.reader import Phrase, joined
 from sprag.service.results.calibration import Calibration, calibration_csv, calibration_json, plan_of
+from sprag.service.views.shown import Column, Shown, ShownTable
 from sprag.service.views.study_questions import CALIBRATION, CalibrationQuestion
 from sprag.service.views.study_view import StudyAnswer, StudyView
+from sprag.worker.planning.calibrate.plan import CALIBRATE
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
     from sprag.service.figures.figure import Figure
     from sprag.service.reading.reader import Reading
     from sprag.service.views.library import Library
+    from sprag.service.views.shown import Cell
     from sprag.worker.study import Study
 
 
@@ -44,7 +53,72 @@ class CalibrationView(StudyView[CalibrationQuestion, None, Calibration]):
         """The measured points on the fitted curves, and the residuals."""
         return calibration_figure(answer.result, columns)
 
+    def has(self, study: Study) -> bool:
+        """Whether it is a calibration."""
+        return study.plan is not None and study.plan.get("kind") == CALIBRATE
 
-def calibration_report(library: Library, study_id: str) -> CalibrationReport:
-    """The calibration as JSON data whose sentences are phrases, for a page."""
-    return calibration_json(study_id, library.calibrations.of(study_id))
+    def shown(self, answer: StudyAnswer[None, Calibration]) -> Shown:
+        """What else should be known before the values are used; values, correlations, measured points."""
+        found = answer.result
+        report = calibration_json(answer.study_id, found)
+        tables = [_values(report), *_correlations(report), *_points(found, report)]
+        return Shown(found.sentences[1:], tables)
+
+
+def _ends(interval: Sequence[float] | None, unit: str) -> Cell:
+    """An interval of a table; None for none."""
+    return None if interval is None else joined(" … ", [Amount(end, unit, 5, bare=True) for end in interval])
+
+
+def _values(report: CalibrationReport) -> ShownTable:
+    rows: list[list[Cell]] = []
+    for one in report["parameters"]:
+        own = joined(" = ", map(Name, one["paths"]))
+        cells = (one["value"], one["interval"], one["deviation"], [one["low"], one["high"]])
+        unit = one["unit"]
+        rows.append(
+            [
+                own,
+                *(
+                    _ends(cell, unit)
+                    if isinstance(cell, list)
+                    else cell
+                    if cell is None
+                    else joined("", [Amount(cell, unit)])
+                    for cell in cells
+                ),
+            ]
+        )
+    titles = (N_("Parameter"), N_("Value"), N_("95 % interval"), N_("Standard deviation"), N_("Range"))
+    return ShownTable(Phrase("Values"), [Column(Phrase(title)) for title in titles], rows)
+
+
+def _correlations(report: CalibrationReport) -> Iterator[ShownTable]:
+    names = [one["name"] for one in report["parameters"]]
+    if report["correlations"] and len(names) > 1:
+        rows = [[joined("", [Name(name)]), *row] for name, row in zip(names, report["correlations"], strict=True)]
+        yield ShownTable(Phrase("Correlations"), [Column(Phrase("Parameter")), *map(Column, names)], rows)
+
+
+def _points(found: Calibration, report: CalibrationReport) -> Iterator[ShownTable]:
+    """The measured values of each result beside the fit."""
+    units = {path: unit_of(found.study, path) for path in found.plan.paths_at}
+    for name, info in found.infos.items():
+        own = [point for point in report["points"] if point["result"] == name]
+        rows: list[list[Cell]] = [
+            [
+                *point["at"].values(),
+                point["measured"],
+                point["sigma"],
+                point["fitted"],
+                _ends(point["interval"], info.unit),
+                point["residual"],
+            ]
+            for point in own
+        ]
+        columns = [
+            *(Column(path, unit) for path, unit in units.items()), Column(Phrase("Measured"), info.unit),
+            Column(Phrase("Sigma"), info.unit), Column(Phrase("Fitted"), info.unit),
+            Column(Phrase("95 % interval"), info.unit), Column(Phrase("Residual")),
+        ]  # fmt: skip
+        yield ShownTable(Phrase("Measured values, {name}", name=Name(name, within=True)), columns, rows)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Final
 
+from sprag.service.languages import N_
 from sprag.service.views.setting import Setting, ViewInfo
 from sprag.worker.limits import (
     MAX_BASIN_POINTS,
@@ -22,21 +23,30 @@ Along = Annotated[
         examples=("shaft.load",),
         longest=400,
         metavar="PATH",
+        label=N_("Parameter"),
     ),
 ]
 Low = Annotated[
-    str | None, Setting("start of the range, SI or with a unit; by default the smallest on its axis", alias="from")
+    str | None,
+    Setting(
+        "start of the range, SI or with a unit; by default the smallest on its axis", alias="from", label=N_("From")
+    ),
 ]
-High = Annotated[str | None, Setting("end of the range; by default the largest on its axis", alias="to")]
+High = Annotated[
+    str | None, Setting("end of the range; by default the largest on its axis", alias="to", label=N_("To"))
+]
 Phase = Annotated[
     str | None,
     Setting(
         "phase of the excitation at the strobes, rad or with a unit; by default 0",
         examples=("90 deg",),
         metavar="ANGLE",
+        label=N_("Phase"),
     ),
 ]
-End = Annotated[str | None, Setting("SI or with a unit; by default as in the study's starts", longest=80)]
+_END: Final = "SI or with a unit; by default as in the study's starts"
+Begin = Annotated[str | None, Setting(_END, longest=80, label=N_("From"))]
+End = Annotated[str | None, Setting(_END, longest=80, label=N_("To"))]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +61,7 @@ class TrajectoryQuestion:
             alias="from",
             examples=("0",),
             metavar="TIME",
+            label=N_("From"),
         ),
     ] = None
     end: Annotated[
@@ -61,6 +72,7 @@ class TrajectoryQuestion:
             alias="to",
             examples=("2.5 periods",),
             metavar="TIME",
+            label=N_("To"),
         ),
     ] = None
     points: Annotated[
@@ -109,7 +121,9 @@ class BranchQuestion:
     along: Along
     low: Low = None
     high: High = None
-    y: Annotated[str | None, Setting("the result that a picture shows", metavar="RESULT", of_files=True)] = None
+    y: Annotated[
+        str | None, Setting("the result that a picture shows", metavar="RESULT", of_files=True, label=N_("Result"))
+    ] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,12 +143,24 @@ class DiagramQuestion:
             high=MAX_DIAGRAM_VALUES,
             option="--values",
             metavar="N",
+            label=N_("Values"),
         ),
     ] = 200
     strobes: Annotated[
-        int, Setting("most strobes of each motion", examples=(16,), low=1, high=MAX_DIAGRAM_STROBES, metavar="N")
+        int,
+        Setting(
+            "most strobes of each motion",
+            examples=(16,),
+            low=1,
+            high=MAX_DIAGRAM_STROBES,
+            metavar="N",
+            label=N_("Strobes of each"),
+        ),
     ] = 64
-    y: Annotated[str | None, Setting("the variable that a picture shows", metavar="VARIABLE", of_files=True)] = None
+    y: Annotated[
+        str | None,
+        Setting("the variable that a picture shows", metavar="VARIABLE", of_files=True, label=N_("Variable")),
+    ] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,9 +168,9 @@ class SectionQuestion:
     """At which phase, and how many strobes."""
 
     phase: Phase = None
-    strobes: Annotated[int, Setting("most strobes", examples=(50,), low=1, high=MAX_SECTION_STROBES, metavar="N")] = (
-        1000
-    )
+    strobes: Annotated[
+        int, Setting("most strobes", examples=(50,), low=1, high=MAX_SECTION_STROBES, metavar="N", label=N_("Strobes"))
+    ] = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,16 +178,29 @@ class BasinQuestion:
     """Which two initial values, from where to where, and how many of each."""
 
     x: Annotated[
-        str | None, Setting("initial value across; by default the first one of the study's starts", metavar="PATH")
+        str | None,
+        Setting(
+            "initial value across; by default the first one of the study's starts", metavar="PATH", label=N_("Across")
+        ),
     ] = None
-    y: Annotated[str | None, Setting("the other initial value; by default the next one", metavar="PATH")] = None
-    x_from: End = None
+    x_from: Begin = None
     x_to: End = None
-    y_from: End = None
+    y: Annotated[
+        str | None, Setting("the other initial value; by default the next one", metavar="PATH", label=N_("Up"))
+    ] = None
+    y_from: Begin = None
     y_to: End = None
     points: Annotated[
         int,
-        Setting("values of each", examples=(2,), low=2, high=MAX_BASIN_POINTS, option="--grid", metavar="N"),
+        Setting(
+            "values of each",
+            examples=(2,),
+            low=2,
+            high=MAX_BASIN_POINTS,
+            option="--grid",
+            metavar="N",
+            label=N_("Points"),
+        ),
     ] = 20
 
 
@@ -172,20 +211,38 @@ class TransientQuestion:
     kind: Annotated[
         str,
         Setting(
-            "which transient it is", examples=("run-up",), choices=("run-up", "load-step", "coasting"), metavar="KIND"
+            "which transient it is",
+            examples=("run-up",),
+            choices=("run-up", "load-step", "coasting"),
+            metavar="KIND",
+            label=N_("Kind"),
+            words=(N_("run-up from rest"), N_("step of the load"), N_("coasting, drive off")),
         ),
     ]
     load: Annotated[
         str | None,
-        Setting("factor on the torque of all operations during it; by default 1", examples=("1.5",), metavar="FACTOR"),
+        Setting(
+            "factor on the torque of all operations during it; by default 1",
+            examples=("1.5",),
+            metavar="FACTOR",
+            label=N_("Factor on the load"),
+        ),
     ] = None
     angle: Annotated[
         str | None,
-        Setting("angle of the shaft at which it begins, rad or with a unit; by default 0", metavar="ANGLE"),
+        Setting(
+            "angle of the shaft at which it begins, rad or with a unit; by default 0",
+            metavar="ANGLE",
+            label=N_("Angle at the start"),
+        ),
     ] = None
     torque: Annotated[
         str | None,
-        Setting("constant driving torque of a run-up, N*m or with a unit; required without a motor", metavar="TORQUE"),
+        Setting(
+            "constant driving torque of a run-up, N*m or with a unit; required without a motor",
+            metavar="TORQUE",
+            label=N_("Driving torque of a run-up"),
+        ),
     ] = None
     within: Annotated[
         str | None,
@@ -193,11 +250,13 @@ class TransientQuestion:
             "share of the first difference in speed from the steady cycle at which that counts as reached; by default "
             "0.01 with a motor, otherwise 0",
             metavar="SHARE",
+            label=N_("Counts as reached at"),
         ),
     ] = None
-    revolutions: Annotated[str | None, Setting("most revolutions that are computed; by default 1000", metavar="N")] = (
-        None
-    )
+    revolutions: Annotated[
+        str | None,
+        Setting("most revolutions that are computed; by default 1000", metavar="N", label=N_("Most revolutions")),
+    ] = None
     points: Annotated[
         int,
         Setting(
@@ -216,35 +275,62 @@ TRAJECTORY: Final = ViewInfo(
     "Compute every variable, torque, power and state of one case over time, or over the angle.",
     pictures=False,
     leading=2,
+    title=N_("Motion"),
 )
 ENGAGEMENTS: Final = ViewInfo(
     "engagements",
     EngagementsQuestion,
     "Compute every engagement of the clutches of one case, and the means of its periods.",
     pictures=False,
+    title=N_("When the clutches engage"),
 )
 STROBES: Final = ViewInfo(
     "strobes",
     StrobesQuestion,
     "Compute the state of one case at the end of each excitation period, and its orbit.",
+    title=N_("How it settles, period by period"),
+    note=N_(
+        "The state at the end of each excitation period: angle and speed of each pendulum, and period by period. "
+        "Points that approach one place, or a few, show a motion that settles; the line is one whole turn of the "
+        "settled motion."
+    ),
 )
 BRANCH: Final = ViewInfo(
     "branch",
     BranchQuestion,
     "Follow the periodic motion of one case along a parameter: stable and unstable orbits, folds, doublings, grazings.",
     leading=3,
+    title=N_("Along a parameter: where this motion is stable, and where it ends"),
+    note=N_(
+        "Full lines are stable motions, dashed ones unstable. Open marks are special points: at a fold the branch "
+        "turns back, at a doubling a motion of twice the period begins, at a grazing an event of a clutch or of the "
+        "shaft appears or disappears. The points are the study's own cases; another motion than this one is off the "
+        "branch."
+    ),
 )
 DIAGRAM: Final = ViewInfo(
     "diagram",
     DiagramQuestion,
     "Compute a bifurcation diagram: the strobes of the settled motions of one case along a parameter.",
     leading=3,
+    title=N_("Along a parameter: to what it settles (bifurcation diagram)"),
+    note=N_(
+        "At each value of the parameter this case settles from its own start, and its state is taken once in each "
+        "excitation period, at the chosen phase: one point for a motion that repeats in every period, two where its "
+        "period has doubled, many for irregular motion."
+    ),
 )
 SECTION: Final = ViewInfo(
     "section",
     SectionQuestion,
     "Compute a Poincare section: the strobes of the settled motion of one case at a phase of the excitation.",
     leading=2,
+    title=N_("Once in each period: regular or irregular (Poincaré section)"),
+    note=N_(
+        "Angle and speed of each pendulum of this case once in each excitation period, at the chosen phase, after it "
+        "has settled: a few points are a periodic motion, a closed line a quasi-periodic one, a cloud an irregular "
+        "one."
+    ),
 )
 BASIN: Final = ViewInfo(
     "basin",
@@ -252,6 +338,11 @@ BASIN: Final = ViewInfo(
     "Compute a basin: the regime to which one case comes from each start of a grid of two initial values.",
     starts=False,
     leading=2,
+    title=N_("From other starts: to which motion it comes (basin)"),
+    note=N_(
+        "Each point is a start of this case, in the colour of the regime to which it comes: its number, its share of "
+        "these starts, its mean speed and its order. The case is run from every start for this."
+    ),
 )
 TRANSIENT: Final = ViewInfo(
     "transient",
@@ -259,6 +350,11 @@ TRANSIENT: Final = ViewInfo(
     "Compute the run-up from rest of a machine shaft, a step of its load, or its coasting, over time.",
     starts=False,
     leading=1,
+    title=N_("Run-up, load step, coasting"),
+    note=N_(
+        "Speed, torques of drive and resistance on the main shaft, and kinetic energy. The dashed and the dotted line "
+        "are the mean speeds of the steady cycles before and after."
+    ),
 )
 #: Every view of a case, in the order of the API.
 CASE_VIEWS: Final = (TRAJECTORY, ENGAGEMENTS, STROBES, BRANCH, DIAGRAM, SECTION, BASIN, TRANSIENT)

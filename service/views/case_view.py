@@ -15,16 +15,15 @@ from sprag.service.figures.pictures.curves import draw_figure
 from sprag.service.figures.read import read_figure
 from sprag.service.json_text import to_bytes
 from sprag.service.reading.reader import Reading
+from sprag.service.views.shown import Shown
 from sprag.worker import models
 from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from sprag.service.figures.figure import Figure
     from sprag.service.figures.pictures.curves import Picture
     from sprag.service.storage.store import Store
-    from sprag.service.views.setting import ViewInfo
+    from sprag.service.views.setting import Offered, ViewInfo
     from sprag.worker.models import KernelShape
     from sprag.worker.study import Study
 
@@ -45,19 +44,16 @@ class CaseAnswer(Generic[Chosen, Result]):
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """What a command says of a view that it has written.
+    """What a command tells programs of a view that it has written; people read what is shown of it.
 
     Attributes
     ----------
-    lines : sequence of str
-        Sentences in the language of the task.
     data : mapping
-        The same for programs that asked for a file.
+        What is shown, for programs that asked for a file.
     ok : bool
         Whether the motion came to its end.
     """
 
-    lines: Sequence[str]
     data: Mapping[str, Any]
     ok: bool = True
 
@@ -85,6 +81,19 @@ class CaseView(ABC, Generic[Question, Chosen, Result]):
     @abstractmethod
     def choose(self, study: Study, case: int, question: Question) -> Chosen:
         """What a question means for a case; FaultError about a setting, or where the case has no such view."""
+
+    @property
+    def drawn(self) -> bool:
+        """Whether it has a figure."""
+        return type(self).figure is not CaseView.figure
+
+    def has(self, study: Study) -> bool:
+        """Whether the cases of a study have it."""
+        return True
+
+    def offered(self, study: Study, case: int) -> Mapping[str, Offered]:
+        """What a study offers for the settings, by alias."""
+        return {}
 
     def kernels(self, study: Study) -> tuple[KernelShape, ...]:
         """The kernels that the computation needs."""
@@ -114,8 +123,12 @@ class CaseView(ABC, Generic[Question, Chosen, Result]):
         """The last part of the name of its file."""
         return self.about.name
 
+    def shown(self, answer: CaseAnswer[Chosen, Result]) -> Shown:
+        """What people read of it."""
+        return Shown()
+
     def said(self, answer: CaseAnswer[Chosen, Result]) -> Said | None:
-        """What a command says beside the file; None: nothing."""
+        """What a command tells beside the file; None: nothing."""
         return None
 
 

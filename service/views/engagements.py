@@ -5,21 +5,33 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Final
 
+from sprag.sentences import Amount
 from sprag.service.answers import filled
 from sprag.service.answers.results import EngagementRow, EngagementTables, PeriodRow
 from sprag.service.exports import table_csv
 from sprag.service.faults import FaultError, choice_of
-from sprag.service.languages import N_, _, decimal
+from sprag.service.languages import N_, _
 from sprag.service.reading.directions import case_values
+from sprag.service.reading.reader import Phrase, joined, plural
 from sprag.service.views.case_questions import ENGAGEMENTS, EngagementsQuestion
 from sprag.service.views.case_view import CaseAnswer, CaseView, Said
+from sprag.service.views.shown import Column, Shown, ShownTable
 from sprag.worker import models
 from sprag.worker.models import Engagements
 
 if TYPE_CHECKING:
     from sprag.service.answers import Value
+    from sprag.service.views.shown import Cell
+    from sprag.worker.models import Engagement
     from sprag.worker.study import Study
 
+#: Most engagements that people are shown, and their columns.
+_SHOWN: Final = 100
+_COLUMNS: Final = (
+    Column(Phrase("Clutch")), Column(Phrase("Start"), "s"), Column(Phrase("End"), "s"), Column(Phrase("Order")),
+    Column(Phrase("Largest torque"), "N*m"), Column(Phrase("Work on the shaft"), "J"),
+    Column(Phrase("Work of the pendulum"), "J"),
+)  # fmt: skip
 #: Columns of each table in their order, with their units.
 COLUMNS: Final[dict[str, dict[str, str]]] = {
     "engagements": {
@@ -90,13 +102,37 @@ class EngagementsView(CaseView[EngagementsQuestion, str, Engagements]):
         """The name of the table."""
         return chosen
 
+    def shown(self, answer: CaseAnswer[str, Engagements]) -> Shown:
+        """How many engagements there are, and the first of them; or why the case did not end ok."""
+        made = answer.result
+        if made.ending != models.OK:
+            return Shown((Phrase(models.ENDING_SENTENCES[made.ending]),))
+        if not made.rows:
+            return Shown((Phrase("No clutch transmits torque."),))
+        count = plural(
+            "{count} engagement from {first} to {last}.", "{count} engagements from {first} to {last}.", len(made.rows),
+            first=Amount(made.start, "s"), last=Amount(made.end, "s"),
+        )  # fmt: skip
+        few = Phrase("The first {some} of {all}; the files contain all of them.", some=_SHOWN, all=len(made.rows))
+        table = ShownTable(_("Engagements"), _COLUMNS, [_row(row, made) for row in made.rows[:_SHOWN]])
+        return Shown((count, *([few] if len(made.rows) > _SHOWN else [])), (table,))
+
+    def has(self, study: Study) -> bool:
+        """Whether there are clutches."""
+        return models.has_clutches(study)
+
     def said(self, answer: CaseAnswer[str, Engagements]) -> Said:
-        """How many engagements there are, or why the case did not end ok."""
-        first, last = (decimal(f"{time:g}") for time in (answer.result.start, answer.result.end))
-        text = _(
-            "{count} engagements from {first} s to {last} s", count=len(answer.result.rows), first=first, last=last
-        )
-        ok = answer.result.ending == models.OK
-        meaning = text if ok else _(models.ENDING_SENTENCES[answer.result.ending])
+        """How many engagements there are, or how the case ended."""
         data = {"ending": answer.result.ending, "engagements": len(answer.result.rows)}
-        return Said([_("case {case}: {text}", case=answer.case, text=meaning)], data, ok)
+        return Said(data, answer.result.ending == models.OK)
+
+
+def _row(row: Engagement, made: Engagements) -> list[Cell]:
+    """An engagement for people; one that is not complete began before the table, or ends after it."""
+    start, end = (joined("", [Amount(time, "s", 8, bare=True)]) for time in (row.start, row.end))
+    return [
+        row.clutch,
+        Phrase("before {time}", time=start) if not row.complete and row.start <= made.start else start,
+        Phrase("after {time}", time=end) if not row.complete and row.end >= made.end else end,
+        row.order, row.torque_max, row.work_shaft, row.work_pendulum,
+    ]  # fmt: skip

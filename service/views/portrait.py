@@ -9,9 +9,11 @@ from sprag.service.faults import FaultError, choice_of
 from sprag.service.figures.portrait import portrait_figure
 from sprag.service.languages import N_
 from sprag.service.reading.directions import case_values
+from sprag.service.results.regimes import motion_sentence
 from sprag.service.views.case_questions import STROBES, StrobesQuestion
 from sprag.service.views.case_view import CaseAnswer, CaseView
 from sprag.service.views.setting import choices_of
+from sprag.service.views.shown import Shown
 from sprag.service.views.trajectory import timed_values, trajectory_csv
 from sprag.worker import models
 from sprag.worker.models import Portrait
@@ -70,6 +72,15 @@ class StrobesView(CaseView[StrobesQuestion, str, Portrait]):
     def figure(self, answer: CaseAnswer[str, Portrait], columns: int = 2, rows: Any = None) -> Figure:
         """Orbit and strobes, beside the strobes period by period."""
         return portrait_figure(answer.result, models.presentation_of(answer.study), columns)
+
+    def has(self, study: Study) -> bool:
+        """Whether there are strobes."""
+        return models.has_strobes(study)
+
+    def shown(self, answer: CaseAnswer[str, Portrait]) -> Shown:
+        """The settled motion in a sentence."""
+        made = answer.result
+        return Shown((motion_sentence(made.regime, made.order or None),) if made.regime else ())
 
     def file_name(self, chosen: str) -> str:
         """The name of the table."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -18,10 +18,12 @@ from sprag.service.reading.directions import case_values
 from sprag.service.reading.numbers import in_language
 from sprag.service.reading.units import QuantityError, typed_value
 from sprag.service.results.start_states import refuse_impossible
-from sprag.service.views.branch import range_of
+from sprag.service.views.branch import ENDS_OFFERED, along_offered, named, range_of
 from sprag.service.views.case_questions import DIAGRAM, SECTION, DiagramQuestion, SectionQuestion
 from sprag.service.views.case_view import CaseAnswer, CaseView
 from sprag.service.views.portrait import require_strobes
+from sprag.service.views.setting import Offered
+from sprag.worker import models
 from sprag.worker.models.abilities import run_sections
 from sprag.worker.models.common import case_machine
 from sprag.worker.models.sections import CaseSections, Sampling
@@ -29,6 +31,10 @@ from sprag.worker.models.sections import CaseSections, Sampling
 if TYPE_CHECKING:
     from sprag.service.figures.figure import Figure
     from sprag.worker.study import Study
+
+
+#: What stands in the empty field of a phase.
+_PHASE_OFFERED: Final = Offered(hint="0 deg")
 
 
 def phase_of(text: str | None) -> float:
@@ -155,6 +161,15 @@ class DiagramView(CaseView[DiagramQuestion, tuple[Sampling, str], CaseSections])
         """One variable at the strobes over the parameter."""
         return diagram_figure(answer.result, answer.study, *answer.chosen)
 
+    def has(self, study: Study) -> bool:
+        """Whether there are strobes."""
+        return models.has_strobes(study)
+
+    def offered(self, study: Study, case: int) -> dict[str, Offered]:
+        """The parameters, initial values among them, and the variables of a strobe."""
+        y = Offered((variable_of(study, None),), groups=named(variables(study)))
+        return {"along": along_offered(study, case, initial=True), **ENDS_OFFERED, "phase": _PHASE_OFFERED, "y": y}
+
 
 class SectionView(CaseView[SectionQuestion, Sampling, CaseSections]):
     """A Poincare section: strobes of the settled motion at a phase of the excitation."""
@@ -183,3 +198,11 @@ class SectionView(CaseView[SectionQuestion, Sampling, CaseSections]):
     def figure(self, answer: CaseAnswer[Sampling, CaseSections], columns: int = 2, rows: Any = None) -> Figure:
         """The strobes in the plane of angle and speed of each pendulum."""
         return section_figure(answer.result, answer.study, answer.chosen)
+
+    def has(self, study: Study) -> bool:
+        """Whether there are strobes."""
+        return models.has_strobes(study)
+
+    def offered(self, study: Study, case: int) -> dict[str, Offered]:
+        """The phase at which strobes are taken without another."""
+        return {"phase": _PHASE_OFFERED}

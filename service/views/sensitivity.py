@@ -6,21 +6,30 @@ from dataclasses import fields
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
+from sprag.sentences import Amount, Name
 from sprag.service import exports
 from sprag.service.answers import results as m
 from sprag.service.faults import warned
-from sprag.service.figures.pictures.sensitivity import draw_sensitivity
-from sprag.service.results.selection import numeric_results
+from sprag.service.figures.effects import effects_figure
+from sprag.service.figures.pictures.sensitivity import MOST_RESULTS, draw_sensitivity
+from sprag.service.languages import N_
+from sprag.service.reading.reader import Phrase, joined, plural
+from sprag.service.results.defaults import drawn_results, varying_axes
+from sprag.service.results.selection import numeric_names, numeric_results
 from sprag.service.results.sensitivity import Sensitivity, sensitivity
 from sprag.service.results.sensitivity_indices import Indices
+from sprag.service.views.branch import named
+from sprag.service.views.setting import Offered
+from sprag.service.views.shown import Column, Shown, ShownTable
 from sprag.service.views.study_questions import SENSITIVITY, SensitivityQuestion
 from sprag.service.views.study_view import StudyAnswer, StudyView
 from sprag.worker import models
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from typing import Any
 
+    from sprag.service.figures.figure import Figure
     from sprag.service.figures.pictures.curves import Picture
     from sprag.service.reading.reader import Reading
     from sprag.service.views.library import Library
@@ -42,6 +51,15 @@ class SensitivityView(StudyView[SensitivityQuestion, tuple[str, ...], list[Sensi
         """The names of the results."""
         numeric_results(models.study_results(study), "y", chosen)
 
+    def has(self, study: Study) -> bool:
+        """Whether anything varies that was not chosen by the study itself."""
+        return bool(varying_axes(study)) and study.plan is None
+
+    def offered(self, study: Study) -> dict[str, Offered]:
+        """The results that are numbers; first those that are drawn."""
+        infos = models.study_results(study)
+        return {"y": Offered(drawn_results(study, infos)[:MOST_RESULTS], groups=named(numeric_names(infos)))}
+
     def find(
         self, library: Library, study_id: str, chosen: tuple[str, ...], *, drawn: bool = False
     ) -> list[Sensitivity]:
@@ -56,6 +74,16 @@ class SensitivityView(StudyView[SensitivityQuestion, tuple[str, ...], list[Sensi
         warnings = warned(answer.library.unaffected.of(answer.library.store, record))
         return {"study": answer.study_id, "results": [item.to_json() for item in answer.result], **warnings}
 
+    def shown(self, answer: StudyAnswer[tuple[str, ...], list[Sensitivity]]) -> Shown:
+        """How they were found, and the shares or effects of each axis."""
+        return Shown(
+            tuple(_about(item) for item in answer.result), tuple(t for item in answer.result for t in _tables(item))
+        )
+
+    def figure(self, answer: StudyAnswer[tuple[str, ...], list[Sensitivity]], columns: int = 2) -> Figure:
+        """The mean of each result along each axis, what matters most first."""
+        return effects_figure(answer.result, columns)
+
     def csv(self, answer: StudyAnswer[tuple[str, ...], list[Sensitivity]], reading: Reading) -> bytes:
         """The indices."""
         return indices_csv(answer.result, reading)
@@ -67,9 +95,58 @@ class SensitivityView(StudyView[SensitivityQuestion, tuple[str, ...], list[Sensi
         return draw_sensitivity(answer.result, title, reading, form)
 
 
-def sensitivities_shown(library: Library, study_id: str, names: Sequence[str]) -> list[m.ResultSensitivity]:
-    """The sensitivities of these results as JSON data, for a page."""
-    return [item.to_json() for item in SensitivityView().find(library, study_id, tuple(names))]
+#: Methods by which indices were found, in words.
+_METHODS: Final = {
+    "grid": N_("exact sums over a full grid"),
+    "saltelli": N_("estimated from the design for Sobol indices"),
+    "morris": N_("elementary effects of trajectories (Morris)"),
+    "rbd-fast": N_("estimated from a sample"),
+    "none": N_("no shares of the variance"),
+}
+
+
+def _about(item: Sensitivity) -> Phrase:
+    """How the indices of a result were found, and what to know about them."""
+    mean = [] if item.mean is None else [Phrase("mean {value}", value=Amount(item.mean, item.info.unit))]
+    parts = [Phrase(_METHODS[item.method]), *mean, *item.notes]
+    return plural(
+        "{name}: {count} case, {parts}.", "{name}: {count} cases, {parts}.", item.cases,
+        name=Name(item.info.name), parts=joined("; ", parts),
+    )  # fmt: skip
+
+
+def _tables(item: Sensitivity) -> Iterator[ShownTable]:
+    """The indices of a result, and its interactions."""
+    if item.method == "none":
+        return
+    name = Name(item.info.name, within=True)
+    columns: tuple[Column, ...]
+    if item.method == "morris":
+        title, unit = Phrase("Elementary effects on {name}", name=name), item.info.unit
+        columns = tuple(Column(Phrase(text), unit, 3) for text in ("μ", "μ*", "±", "σ"))
+        values: tuple[str, ...] = ("mu", "mu_star", "mu_star_error", "sigma")
+    else:
+        title = Phrase("Shares of the variance of {name}", name=name)
+        columns = tuple(
+            Column(Phrase(text), "1", 3)
+            for text in (N_("Alone"), "±", N_("With what it does together with others"), "±")
+        )
+        values = ("first_order", "first_order_error", "total", "total_error")
+    names = [joined(" = ", map(Name, effect.paths)) for effect in item.effects]
+    rows = [
+        [own, *(getattr(effect.indices, value) for value in values)]
+        for own, effect in zip(names, item.effects, strict=True)
+    ]
+    yield ShownTable(title, (Column(Phrase("Parameter")), *columns), rows)
+    if item.pairs:
+        pairs = [[names[pair.first], names[pair.second], pair.index, pair.error] for pair in item.pairs]
+        heads = (
+            Column(Phrase("Parameter")),
+            Column(Phrase("with")),
+            Column(Phrase("Share"), "1", 3),
+            Column(Phrase("±"), "1", 2),
+        )
+        yield ShownTable(Phrase("Interactions of two, on {name}", name=name), heads, pairs)
 
 
 #: Indices in the unit of the result; the others are shares of its variance.

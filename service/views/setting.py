@@ -6,15 +6,21 @@ the options of its command.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, fields
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, fields
 from keyword import iskeyword
-from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, Final, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from sprag.service.faults import parameter_error
+from sprag.service.languages import N_
 from sprag.service.reading.limits import span
+from sprag.service.reading.numbers import probability_of
 
 Question = TypeVar("Question")
+
+#: What stands between probabilities.
+_PARTS: Final = re.compile(r"\s*[;,]\s*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +49,10 @@ class Setting:
         Whether it is an argument of the command rather than an option.
     of_files : bool
         Whether only its pictures, or its CSV, have it.
+    label : str
+        What its field is called on a page; "" for one that pages do not have, because it is about files only.
+    words : tuple of str
+        What people read instead of each of ``choices``.
     """
 
     meaning: str
@@ -57,12 +67,36 @@ class Setting:
     metavar: str = "VALUE"
     positional: bool = False
     of_files: bool = False
+    label: str = ""
+    words: tuple[str, ...] = ()
 
     @property
     def limits(self) -> dict[str, int]:
         """Its limits as pydantic names them."""
         limits = {"ge": self.low, "le": self.high, "min_length": self.least, "max_length": self.longest}
         return {name: limit for name, limit in limits.items() if limit is not None}
+
+
+@dataclass(frozen=True, slots=True)
+class Offered:
+    """What a study offers for a setting.
+
+    Attributes
+    ----------
+    usual : tuple of str
+        What is asked where nobody chooses; () for what the question has.
+    hint : str
+        What stands in its empty field.
+    groups : mapping
+        Values to choose from, each with what it is called, by the name of their group.
+    left_out : bool
+        Whether the study has no use for it.
+    """
+
+    usual: tuple[str, ...] = ()
+    hint: str = ""
+    groups: Mapping[str, Sequence[tuple[str, str]]] = field(default_factory=dict)
+    left_out: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +124,11 @@ class NamedSetting:
         return any(get_origin(kind) is list for kind in (self.type, *get_args(self.type)))
 
     @property
+    def probabilities(self) -> bool:
+        """Whether it is a list of probabilities."""
+        return "float" in str(self.type)
+
+    @property
     def option(self) -> str:
         """The name of its option."""
         return self.setting.option or f"--{self.alias.replace('_', '-')}"
@@ -100,12 +139,12 @@ def settings_of(question: type) -> tuple[NamedSetting, ...]:
     hints = get_type_hints(question, include_extras=True)
     return tuple(
         NamedSetting(
-            field.name,
-            hints[field.name].__origin__,
-            ... if field.default is MISSING else field.default,
-            hints[field.name].__metadata__[0],
+            own.name,
+            hints[own.name].__origin__,
+            ... if own.default is MISSING else own.default,
+            hints[own.name].__metadata__[0],
         )
-        for field in fields(question)
+        for own in fields(question)
     )
 
 
@@ -114,10 +153,28 @@ def choices_of(question: type, name: str) -> tuple[str, ...]:
     return next(asked.setting.choices for asked in settings_of(question) if asked.name == name)
 
 
-def question_of(question: type[Question], texts: Mapping[str, str]) -> Question:
-    """A question with the texts of a form, by alias; blank ones are not given. FaultError about a whole number."""
-    given = {asked: texts[asked.alias].strip() for asked in settings_of(question) if asked.alias in texts}
-    return question(**{asked.name: _value(asked, text) for asked, text in given.items() if text})
+def question_of(question: type[Question], given: Mapping[str, Sequence[str]]) -> Question:
+    """A question with the texts of a form, by alias; blank ones are not given. FaultError about a number.
+
+    An item of a list is a line.
+    """
+    asked: dict[str, Any] = {}
+    for one in settings_of(question):
+        texts = [line for text in given.get(one.alias, ()) for line in map(str.strip, text.splitlines()) if line]
+        if texts and one.probabilities:
+            asked[one.name] = [_probability(one.alias, part) for text in texts for part in _PARTS.split(text) if part]
+        elif texts and one.several:
+            asked[one.name] = texts
+        elif texts:
+            asked[one.name] = _value(one, texts[-1])
+    return question(**asked)
+
+
+def _probability(name: str, text: str) -> float:
+    value = probability_of(text)
+    if value is None:
+        raise parameter_error(name, "out-of-range", N_("is no probability"), text, N_("such as 5 % or 0.05"))
+    return value
 
 
 def _value(asked: NamedSetting, text: str) -> str | int:
@@ -147,6 +204,10 @@ class ViewInfo:
         Whether it is that of one start where the case has several.
     leading : int
         How many of its settings stand without their names in calls of the client.
+    title : str
+        What it is called on pages.
+    note : str
+        How its figure is read.
     """
 
     name: str
@@ -155,6 +216,8 @@ class ViewInfo:
     pictures: bool = True
     starts: bool = True
     leading: int = 0
+    title: str = ""
+    note: str = ""
 
     @property
     def method(self) -> str:

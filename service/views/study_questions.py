@@ -7,6 +7,7 @@ from typing import Annotated, Final, Literal
 
 from annotated_types import Interval
 
+from sprag.service.languages import N_
 from sprag.service.views.setting import Setting, ViewInfo
 from sprag.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, REGIME_CODES
 from sprag.worker.limits import (
@@ -59,7 +60,8 @@ Number = Annotated[
     ),
 ]
 LineBy = Annotated[
-    list[str] | None, Setting("axis with one line for each of its values; may be repeated", metavar="PATH")
+    list[str] | None,
+    Setting("axis with one line for each of its values; may be repeated", metavar="PATH", label=N_("A line for each")),
 ]
 CurveBy = Annotated[
     list[str] | None,
@@ -71,7 +73,12 @@ CurveBy = Annotated[
 ]
 LineAlong = Annotated[
     str | None,
-    Setting("path of the axis along the lines; default: that of the curves", examples=("shaft.load",), metavar="PATH"),
+    Setting(
+        "path of the axis along the lines; default: that of the curves",
+        examples=("shaft.load",),
+        metavar="PATH",
+        label=N_("Along"),
+    ),
 ]
 Ending = Annotated[str | None, Setting("only cases with this ending", least=1, longest=40, metavar="ENDING")]
 Regime = Annotated[
@@ -80,7 +87,12 @@ Regime = Annotated[
 Flag = Annotated[str | None, Setting("only cases with this flag", least=1, longest=40, metavar="FLAG")]
 Result = Annotated[
     list[str] | None,
-    Setting("result; may be repeated; default: those of the page", examples=(["shaft.speed.mean"],), metavar="RESULT"),
+    Setting(
+        "result; may be repeated; default: those of the page",
+        examples=(["shaft.speed.mean"],),
+        metavar="RESULT",
+        label=N_("Results"),
+    ),
 ]
 
 
@@ -252,6 +264,7 @@ class RibbonQuestion:
             alias="quantile",
             longest=MAX_QUANTILES,
             metavar="P",
+            label=N_("Quantiles"),
         ),
     ] = None
     mapped: Annotated[
@@ -273,6 +286,7 @@ class YieldQuestion:
             least=1,
             metavar="CONDITION",
             positional=True,
+            label=N_("What a good drive reaches, one condition on a line"),
         ),
     ]
     x: LineAlong = None
@@ -310,7 +324,9 @@ class SensitivityQuestion:
 
     y: Annotated[
         list[str],
-        Setting("result; may be repeated", examples=(["shaft.speed.mean"],), least=1, metavar="RESULT"),
+        Setting(
+            "result; may be repeated", examples=(["shaft.speed.mean"],), least=1, metavar="RESULT", label=N_("Results")
+        ),
     ]
 
 
@@ -411,12 +427,15 @@ RIBBON: Final = ViewInfo(
     RibbonQuestion,
     "Quantiles of results over the drives along an axis, with 95 % intervals, the nominal drive, and the causes.",
     leading=2,
+    title=N_("What do tolerances do?"),
+    note=N_("Quantiles over the drives, and the drive as drawn. A click on one of its points opens its case."),
 )
 YIELD: Final = ViewInfo(
     "yield",
     YieldQuestion,
     "The share of drives that reach conditions, at each place and at all places, its causes, and the worst drives.",
     leading=2,
+    title=N_("How many drives are good"),
 )
 FRONT: Final = ViewInfo(
     "front",
@@ -428,12 +447,19 @@ CALIBRATION: Final = ViewInfo(
     "calibration",
     CalibrationQuestion,
     "The results of a calibration: values with intervals, correlations, residuals, the next point to measure.",
+    title=N_("Does it match the measurement?"),
+    note=N_(
+        "Measured points, the fit and its 95 % interval; beside them the residuals, measured less fitted, in standard "
+        "deviations."
+    ),
 )
 SENSITIVITY: Final = ViewInfo(
     "sensitivity",
     SensitivityQuestion,
     "Main effects of every axis on results, and shares of their variance (Sobol indices) or elementary effects.",
     leading=1,
+    title=N_("What matters most?"),
+    note=N_("The mean of each result along each axis, over all that the others do."),
 )
 #: Every view of a study, in the order of the API.
 STUDY_VIEWS: Final = (CURVES, MAP, SENSITIVITY, RIBBON, YIELD, CALIBRATION, FRONT, EXPLORE, ANSWERS)

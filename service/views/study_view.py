@@ -15,13 +15,14 @@ from sprag.service.figures.pictures.curves import draw_figure
 from sprag.service.figures.read import read_figure
 from sprag.service.json_text import to_bytes
 from sprag.service.views.library import reading_of
+from sprag.service.views.shown import NOTHING, Shown
 
 if TYPE_CHECKING:
     from sprag.service.figures.figure import Figure
     from sprag.service.figures.pictures.curves import Picture
     from sprag.service.reading.reader import Choice, Reading
     from sprag.service.views.library import Library
-    from sprag.service.views.setting import ViewInfo
+    from sprag.service.views.setting import Offered, ViewInfo
     from sprag.worker.study import Study
 
 #: Numbers of a view that the service itself reads and writes, in about ten milliseconds; more belong in another
@@ -74,6 +75,14 @@ class StudyView(ABC, Generic[Question, Chosen, Result]):
     drawn_differs: ClassVar[bool] = False
     selects: ClassVar[bool] = False
 
+    def has(self, study: Study) -> bool:
+        """Whether a study has it."""
+        return True
+
+    def offered(self, study: Study) -> Mapping[str, Offered]:
+        """What a study offers for the settings, by alias."""
+        return {}
+
     @abstractmethod
     def choose(self, study: Study, question: Question) -> Chosen:
         """What a question means for a study; FaultError about a setting, or where the study has no such view."""
@@ -97,15 +106,23 @@ class StudyView(ABC, Generic[Question, Chosen, Result]):
     def csv(self, answer: StudyAnswer[Chosen, Result], reading: Reading) -> bytes:
         """The view as a table, in a reader's units where it has columns in them."""
 
+    def shown(self, answer: StudyAnswer[Chosen, Result]) -> Shown:
+        """What people read of it."""
+        return NOTHING
+
+    def drawn_in(self, answer: StudyAnswer[Chosen, Result], columns: int) -> Figure:
+        """The figure where there is something to draw."""
+        figure = self.figure(answer, columns)
+        assert figure is not None
+        return figure
+
     def figure(self, answer: StudyAnswer[Chosen, Result], columns: int = 2) -> Figure | None:
         """The view as a described figure with so many panels in a row; None where there is nothing to draw."""
         raise NotImplementedError  # those that are pictures of another kind
 
     def picture(self, answer: StudyAnswer[Chosen, Result], reading: Reading, title: str, form: Picture) -> bytes:
         """The view as a picture; SelectionError where there is more than one can show."""
-        figure = self.figure(answer)
-        assert figure is not None
-        return draw_figure(read_figure(figure, reading), title, form)
+        return draw_figure(read_figure(self.drawn_in(answer, 2), reading), title, form)
 
 
 def found(

@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Part, Sentence, Typed, joined
+from sprag.sentences import Amount, Part, Sentence, Typed
 from sprag.service.answers.results import AngleTable
 from sprag.service.answers.results import Trajectory as TrajectoryData
 from sprag.service.exports import read_table
 from sprag.service.faults import parameter_error
+from sprag.service.figures.figure import Figure, Quantity
+from sprag.service.figures.motion import motion_figure, phase_figure
 from sprag.service.json_text import numbers
-from sprag.service.languages import N_, _
+from sprag.service.languages import N_
 from sprag.service.reading.directions import case_values
 from sprag.service.reading.quantities import Units
-from sprag.service.reading.units import PERIOD_NAMES, QuantityError, split_quantity, to_float, typed_value
+from sprag.service.reading.reader import Phrase, joined, plural, term
+from sprag.service.reading.units import (
+    PERIOD_NAMES,
+    QuantityError,
+    split_quantity,
+    to_float,
+    typed_value,
+)
 from sprag.service.results.selection import ends_of_range
 from sprag.service.views.case_questions import TRAJECTORY, TrajectoryQuestion
 from sprag.service.views.case_view import CaseAnswer, CaseView, Said
+from sprag.service.views.shown import Shown
 from sprag.worker import models
 from sprag.worker.models import Trajectory
 
@@ -107,6 +118,10 @@ def trajectory_csv(made: Trajectory, units: Units | None = None) -> bytes:
     return read_table(columns, si, units or Units())
 
 
+#: Times at which a whole run is sampled to see where it stopped.
+_SAMPLES: Final = 6000
+
+
 class TrajectoryView(CaseView[TrajectoryQuestion, tuple[float, float, int], Trajectory]):
     """The motion of a case over time, or over the angle."""
 
@@ -134,15 +149,70 @@ class TrajectoryView(CaseView[TrajectoryQuestion, tuple[float, float, int], Traj
         """None: the file is the motion itself."""
         return ""
 
-    def said(self, answer: CaseAnswer[tuple[float, float, int], Trajectory]) -> Said:
+    def figure(
+        self, answer: CaseAnswer[tuple[float, float, int], Trajectory], columns: int = 2, rows: object = None
+    ) -> Figure:
+        """The model's panels over time or angle, above the states of its parts; a note where there is no motion."""
+        return _stopped(answer) or motion_figure(answer.result, models.presentation_of(answer.study), columns=columns)
+
+    def shown(self, answer: CaseAnswer[tuple[float, float, int], Trajectory]) -> Shown:
         """How many places there are, or why there are none."""
-        way = _("{count} points in time") if answer.result.along == "time" else _("{count} points over the angle")
-        text = way.format(count=answer.chosen[2])
+        ending, count = answer.result.ending, answer.chosen[2]
         if not len(answer.result.values):
-            text = _("no points: {why}", why=_(models.ENDING_SENTENCES[answer.result.ending]))
-        sentence = _("case {case}: {text}", case=answer.case, text=f"{answer.result.ending}, {text}")
-        return Said(
-            [sentence],
-            {"ending": answer.result.ending, "points": len(answer.result.values)},
-            answer.result.ending == models.OK,
-        )
+            text = Phrase("no points: {why}", why=Phrase(models.ENDING_SENTENCES[ending]))
+        elif answer.result.along == "time":
+            text = plural("{count} point in time", "{count} points in time", count)
+        else:
+            text = plural("{count} point over the angle", "{count} points over the angle", count)
+        return Shown((joined(", ", (term(ending), text)),))
+
+    def said(self, answer: CaseAnswer[tuple[float, float, int], Trajectory]) -> Said:
+        """How many places there are."""
+        data = {"ending": answer.result.ending, "points": len(answer.result.values)}
+        return Said(data, answer.result.ending == models.OK)
+
+
+class PhasesView(TrajectoryView):
+    """The phase portrait of a motion: speed over angle of what swings. On pages only."""
+
+    about = replace(
+        TRAJECTORY,
+        name="phases",
+        title=N_("Speed over angle (phase portrait)"),
+        note=N_("Speed over angle for the part shown above; a closed line is a periodic motion."),
+    )
+
+    def has(self, study: Study) -> bool:
+        """Whether anything swings."""
+        return bool(models.presentation_of(study).portrait)
+
+    def figure(
+        self, answer: CaseAnswer[tuple[float, float, int], Trajectory], columns: int = 2, rows: object = None
+    ) -> Figure:
+        """Speed over angle of each part that swings."""
+        return _stopped(answer) or phase_figure(answer.result, models.presentation_of(answer.study))
+
+    def shown(self, answer: CaseAnswer[tuple[float, float, int], Trajectory]) -> Shown:
+        """Nothing beside it."""
+        return Shown()
+
+
+def _stopped(answer: CaseAnswer[tuple[float, float, int], Trajectory]) -> Figure | None:
+    """Why a part has no motion, because the run stopped earlier; None where it has one."""
+    times, (first, last, _) = answer.result.times, answer.chosen
+    if times.size and not times[-1] == first < last:
+        return None
+    return Figure(Quantity("", "1"), (), note=_no_motion(answer))
+
+
+def _no_motion(answer: CaseAnswer[tuple[float, float, int], Trajectory]) -> str:
+    """The sentence about a run that stopped."""
+    made, study, case = answer.result, answer.study, answer.case
+    if made.along == "angle":
+        return Phrase("There is no motion: the case ended with {ending}.", ending=term(made.ending))
+    times = models.run_trajectory(study, case, 0.0, models.extent(study, case).end, _SAMPLES).times
+    last = float(times[-1]) if times.size else 0.0
+    when = Phrase("about t = {time}", time=Amount(last, "s", 3)) if last > 0.0 else "t = 0"
+    return Phrase(
+        "There is no motion in this part: the run stopped at {when} with {ending}.", when=when, ending=term(made.ending)
+    )

@@ -5,17 +5,19 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Amount, Sentence, Typed
+from sprag.sentences import Amount, Sentence, Typed, Whole
 from sprag.service.answers.transients import Transient as TransientData
 from sprag.service.faults import FaultError, choice_of, parameter_error
 from sprag.service.figures.transient import transient_figure
 from sprag.service.languages import N_, _
 from sprag.service.reading.limits import span
 from sprag.service.reading.numbers import in_language
+from sprag.service.reading.reader import Phrase, joined
 from sprag.service.reading.units import QuantityError, typed_value
-from sprag.service.reading.wording import number, unit_text
 from sprag.service.views.case_questions import TRANSIENT, TransientQuestion
 from sprag.service.views.case_view import CaseAnswer, CaseView, Said
+from sprag.service.views.setting import Offered
+from sprag.service.views.shown import Column, Shown, ShownTable
 from sprag.service.views.trajectory import timed_values, trajectory_csv
 from sprag.worker import models
 from sprag.worker.limits import MIN_TRAJECTORY_POINTS
@@ -191,12 +193,31 @@ class TransientView(CaseView[TransientQuestion, tuple[Course, int], Transient]):
         """The name of its kind."""
         return chosen[0].kind
 
+    def has(self, study: Study) -> bool:
+        """Whether there are transients."""
+        return has_transients(study)
+
+    def offered(self, study: Study, case: int) -> dict[str, Offered]:
+        """Coasting first, which every machine can; a torque only where no motor gives it."""
+        motor = has_motor(study)
+        return {
+            "kind": Offered(("coasting",)), "load": Offered(hint="1"), "angle": Offered(hint="0 deg"),
+            "torque": Offered(hint="N*m", left_out=motor), "within": Offered(hint=f"{_DEVIATION if motor else 0:g}"),
+            "revolutions": Offered(hint="1000"),
+        }  # fmt: skip
+
+    def shown(self, answer: CaseAnswer[tuple[Course, int], Transient]) -> Shown:
+        """Its end and its cause, and the results."""
+        made = answer.result
+        rows = [
+            [Phrase(meaning), joined("", [Amount(made.results[name], unit, 6)])]
+            for name, unit, meaning in RESULTS
+            if math.isfinite(made.results[name])
+        ]
+        end = joined(" ", (Whole(Phrase(made.outcome)), Phrase(made.cause)))
+        return Shown((end,), (ShownTable(_("Results"), (Column(Phrase("Meaning")), Column(Phrase("Value"))), rows),))
+
     def said(self, answer: CaseAnswer[tuple[Course, int], Transient]) -> Said:
         """Its end and its cause, and the results."""
-        lines = [_("case {case}: {text}", case=answer.case, text=f"{answer.result.outcome}. {_(answer.result.cause)}")]
-        for name, unit, meaning in RESULTS:
-            if math.isfinite(answer.result.results[name]):
-                value = f"{number(answer.result.results[name], 6)} {unit_text(unit)}".rstrip()
-                lines.append(f"  {name} = {value}  ({_(meaning)})")
         data = {"outcome": answer.result.outcome, "cause": answer.result.cause, "results": results_json(answer.result)}
-        return Said(lines, data, answer.result.outcome == completed(answer.chosen[0]))
+        return Said(data, answer.result.outcome == completed(answer.chosen[0]))

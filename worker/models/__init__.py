@@ -14,7 +14,7 @@ from sprag.engine import ENGINE_VERSION, Ending, Run, Span
 from sprag.engine.catalogue import Parameter, ResultInfo
 from sprag.engine.formulas.expressions import ExpressionError
 from sprag.engine.machine_shaft.problems import AssemblyError, InsufficientInertiaError, TableError
-from sprag.engine.outcome import Basin, Engagements, Portrait, Trajectory
+from sprag.engine.outcome import Basin, Engagement, Engagements, Portrait, Trajectory
 from sprag.engine.problems import MachineError
 from sprag.engine.run import MEANS_FROM_PERIODS
 from sprag.engine.sources import engine_folder, source_hash
@@ -110,6 +110,7 @@ __all__ = [
     "ClutchLawError",
     "DegreeReport",
     "Ending",
+    "Engagement",
     "Engagements",
     "ExpressionError",
     "Extent",

@@ -200,3 +200,9 @@ async def map_of(work: Attended, study_id: StudyId, choice: FileChoice, kind: st
         return CurveQuery(query.x, (query.z,), (query.y,), query.at), kind == "contour"
 
     return await figure_of(work, study_id, "map", chosen, choice)
+
+
+@router.get("/studies/{study_id:study}/figures/calibration")
+async def calibration_of(work: Attended, study_id: StudyId, choice: FileChoice, columns: Columns = 2) -> Response:
+    """The figure of the measured points on the fitted curves, and of the residuals."""
+    return await figure_of(work, study_id, "calibration", lambda _study: (), choice, columns)

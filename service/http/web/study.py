@@ -84,11 +84,9 @@ def study_frame(context: Context, study_id: str) -> dict[str, Any]:
     mapped = grid or map_plan(study) is not None
     tabs = [
         ("", N_("Overview")),
-        *([("/calibration", N_("Calibration"))] if _calibrates(study) else []),
-        *([("/drives", N_("Drives"))] if study.spread is not None and study.plan is None else []),
         *([("/curves", N_("Curves"))] if main_query(study, models.study_results(study)) is not None else []),
         *([("/map", N_("Map"))] if mapped else []),
-        *([("/sensitivity", N_("Sensitivity"))] if varying and study.plan is None else []),
+        ("/matters", N_("What matters")),
     ]
     return {
         "study": shown,

@@ -23,7 +23,7 @@ def test_a_table_of_one_case(sprag: Sprag, examples: Path, tmp_path: Path) -> No
     (row,) = csv.DictReader(io.StringIO(file.read_text(encoding="utf-8")))
     assert float(row["torque_max"]) == pytest.approx(4.0567750130, abs=1e-9)
     assert (row["clutch"], row["order"], row["complete"]) == ("0", "1", "true")
-    assert "1 engagements from 0 s to 0.08 s" in done.err
+    assert "1 engagement from 0 s to 0.08 s" in done.err
     periods = sprag("engagements", examples / _DRIVE, "--case", 178, "--table", "periods")
     assert len(list(csv.DictReader(io.StringIO(periods.out)))) == 2
 

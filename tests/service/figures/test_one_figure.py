@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from html import unescape
 from typing import TYPE_CHECKING, Any
@@ -15,7 +14,6 @@ from matplotlib.figure import Figure
 from sprag.service.figures.pictures import curves as pictures
 from sprag.service.figures.pictures.legends import MARKERS
 from sprag.service.http.web.figures.plotly import plotly_figure
-from sprag.service.presets import preset_text
 from sprag.service.reading.reader import Choice
 from sprag.service.results.curves import CurveQuery
 from sprag.service.views.answers import AnswersChoice, AnswersView
@@ -157,15 +155,5 @@ def test_a_downloaded_family_is_that_of_the_page(service: Service) -> None:
     assert len(names) == 4
     assert in_order(names, texts)
     assert in_order([trace["line"]["color"] for trace in listed(page)], strokes)
-    assert in_order(titles(page, "y"), texts)
-    assert set(titles(page, "x")) <= set(texts)
-
-
-def test_downloaded_ribbons_are_those_of_the_page(service: Service) -> None:
-    study_id = service.submit(json.loads(preset_text("tolerances")[1]))
-    service.fill(study_id)
-    page, texts, _ = downloaded(service, f"/studies/{study_id}/drives", "figures/ribbon", "ribbon?")
-    assert listed(page)
-    assert in_order([trace["name"] for trace in listed(page)], texts)
     assert in_order(titles(page, "y"), texts)
     assert set(titles(page, "x")) <= set(texts)

@@ -269,14 +269,10 @@ def test_pairs_and_elementary_effects_are_in_every_form(
         assert service.http.get(f"{place}&format=svg").status_code == 200
         _show_effects(found)
         assert heading in capsys.readouterr().out
-        page = service.http.get(f"/studies/{study_id}/sensitivity?y={SPEED}").text
-        address = f"/studies/{study_id}/figures/sensitivity?y={SPEED}&amp;units=typed"
-        assert f'src="{address}"' in page
-        drawn = service.http.get(address.replace("&amp;", "&"), headers={"Accept-Language": "uk"})
-        assert "<!-- середнє: середня" in drawn.text
+        page = service.http.get(f"/studies/{study_id}/matters?y={SPEED}&units=si").text
         for number in numbers:
             assert f'<td class="num">{number_text(number, 3)}</td>' in page
-    assert service.http.get(f"/studies/{study_id}/sensitivity?y=shaft.speed.men").status_code == 422
+    assert service.http.get(f"/studies/{study_id}/matters?y=shaft.speed.men").status_code == 422
 
 
 @pytest.mark.parametrize(

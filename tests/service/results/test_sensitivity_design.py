@@ -200,5 +200,5 @@ def test_files_are_in_the_units_and_names_of_the_reader(service: Service, spec: 
     assert "mean shaft speed" in svg
     assert "(rpm)" in svg
     assert SPEED in service.http.get(f"{place}&format=svg&names=codes").text
-    page = service.http.get(f"/studies/{study_id}/sensitivity?y={SPEED}&units=rpm").text
+    page = service.http.get(f"/studies/{study_id}/matters?y={SPEED}&units=rpm").text
     assert f"sensitivity?y={SPEED}&amp;units=rpm&amp;format=csv" in page

@@ -45,26 +45,19 @@ def test_a_branch_is_the_same_everywhere(service: Service, settled: str, portal:
     assert [row["special"] for row in rows if row["special"]] == ["doubling"]
     with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
         assert client.study(settled).branch(2, "shaft.load", 0.215, "0.23 N*m") == body
-    figure = service.http.get(f"/studies/{settled}/cases/2/branch/figure?along=shaft.load").json()
-    names = [trace["name"] for trace in figure["data"]]
-    assert "cases of the study" not in names
-    service.fill(settled)
-    drawn = service.http.get(f"/studies/{settled}/cases/2/branch/figure?along=shaft.load").json()["data"]
-    (own,) = (trace for trace in drawn if trace["name"] == "cases of the study")
-    assert (own["x"], own["customdata"]) == (LOADS, [0, 1, 2])
-    assert names[:2] == ["stable", "unstable"]
-    assert names[-1].startswith("doubling at 0.22298965")
-    full, dashed = figure["data"][:2]
-    assert min(full["x"]) == max(dashed["x"]) == doubling["parameter"]
-    assert (full["line"]["dash"], dashed["line"]["dash"]) == ("solid", "dash")
     assert asked(service, settled, "along=shaft.load&format=svg").content.startswith(b"<?xml")
 
 
 def test_the_page_has_a_form_and_the_figure(service: Service, settled: str) -> None:
-    page = service.http.get(f"/studies/{settled}/cases/2/branch").text
-    assert f"/studies/{settled}/cases/2/branch/figure?along=shaft.load&amp;y=shaft.speed.mean" in page
-    assert f"/studies/{settled}/cases/2/branch" in service.http.get(f"/studies/{settled}/cases/2").text
-    refused = service.http.get(f"/studies/{settled}/cases/2/branch?along=shaft.lode")
+    own = f"/studies/{settled}/cases/2"
+    assert f'href="{own}?show=branch#branch"' in service.http.get(own).text
+    service.fill(settled)
+    page = service.http.get(f"{own}?show=branch").text
+    assert '<option value="shaft.load" selected>Load torque</option>' in page
+    assert "doubling at 0.2229" in page
+    for case in range(3):
+        assert f'data-case="{case}"' in page or f"/cases/{case}" in page, "the cases of the study are in the figure"
+    refused = service.http.get(f"{own}?show=branch&along=shaft.lode")
     assert refused.status_code == 422
     assert "is not a numeric parameter of the study" in refused.text
 
@@ -98,9 +91,6 @@ def test_a_case_of_a_sweep_has_the_motion_of_the_sweep(service: Service) -> None
     section = service.get(f"/studies/{study_id}/cases/1/section")
     assert (section["order"], len(section["strobes"]["shaft.speed"][0])) == ([1], 1)
     service.fill(study_id)
-    drawn = service.http.get(f"/studies/{study_id}/cases/1/branch/figure?along=shaft.load").json()["data"]
-    (own,) = (trace for trace in drawn if trace["name"] == "cases of the study")
-    assert own["customdata"] == [0, 1, 2, 3]
 
 
 def test_a_case_without_an_orbit_has_a_note(service: Service) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from typing import Any
 
 import pytest
@@ -87,7 +88,7 @@ def test_a_machine_without_clutches_has_no_engagements(service: Service) -> None
     assert response.status_code == 404
     assert response.json()["type"] == "/problems/not-found"
     assert "engagements" not in service.get(f"/studies/{study_id}/cases/0")["links"]
-    page = service.http.get(f"/studies/{study_id}/cases/0/engagements")
+    page = service.http.get(f"/studies/{study_id}/cases/0?show=engagements")
     assert page.status_code == 404
 
 
@@ -98,11 +99,12 @@ def test_the_client_gives_the_same(service: Service, one_case: str, portal: Any)
 
 def test_the_page_of_a_case_shows_the_table(service: Service, one_case: str) -> None:
     own = f"/studies/{one_case}/cases/4"
-    page = service.http.get(own).text
-    assert f'data-engagements="{own}/engagements"' in page
-    table = service.http.get(own + "/engagements")
+    assert f"{own}?show=engagements" in service.http.get(own).text
+    table = service.http.get(f"{own}?show=engagements")
     assert table.status_code == 200, table.text
     rows = asked(service, one_case).json()["engagements"]
     body = table.text.partition('id="engagements"')[2].partition("<tbody>")[2].partition("</tbody>")[0]
     assert body.count("<tr>") == len(rows)
-    assert f"/api/v1{own}/engagements?format=csv" in table.text
+    for query in ("table=engagements&", "table=periods&", ""):
+        assert re.search(rf'href="/api/v1{own}/engagements\?[^"]*', table.text), query
+    assert "csv, periods" in table.text

@@ -49,9 +49,6 @@ def test_a_run_of_a_given_time_has_strobes_only(service: Service, spec: dict[str
     body = asked(service, study_id, case=4).json()
     assert (body["regime"], body["order"], body["orbit"]) == (None, None, None)
     assert body["strobes"]["times"] == pytest.approx([k / 25.5 for k in range(1, 13)])
-    strobes, along = service.http.get(f"/studies/{study_id}/cases/4/strobes/figure").json()["data"]
-    assert strobes["x"] == body["strobes"]["values"]["pendulums.0.angle"]
-    assert strobes["customdata"] == along["x"] == list(range(1, 13))
     assert asked(service, study_id, "?format=svg", case=4).status_code == 200
     with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
         assert client.study(study_id).strobes(4) == body
@@ -69,23 +66,6 @@ def test_what_there_is_none_of_is_refused(service: Service, settled: str) -> Non
     assert (error["parameter"], error["value"], error["allowed"]) == ("table", "points", "strobes, orbit")
     press = service.submit(service.get("/presets/press")["spec"])
     assert asked(service, press).status_code == 404
-    assert service.http.get(f"/studies/{press}/cases/0/strobes/figure").status_code == 404
+    assert service.http.get(f"/studies/{press}/cases/0?show=strobes").status_code == 404
     assert "strobes" not in service.get(f"/studies/{press}/cases/0")["links"]
-    assert "/strobes" not in service.http.get(f"/studies/{press}/cases/0").text
-
-
-@pytest.mark.parametrize("columns", [1, 2])
-def test_the_page_of_a_case_draws_the_orbit_and_its_strobes(service: Service, settled: str, columns: int) -> None:
-    own = f"/studies/{settled}/cases/0"
-    assert f'data-figure="{own}/strobes/figure?columns=2&units=workshop"' in service.http.get(own).text
-    response = service.http.get(f"{own}/strobes/figure?columns={columns}")
-    orbit, strobes, rings, levels, along = response.json()["data"]
-    assert (orbit["x"][0], orbit["y"][0]) == pytest.approx((orbit["x"][-1], orbit["y"][-1]), abs=1e-6)
-    assert len(rings["x"]) == 2
-    assert len(levels["y"]) == 2 * 3
-    assert strobes["customdata"] == along["x"] == list(range(1, len(along["x"]) + 1))
-    assert min(abs(along["y"][-1] - level) for level in levels["y"][::3]) < 1e-5
-    unchanged = service.http.get(
-        f"{own}/strobes/figure?columns={columns}", headers={"If-None-Match": response.headers["etag"]}
-    )
-    assert unchanged.status_code == 304
+    assert "strobes" not in service.http.get(f"/studies/{press}/cases/0").text

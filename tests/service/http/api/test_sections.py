@@ -60,15 +60,6 @@ def test_a_section_is_taken_at_its_phase(service: Service, settled: str, portal:
         assert client.study(settled).section(1, "90 deg", strobes=8) == body
 
 
-def test_the_page_has_both_figures(service: Service, settled: str) -> None:
-    page = service.http.get(f"/studies/{settled}/cases/1/diagram?from=0.2&to=0.3").text
-    assert f"/studies/{settled}/cases/1/section/figure?" in page
-    (figure,) = service.http.get(f"/studies/{settled}/cases/1/section/figure").json()["data"]
-    assert len(figure["x"]) == 2
-    drawn = service.http.get(f"/studies/{settled}/cases/1/diagram/figure?along=shaft.load&from=0.2&to=0.21").json()
-    assert len(drawn["data"][0]["x"]) == 400
-
-
 @pytest.mark.parametrize(
     ("part", "parameter", "code"),
     [
@@ -82,5 +73,5 @@ def test_the_page_has_both_figures(service: Service, settled: str) -> None:
 def test_what_cannot_be_drawn_is_refused(service: Service, settled: str, part: str, parameter: str, code: str) -> None:
     (error,) = asked(service, settled, part).json()["errors"]
     assert (error["parameter"], error["code"]) == (parameter, code)
-    page = service.http.get(f"/studies/{settled}/cases/1/diagram?phase=400 deg")
+    page = service.http.get(f"/studies/{settled}/cases/1?show=diagram&phase=400 deg")
     assert page.status_code == 422

@@ -143,35 +143,33 @@ def test_the_motion_of_a_start_is_that_of_its_case(service: Service, started: st
 
 def test_the_page_of_a_case_lists_its_regimes(service: Service, started: str) -> None:
     page = service.http.get(f"/studies/{started}/cases/1").text
-    assert "<h3>Regimes</h3>" in page
+    assert "Motions to which it comes from other starts" in page
     assert '<a href="?start=5">5</a>' in page
     assert "0, shown below" in page
     other = service.http.get(f"/studies/{started}/cases/1", params={"start": "5"}).text
     assert "5, shown below" in other
-    assert f"/studies/{started}/cases/1/strobes/figure?columns=2&amp;start=5" in other
+    assert f"/studies/{started}/cases/1?show=strobes&amp;start=5" in other
 
 
-@pytest.mark.parametrize("figure", ["branch", "diagram", "section"])
-def test_pages_of_a_regime_follow_its_motion(service: Service, started: str, figure: str) -> None:
+@pytest.mark.parametrize("part", ["branch", "diagram", "section"])
+def test_views_of_a_regime_follow_its_motion(service: Service, started: str, part: str) -> None:
     case = f"/studies/{started}/cases/1"
-    which = "branch" if figure == "branch" else "diagram"
-    assert f"{case}/{which}?start=5" in service.http.get(case, params={"start": "5"}).text
-    asked = {"start": "5", "along": "shaft.load", "from": "0.1", "to": "0.3"}
-    page = html.unescape(service.http.get(f"{case}/{which}", params=asked).text)
-    (drawn,) = re.findall(f'data-figure="({case}/{figure}/figure[^"]*)"', page)
-    assert "start=5" in drawn
-    assert '<input type="hidden" name="start" value="5">' in page
-    assert f'{case}?start=5">' in page
+    asked = {"show": part, "start": "5", "along": "shaft.load", "from": "0.1", "to": "0.3", "points": "3"}
+    page = service.http.get(case, params=asked)
+    assert page.status_code == 200
+    assert f"api/v1{case}/{part}?" in page.text
+    assert "start=5" in page.text.partition(f"api/v1{case}/{part}?")[2].partition('"')[0]
+    assert '<input type="hidden" name="start" value="5">' in page.text
 
     def not_here(*_: Any) -> Any:
         raise ApiError("not-computed", "It is not computed here.")
 
     service.computer.answer = not_here
-    service.http.get(drawn)
-    _, study, number, _view, _chosen, start, *_ = service.computer.calls[-1]
-    study, number = motion_of(study, number, start)
-    values = service.store.studies.study(started).run["starts"]["values"][SPEED]
-    assert (number, study.base[SPEED], study.base["shaft.load"]) == (0, values[4], 0.2)
+    page = service.http.get(case, params=asked)
+    assert "It is not computed here." in page.text
+    assert page.status_code == 409
+    _, _study, number, view, _chosen, start, *_ = service.computer.calls[-1]
+    assert (number, view.about.name, start) == (1, part, 5)
 
 
 def test_a_study_begins_at_the_end_of_a_case(service: Service, started: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -260,26 +258,23 @@ def test_a_basin_is_a_grid_of_two_initial_values(
     picture = service.http.get(API + own, params={**asked, "format": "svg"})
     assert picture.status_code == 200
     assert "<!-- 1: 25 %, 3.5 rad/s, order 2 -->" in picture.text
-    page = service.http.get(own, params=asked).text
-    figure = html.unescape(re.findall(r'data-figure="(.*?)"', page)[0])
     monkeypatch.undo()
     # This one is run: all four starts come to the motion of two periods.
-    (line,) = service.http.get(figure).json()["data"]
-    assert (line["name"], len(line["x"])) == ("0: 100 %, 218.1 rpm, order 2", 4)
+    page = service.http.get(f"/studies/{started}/cases/1", params={"show": "basin", **asked}).text
+    assert "0: 100 %, 218.1 rpm, order 2" in page
 
 
 def test_the_page_of_a_basin_keeps_its_form(service: Service, started: str) -> None:
-    own = f"/studies/{started}/cases/1/basin"
+    own = f"/studies/{started}/cases/1?show=basin"
     first = service.http.get(own)
-    shown = [text in first.text for text in ('placeholder="30 rad/s"', "data-figure", 'role="alert"')]
-    assert (first.status_code, *shown) == (200, True, False, False)
+    shown = [text in first.text for text in ('placeholder="30 rad/s"', 'role="alert"')]
+    assert (first.status_code, *shown) == (200, True, False)
     wrong = {"y": "pendulums.0.initial_angle", "y_from": "12 mm", "y_to": "0.2 rad", "points": "many"}
     for faulty, sentence in ((wrong, "must be a whole number"), ({**wrong, "points": "9"}, "<code>y_from</code>")):
-        page = service.http.get(own, params=faulty)
+        page = service.http.get(own, params={"show": "basin", **faulty})
         assert page.status_code == 422
         assert sentence in page.text
         assert 'name="y_from" value="12 mm"' in page.text
-        assert "data-figure" not in page.text
 
 
 def test_a_basin_has_possible_starts_only(service: Service, started: str) -> None:

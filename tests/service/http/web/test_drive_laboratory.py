@@ -118,7 +118,7 @@ def test_a_case_of_a_study_goes_to_the_laboratory_and_back(visitor: Visitor, off
     loads = {"path": "shaft.load", "values": [0.1, 0.2]}
     example = office.submit(office.get("/presets/one_pendulum")["spec"], axes=[loads])
     page.goto(f"/studies/{example}/cases/1")
-    page.get_by_role("link", name="This machine in the laboratory").click()
+    page.get_by_role("link", name="Move it with sliders").click()
     page.wait_for_url("**/laboratory/drive?machine=own&**")
     drawn(page, "#lab-plot")
     results = office.get(f"/studies/{example}/cases/1")["results"]

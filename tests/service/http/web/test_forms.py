@@ -14,7 +14,6 @@ from hypothesis.extra.numpy import arrays
 
 from sprag.service.faults import Fault
 from sprag.service.figures.painter.thinning import thin
-from sprag.service.http.web.figures.motion import motion_figures
 from sprag.service.http.web.form.check import check_form, check_text
 from sprag.service.http.web.form.entries import plain
 from sprag.service.http.web.form.page import empty
@@ -23,9 +22,10 @@ from sprag.service.http.web.form.spec import field_of, spec_of, values_of
 from sprag.service.http.web.templates import duration, fragment, time_left
 from sprag.service.presets import preset_names, preset_text
 from sprag.service.reading.faults import message
-from sprag.service.reading.reader import Reading
 from sprag.service.reading.wording import number, symbol, unit_text
 from sprag.service.spec.document import format_of, load_spec, parse_spec
+from sprag.service.views.case_view import see
+from sprag.service.views.trajectory import PhasesView, TrajectoryView
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
 from sprag.worker.study import Study
@@ -387,7 +387,6 @@ def test_a_part_after_the_run_stopped_is_a_sentence(monkeypatch: pytest.MonkeyPa
         return models.Trajectory(times, (), (), np.zeros((times.size, 0)), {}, "chatter")
 
     monkeypatch.setattr(models, "run_trajectory", stopped)
-    figures = motion_figures(study, 0, 0.5, 0.6, 2, Reading(study.model))
     sentence = "There is no motion in this part: the run stopped at about t = 0.012 s with chatter."
-    assert {name: figure["note"] for name, figure in figures.items()} == {"motion": sentence, "phase": sentence}
-    assert figures["motion"]["layout"] == {}
+    for view in (TrajectoryView(), PhasesView()):
+        assert view.figure(see(study, 0, view, (0.5, 0.6, 2400), None)).note == sentence

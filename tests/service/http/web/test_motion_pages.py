@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 SPEC: dict[str, Any] = json.loads((EXAMPLES / "coexisting_motions.json").read_text(encoding="utf-8"))
 PHONE = {"viewport": {"width": 390, "height": 800}, "color_scheme": "dark"}
 PAGES = {
-    "case": "",
-    "basin": "/basin?x=shaft.initial_speed&y=pendulums.0.initial_angle&points=3",
-    "branch": "/branch?along=shaft.load&from=0.35&to=0.5",
-    "diagram": "/diagram?along=shaft.load&from=0.35&to=0.5",
+    "motion": "",
+    "basin": "?show=basin&x=shaft.initial_speed&y=pendulums.0.initial_angle&points=3",
+    "branch": "?show=branch&along=shaft.load&from=0.35&to=0.5",
+    "diagram": "?show=diagram&along=shaft.load&from=0.35&to=0.5&points=20",
 }
 
 
@@ -43,12 +43,12 @@ def swept(office: Office) -> str:
 
 
 def outside(page: Page) -> list[str]:
-    """Texts of pictures that are not wholly within their picture, and what reaches past the page."""
+    """Texts of figures that are not wholly within their figure, and what reaches past the page."""
     found: list[str] = page.evaluate(
         """() => {
           const within = (box, of) => !box.width || (box.left >= of.left - 1 && box.right <= of.right + 1);
-          const texts = [...document.querySelectorAll(".plot .main-svg text")].filter(
-            (text) => !within(text.getBoundingClientRect(), text.closest(".plot").getBoundingClientRect()));
+          const texts = [...document.querySelectorAll("svg.figure text")].filter(
+            (text) => !within(text.getBoundingClientRect(), text.closest("svg").getBoundingClientRect()));
           const wide = document.documentElement.scrollWidth - innerWidth;
           return [...texts.map((text) => text.textContent), ...(wide > 0 ? [`page: ${wide} px too wide`] : [])];
         }"""
@@ -61,12 +61,13 @@ def outside(page: Page) -> list[str]:
 def test_a_phone_has_the_whole_page(visitor: Visitor, motions: str, which: str) -> None:
     page = visitor.page
     page.goto(f"/studies/{motions}/cases/0{PAGES[which]}")
-    page.wait_for_function("() => [...document.querySelectorAll('.plot')].every((plot) => plot.dataset.drawn)")
     page.evaluate("() => { for (const one of document.querySelectorAll('details')) one.open = true; }")
     assert outside(page) == []
-    # A picture with buttons of its own is no image, in which they would be hidden from screen readers.
-    plots = page.locator(".plot")
-    assert {plots.nth(k).get_attribute("role") for k in range(plots.count())} == {"group"}
+    # Of each figure that for a narrow place is shown, and no other.
+    shown = [page.locator(f"figure .{place} > svg").count() for place in ("narrow", "broad")]
+    seen = [page.locator(f"figure .{place} > svg:visible").count() for place in ("narrow", "broad")]
+    assert (shown[0], seen) == (shown[1], [shown[0], 0])
+    assert shown[0] == (1 if which == "motion" else 2)
 
 
 @pytest.mark.parametrize("visitor", [PHONE], indirect=True)
@@ -80,31 +81,21 @@ def test_a_phone_has_the_whole_table_of_a_single_case(visitor: Visitor, motions:
 
 
 @pytest.mark.parametrize("visitor", [{"java_script_enabled": False}], indirect=True)
-@pytest.mark.parametrize("which", PAGES)
-def test_without_scripts_there_are_pictures(visitor: Visitor, motions: str, which: str) -> None:
+def test_a_basin_is_chosen_by_keyboard_without_scripts(visitor: Visitor, motions: str) -> None:
     page = visitor.page
-    page.goto(f"/studies/{motions}/cases/0{PAGES[which]}")
-    images = page.locator("noscript img, figure img, .plot img")
-    assert images.count() > 0
-    for k in range(images.count()):
-        address = images.nth(k).get_attribute("src")
-        answer = page.request.get(str(address))
-        assert (answer.status, answer.headers["content-type"].partition(";")[0]) == (200, "image/svg+xml"), address
-
-
-def test_a_basin_is_chosen_by_keyboard(visitor: Visitor, motions: str) -> None:
-    page = visitor.page
+    page.goto(f"/studies/{motions}/cases/0")
+    page.get_by_role("link", name="From other starts").click()
+    page.wait_for_url(re.compile("show=basin"))
     page.goto(f"/studies/{motions}/cases/0{PAGES['basin']}")
-    drawn(page)
     points = page.get_by_label("Points")
     points.focus()
     page.keyboard.press("Control+A")
     page.keyboard.type("2")
     page.keyboard.press("Tab")
-    expect(page.get_by_role("button", name="Show")).to_be_focused()
+    expect(page.get_by_role("button", name="Show").last).to_be_focused()
     page.keyboard.press("Enter")
     page.wait_for_url(re.compile("points=2"))
-    assert sum(len(line["x"]) for line in drawn(page) if line["x"]) == 4
+    expect(page.get_by_role("region", name="Regimes", exact=True)).to_contain_text("periodic")
 
 
 def test_jumps_are_narrowed_by_a_button(visitor: Visitor, swept: str, office: Office) -> None:

@@ -71,7 +71,7 @@ def test_a_draft_is_discarded(visitor: Visitor) -> None:
 
 def test_drafts_of_a_calibration_and_a_schedule(visitor: Visitor, office: Office, example: str) -> None:
     page = visitor.page
-    page.goto(f"/calibrate?study={example}")
+    page.goto(f"/studies/{example}/matters?ask=measurement")
     page.get_by_label("A line of headings").fill("shaft.load [N*m],shaft.speed.mean [rad/s]")
     page.get_by_label("Outliers").select_option("huber")
     page.wait_for_function("() => Object.values(localStorage).some((text) => text.includes('huber'))")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-import pytest
 from playwright.sync_api import expect
 
 from sprag.service.figures.figure import NOTES
@@ -97,30 +96,11 @@ def test_a_case_is_found_and_its_motion_seen(visitor: Visitor, office: Office, e
     fastest = max(office.get(f"/studies/{example}/cases")["cases"], key=lambda row: row["results"]["shaft.speed.mean"])
     expect(page.locator("tbody tr").first.locator("td").first).to_have_text(str(fastest["case"]))
     page.locator("tbody tr").first.get_by_role("link").click()
-    lines = drawn(page, "#motion")
-    case = fastest["case"]
-    told = office.get(f"/studies/{example}/cases/{case}/trajectory", points=2000)
-    speed = next(line for line in lines if line["name"] == "Shaft")
-    window = [v for t, v in zip(told["times"], told["values"]["shaft.speed"], strict=True) if t >= speed["x"][0]]
-    assert max(speed["y"]) == pytest.approx(max(window), rel=1e-3)
-    states = {line["name"] for line in lines if line["type"] == "bar"}
-    assert (
-        {"free", "engaged", "rotating"}
-        <= states
-        <= {"free", "take up", "engaged", "beyond", "locked", "rotating", "held"}
-    )
-    assert drawn(page, "#phase")
-    # A closer look is computed anew.
-    start, end = speed["x"][0], speed["x"][-1]
-    page.evaluate("range => Plotly.relayout('motion', {'xaxis.range': range})", [start, start + (end - start) / 4])
-    page.evaluate(
-        "range => document.getElementById('motion').emit('plotly_relayout', "
-        "{'xaxis.range[0]': range[0], 'xaxis.range[1]': range[1]})",
-        [start, start + (end - start) / 4],
-    )
-    page.wait_for_function("() => document.getElementById('motion')?.dataset.drawn === '2'")
-    closer = next(line for line in drawn(page, "#motion") if line["name"] == "Shaft")
-    assert closer["x"][-1] == pytest.approx(start + (end - start) / 4)
+    page.wait_for_url(f"**/cases/{fastest['case']}")
+    figure = page.locator("#motion svg.figure:visible")
+    for text in ("free", "engaged", "rotating", "Shaft"):
+        expect(figure).to_contain_text(text)
+    page.get_by_text("Another part of it").click()
     page.locator('input[name="from"]').fill("10 apples")
     page.get_by_role("button", name="Show").click()
     expect(page.get_by_role("alert")).to_contain_text("apples")

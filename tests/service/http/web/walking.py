@@ -117,7 +117,7 @@ def walk(hand: Hand, name: str, file: Path) -> str:
     hand.arrive(f"**/studies/{study_id}/cases")
     hand.use(page.locator('tbody a[href$="/cases/1"]'))
     hand.arrive(f"**/studies/{study_id}/cases/1")
-    hand.use(page.locator(".tabs a").first)
+    hand.use(page.locator(".crumbs a").nth(1))
     hand.arrive(f"**/studies/{study_id}")
     hand.type(page.locator('form[action$="/report"] [name="project"]'), "Feeder 7")
     with page.expect_download() as waiting:

@@ -147,7 +147,7 @@ def test_correlated_tolerances_have_no_shares(service: Service) -> None:
     # Var = 9 + 4 + 2 * 0.8 * 3 * 2 + 1.
     assert causes["shares"][2]["share"] == pytest.approx(1 / 23.6, abs=0.03)
     assert causes["note"] == "first, second are correlated: they have no shares of their own"
-    page = service.http.get(f"/studies/{study_id}/drives").text
+    page = service.http.get(f"/studies/{study_id}/matters").text
     assert "The first parameter, the second parameter are correlated: they have no shares of their own." in page
     assert causes["rest"] is None
 
@@ -202,24 +202,19 @@ def test_the_page_shows_ribbon_yield_and_the_worst_drives(service: Service) -> N
     axes = [*SPEC["axes"], {"path": "grade", "values": [1, 2]}]
     study_id = finish(service, {**SPEC, "axes": axes, "drives": 128})
     own = f"/studies/{study_id}"
-    assert f'href="{own}/drives"' in service.http.get(own).text
-    text = service.http.get(f"{own}/drives").text
+    assert f'href="{own}/matters"' in service.http.get(own).text
+    text = service.http.get(f"{own}/matters?ask=tolerances").text
     answer = service.get(f"{own}/yield", condition="speed >= 90 % of nominal", x="load", at="grade=1")
     (line,) = answer["lines"]
-    assert f"<strong>{100 * line['all']['value']:.1f} %</strong>" in text
+    assert f"{100 * line['all']['value']:.1f} % of 128 drives" in text
     for one in line["worst"]:
         assert f'<a href="{own}/cases/{one["case"]}">{one["drive"]}</a>' in text
     asked = {"x": "load", "by": "grade", "quantile": "10 %; 0.9", "condition": "speed >= 50 m\r\nspeed <= 70 m"}
-    text = service.http.get(f"{own}/drives", params=asked).text
-    assert "10 %, 90 %" in text
+    text = service.http.get(f"{own}/matters", params={"ask": "tolerances", **asked}).text
+    assert 'value="10 %; 0.9"' in text
     assert "The grade parameter = 2" in text
-    ribbon = service.http.get(f"{own}/figures/ribbon", params=asked).json()
-    fills = [trace for trace in ribbon["data"] if trace.get("fill") == "tonexty"]
-    assert [len(trace["y"]) for trace in fills] == [5, 5]
-    drawn = service.http.get(f"{own}/figures/yield", params=asked).json()
-    assert [trace["name"] for trace in drawn["data"] if "customdata" in trace] == ["1", "2"]
     for wrong in ({"quantile": "5 %, 120 %"}, {"condition": "speed > 3"}, {"x": "first"}):
-        refused = service.http.get(f"{own}/drives", params=wrong)
+        refused = service.http.get(f"{own}/matters", params={"ask": "tolerances", **wrong})
         assert refused.status_code == 422, wrong
         assert 'role="alert"' in refused.text
         assert next(iter(wrong.values())).replace(">", "&gt;") in refused.text
@@ -228,11 +223,11 @@ def test_the_page_shows_ribbon_yield_and_the_worst_drives(service: Service) -> N
     both = service.get(f"{own}/yield", condition="speed >= 90 % of nominal")["lines"]
     for line in both:
         place = f"The grade parameter = {line['by']['grade']:g} m: "
-        assert f"<li>{place}<strong>" in text
+        assert f"<p>{place}" in text
         assert f"{place}{100 * line['all']['value']:.1f} % of 128 drives" in report
     assert service.http.get(f"{API}{own}/report", params={"format": "pdf"}).content.startswith(b"%PDF")
     plain = service.submit({key: value for key, value in SPEC.items() if key not in ("tolerances", "drives", "seed")})
-    assert service.http.get(f"/studies/{plain}/drives").status_code == 303
+    assert "This study has no tolerances." in service.http.get(f"/studies/{plain}/matters?ask=tolerances").text
 
 
 def test_a_page_begins_with_the_side_of_the_nominal_drive_that_is_worse() -> None:

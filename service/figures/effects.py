@@ -1,0 +1,33 @@
+"""Main effects as a described figure: the mean of each result along each axis."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag.service.reading.reader import Phrase
+from sprag.service.results.sensitivity import in_order
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sprag.service.results.sensitivity import Sensitivity
+
+
+def effects_figure(found: Sequence[Sensitivity], columns: int = 2) -> Figure:
+    """A panel for each result and axis, what matters most first, so many in a row."""
+    panels = tuple(
+        Panel(
+            Quantity(item.info.name, item.info.unit),
+            (Line(effect.paths[0], effect.values, effect.means, PALETTE[0], key="0"),),
+            x=Quantity(" = ".join(effect.paths), effect.unit),
+        )
+        for item in found
+        for effect in in_order(item)
+    )
+    nothing = "" if panels else Phrase("No case has these results yet.")
+    return (
+        Figure(panels[0].x or panels[0].y, panels, columns, note=nothing)
+        if panels
+        else Figure(Quantity("", "1"), (), note=nothing)
+    )

@@ -1,0 +1,214 @@
+"""What matters in a study: one question at a time, each answered by a sentence, its numbers, one chart and tables."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any, Final
+from urllib.parse import urlencode
+
+from fastapi import Query, Request
+from starlette.datastructures import QueryParams
+from starlette.responses import RedirectResponse, Response
+
+from sprag.service.faults import Fault, FaultError, SelectionError
+from sprag.service.http.context import ID_PATTERN, Context, Ctx, StudyId
+from sprag.service.http.current import current
+from sprag.service.http.prefix import here
+from sprag.service.http.problems import ApiError, api_error
+from sprag.service.http.reading import file_pairs
+from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
+from sprag.service.http.views import study_address
+from sprag.service.http.web import calibrate
+from sprag.service.http.web.figures.inline import inline
+from sprag.service.http.web.form.values import Form
+from sprag.service.http.web.held import fixed_choices, with_held
+from sprag.service.http.web.study import study_frame
+from sprag.service.http.web.templates import page
+from sprag.service.http.web.view_forms import Asked, Seen, asked_of, fact_of, files_of
+from sprag.service.http.work import Attended
+from sprag.service.jobs import checks
+from sprag.service.jobs.submission import take_in
+from sprag.service.languages import N_
+from sprag.service.results.choice import held
+from sprag.service.results.headlines.headline import Headline
+from sprag.service.results.headlines.influence import influence_headline
+from sprag.service.results.tolerances.yields import Yield
+from sprag.service.spec.stored import accepted
+from sprag.service.views.headline import headline_of
+from sprag.service.views.library import reading_of
+from sprag.service.views.sensitivity import SensitivityView
+from sprag.service.views.studies import STUDY_VIEWS
+from sprag.service.views.study_view import StudyAnswer
+from sprag.worker.spread import DRIVE
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from sprag.service.http.work import Work
+    from sprag.service.jobs.submission import Submission
+    from sprag.service.reading.reader import Choice
+    from sprag.service.views.library import Library
+    from sprag.service.views.study_view import StudyView
+    from sprag.worker.study import Study
+
+router = page_router()
+
+#: The views that answer each question, the first with its sentence and its chart.
+ASKS: Final = {"sensitivity": ("sensitivity",), "tolerances": ("ribbon", "yield"), "measurement": ("calibration",)}
+#: How to get the answer to a question that a study has none to.
+_HOW: Final = {
+    "sensitivity": N_("Nothing varies in this study, so nothing can be said about what matters."),
+    "tolerances": N_("This study has no tolerances. Give a copy of it some: then many drives are drawn and run."),
+}
+#: Addresses of these answers as pages of their own, whose names saved views have.
+OLD: Final = {"sensitivity": "sensitivity", "drives": "tolerances", "calibration": "measurement"}
+
+
+def seen(
+    library: Library,
+    study_id: str,
+    view: StudyView[Any, Any, Any],
+    chosen: Any,
+    choice: Choice,
+    cases: str,
+    *,
+    first: bool,
+) -> tuple[Seen, Headline]:
+    """Find the view of a study, draw it and say what people read of it; the headline of the ``first`` one."""
+    answer = StudyAnswer(library, study_id, chosen, view.find(library, study_id, chosen))
+    shown, head = view.shown(answer), Headline()
+    if first and isinstance(view, SensitivityView):
+        head = influence_headline(answer.study, answer.result[0])
+    elif first:
+        head = headline_of(library, study_id)
+    if isinstance(answer.result, Yield) and answer.result.places.x is None:
+        return Seen(shown=shown), head
+    reading = reading_of(library.store, study_id, choice)
+    return inline(partial(view.drawn_in, answer), reading, shown, cases=cases), head
+
+
+@router.get("/studies/{study_id:study}/matters")
+async def matters_page(work: Attended, study_id: StudyId, ask: Annotated[str, Query(max_length=20)] = "") -> Response:
+    """The answer to a question about a study, by default to the first that it has one to."""
+    return await answered(work, study_id, ask)
+
+
+async def answered(
+    work: Work, study_id: str, ask: str = "", pasted: Mapping[str, str] | None = None, faults: Sequence[Fault] = (),
+    status: int = 200,
+) -> Response:  # fmt: skip
+    """The page of a question; ``pasted`` are the fields of a new calibration, with what is wrong with them."""
+    context = work.context
+    study = await in_thread(context.store.studies.study, study_id)
+    known = [name for name, views in ASKS.items() if STUDY_VIEWS[views[0]].has(study)]
+    ask = ask or next(reversed(known), "sensitivity")
+    if ask not in ASKS:
+        raise ApiError("not-found", "There is no such question.")
+    reading = await in_thread(reading_of, context.store, study_id, current().choice)
+    params = _places(study, with_held(work.request.query_params, study, reading))
+    opened: list[tuple[Asked, Seen | None]] = []
+    cases = here(f"/studies/{study_id}/cases/")
+    head = Headline()
+    for place, name in enumerate(ASKS[ask] if ask in known else ()):
+        view = STUDY_VIEWS[name]
+        asked = asked_of(view.about, params, view.offered(study), partial(view.choose, study))
+        found = None
+        try:
+            if asked.chosen is not None or view.about.name == "calibration":
+                shown = context.library, study_id, view, asked.chosen, current().choice, cases
+                found, own = await work.check(partial(seen, first=not place), *shown)
+                head = own if not place else head
+        except SelectionError as error:
+            asked = replace(asked, faults=error.faults)
+        except FaultError as error:
+            found, status = Seen(below=error.detail), api_error(error).type.status
+        opened.append((asked, found))
+    if any(asked.faults for asked, _found in opened):
+        status = 422
+    return await in_thread(_page, context, study_id, study, ask, known, opened, head, status, (pasted or {}, faults))
+
+
+def _places(study: Study, params: QueryParams) -> QueryParams:
+    """The parameters with a value for each axis that is not drawn."""
+    if study.spread is None:
+        return params
+    offered = STUDY_VIEWS["ribbon"].offered(study)
+    drawn = tuple(path for name in ("x", "by") for path in params.getlist(name) or offered[name].usual if path)
+    at = held(study, params.getlist("at"), drawn) if drawn else ()
+    pairs = [("at", f"{path}={value}") for path, value in at if path != DRIVE]
+    return QueryParams([*((name, text) for name, text in params.multi_items() if name != "at"), *pairs])
+
+
+def _page(
+    context: Context, study_id: str, study: Study, ask: str, known: Sequence[str],
+    opened: list[tuple[Asked, Seen | None]], head: Headline, status: int,
+    new: tuple[Mapping[str, str], Sequence[Fault]],
+) -> Response:  # fmt: skip
+    frame = study_frame(context, study_id)
+    reading, cases = frame["reading"], f"/studies/{study_id}/cases/"
+    places = dict(text.partition("=")[::2] for asked, _ in opened[:1] for name, text in asked.pairs if name == "at")
+    drawn = tuple(text for asked, _ in opened[:1] for name, text in asked.pairs if name in ("x", "by"))
+    fixed = fixed_choices(study, drawn, tuple(places.items()), reading) if ask == "tolerances" else []
+    address = study_address(study_id)
+    paste = calibrate.fields(context, study_id, *new) if ask == "measurement" and ask not in known else None
+    return page(
+        "matters.html",
+        status=status,
+        **frame,
+        tab="/matters",
+        ask=ask,
+        asks={name: STUDY_VIEWS[views[0]].about.title for name, views in ASKS.items()},
+        known=known,
+        how=_HOW.get(ask, ""),
+        head=head.said(reading),
+        numbers=[fact_of(one, reading, cases) for one in head.numbers],
+        opened=[(*one, files_of(f"{address}/{one[0].about.name}", one[0], file_pairs())) for one in opened],
+        fixed=[one for one in fixed if one["path"] != DRIVE],
+        asks_more=any(one.asked.setting.label for asked, _ in opened for one in asked.fields),
+        cases=cases,
+        paste=paste,
+        saves=next((old for old, own in OLD.items() if own == ask and old != "calibration"), ""),
+    )
+
+
+@router.get("/calibrate")
+def calibrate_page(study: Annotated[str, Query(pattern=ID_PATTERN)]) -> Response:
+    """The address that the form had as a page of its own."""
+    return RedirectResponse(f"/studies/{study}/matters?ask=measurement", status_code=308)
+
+
+@router.post("/calibrate")
+async def send_points(context: Ctx, work: Attended, values: Form) -> Response:
+    """Submit the calibration, or show what is wrong with it."""
+    study_id = values.get("study", "")
+    spec = await in_thread(context.store.studies.spec, study_id)
+    study = await in_thread(context.store.studies.study, study_id)
+    content = json.dumps(calibrate.calibration_spec(await in_thread(accepted, spec, study), values)).encode()
+    try:
+        made = await work.check(
+            checks.new_study, context.library, content, "json", False, None, context.store.clock.now(), {}
+        )
+        return await in_thread(_submit, context, made)
+    except FaultError as error:
+        faults = error.faults or (Fault(None, "conflict", error.detail),)
+        status = api_error(error).type.status
+        return await answered(work, study_id, "measurement", values, faults, status)
+
+
+def _submit(context: Context, made: Submission) -> Response:
+    return RedirectResponse(f"/studies/{take_in(context.store, made).id}", status_code=303)
+
+
+def _add(old: str, ask: str) -> None:
+    @router.get(f"/studies/{{study_id:study}}/{old}")
+    def moved(request: Request, study_id: StudyId) -> Response:
+        """The address that the answer had as a page of its own."""
+        pairs = [("ask", ask), *(pair for pair in request.query_params.multi_items() if pair[0] != "ask")]
+        return RedirectResponse(f"/studies/{study_id}/matters?{urlencode(pairs)}", status_code=308)
+
+
+for _old, _ask in OLD.items():
+    _add(_old, _ask)

@@ -1,0 +1,315 @@
+"""The page of a case: what it is, how it moves, and below its motion every other view of it, one opened at a time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any, Final
+from urllib.parse import urlencode
+
+from fastapi import Query, Request
+from starlette.responses import RedirectResponse, Response
+
+from sprag.sentences import Part, Whole
+from sprag.service.faults import FaultError
+from sprag.service.figures.read import read_figure
+from sprag.service.figures.svg import WIDE, picture_svg
+from sprag.service.http.context import CaseNumber, StartNumber, StudyId, study_with
+from sprag.service.http.current import current
+from sprag.service.http.drawing import picture, unchanging
+from sprag.service.http.language import language_pairs
+from sprag.service.http.prefix import here
+from sprag.service.http.problems import ApiError, api_error
+from sprag.service.http.reading import FileChoice
+from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
+from sprag.service.http.views import study_address
+from sprag.service.http.web.figures.inline import inline
+from sprag.service.http.web.form.own_machine import case_address
+from sprag.service.http.web.study import study_frame
+from sprag.service.http.web.templates import page, spec_text
+from sprag.service.http.web.view_forms import Asked, Seen, asked_of, fact_of, files_of
+from sprag.service.http.work import Attended
+from sprag.service.languages import _
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.reader import Phrase, joined, meanings
+from sprag.service.results.defaults import main_results
+from sprag.service.results.headlines.along import told
+from sprag.service.results.headlines.headline import MOST, NOTHING, KeyNumber, amount, digits, shared, shown_unit
+from sprag.service.results.regimes import ORDER, motion_sentence
+from sprag.service.results.selection import axis_name, own_paths
+from sprag.service.results.start_states import check_start
+from sprag.service.results.sweeps import direction_texts
+from sprag.service.spec.design import design_spec
+from sprag.service.views.case_view import see
+from sprag.service.views.cases import CASE_VIEWS
+from sprag.service.views.library import reading_of
+from sprag.service.views.shown import NOTHING as NOTHING_MORE
+from sprag.service.views.trajectory import PhasesView
+from sprag.worker import models
+from sprag.worker.models.starts import motion_of
+
+if TYPE_CHECKING:
+    from starlette.datastructures import QueryParams
+
+    from sprag.service.http.context import Context
+    from sprag.service.http.work import Work
+    from sprag.service.reading.reader import Reading
+    from sprag.service.storage.studies.records import CaseRow
+    from sprag.service.views.case_view import CaseAnswer, CaseView
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.study import Study
+
+router = page_router()
+
+_MOTION: Final = CASE_VIEWS["trajectory"]
+#: The views below the motion, in their order.
+PARTS: Final[dict[str, CaseView[Any, Any, Any]]] = {
+    **{name: CASE_VIEWS[name] for name in ("engagements", "strobes", "section")},
+    "phases": PhasesView(),
+    **{name: CASE_VIEWS[name] for name in ("branch", "diagram", "basin", "transient")},
+}
+#: The ending of a machine that has no motion of the required mean speed, for which no spec of it alone is valid.
+_NO_MOTION: Final = "inertia_insufficient"
+#: Periods of a motion of a given time that are shown first, at the end of the evaluated window.
+_FIRST_PERIODS: Final = 4
+#: Places of a motion.
+_POINTS: Final = 2400
+#: Result with the start that a row describes.
+_START: Final = "regime.start"
+
+#: The name of a view.
+Name = Annotated[str, Query(max_length=20)]
+
+
+def seen(
+    study: Study,
+    case: int,
+    view: CaseView[Any, Any, Any],
+    chosen: Any,
+    start: int | None,
+    rows: Any,
+    reading: Reading,
+    cases: str,
+) -> Seen:
+    """Compute the view of a case, draw it and say what people read of it. For a process that computes."""
+    answer = see(study, case, view, chosen, start)
+    shown = NOTHING_MORE if view.about.name == _MOTION.about.name else view.shown(answer)
+    if not view.drawn:
+        return Seen(shown=shown)
+    return inline(lambda columns: view.figure(answer, columns, rows), reading, shown, cases=cases)
+
+
+@router.get("/studies/{study_id:study}/cases/{case:case}")
+async def motion_page(
+    work: Attended, study_id: StudyId, case: CaseNumber, show: Name = "", which: StartNumber = None
+) -> Response:
+    """One case."""
+    context = work.context
+    study = await in_thread(study_with, context, study_id, case)
+    rows = await in_thread(_rows, context, study, study_id, case)
+    # The motion that is shown is that of the regime on the page.
+    row = next((one for one in rows if which is not None and one.results.get(_START) == which), (*rows, None)[0])
+    which = _start_of(row) if which is None else which
+    check_start(study, which)
+    if show and not (show in PARTS and PARTS[show].has(study)):
+        raise ApiError("not-found", "The cases of this study have no such view.")
+    reading = await in_thread(reading_of, context.store, study_id, current().choice)
+    params, nothing = work.request.query_params, type(work.request.query_params)()
+    motion = await in_thread(_motion, study, case, nothing if show else params)
+    part = await in_thread(_asked, PARTS[show], study, case, params) if show else None
+    status, opened = 200, []
+    for view, asked in ((_MOTION, motion), *([(PARTS[show], part)] if part else [])):
+        found, own = await _seen(work, study_id, study, case, view, asked, which, reading)
+        status = max(status, own)
+        opened.append((asked, found))
+    values = {"row": row, "regimes": rows if row and row.results.get("regime.number") is not None else (), "show": show}
+    return await in_thread(_page, context, study_id, study, case, which, opened, status, values)
+
+
+def _asked(view: CaseView[Any, Any, Any], study: Study, case: int, params: QueryParams) -> Asked:
+    return asked_of(view.about, params, view.offered(study, case), partial(view.choose, study, case))
+
+
+def _motion(study: Study, case: int, params: QueryParams) -> Asked:
+    """The part of the motion that is shown: as requested, otherwise the last periods of the window."""
+    asked = _asked(_MOTION, study, case, params)
+    extent, window = models.extent(study, case), study.run.get("window")
+    if extent.along == "time" and not any(one.given for one in asked.fields):
+        last = extent.end
+        if window:
+            last = min(window[1][0] * (extent.period if window[1][1] == "periods" else 1.0), extent.end)
+        return replace(asked, chosen=(max(last - _FIRST_PERIODS * extent.period, 0.0), last, _POINTS))
+    return replace(asked, chosen=(*asked.chosen[:2], _POINTS)) if asked.chosen else asked
+
+
+async def _seen(
+    work: Work, study_id: str, study: Study, case: int, view: CaseView[Any, Any, Any], asked: Asked,
+    which: int | None, reading: Reading,
+) -> tuple[Seen | None, int]:  # fmt: skip
+    """A view as the page shows it, and the status of the page; a sentence where it cannot be computed now."""
+    if asked.chosen is None:
+        return None, 422 if asked.faults else 200
+    rows = await in_thread(view.rows, work.context.store, study_id, study, case, asked.chosen)
+    try:
+        for kernel in view.kernels(study):
+            await work.load(kernel)
+        start = which if view.about.starts else None
+        cases = here(f"/studies/{study_id}/cases/")
+        return await work.compute(seen, study, case, view, asked.chosen, start, rows, reading, cases), 200
+    except FaultError as error:
+        return Seen(below=error.detail), api_error(error).type.status
+
+
+def _page(
+    context: Context, study_id: str, study: Study, case: int, which: int | None,
+    opened: list[tuple[Asked, Seen | None]], status: int, values: dict[str, Any],
+) -> Response:  # fmt: skip
+    frame, infos, row = study_frame(context, study_id), models.study_results(study), values["row"]
+    reading = frame["reading"]
+    own, address = f"/studies/{study_id}/cases/{case}", f"{study_address(study_id)}/cases/{case}"
+    only = [] if which is None else [("start", str(which))]
+    known = {info.name: info for info in infos}
+    main = [known[name] for name in main_results(study, infos)]
+    flags = meanings(models.flags_of(study.model))
+    files = [
+        files_of(f"{address}/{asked.about.name}", asked, [*(only if asked.about.starts else []), *_languages(asked)])
+        if asked.about.name in CASE_VIEWS
+        else []
+        for asked, _found in opened
+    ]
+    return page(
+        "motion.html",
+        status=status,
+        **frame,
+        **values,
+        tab="/cases",
+        case=case,
+        last=study.cases - 1,
+        own=own,
+        start="" if which is None else str(which),
+        sentences=[_("The case has not been run yet.")]
+        if row is None
+        else [reading.say(text) for text in _said(study, row)],
+        flags=[] if row is None else [(flag, flags.get(flag, "")) for flag in row.flags],
+        parameters=_parameters(study, case, reading),
+        main=main,
+        main_facts=[] if row is None else [fact_of(_number(study, info, row), reading) for info in main[:MOST]],
+        infos=infos,
+        shown=models.presentation_of(study),
+        settled=models.is_settled(study.run),
+        extent=models.extent(study, case),
+        parts={name: view.about.title for name, view in PARTS.items() if view.has(study)},
+        opened=[(*one, files[place]) for place, one in enumerate(opened)],
+        only=urlencode(only),
+        spec=spec_text(design_spec(context.store.studies.spec(study_id), study, case)),
+        goes_on=models.has_strobes(study) and row is not None and row.ending == "ok",
+        has_motion=row is None or row.ending != _NO_MOTION,
+    )
+
+
+def _languages(asked: Asked) -> list[tuple[str, str]]:
+    return language_pairs() if asked.about.pictures else []
+
+
+def _rows(context: Context, study: Study, study_id: str, case: int) -> tuple[CaseRow, ...]:
+    """The rows of a case: one, or one for each regime; none while it is not finished."""
+    if models.numbered_by(study.model, models.variant_of(study)) is not None:
+        rows = context.store.rows.of_case(study_id, case)
+        if rows:
+            return rows
+    row = context.store.rows.case(study_id, case)
+    return () if row is None else (row,)
+
+
+def _start_of(row: CaseRow | None) -> int | None:
+    """The start whose motion a row describes; None where a case has one start."""
+    start = None if row is None else row.results.get(_START)
+    return start if isinstance(start, int) else None
+
+
+def _said(study: Study, row: CaseRow) -> list[str]:
+    """What a case does, or how it ended; and its settled motion where it has one that no flag explains."""
+    if row.ending != models.OK:
+        return [Phrase(models.ENDING_SENTENCES[row.ending])]
+    infos = {info.name: info for info in models.study_results(study)}
+    values = {name: value for name in infos if isinstance(value := row.results[name], float)}
+    widths = {name: values[width] for name in values if values.get(width := models.half_width(name), 0.0) > 0.0}
+    main = main_results(study, list(infos.values()))
+    said: list[Part] = [Whole(told(study, infos, {name: values[name] for name in main if name in values}, widths))]
+    regime, order = row.results.get("regime"), row.results.get(ORDER)
+    if isinstance(regime, str) and regime not in row.flags:
+        said.append(motion_sentence(regime, order if isinstance(order, int) else None))
+    return [joined("", [text]) for text in said]
+
+
+def _parameters(study: Study, case: int, reading: Reading) -> list[tuple[str, str, str]]:
+    """Name, value and (of a derived one) formula of each parameter that a case has for itself."""
+    values, texts = study.case_parameters(case), direction_texts(study, case)
+    return [
+        (name, texts.get(name) or reading.quantity(values[path], unit_of(study, path), 8), study.derive.get(path, ""))
+        for path in own_paths(study)
+        for name in (axis_name(study, path),)
+    ]
+
+
+def _number(study: Study, info: ResultInfo, row: CaseRow) -> KeyNumber:
+    """A main result, with as many digits as its interval leaves."""
+    value, half = row.results[info.name], row.results.get(models.half_width(info.name))
+    if not isinstance(value, float):
+        return KeyNumber(info.name, None if value is None else str(value))
+    width = half if isinstance(half, float) and half > 0.0 else None
+    note = NOTHING if width is None else Phrase("± {width}", width=replace(amount(study, info, width), digits=2))
+    return KeyNumber(
+        info.name,
+        shared(study, info, value),
+        shown_unit(study, info),
+        digits(shared(study, info, value), width),
+        note=note,
+    )
+
+
+def draw(answer: CaseAnswer[Any, Any], reading: Reading, title: str, _form: str) -> bytes:
+    """The motion as a picture of its own."""
+    return picture_svg(read_figure(_MOTION.figure(answer, 1), reading), title, width=WIDE).encode()
+
+
+@router.get("/studies/{study_id:study}/cases/{case:case}/motion.svg")
+async def motion_picture(
+    work: Attended, study_id: StudyId, case: CaseNumber, choice: FileChoice, which: StartNumber = None
+) -> Response:
+    """The part of the motion that the address asks for, as a picture."""
+    params = work.request.query_params
+    study, asked = await work.case_of(study_id, case, lambda study: _motion(study, case, params), which)
+    if asked.faults:
+        raise FaultError("invalid-parameter", str(asked.faults[0]), asked.faults)
+
+    async def make() -> Response:
+        reading = await in_thread(reading_of, work.context.store, study_id, choice)
+        answer = await work.run_case(see, study, case, _MOTION, asked.chosen, which)
+        return await picture(draw, "svg", answer, reading, f"{study.name}, case {case}").response(work)
+
+    return await unchanging(work, study_id, make)
+
+
+@router.get("/studies/{study_id:study}/cases/{case:case}/laboratory")
+async def in_laboratory(work: Attended, study_id: StudyId, case: CaseNumber, which: StartNumber = None) -> Response:
+    """The machine of a case in the laboratory, in the motion that the case comes to."""
+    study, spec = await work.case_of(study_id, case, lambda _: work.context.store.studies.spec(study_id), which)
+    moving = models.has_strobes(study)
+    state = await work.run_case(models.run_end_state, *motion_of(study, case, which)) if moving else None
+    mark = f"{study_id}/{case}" if which is None else f"{study_id}/{case}/{which}"
+    address = await work.check(case_address, spec, study, case, mark, state or {})
+    return RedirectResponse(address, status_code=303)
+
+
+def _add(name: str) -> None:
+    @router.get(f"/studies/{{study_id:study}}/cases/{{case:case}}/{name}")
+    def moved(request: Request, study_id: StudyId, case: CaseNumber) -> Response:
+        """The address that the view had as a page of its own."""
+        pairs = [("show", name), *request.query_params.multi_items()]
+        return RedirectResponse(f"/studies/{study_id}/cases/{case}?{urlencode(pairs)}", status_code=308)
+
+
+for _name in ("engagements", "branch", "diagram", "basin", "transient"):
+    _add(_name)

@@ -1,0 +1,83 @@
+"""What is said of the drives of a study with tolerances: how many reach conditions, and what spreads are owed to."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from sprag.sentences import Amount, Name
+from sprag.service.languages import decimal
+from sprag.service.reading.reader import Phrase, joined, plural
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from sprag.service.results.refined import Line
+    from sprag.service.results.tolerances.batch import Places
+    from sprag.service.results.tolerances.causes import Causes
+    from sprag.service.results.tolerances.yields import YieldLine
+    from sprag.worker.study import Study
+
+
+def at_line(places: Places, line: Line) -> Phrase:
+    """What tells a line from others: the values of its parameters; "" for the only one."""
+    values = (
+        Phrase("{name} = {value}", name=Name(path), value=Amount(value, places.units[path], 6))
+        for path, value in line.by.items()
+    )
+    return joined(", ", values)
+
+
+def yield_sentences(line: YieldLine, condition: str) -> Iterator[str]:
+    """The share of the drives that reach a condition, and the worst of them."""
+    share = line.whole
+    if not share.drives:
+        yield Phrase("No drive has been run at every place yet.")
+        return
+    value, low, high = (_percent(float(part)) for part in (share.value, share.low, share.high))
+    shares: dict[str, str] = {"value": value, "low": low, "high": high, "condition": condition}
+    count = int(share.drives)
+    if line.line.x:
+        yield plural(
+            "{value} of {count} drive (95 % interval {low} to {high}) has {condition} at every place.",
+            "{value} of {count} drives (95 % interval {low} to {high}) have {condition} at every place.",
+            count,
+            **shares,
+        )
+    else:
+        yield plural(
+            "{value} of {count} drive (95 % interval {low} to {high}) has {condition}.",
+            "{value} of {count} drives (95 % interval {low} to {high}) have {condition}.",
+            count,
+            **shares,
+        )
+    worst = [
+        Phrase(
+            "{drive} (case {case}, {margin})",
+            drive=one.drive,
+            case=one.case,
+            margin=Phrase("no result") if math.isinf(one.margin) else _percent(one.margin),
+        )
+        for one in line.worst
+    ]
+    if worst:
+        yield Phrase("Drives with the least margin: {drives}.", drives=joined(", ", worst))
+
+
+def _percent(share: float) -> str:
+    return decimal(f"{100.0 * share:.1f} %")
+
+
+def causes_sentences(study: Study, causes: Causes, name: str) -> Iterator[str]:
+    """The shares that tolerances have of the variance of a result, and what to know about them."""
+    tolerances = () if study.spread is None else study.spread.names
+    known = [(share.value, share.error, path) for path, share in zip(tolerances, causes.shares, strict=True) if share]
+    parts = [
+        joined(" ", (Name(path, within=True), f"{_percent(max(value, 0.0)).removesuffix(' %')} ± {_percent(error)}"))
+        for value, error, path in sorted(known, reverse=True)
+    ]
+    if parts:
+        shares = joined(", ", parts)
+        yield Phrase("Shares of the variance of {name}: {shares}.", name=Name(name, within=True), shares=shares)
+    if causes.note:
+        yield joined("", (causes.note, "."))
