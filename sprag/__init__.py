@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         Study,
         StudyTimeoutError,
         UnreachableError,
+        compare,
         preset,
         with_units,
     )
@@ -49,6 +50,7 @@ _OF_CLIENT: Final = (
     "Study",
     "StudyTimeoutError",
     "UnreachableError",
+    "compare",
     "preset",
     "with_units",
 )
@@ -77,6 +79,7 @@ __all__ = [
     "StudyTimeoutError",
     "UnreachableError",
     "__version__",
+    "compare",
     "engine",
     "preset",
     "run",

@@ -51,7 +51,8 @@ def compare(
     as_json: JsonFlag = False,
 ) -> None:
     """Compare studies: the inputs in which they differ, and the same curves of each."""
-    from sprag.service.client.synchronous.comparing import compare_studies
+    from sprag.service.client import Study
+    from sprag.service.client import compare as side_by_side
 
     if not 2 <= len(studies) <= MOST_COMPARED:
         raise wrong_option(
@@ -59,8 +60,8 @@ def compare(
         )
     held = dict(pair(text) for text in at or ())
     with connection(server, token) as client:
-        ids = [study_of(client, text) for text in studies]
-        found = compare_studies(client, ids, x, y or (), by=by or (), at=held)
+        named = [Study(client, study_of(client, text)) for text in studies]
+        found = side_by_side(named, x, y or (), by=by or (), at=held)
     if as_json:
         curves = {name: curves.data for name, curves in zip(found.names, found.curves, strict=False)}
         write_json({"studies": list(found.names), "inputs": found.inputs, "curves": curves})

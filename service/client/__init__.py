@@ -29,6 +29,7 @@ from sprag.service.client.frames import Curves
 from sprag.service.client.motions import Engagements, Motion
 from sprag.service.client.queries import preset
 from sprag.service.client.synchronous.client import Client
+from sprag.service.client.synchronous.comparing import compare
 from sprag.service.client.synchronous.study import Study
 from sprag.service.client.tabular import with_units
 from sprag.service.client.wire import Query
@@ -52,6 +53,7 @@ __all__ = [
     "StudyTimeoutError",
     "UnreachableError",
     "UntrustedError",
+    "compare",
     "preset",
     "with_units",
 ]

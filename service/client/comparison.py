@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from sprag.service.answers.studies import StudyDetail
     from sprag.service.client.frames import Curves
-    from sprag.service.client.queries import Value
+    from sprag.service.client.queries import Held
     from sprag.service.client.sketch import Line
 
 
@@ -65,7 +65,7 @@ class Comparison(Tabular):
         return drawn[0][0], drawn[0][1], [lines[0] for _, _, lines in drawn if lines]
 
 
-def held_in(detail: StudyDetail, details: Sequence[StudyDetail], at: Mapping[str, Value] | None) -> dict[str, Value]:
+def held_in(detail: StudyDetail, details: Sequence[StudyDetail], at: Held | None) -> Held:
     """The values ``at`` which a study is held: those of its axes, and of what no study has, for it to be refused."""
     own, *_ = paths = [{path for axis in each["axes"] for path in axis["paths"]} for each in (detail, *details)]
     return {path: value for path, value in (at or {}).items() if path in own or not any(path in each for each in paths)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
-from sprag.service.client.asynchronous.comparing import compare_studies
+from sprag.service.client.asynchronous.comparing import compare
 from sprag.service.client.asynchronous.connection import AsyncConnection
 from sprag.service.client.asynchronous.naming import schedule_of, study_of
 from sprag.service.client.asynchronous.study import AsyncStudy
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from sprag.service.answers.studies import ClutchFitReport, Preview, StudySummary
     from sprag.service.answers.workers import WorkerList
     from sprag.service.client.comparison import Comparison
-    from sprag.service.client.queries import Spec, Value
+    from sprag.service.client.queries import Held, Spec, Value
 
 
 class AsyncClient(AsyncConnection):
@@ -104,16 +104,10 @@ class AsyncClient(AsyncConnection):
         y: str | Sequence[str] = (),
         *,
         by: str | Sequence[str] = (),
-        at: Mapping[str, Value] | None = None,
+        at: Held | None = None,
     ) -> Comparison:
-        """Two to ten studies, named as for `study`: inputs in which they differ, and the same curves of each.
-
-        Curves are chosen as in `AsyncStudy.curves`; without ``x`` and ``y``, those that the first study shows first,
-        over a parameter that varies in all of them. Axes that are not drawn and not in ``at`` are held at the usual
-        value of each study, and a value of an axis that only some of them have applies to these.
-        """
-        ids = [await study_of(self, text) for text in studies]
-        return await compare_studies(self, ids, x, y, by=by, at=at)
+        """Two to ten studies, named as for `study`, side by side, as the function `compare` does."""
+        return await compare([AsyncStudy(self, await study_of(self, text)) for text in studies], x, y, by=by, at=at)
 
     async def workers(self) -> WorkerList:
         """The processes that run cases, by host, and those that are refused, with the reason."""

@@ -2,59 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, cast
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from sprag.service.answers.differing import MOST_COMPARED, common_axes
-from sprag.service.client.asynchronous.study import AsyncStudy
 from sprag.service.client.comparison import Comparison, compared, held_in
-from sprag.service.client.frames import Curves
-from sprag.service.client.queries import query_of
 
 if TYPE_CHECKING:
-    from sprag.service.client.asynchronous.connection import AsyncConnection
-    from sprag.service.client.queries import Value
+    from sprag.service.client.asynchronous.study import AsyncStudy
+    from sprag.service.client.queries import Held
 
 
-async def compare_studies(
-    connection: AsyncConnection,
-    studies: Sequence[str],
-    x: str | None,
-    y: str | Sequence[str],
+async def compare(
+    studies: Sequence[AsyncStudy],
+    x: str | None = None,
+    y: str | Sequence[str] = (),
     *,
-    by: str | Sequence[str],
-    at: Mapping[str, Value] | None,
+    by: str | Sequence[str] = (),
+    at: Held | None = None,
 ) -> Comparison:
-    """Studies, by their ids, and the same curves of each, as the page that compares them draws them.
+    """Two to ten studies, of a service or run here: inputs in which they differ, and the same curves of each.
 
-    Axes that only some of them have are held at their usual value. There are no curves where no parameter varies in
-    all of them. ValueError for less than two, or too many.
+    Curves are chosen as in `Study.curves`; without ``x`` and ``y``, those that the first study shows first, over a
+    parameter that varies in all of them. Axes that are not drawn and not in ``at`` are held at the usual value of each
+    study, and a value of an axis that only some of them have applies to these. There are no curves where no parameter
+    varies in all of them. ValueError for less than two studies, or too many.
     """
     if not 2 <= len(studies) <= MOST_COMPARED:
         raise ValueError(f"2 to {MOST_COMPARED} studies can be compared, not {len(studies)}")
-    details = [await AsyncStudy(connection, study_id).detail() for study_id in studies]
+    details = [await study.detail() for study in studies]
     axes = common_axes([[(axis["paths"], axis["values"]) for axis in detail["axes"]] for detail in details])
     if not axes and x is None:
         return compared(details, [])
     held = [held_in(detail, details, at) for detail in details]
     if x is None or not y:
-        usual = (await _curves(connection, studies[0], x, y, by, held[0])).data
+        usual = (await studies[0].curves(x, y, by=by, at=held[0], rest="usual")).data
         x = x or (path if (path := usual["x"]["path"]) in axes else axes[0])
         y = y or list(usual["results"])
         by = by or [path for curve in usual["curves"][:1] for path in curve["by"] if path in axes and path != x]
-    return compared(
-        details,
-        [await _curves(connection, study_id, x, y, by, own) for study_id, own in zip(studies, held, strict=True)],
-    )
-
-
-async def _curves(
-    connection: AsyncConnection,
-    study_id: str,
-    x: str | None,
-    y: str | Sequence[str],
-    by: str | Sequence[str],
-    at: Mapping[str, Value],
-) -> Curves:
-    query = query_of({"x": x, "y": y, "by": by, "at": at, "rest": "usual"})
-    return Curves(cast("Any", await connection.request("GET", f"/studies/{study_id}/curves", params=query)))
+    pairs = zip(studies, held, strict=True)
+    return compared(details, [await study.curves(x, y, by=by, at=own, rest="usual") for study, own in pairs])

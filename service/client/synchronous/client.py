@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 from sprag.service.client.queries import finish_text, query_of, spec_of
-from sprag.service.client.synchronous.comparing import compare_studies
+from sprag.service.client.synchronous.comparing import compare
 from sprag.service.client.synchronous.connection import Connection
 from sprag.service.client.synchronous.naming import schedule_of, study_of
 from sprag.service.client.synchronous.study import Study
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from sprag.service.answers.studies import ClutchFitReport, Preview, StudySummary
     from sprag.service.answers.workers import WorkerList
     from sprag.service.client.comparison import Comparison
-    from sprag.service.client.queries import Spec, Value
+    from sprag.service.client.queries import Held, Spec, Value
 
 
 class Client(Connection):
@@ -104,16 +104,10 @@ class Client(Connection):
         y: str | Sequence[str] = (),
         *,
         by: str | Sequence[str] = (),
-        at: Mapping[str, Value] | None = None,
+        at: Held | None = None,
     ) -> Comparison:
-        """Two to ten studies, named as for `study`: inputs in which they differ, and the same curves of each.
-
-        Curves are chosen as in `Study.curves`; without ``x`` and ``y``, those that the first study shows first,
-        over a parameter that varies in all of them. Axes that are not drawn and not in ``at`` are held at the usual
-        value of each study, and a value of an axis that only some of them have applies to these.
-        """
-        ids = [study_of(self, text) for text in studies]
-        return compare_studies(self, ids, x, y, by=by, at=at)
+        """Two to ten studies, named as for `study`, side by side, as the function `compare` does."""
+        return compare([Study(self, study_of(self, text)) for text in studies], x, y, by=by, at=at)
 
     def workers(self) -> WorkerList:
         """The processes that run cases, by host, and those that are refused, with the reason."""

@@ -246,6 +246,18 @@ def test_a_preset_is_named_and_a_file_of_that_name_comes_first(tmp_path: Path, m
         sprag.preset("two_pendulum")
 
 
+def test_studies_are_compared_wherever_they_were_run(run: sprag.Study, pair: tuple[Study, Study]) -> None:
+    other = _small()
+    other["base"]["shaft"]["inertia"] = "4e-3 kg*m^2"
+    with sprag.run(other, processes=0) as changed:
+        comparison = sprag.compare([run, changed], y=SPEED)
+    assert list(comparison.inputs) == ["/base/shaft/inertia"]
+    assert comparison.curves[0] == run.curves(LOAD, SPEED, rest="usual")
+    assert sprag.compare([*pair]).curves[0] == sprag.compare([*pair]).curves[1]
+    with pytest.raises(ValueError, match="2 to 10"):
+        sprag.compare([run])
+
+
 def test_what_is_closed_says_so() -> None:
     with sprag.run(_small(), processes=0) as study:
         assert len(study.table()) == 3
