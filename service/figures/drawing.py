@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from html import escape
 from typing import TYPE_CHECKING, Final, Literal
 
+from sprag.service.figures.painter.elements import text_width
 from sprag.service.reading.wording import symbol
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ def svg(drawing: Drawing, labels: Mapping[str, str] | None = None, *, alone: boo
 
     ``alone`` gives it the name space and the colours that it has as a file.
     """
-    beside = 0.0 if labels is None else _LABEL
+    beside = 0.0 if labels is None else max([_LABEL, *(_room(each, labels) for each in drawing.dimensions)])
     text = _letters(drawing) if labels is None else _beside(drawing, labels)
     space = ' xmlns="http://www.w3.org/2000/svg"' if alone else ""
     frames = f' data-frames="{escape(drawing.frames)}"' if drawing.frames and not alone else ""
@@ -77,6 +78,12 @@ def svg(drawing: Drawing, labels: Mapping[str, str] | None = None, *, alone: boo
         f'viewBox="{-beside:g} 0 {drawing.width + 2 * beside:g} {drawing.height:g}">'
         f"{_COLOURS if alone else ''}{drawing.shapes}{text}</svg>"
     )
+
+
+def _room(dimension: Dimension, labels: Mapping[str, str]) -> float:
+    """Pixels that a label takes beside the drawing."""
+    label = labels.get(dimension.path)
+    return 14.0 + text_width(f"{dimension.symbol} = {label}") if label else 0.0
 
 
 def rows_of(drawing: Drawing, side: Side) -> tuple[Dimension, ...]:

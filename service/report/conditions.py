@@ -27,7 +27,7 @@ _ROWS: Final = 26
 _DIGITS: Final = 5
 _SHORT: Final = 4
 #: A name of a parameter or of a result in a formula.
-_CODE: Final = re.compile(r"[a-z_]+(?:\.[a-z_0-9]+)+")
+_CODE: Final = re.compile(r"[a-z_]+(?:\.(?:[a-z_0-9]+|\*))+")
 
 
 def conditions(report: Report) -> Iterator[Section]:
@@ -132,4 +132,5 @@ def _tolerance(report: Report, path: str) -> str:
 def in_captions(report: Report, text: str) -> str:
     """A formula with what parameters are called instead of their names in files."""
     known = {item.path for item in report.inputs} | {info.name for info in report.infos}
-    return _CODE.sub(lambda name: report.reading.within(name[0]) if name[0] in known else name[0], text)
+    every = {*known, *(re.sub(r"\.\d+", ".*", name) for name in known)}
+    return _CODE.sub(lambda name: report.reading.within(name[0]) if name[0] in every else name[0], text)

@@ -57,15 +57,22 @@ def document_of(
 
 def made_document(report: Report, office: str = "", *, edited: bool = False) -> Document:
     """The document of what is known of a study; one that is ``edited`` has a place for each text of the author."""
-    further = further_figures(report)
-    sections = [*sheets(report), *([] if further is None else [further]), *appendix(report)]
-    kept = (said(_without(section, edited=edited), report.reading) for section in sections)
+    kept = (said(_without(section, edited=edited), report.reading) for section in sections_of(report))
     return Document(
         report.title,
         tuple(title_block(report.question, office)),
         tuple(section for section in kept if section.blocks),
         _("computed by Sprag {version}, {time}", version=version("sprag"), time=moment(_computed(report))),
     )
+
+
+def sections_of(report: Report) -> Iterator[Section]:
+    """The sections of a document with sentences and amounts, which `said` prints."""
+    yield from sheets(report)
+    further = further_figures(report)
+    if further is not None:
+        yield further
+    yield from appendix(report)
 
 
 def _computed(report: Report) -> datetime:

@@ -40,6 +40,8 @@ _PANELS: Final = 2
 _DRAWINGS: Final = 2
 _RESULTS: Final = 5
 _SENTENCES: Final = 4
+#: Key numbers: where there are few, the dimensions of the best design follow them.
+_NUMBERS: Final = 4
 #: Designs, and their columns.
 _DESIGNS: Final = 6
 _COLUMNS: Final = 9
@@ -70,7 +72,7 @@ def _answer(report: Report) -> Iterator[Block]:
         yield Text(found.said(read), look="answer")
     rows = tuple(
         (one.title(read), f"{one.number(read)} {one.unit_text(read)}".strip(), read.say(one.where or one.note))
-        for one in found.numbers
+        for one in (*found.numbers, *found.dimensions)[:_NUMBERS]
     )
     if rows:
         yield Table(("", "", ""), rows, look="numbers")
@@ -105,7 +107,9 @@ def _main(report: Report, begin: int = 0, end: int = _PANELS) -> Iterator[Block]
     panels = {info.name: panel for info, panel in zip(infos, figure.panels, strict=False) if varies(found.drawn, info)}
     shown = [name for name in _results(report) if name in panels][begin:end]
     if shown:
-        figure = replace(figure, panels=tuple(panels[name] for name in shown))
+        nominal = held_text(report.study, DRIVE, 0.0)  # a batch is drawn as such; these are the curves of its base
+        held = tuple(text for text in figure.held if text != nominal)
+        figure = replace(figure, panels=tuple(panels[name] for name in shown), held=held)
         yield image(report, figure, caption(report.study, replace(found.query, y=tuple(shown))).said(report.reading))
 
 
@@ -152,7 +156,8 @@ def _along(report: Report) -> Iterator[Section]:
     title = _("Answers along the axis: {axis}", axis=read.within(found.query.x))
     meant = next((row for row, index in enumerate(shown) if curve.line.x[index] == found.point), None)
     table = Table(tuple(heads), tuple(rows), tuple(range(1 + len(names))), chosen=meant)
-    yield Section(title, (*([Text(held)] if held else []), table, *_main(report, _PANELS, _PANELS + 1)), 2)
+    yield Section(title, (*([Text(held)] if held else []), table), 2)
+    yield Section("", tuple(_main(report, _PANELS, _PANELS + 1)), 2)
 
 
 def _motion(curve: Curve, index: int) -> str:

@@ -309,7 +309,8 @@ def test_pages_pictures_and_the_report_show_it(finished: tuple[Service, str]) ->
     assert "What a spring does" in service.http.get(own).text
     columns = service.http.get(f"{own}/cases").text
     assert re.findall(r'name="col" value="([^"]+)" checked', columns) == ["swings"]
-    report = service.http.get(f"/api/v1{own}/report", params={"format": "html"})
+    report = service.http.get(f"/api/v1{own}/report", params={"format": "html", "appendix": "all"})
+    assert re.findall(rb"/Type/Pages/Count 2/", service.http.get(f"/api/v1{own}/report?format=pdf").content)
     assert "Displacement end" in report.text
 
 

@@ -147,7 +147,7 @@ def digits(value: float, half_width: float | None = None) -> int:
     if value == 0.0 or not math.isfinite(value):
         return _DIGITS
     size = math.floor(math.log10(abs(value)))
-    if half_width:
+    if half_width is not None and half_width > 0.0:
         return min(max(size - math.floor(math.log10(half_width)) + 1, _DIGITS), _MOST_DIGITS)
     return min(max(_DIGITS, size + 1), _WHOLE)
 

@@ -71,6 +71,9 @@ PAGES: Final[dict[str, list[str]]] = {
     "/laboratory/{model}/form": ["/laboratory/drive/form"],
     "/laboratory/{model}/study": ["/laboratory/drive/study"],
     "/studies/{study_id}": ["/studies/{STUDY}", "/studies/{SHAFT}", "/studies/{RUNNING}", "/studies/none"],
+    "/studies/{study_id}/document": [
+        "/studies/{STUDY}/document?appendix=inputs&text=A", "/studies/{GOAL}/document", "/studies/{DRIVES}/document",
+    ],
     "/studies/{study_id}/delete": ["/studies/{STUDY}/delete"],
     "/studies/{study_id}/extend": ["/studies/{STUDY}/extend"],
     "/studies/{study_id}/rows": [

@@ -33,7 +33,7 @@ def settings(settings: Settings, tmp_path: Path) -> Settings:
 def test_a_report_with_a_logo_in_ukrainian(browser: Browser, service: Service) -> None:
     study_id = service.submit({**SPEC, "name": "Привод живильника", "axes": []})
     service.fill(study_id)
-    context = browser.new_context(base_url="http://localhost", locale="uk-UA")
+    context = browser.new_context(base_url="http://localhost", locale="uk-UA", java_script_enabled=False)
     context.set_default_timeout(100 * SECONDS)
     page = context.new_page()
     serve(page, service)
