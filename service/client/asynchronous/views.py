@@ -371,10 +371,10 @@ class AsyncStudyViews(AsyncStudyPart):
         ----------
         x : str, optional
             Initial value across; by default the first one of the study's starts.
-        y : str, optional
-            The other initial value; by default the next one.
         x_range : two float or str, optional
             Its ends, SI or with a unit; by default as in the study's starts.
+        y : str, optional
+            The other initial value; by default the next one.
         y_range : two float or str, optional
             Its ends, SI or with a unit; by default as in the study's starts.
         points : int, optional
@@ -383,9 +383,9 @@ class AsyncStudyViews(AsyncStudyPart):
         query = query_of(
             {
                 "x": x,
-                "y": y,
                 "x_from": None if x_range is None else x_range[0],
                 "x_to": None if x_range is None else x_range[1],
+                "y": y,
                 "y_from": None if y_range is None else y_range[0],
                 "y_to": None if y_range is None else y_range[1],
                 "points": points,

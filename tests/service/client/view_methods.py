@@ -105,16 +105,20 @@ def _method(about: ViewInfo, shape: Any, of_case: bool) -> str:
 
 
 def _parameters(asked: list[NamedSetting], leading: int) -> Iterator[str]:
-    for place, setting in enumerate(asked):
-        if place == leading:
-            yield "*"
-        if setting.name.endswith(ENDS[1]):
-            continue
-        if setting.name.endswith(ENDS[0]):
-            yield f"{setting.name.removesuffix(ENDS[0])}_range: Ends | None = None"
-        else:
-            kind, default = _kind(setting)
-            yield f"{setting.name}: {kind}" if setting.default is ... else f"{setting.name}: {kind}{default}"
+    """The parameters: those that stand without a name, which are no pairs, and the others by name."""
+    first = [setting for setting in asked if not setting.name.endswith(ENDS)][:leading]
+    yield from map(_parameter, first)
+    others = [setting for setting in asked if setting not in first and not setting.name.endswith(ENDS[1])]
+    if others:
+        yield "*"
+    yield from map(_parameter, others)
+
+
+def _parameter(setting: NamedSetting) -> str:
+    if setting.name.endswith(ENDS[0]):
+        return f"{setting.name.removesuffix(ENDS[0])}_range: Ends | None = None"
+    kind, default = _kind(setting)
+    return f"{setting.name}: {kind}" if setting.default is ... else f"{setting.name}: {kind}{default}"
 
 
 def _kind(setting: NamedSetting) -> tuple[str, str]:
