@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import datetime
 from functools import lru_cache
 from typing import Any, Final
 from urllib.parse import urlencode
 
-from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, pass_context
 from jinja2.ext import Extension
+from jinja2.runtime import Context
 from markupsafe import Markup, escape
 from starlette.responses import Response
 
@@ -88,6 +89,16 @@ def _read(value: object) -> object:
     return shown(value) if isinstance(value, Sentence) else value
 
 
+def _when_shown(write: Callable[[Any], str]) -> Callable[[Context, Any], str]:
+    """A filter whose constants are written when a page is, not once for all languages when its template is read."""
+
+    @pass_context
+    def written(_context: Context, value: Any) -> str:
+        return write(value)
+
+    return written
+
+
 def _warning(text: str, reading: Reading) -> str:
     return reading.warning(text)
 
@@ -112,8 +123,8 @@ def _templates() -> Environment:
         "number": cell,
         "counted": counted,
         "decimal": languages.decimal,
-        "typed": typed_text,
-        "unit": unit_text,
+        "typed": _when_shown(typed_text),
+        "unit": _when_shown(unit_text),
         "spec": spec_text,
         "marked": marked,
         "symbol": symbol,

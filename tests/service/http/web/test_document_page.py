@@ -68,3 +68,9 @@ def test_a_report_is_saved_with_its_study(service: Service, address: str) -> Non
     saved = service.http.get(answer.headers["location"]).text
     assert 'value="Acme"' in saved
     assert ">R-12</a>" in service.http.get(address).text
+
+
+def test_examples_in_fields_are_in_the_language_of_each_reader(service: Service, address: str) -> None:
+    for code, example in (("en", "0.3 N·m"), ("uk", "0,3 Н·м"), ("en", "0.3 N·m")):
+        page = service.http.get(address, headers={"Accept-Language": code}).text
+        assert re.search(r'name="point"[^>]* placeholder="([^"]*)"', page)[1].replace("*", "·") == example  # type: ignore[index]
