@@ -2,7 +2,8 @@
 
 python -m benchmarks.explore [--cases 1000000]
 
-Rows are random numbers in a database of its own. Times are also given relative to sorting one column with numpy.
+Also the page of rows, as lines and as points, without its template. Rows are random numbers in a database of its own.
+Times are also given relative to sorting one column with numpy.
 """
 
 from __future__ import annotations
@@ -17,11 +18,14 @@ import numpy as np
 
 from benchmarks.reading import build, grid
 from sprag.service.figures.explore import explore_figure
+from sprag.service.http.web.rows.view import rows_view
 from sprag.service.json_text import to_bytes
+from sprag.service.reading.reader import Choice
 from sprag.service.results.explore import ExploreQuery, explore, explored_json, plan_of
 from sprag.service.storage.store import Store
 from sprag.service.views.column_files import ColumnFiles
 from sprag.service.views.columns import Columns
+from sprag.service.views.library import Library
 
 
 def timed(what: str, work: Callable[[], object], unit: float | None = None) -> float:
@@ -59,10 +63,23 @@ def main() -> None:
                 to_bytes(explored_json(study_id, found))
                 explore_figure(found)
 
+            library = Library(store)
+            library.columns = columns
+
+            def page(pairs: list[tuple[str, str]]) -> None:
+                rows_view(library, study_id, pairs, Choice())
+
             usual = plan_of(study, ExploreQuery()).results
             timed("reading the columns when the study has ended", lambda: columns.of(study_id, usual), unit)
             for what, query in queries.items():
                 timed(what, lambda query=query: ask(query), unit)  # type: ignore[misc]
+            usual_pairs = [("where", text) for text in where]
+            for what, pairs in {
+                "the page of rows, first": usual_pairs,
+                "the page of rows": usual_pairs,
+                "the page of rows as points": [*usual_pairs, ("plot", "points"), ("outside", "1")],
+            }.items():
+                timed(what, lambda pairs=pairs: page(pairs), unit)  # type: ignore[misc]
 
 
 if __name__ == "__main__":

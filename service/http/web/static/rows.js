@@ -30,9 +30,10 @@
 
   document.addEventListener("click", (event) => {
     const line = event.target.closest?.("#rows svg [data-case]"), row = line && rowOf(line.dataset.case);
-    if (line) { choose(row, line.dataset.case); return; }
     const link = event.target.closest?.("#rows a[href]");
-    if (!link || event.ctrlKey || event.metaKey || event.shiftKey || event.defaultPrevented) return;
+    if (event.ctrlKey || event.metaKey || event.shiftKey || event.defaultPrevented) return; // a tab or window of its own
+    if (line) { event.preventDefault(); choose(row, line.dataset.case); return; }
+    if (!link) return;
     const address = link.getAttribute("href");
     if (!address.startsWith("?")) return;
     event.preventDefault();
@@ -82,13 +83,17 @@
     event.preventDefault();
   });
 
-  // A drag along an axis writes its ends into the form, to three digits of its width; open beyond the ends of the axis.
+  // A drag along an axis writes its ends into the form, to three digits of its width; open at the ends of the axis.
+  const EDGE = 0.015;
   let drag = null;
   const value = ({ low, high, log }, share) => log === undefined ? Number(low) + (high - low) * share : Number(low) * (high / low) ** share;
-  const fill = ({ name }, ends) => {
-    const form = document.querySelector("#condition"), digit = 10 ** (Math.floor(Math.log10(Math.abs(ends[1] - ends[0]) || 1)) - 2);
-    form.elements.of.value = name;
-    ["least", "most"].forEach((end, at) => { form.elements[end].value = String(Number((Math.round(ends[at] / digit) * digit).toPrecision(12))); });
+  const fill = (axis, shares) => {
+    const form = document.querySelector("#condition"), ends = shares.map((share) => value(axis, share));
+    const digit = 10 ** (Math.floor(Math.log10(Math.abs(ends[1] - ends[0]) || 1)) - 2);
+    const text = (at) => shares[at] < EDGE || shares[at] > 1 - EDGE ? "" : String(Number((Math.round(ends[at] / digit) * digit).toPrecision(12)));
+    form.elements.of.value = axis.name;
+    const order = ends[0] <= ends[1] ? ["least", "most"] : ["most", "least"]; // an axis may run the other way
+    order.forEach((end, at) => { form.elements[end].value = text(at); });
     form.requestSubmit();
   };
   const share = ({ top, height }, y) => Math.min(Math.max(1 - (y - top) / height, 0), 1);
@@ -108,7 +113,7 @@
     const done = drag;
     drag = null;
     if (!done || Math.abs(event.clientY - done.from) < LEAST) return;
-    fill(done.data, [done.from, event.clientY].map((y) => value(done.data, share(done, y))).sort((a, b) => a - b));
+    fill(done.data, [done.from, event.clientY].map((y) => share(done, y)).sort((a, b) => a - b));
   });
   document.addEventListener("pointercancel", () => { drag = null; });
 

@@ -1,0 +1,133 @@
+"""The page of rows in the browser: conditions, a dragged part of an axis, arrow keys, ticked rows."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+import pytest
+from playwright.sync_api import expect
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Locator, Page
+
+    from tests.service.http.web.conftest import Office, Visitor
+
+
+def best(office: Office, study: str) -> int:
+    """The case with the best efficiency at loads up to 0.15 N*m, by looking at each."""
+    rows = [row for row in office.get(f"/studies/{study}/cases", page_size=100)["cases"] if row["ending"] == "ok"]
+    kept = [row for row in rows if row["parameters"]["shaft.load"] <= 0.15]
+    return int(max(kept, key=lambda row: row["results"]["efficiency"] or 0.0)["case"])
+
+
+def counted(page: Page) -> Locator:
+    """How many rows are within the conditions."""
+    return page.locator(".chips [role=status]")
+
+
+def add(page: Page, quantity: str, most: str) -> None:
+    """Add a condition by the form."""
+    page.locator(".chips summary").click()
+    page.get_by_label("Quantity").select_option(quantity)
+    page.get_by_label("at most").fill(most)
+    page.locator("#condition").get_by_role("button", name="Show").click()
+
+
+@pytest.mark.parametrize("visitor", [{}, {"java_script_enabled": False, "viewport": {"width": 390, "height": 800}}],
+                         indirect=True, ids=["scripts", "none on a phone"])  # fmt: skip
+def test_the_best_efficiency_below_a_load(visitor: Visitor, office: Office, example: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{example}/rows", wait_until="domcontentloaded")
+    # What is told first is on the first screen.
+    box = page.locator(".pane .big").bounding_box()
+    assert box is not None
+    assert box["y"] + box["height"] < 800
+    add(page, "shaft.load", "150 N*mm")
+    expect(counted(page)).to_have_text("6 of 9 cases")
+    page.locator("thead").get_by_role("link", name="Efficiency").click()
+    expect(page.locator("tbody tr").first).to_have_attribute("data-case", str(best(office, example)))
+    expect(page.locator("tr.on")).to_have_attribute("data-case", str(best(office, example)))
+    page.get_by_role("link", name="Whole motion").click()
+    page.wait_for_url(f"**/studies/{example}/cases/{best(office, example)}")
+    page.go_back()
+    page.get_by_role("link", name=re.compile("^Take away: load torque")).click()
+    expect(counted(page)).to_have_text("9 of 9 cases")
+
+
+def test_a_drag_along_an_axis_is_a_condition(visitor: Visitor, office: Office, example: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{example}/rows?units=typed")
+    box = page.locator('[data-name="shaft.load"] .grip').bounding_box()
+    assert box is not None
+    # The lower three fifths of the loads 0.02, 0.1 and 0.3 N*m.
+    x = box["x"] + box["width"] / 2
+    page.mouse.move(x, box["y"] + box["height"])
+    page.mouse.down()
+    page.mouse.move(x, box["y"] + 0.4 * box["height"], steps=4)
+    page.mouse.up()
+    expect(counted(page)).to_have_text("6 of 9 cases")
+    expect(page.get_by_role("link", name=re.compile(r"^Take away: load torque ≤ 0\.188"))).to_be_visible()
+    assert office.get(f"/studies/{example}/explore", where="shaft.load <= 0.188")["selected"] == 6
+    page.go_back()
+    expect(counted(page)).to_have_text("9 of 9 cases")
+
+
+def test_arrow_keys_choose_a_row_and_enter_opens_its_motion(visitor: Visitor, example: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{example}/rows")
+    rows = [row.get_attribute("data-case") for row in page.locator("tbody tr").all()]
+    for place in (1, 2):
+        page.keyboard.press("ArrowDown")
+        expect(page.locator("#pane nav b")).to_have_text(f"No. {place + 1} of 9")
+        expect(page.locator("tr.on")).to_have_attribute("data-case", str(rows[place]))
+    page.keyboard.press("ArrowUp")
+    expect(page.locator("#pane nav b")).to_have_text("No. 2 of 9")
+    assert f"row={rows[1]}" in page.url
+    expect(page.locator("svg path.on")).to_have_attribute("data-case", str(rows[1]))
+    # One link of the table is a stop of the Tab key.
+    assert page.locator("tbody tr a[tabindex='0']").count() == 1
+    page.keyboard.press("Enter")
+    page.wait_for_url(f"**/cases/{rows[1]}")
+
+
+def test_ticked_rows_are_acted_on(visitor: Visitor, example: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{example}/rows")
+    bar = page.locator(".bulk")
+    expect(bar).to_be_hidden()
+    for box in page.locator("tbody [type=checkbox]").all()[:2]:
+        box.check()
+    expect(bar).to_be_visible()
+    bar.get_by_role("button", name="Side by side").click()
+    expect(page.get_by_role("heading", name="2 cases side by side")).to_be_visible()
+    page.get_by_role("link", name="All rows").click()
+    page.locator("tbody [type=checkbox]").first.check()
+    with page.expect_download() as download:
+        bar.get_by_role("button", name="As a file").click()
+    assert len(download.value.path().read_text("utf-8").splitlines()) == 2
+    bar.get_by_role("button", name="Leave out").click()
+    expect(counted(page)).to_have_text("8 of 9 cases")
+
+
+def test_points_with_turned_and_logarithmic_axes(visitor: Visitor, example: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{example}/rows?units=typed")
+    page.get_by_role("link", name="Points").click()
+    form = page.locator("details.axes form")
+    form.locator("[name=x]").select_option("shaft.load")
+    form.locator("[name=y]").select_option("shaft.speed.mean")
+    form.get_by_role("button", name="Show").click()
+    points = page.locator("figure.points [data-case]")
+    page.wait_for_url("**y=shaft.speed.mean*")
+    expect(points.first).to_be_visible()
+    place = "(point) => point.getBoundingClientRect().x"
+    before = page.locator('figure.points [data-case="0"]').first.evaluate(place)
+    form.locator("[name=flip]").first.check()
+    form.get_by_role("button", name="Show").click()
+    page.wait_for_url("**flip=shaft.load*")
+    expect(points.first).to_be_visible()
+    assert page.locator('figure.points [data-case="0"]').first.evaluate(place) != before
+    chosen = page.locator('figure.points [data-case="4"]').first
+    chosen.dispatch_event("click")
+    expect(page.locator("tr.on")).to_have_attribute("data-case", "4")
