@@ -44,6 +44,9 @@ class Computes(Protocol):
     async def load(self, shape: models.KernelShape) -> None:
         """Load a kernel, however long its compilation takes; ApiError when that fails."""
 
+    def has_loaded(self, shape: models.KernelShape) -> bool:
+        """Whether a kernel is loaded, so that `load` takes no time."""
+
     def close(self) -> None:
         """End all processes."""
 
@@ -210,6 +213,11 @@ class ProcessComputer:
                 await self._loaded(shape)
             except ProcessDiedError:
                 await self._loaded(shape)
+
+    def has_loaded(self, shape: models.KernelShape) -> bool:
+        """Whether a kernel has been loaded in a process."""
+        known = self._loads.get(shape)
+        return known is not None and known.future.done() and known.future.exception() is None
 
     async def _loaded(self, shape: models.KernelShape) -> None:
         loading = self._loads.get(shape)

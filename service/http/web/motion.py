@@ -147,10 +147,15 @@ async def _seen(
     work: Work, study_id: str, study: Study, case: int, view: CaseView[Any, Any, Any], asked: Asked,
     which: int | None, reading: Reading,
 ) -> tuple[Seen | None, int]:  # fmt: skip
-    """A view as the page shows it, and the status of the page; a sentence where it cannot be computed now."""
+    """A view as the page shows it, and the status of the page; a sentence where it cannot be computed now.
+
+    The first one after the start waits seconds for its kernel, so the page comes without it and asks again.
+    """
     if asked.chosen is None:
         return None, 422 if asked.faults else 200
     rows = await in_thread(view.rows, work.context.store, study_id, study, case, asked.chosen)
+    if not ("wait" in work.request.query_params or all(map(work.context.computer.has_loaded, view.kernels(study)))):
+        return Seen(later=True), 200
     try:
         for kernel in view.kernels(study):
             await work.load(kernel)

@@ -77,11 +77,15 @@ def fact_of(one: KeyNumber, reading: Reading, cases: str = "") -> Fact:
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """A view as a page shows it: its figure as SVG, "" for none, the sentence below, and what people read of it."""
+    """A view as a page shows it: its figure as SVG, "" for none, the sentence below, and what people read of it.
+
+    ``later`` says that the page has to ask for it once more.
+    """
 
     figure: str = ""
     below: str = ""
     shown: Shown = NOTHING
+    later: bool = False
 
 
 def asked_of(

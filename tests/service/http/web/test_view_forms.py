@@ -157,3 +157,16 @@ def test_what_matters_most_is_said_by_its_numbers(service: Service) -> None:
     steepest = max(changes.values(), key=abs)
     verb = "lowers" if steepest < 0.0 else "raises"
     assert re.search(rf"10 % more .* {verb} .* by about {abs(steepest):.2g} Hz", said[1])
+
+
+def test_a_kernel_that_is_not_loaded_does_not_hold_the_page_up(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = f"/studies/{study_of(service, 'press')}/cases/1"
+    monkeypatch.setattr(service.computer, "has_loaded", lambda _shape: False)
+    first = service.http.get(own)
+    assert (first.status_code, service.computer.loads, "data-later" in first.text) == (200, [], True)
+    assert f'<a href="{own}?wait=1">' in first.text, "without scripts"
+    again = service.http.get(f"{own}?wait=1")
+    assert '<svg class="figure"' in again.text
+    assert "data-later" not in again.text

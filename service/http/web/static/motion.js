@@ -1,0 +1,15 @@
+// The page of a case: what was not ready when the page came is asked for once more.
+"use strict";
+
+document.addEventListener("DOMContentLoaded", async () => {
+  const parts = [...document.querySelectorAll(".part:has(> [data-later])")];
+  if (!parts.length) return;
+  const again = new URL(location.href);
+  again.searchParams.set("wait", "1");
+  try {
+    const page = await sprag.busy(parts[0], sprag.page(again.pathname + again.search));
+    for (const part of parts) sprag.take(page, `#${part.id}`);
+  } catch (error) {
+    for (const part of parts) sprag.note(part, error.message, () => location.reload());
+  }
+});
