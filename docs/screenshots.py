@@ -83,7 +83,7 @@ def shots(ids: list[str]) -> list[tuple[str, str, tuple[int, int], bool]]:
         ("case", f"/studies/{two}/cases/45", DESKTOP, True),
         ("laboratory", "/laboratory?machine=press", (1280, 1000), False),
         ("laboratory-drive", "/laboratory/drive?shaft.load=0.2&held=shaft.load%3D0.4", (1280, 1000), False),
-        ("schedules", "/schedules/new", DESKTOP, True),
+        ("schedules", "/nights/new", DESKTOP, True),
         ("compare", f"/compare?study={one}&study={two}&study={fitted}", DESKTOP, True),
     ]
 

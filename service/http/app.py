@@ -58,23 +58,21 @@ from sprag.service.http.web import (
     further,
     login,
     matters,
+    me,
     motion,
+    moved,
     pages,
     results,
     study,
 )
 from sprag.service.http.web import components as component_pages
 from sprag.service.http.web import document as document_pages
-from sprag.service.http.web import language as language_pages
 from sprag.service.http.web import live as live_pages
-from sprag.service.http.web import people as people_pages
 from sprag.service.http.web import saved_views as view_pages
 from sprag.service.http.web import schedules as schedule_pages
 from sprag.service.http.web import (
     study_list as list_pages,
 )
-from sprag.service.http.web import units as unit_pages
-from sprag.service.http.web import workers as worker_pages
 from sprag.service.http.web.form import page as form
 from sprag.service.http.web.laboratory import pages as laboratory
 from sprag.service.http.web.rows import motion as row_motion
@@ -155,7 +153,9 @@ ROUTED = (
     health,
     list_pages,
     further,
+    me,
     pages,
+    moved,
     form,
     study,
     front,
@@ -170,11 +170,7 @@ ROUTED = (
     view_pages,
     document_pages,
     schedule_pages,
-    worker_pages,
-    people_pages,
     login,
-    unit_pages,
-    language_pages,
     live_pages,
 )
 

@@ -31,6 +31,7 @@ class Current:
     page : address of the page that is made; "" for one that answers a form
     usual : the choice of the service, which a page has where nobody chose another
     zone : time zone of the reader of a page
+    chosen_zone : where somebody chose it, "" where the browser or the service has it
     """
 
     grant: Grant | None = None
@@ -41,6 +42,7 @@ class Current:
     page: str = ""
     usual: str = WORKSHOP
     zone: str = "UTC"
+    chosen_zone: str = ""
 
 
 _CURRENT: ContextVar[Current] = ContextVar("current", default=Current())  # noqa: B039 - frozen

@@ -33,8 +33,8 @@ _LOG = logging.getLogger("sprag.service")
 LIVE_PATH: Final = "/livez"
 #: Paths that need no token: health checks, the login, and what its page has on it.
 OPEN_PATHS: Final = frozenset(
-    {LIVE_PATH, "/readyz", LOGIN_PATH, "/language", "/static/sprag.css", "/static/sprag.svg"}
-    | {"/static/link.js", "/static/keys.js"}
+    {LIVE_PATH, "/readyz", LOGIN_PATH, "/me", "/static/sprag.css", "/static/sprag.svg"}
+    | {"/static/link.js", "/static/keys.js", "/static/reader.js"}
 )
 SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 

@@ -38,13 +38,17 @@ async def page_choice(request: Request, context: Ctx) -> Choice:
         names = CODES if kept.get(NAMES_COOKIE) == CODES else CAPTIONS
     read_units(units)
     choice = Choice(units or usual, names or CAPTIONS)
-    zones_kept = (unquote(kept.get(name, "")) for name in (ZONE_COOKIE, HERE_COOKIE))
-    learn(choice=choice, usual=usual, zone=next((zone for zone in zones_kept if zone and is_zone(zone)), office))
+    chosen, here = (_zone(unquote(kept.get(name, ""))) for name in (ZONE_COOKIE, HERE_COOKIE))
+    learn(choice=choice, usual=usual, zone=chosen or here or office, chosen_zone=chosen)
     if request.method == "GET":  # the address of a page that answers a form may have no page of its own
         # What the address says would hide what is chosen next.
         own = request.url.remove_query_params(["units", "names", "language"])
         learn(page=str(own.replace(scheme="", netloc="")))
     return choice
+
+
+def _zone(name: str) -> str:
+    return name if name and is_zone(name) else ""
 
 
 def _valid(units: str) -> str:
@@ -127,3 +131,11 @@ def keep(response: Response, choice: Choice) -> None:
     """Keep the choice in the browser."""
     for name, value in ((UNITS_COOKIE, quote(choice.units)), (NAMES_COOKIE, choice.names)):
         response.set_cookie(name, value, max_age=_YEAR, httponly=True, samesite="lax")
+
+
+def keep_zone(response: Response, zone: str) -> None:
+    """Keep a chosen time zone in the browser; "" for that of the browser."""
+    if zone:
+        response.set_cookie(ZONE_COOKIE, quote(zone), max_age=_YEAR, httponly=True, samesite="lax")
+    else:
+        response.delete_cookie(ZONE_COOKIE, httponly=True, samesite="lax")

@@ -32,7 +32,8 @@ _ANYONE: Final = (
     "POST /login",
     "POST /logout",
     "GET /static/{name}",
-    "POST /language",
+    "GET /me",
+    "POST /me",
 )
 _VIEWER: Final = (
     "GET /api/v1/me",
@@ -46,14 +47,15 @@ _VIEWER: Final = (
     *(f"GET {_CASE}/{part}" for part in (
         "trajectory", "branch", "diagram", "section", "engagements", "strobes", "transient", "basin",
     )),
-    "GET /api/v1/night", "GET /night",
+    "GET /api/v1/night",
     "GET /api/v1/schedules", "GET /api/v1/schedules/{schedule_id}",
-    "GET /api/v1/components", "GET /components", "GET /api/v1/views",
+    "GET /api/v1/components", "GET /components", "GET /parts", "GET /api/v1/views",
     "GET /api/v1/models", "GET /api/v1/models/{name}", "GET /api/v1/presets", "GET /api/v1/presets/{name}",
-    "GET /api/v1/workers", "GET /workers",
+    "GET /api/v1/workers", "GET /workers", "GET /me/workers",
     "GET /metrics", "GET /openapi.json", "GET /problems/{slug}",
-    "GET /docs", "GET /docs/{name}", "GET /docs/site", "GET /docs/site/{name}",
-    "GET /live/{name}", "GET /units", "POST /units",  # a cookie of the reader's own
+    "GET /help", "GET /help/interface", "GET /help/{name}", "GET /docs", "GET /docs/{name}",
+    "GET /docs/site", "GET /docs/site/{name}",
+    "GET /live/{name}", "GET /units",
     "GET /", "GET /new", "POST /new/check", "GET /calibrate",
     f"GET {_PAGE}",
     *(f"GET {_PAGE}/{part}" for part in (
@@ -71,7 +73,8 @@ _VIEWER: Final = (
         "", "/figure", "/picture.{form}", "/form", "/study",
     )),
     "GET /laboratory/questions",
-    "GET /schedules", "GET /schedules/new", "GET /schedules/{schedule_id}",
+    "GET /nights", "GET /nights/new", "GET /nights/{schedule_id}",
+    "GET /night", "GET /schedules", "GET /schedules/new", "GET /schedules/{schedule_id}",
 )  # fmt: skip
 _DESIGNER: Final = (
     "POST /api/v1/studies",
@@ -80,7 +83,7 @@ _DESIGNER: Final = (
         "cancel", "pause", "resume", "retry", "extend", "longer", "narrow", "select", "prioritize", "restore",
     )),
     "POST /api/v1/components", "DELETE /api/v1/components/{component_id}",
-    "POST /components", "POST /components/{component_id}/delete",
+    "POST /parts", "POST /parts/{component_id}/delete",
     "POST /api/v1/views", "PATCH /api/v1/views/{view_id}", "DELETE /api/v1/views/{view_id}",
     "POST /views", "POST /views/{view_id}",
     "POST /api/v1/schedules", "PATCH /api/v1/schedules/{schedule_id}", "DELETE /api/v1/schedules/{schedule_id}",
@@ -88,9 +91,16 @@ _DESIGNER: Final = (
     f"POST {_PAGE}/extend",
     f"POST {_PAGE}/delete", f"POST {_PAGE}/longer/{{kind}}", f"POST {_PAGE}/narrow", f"POST {_PAGE}/{{verb}}",
     f"POST {_PAGE}/rows/longer",
-    "POST /schedules/new", "POST /schedules/{schedule_id}", "POST /schedules/{schedule_id}/{verb}",
+    "POST /nights/new", "POST /nights/{schedule_id}", "POST /nights/{schedule_id}/{verb}",
 )  # fmt: skip
-_ADMINISTRATOR: Final = ("GET /api/v1/audit", "GET /api/v1/users", "GET /audit", "GET /users")
+_ADMINISTRATOR: Final = (
+    "GET /api/v1/audit",
+    "GET /api/v1/users",
+    "GET /me/audit",
+    "GET /me/users",
+    "GET /audit",
+    "GET /users",
+)
 
 #: Role by method and pattern; None: no login is needed.
 ROLES: Final[Mapping[str, Role | None]] = {

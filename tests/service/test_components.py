@@ -142,27 +142,27 @@ def test_the_form_offers_them_and_undoes_taking_them(service: Service) -> None:
 
 def test_the_page_keeps_shows_refuses_and_removes(service: Service) -> None:
     sent = {"kind": "spring", "name": "F-120", "note": "", "fields/spring_rate": "9 N/mm"}
-    answer = service.http.post("/components", data=sent, follow_redirects=False)
+    answer = service.http.post("/parts", data=sent, follow_redirects=False)
     assert answer.status_code == 303
-    assert "<td>9 N/mm</td>" in service.http.get("/components").text
-    refused = service.http.post("/components", data={**sent, "fields/spring_rate": "9 mm"})
+    assert "<td>9 N/mm</td>" in service.http.get("/parts").text
+    refused = service.http.post("/parts", data={**sent, "fields/spring_rate": "9 mm"})
     assert refused.status_code == 422
     assert 'id="wrong:fields/spring_rate"' in refused.text
     assert 'value="9 mm"' in refused.text
-    refused = service.http.post("/components", data={"do": "csv", "csv": "kind;name\nbelt;B\n"})
+    refused = service.http.post("/parts", data={"do": "csv", "csv": "kind;name\nbelt;B\n"})
     assert refused.status_code == 422
     assert "line 2, column kind: is not a kind of component" in refused.text
     sent = {"do": "csv", "csv": "kind;name;coefficients\nclutch;C;0 200\n"}
-    assert "1 component is read." in service.http.post("/components", data=sent, follow_redirects=True).text
+    assert "1 component is read." in service.http.post("/parts", data=sent, follow_redirects=True).text
     assert [one.component.name for one in service.store.components.all()] == ["C", "F-120"]
     component = service.store.components.all("spring")[0].id
-    assert f'href="/components?edit={component}#spring:name"' in service.http.get("/components").text
-    changed = service.http.get(f"/components?edit={component}").text
+    assert f'href="/parts?edit={component}#spring:name"' in service.http.get("/parts").text
+    changed = service.http.get(f"/parts?edit={component}").text
     assert '<details class="columns" open><summary>Add or change a spring' in changed
     assert 'name="name" value="F-120"' in changed
     assert 'name="fields/spring_rate" value="9 N/mm"' in changed
-    assert service.http.get("/components?edit=cm_none").status_code == 404
-    service.http.post(f"/components/{component}/delete")
+    assert service.http.get("/parts?edit=cm_none").status_code == 404
+    service.http.post(f"/parts/{component}/delete")
     assert service.store.components.all("spring") == ()
 
 

@@ -48,7 +48,7 @@ def test_before_the_first_dispatcher_there_is_none(service: Service) -> None:
     found = service.get("/workers")
     fits(WorkerList, found)
     assert (found["usable"], found["dispatchers"]) == (0, [])
-    assert "No dispatcher has worked" in service.http.get("/workers").text
+    assert "No dispatcher has worked" in service.http.get("/me/workers").text
     service.store.work.take_over("head:7")
     (found,) = service.get("/workers")["dispatchers"]
     assert found["executor"] is None, "it has not reported yet"
@@ -70,7 +70,7 @@ def test_the_workers_are_shown_by_host_with_refusals(
         ("a", 2, 2, 0),
         ("b", 0, 4, 1),
     ]
-    page = service.http.get("/workers").text
+    page = service.http.get("/me/workers").text
     assert "5 workers run chunks" in page
     assert '<td class="name">a</td><td>znver5</td>' in page
     assert "<code>tls://b:1</code>: numpy: 1.0 instead of 2.0" in page
@@ -115,7 +115,7 @@ def test_a_report_of_an_earlier_version_names_no_processor(service: Service, tea
     found = service.get("/workers")
     fits(WorkerList, found)
     assert [host["processor"] for host in found["dispatchers"][0]["hosts"]] == ["", ""]
-    assert '<td class="name">a</td><td></td>' in service.http.get("/workers").text
+    assert '<td class="name">a</td><td></td>' in service.http.get("/me/workers").text
 
 
 def test_a_difference_says_from_which_dispatcher(
@@ -131,7 +131,7 @@ def test_a_difference_says_from_which_dispatcher(
     monkeypatch.setattr(fingerprint, "own", partial(dict, fingerprint.own(), Python="2.7"))
     service.store.work.take_over("other:8")
     difference = f"Python: 2.7 instead of {platform.python_version()}"
-    assert f"<code>another</code> (differs from that of head:7: {difference})" in service.http.get("/workers").text
+    assert f"<code>another</code> (differs from that of head:7: {difference})" in service.http.get("/me/workers").text
     assert execute(["workers"]) == 0
     said = capsys.readouterr().err
     assert said.count("Its fingerprint differs from that of ") == 1
@@ -142,7 +142,7 @@ def test_the_service_is_not_ready_while_no_worker_can_work(service: Service) -> 
     report(service, REFUSED, shortage=SHORTAGE)
     answer = service.http.get("/readyz")
     assert (answer.status_code, answer.json()["detail"]) == (503, SHORTAGE)
-    page = service.http.get("/workers").text
+    page = service.http.get("/me/workers").text
     assert "No worker can be used at present." in page
     assert SHORTAGE in page
     doctor = {finding.subject: finding for finding in examine(str(service.store.session.path))}

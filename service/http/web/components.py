@@ -63,7 +63,7 @@ def _columns(kind: str) -> list[_Column]:
     return found
 
 
-@router.get("/components")
+@router.get("/parts")
 def components_page(
     context: Ctx,
     edit: Annotated[str, Query(max_length=40)] = "",
@@ -85,7 +85,7 @@ def _values(context: Context, component_id: str) -> Values:
     return {"kind": component.kind, "name": component.name, "note": component.note, **fields}
 
 
-@router.post("/components")
+@router.post("/parts")
 async def put_component(context: Ctx, work: Attended, values: Form) -> Response:
     """Add or replace one component, or those of a CSV text; the page again, with what is wrong, where invalid."""
     csv = values.get("do") == "csv"
@@ -98,7 +98,7 @@ async def put_component(context: Ctx, work: Attended, values: Form) -> Response:
     except FaultError as error:
         faults, status = _faults(error, csv=csv), api_error(error).type.status
         return await in_thread(_page, context, values, faults, status)
-    return RedirectResponse(f"/components?read={len(given)}" if csv else "/components", status_code=303)
+    return RedirectResponse(f"/parts?read={len(given)}" if csv else "/parts", status_code=303)
 
 
 def _component(values: Values) -> Component:
@@ -117,17 +117,17 @@ def _faults(error: FaultError, *, csv: bool) -> Faults:
     return found
 
 
-@router.post("/components/{component_id}/delete")
+@router.post("/parts/{component_id}/delete")
 def delete_component(context: Ctx, component_id: str) -> Response:
     """Remove a component."""
     context.store.components.remove(component_id)
-    return RedirectResponse("/components", status_code=303)
+    return RedirectResponse("/parts", status_code=303)
 
 
 def _page(context: Context, values: Values, faults: Faults, status: int, read: int = 0) -> Response:
     records = context.store.components.all()
     return page(
-        "components.html",
+        "parts.html",
         status=status,
         kinds=[
             (kind_of(kind), _columns(kind), [record for record in records if record.component.kind == kind])

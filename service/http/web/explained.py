@@ -40,9 +40,9 @@ def explained(pointer: str, model: str) -> str:
     """
     if pointer.startswith("/base/"):
         found = models.model_of(model).presentation.explained(pointer.removeprefix("/base/").replace("/", "."))
-        return found and f"/docs/{found}"
+        return found and f"/help/{found}"
     parts = [part for part in pointer.split("/") if part and not part.isdigit()]
     for length in range(len(parts), 0, -1):
         if section := _SECTIONS.get("/" + "/".join(parts[:length])):
-            return f"/docs/{section}"
+            return f"/help/{section}"
     return ""

@@ -35,13 +35,10 @@ def _studies(context: Context, given: QueryParams) -> Any:
     return [[study.id, study.revision] for study in listed(context, given).studies]
 
 
-def _schedules(context: Context, _: QueryParams) -> Any:
-    return all_schedules(context.store)
-
-
-def _night(context: Context, given: QueryParams) -> Any:
+def _nights(context: Context, given: QueryParams) -> Any:
     found = night(context.store, float(given.get("hours", HOURS)))
-    return [found["off"], found["late"], found["runs"]]  # without the ends of the interval, which move with the clock
+    # Without the ends of the interval, which move with the clock.
+    return [all_schedules(context.store), found["off"], found["late"], found["runs"]]
 
 
 def _workers(context: Context, _: QueryParams) -> Any:
@@ -51,8 +48,7 @@ def _workers(context: Context, _: QueryParams) -> Any:
 #: What is listed, by the name of its stream.
 _LISTS: Final[dict[str, Callable[[Context, QueryParams], Any]]] = {
     "studies": _studies,
-    "schedules": _schedules,
-    "night": _night,
+    "nights": _nights,
     "workers": _workers,
 }
 

@@ -20,6 +20,7 @@ from sprag.service.http.web.apidoc import with_token_needed
 from sprag.service.http.web.manual import PAGES, manual_page, titles
 from sprag.service.http.web.plotly_script import plotly_script
 from sprag.service.http.web.templates import page
+from sprag.service.reading.quantities import KINDS
 
 if TYPE_CHECKING:
     from starlette.types import Receive, Scope, Send
@@ -32,12 +33,16 @@ PLOTLY: Final = "plotly.min.js"
 _KEPT: Final = "max-age=3600"
 
 
-@router.get("/docs")
-async def docs(request: Request) -> Response:
+@router.get("/help")
+async def help_page() -> Response:
+    """What there is to read: the manual, the interface for programs, units and names."""
+    return await in_thread(lambda: page("help.html", titles=titles(), site=_SITE.is_dir(), kinds=KINDS))
+
+
+@router.get("/help/interface")
+async def interface(request: Request) -> Response:
     """The interface, operation by operation."""
-    return page(
-        "docs.html", groups=apidoc.groups(request.app.openapi()), problems=PROBLEM_TYPES.values(), site=_SITE.is_dir()
-    )
+    return page("docs.html", groups=apidoc.groups(request.app.openapi()), problems=PROBLEM_TYPES.values())
 
 
 @router.get("/docs/site")
@@ -56,12 +61,12 @@ async def site(name: str) -> Response:
     return _FileAnswer(_SITE_FILES, name or "index.html")
 
 
-@router.get("/docs/{name}")
+@router.get("/help/{name}")
 async def manual(name: str) -> Response:
     """A page of the guide or the theory."""
     if name not in PAGES:
         raise ApiError("not-found", Sentence("Unknown page; known pages: {pages}.", pages=", ".join(PAGES)))
-    return await in_thread(lambda: page("manual.html", page=manual_page(name), titles=titles(), site=_SITE.is_dir()))
+    return await in_thread(lambda: page("manual.html", page=manual_page(name)))
 
 
 @router.get("/openapi.json")

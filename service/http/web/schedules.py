@@ -1,4 +1,4 @@
-"""The pages of schedules: the list with last and next run, and the form to create or change one."""
+"""Nights: what schedules did lately, the list of them with last and next run, and the form to create or change one."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from starlette.responses import RedirectResponse, Response
 from sprag.sentences import Sentence
 from sprag.service.faults import Fault
 from sprag.service.http.context import Context, Ctx
+from sprag.service.http.current import current
 from sprag.service.http.problems import ApiError
 from sprag.service.http.routers import page_router
 from sprag.service.http.schedule_views import listed
@@ -31,6 +32,7 @@ from sprag.service.presets import preset_names
 from sprag.service.reading.faults import allowed_text, fault_text
 from sprag.service.reading.reader import meanings
 from sprag.service.schedules.fields import ScheduleFields, change_fields
+from sprag.service.schedules.plain import DAYS, cron_of, days_of, said
 from sprag.service.schedules.report_to import require_deliverable
 from sprag.service.schedules.trouble import usual_flags
 from sprag.service.spec.report import SpecError
@@ -45,10 +47,10 @@ router = page_router()
 _WHOLE: Final = re.compile(r"-?[0-9]{1,8}")
 #: Most studies offered for a schedule.
 _OFFERED: Final = 50
-_EMPTY: Final[Values] = {
-    "when": "cron",
-    "cron": "0 22 * * 1-5",
-    "zone": "UTC",
+_EMPTY: Final[Values] = {  # in the zone of the reader
+    "when": "days",
+    "days": "1-5",
+    "clock": "22:00",
     "priority": "0",
     "overlap": "queue",
     "catch_up": "latest",
@@ -75,48 +77,50 @@ _WITH_FLAGS: Final = "trouble_flags"
 _FIELD_OF: Final = {"window": "window_begin", "spec": "source"}
 
 
-@router.get("/schedules")
-def schedules(context: Ctx) -> Response:
-    """Every schedule, newest first."""
-    return page("schedules.html", **listed(context.store))
+@router.get("/nights")
+def nights(context: Ctx, hours: Annotated[float, Query(ge=1, le=MOST_HOURS)] = HOURS) -> Response:
+    """What schedules did in the last hours, and every schedule, newest first."""
+    return page(
+        "nights.html",
+        night=night(context.store, hours),
+        hours=hours,
+        choices=_HOURS,
+        pictures=_PICTURES,
+        said=said,
+        **listed(context.store),
+    )
 
 
-@router.get("/night")
-def last_night(context: Ctx, hours: Annotated[float, Query(ge=1, le=MOST_HOURS)] = HOURS) -> Response:
-    """What schedules did in the last hours."""
-    return page("night.html", night=night(context.store, hours), hours=hours, choices=_HOURS, pictures=_PICTURES)
-
-
-@router.get("/schedules/new")
+@router.get("/nights/new")
 def new_schedule(context: Ctx, study: Annotated[str | None, Query(max_length=80)] = None) -> Response:
     """The form, empty, or for a study."""
-    values = {**_EMPTY, **_ticks(_usual())}
+    values = {**_EMPTY, "zone": current().zone, **_ticks(_usual())}
     if study is not None:
         context.store.studies.get(study)
         values["source"] = f"study {study}"
     return _form(context, values, {})
 
 
-@router.post("/schedules/new")
+@router.post("/nights/new")
 async def keep_schedule(context: Ctx, work: Attended, values: Form) -> Response:
     """The submitted form: create the schedule, or show the form again with its faults."""
     return await _save(context, work, values, None)
 
 
-@router.get("/schedules/{schedule_id:schedule}")
+@router.get("/nights/{schedule_id:schedule}")
 def edit_schedule(context: Ctx, schedule_id: str) -> Response:
     """The form with the fields of a schedule."""
     record = context.store.schedules.get(schedule_id)
     return _form(context, {**_values_of(record.fields), "etag": record.etag}, {}, schedule_id)
 
 
-@router.post("/schedules/{schedule_id:schedule}")
+@router.post("/nights/{schedule_id:schedule}")
 async def change_schedule(context: Ctx, work: Attended, schedule_id: str, values: Form) -> Response:
     """The submitted form of an existing schedule."""
     return await _save(context, work, values, schedule_id)
 
 
-@router.post("/schedules/{schedule_id:schedule}/{verb}")
+@router.post("/nights/{schedule_id:schedule}/{verb}")
 def act(context: Ctx, schedule_id: str, verb: str) -> Response:
     """A button of the list."""
     if verb == "delete":
@@ -125,7 +129,7 @@ def act(context: Ctx, schedule_id: str, verb: str) -> Response:
         _change(context, schedule_id, _CHANGES[verb])
     else:
         raise ApiError("not-found", Sentence("Unknown action."))
-    return RedirectResponse("/schedules", status_code=303)
+    return RedirectResponse("/nights", status_code=303)
 
 
 def _change(context: Context, schedule_id: str, changes: Mapping[str, object]) -> None:
@@ -165,7 +169,7 @@ async def _save(context: Context, work: Work, values: Values, schedule_id: str |
         return await in_thread(_form, context, values, faults, schedule_id, status=412)
     if faults:
         return await in_thread(_form, context, values, faults, schedule_id, status=422)
-    return RedirectResponse("/schedules", status_code=303)
+    return RedirectResponse("/nights", status_code=303)
 
 
 def _sentence(fault: Fault) -> str:
@@ -207,8 +211,11 @@ def _data_of(context: Context, values: Mapping[str, str]) -> dict[str, Any]:
         ticked = [flag for flag in _flags() if _FLAG + flag in values]
         # Those that count by default stand for the ones that the model of the study has.
         data["trouble_flags"] = None if set(ticked) == _usual() else ticked
-    when = "at" if values.get("when") == "at" else "cron"
-    data[when] = values.get(when, "").strip() or None
+    if values.get("when") == "days":
+        data["cron"] = cron_of(values.get("days", ""), values.get("clock", ""))
+    else:
+        when = "at" if values.get("when") == "at" else "cron"
+        data[when] = values.get(when, "").strip() or None
     kind, _, name = values.get("source", "").partition(" ")
     if kind == "study":
         data["spec"] = accepted(context.store.studies.spec(name), context.store.studies.study(name))
@@ -235,9 +242,12 @@ def _ticks(flags: Iterable[str]) -> Values:
 def _values_of(fields: ScheduleFields) -> Values:
     at, zone = fields.timing.at, fields.timing.zone
     window, policies = fields.window, fields.policies
+    plain = days_of(fields.timing.cron or "")
     return {
         "name": fields.name,
-        "when": "cron" if at is None else "at",
+        "when": "at" if at is not None else "cron" if plain is None else "days",
+        "days": "1-5" if plain is None else plain[0],
+        "clock": "22:00" if plain is None else plain[1],
         "cron": fields.timing.cron or "",
         "at": _entry(at, zone),
         "zone": zone,
@@ -283,6 +293,7 @@ def _form(
         presets=[preset_of(name) for name in preset_names()],
         flags=meanings(_flags()),
         zones=sorted(zones()),
+        days=DAYS,
         most_priority=MAX_PRIORITY,
     )
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Mapping
-from datetime import datetime
+from datetime import UTC, datetime
 from functools import lru_cache
 from typing import Any, Final
 from urllib.parse import urlencode
+from zoneinfo import ZoneInfo
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, pass_context
 from jinja2.ext import Extension
@@ -27,11 +28,13 @@ from sprag.service.http.prefix import here
 from sprag.service.http.web.explained import explained
 from sprag.service.http.web.script_texts import translated_texts
 from sprag.service.languages import N_
+from sprag.service.reading import times
 from sprag.service.reading.faults import allowed_text, fault_text, value_text
+from sprag.service.reading.quantities import KINDS, SI, TYPED, read_units
 from sprag.service.reading.reader import CLUTCH, Reading, model_title, shown, titled, told, word
 from sprag.service.reading.wording import counted, duration, number, symbol, typed_text, unit_text
 from sprag.service.report.html import embedded, sheet_of
-from sprag.service.schedules.times import wall_clock
+from sprag.worker import models
 
 #: The beginning of an attribute that is an address: a path of this service, or an expression that may give one.
 _ADDRESS = re.compile(
@@ -140,7 +143,7 @@ def _templates() -> Environment:
         "day": day,
         "model": model_title,
         "moment": moment,
-        "wall": wall,
+        "moment_in_full": moment_in_full,
         "duration": duration,
         "time_left": time_left,
         "bytes": bytes_text,
@@ -160,6 +163,13 @@ def _templates() -> Environment:
     environment.globals["read_only"] = _read_only
     environment.globals["units_back"] = _units_back
     environment.globals["part_of_pages"] = _part
+    environment.globals["units_shown"] = _units_shown
+    environment.globals["units_of_address"] = lambda: (
+        "" if current().choice.units == current().usual else current().choice.units
+    )
+    environment.globals["zone"] = lambda: current().zone
+    environment.globals["zone_of_browser"] = lambda: "" if current().chosen_zone else current().zone
+    environment.globals["reader_name"] = _reader_name
     environment.globals["explained"] = explained
     environment.globals["clutch_reading"] = CLUTCH
     environment.globals["administers"] = _administers
@@ -176,21 +186,18 @@ def cell(value: float | str | None, digits: int = 5) -> str:
     return word(value) if isinstance(value, str) else number(value, digits)
 
 
+#: Kinds of quantities whose units the head of a page names, and what they are in a workshop.
+_NAMED_KINDS: Final = ("speed", "length", "torque", "share")
+_WORKSHOP: Final = {"rad/s": "rpm", "m": "mm", "N*m": "N*m", models.SHARE: "%"}
+
 #: Which part of the pages an address belongs to, for the head of the page; studies are the rest.
 _PARTS: Final = {
-    "components": "parts",
     "parts": "parts",
-    "schedules": "nights",
-    "night": "nights",
     "nights": "nights",
-    "docs": "help",
     "help": "help",
-    "units": "me",
+    "problems": "help",
     "login": "me",
     "me": "me",
-    "users": "me",
-    "audit": "me",
-    "workers": "me",
 }
 
 
@@ -205,10 +212,28 @@ def _units_back() -> str:
     return f"?{urlencode({'back': current().page})}" if current().page not in {"", "/"} else ""
 
 
+def _units_shown() -> str:
+    """The units of the page in a few words: ``rpm · mm · deg · %``."""
+    rest, chosen = read_units(current().choice.units)
+    if rest == TYPED and not chosen:
+        return languages.gettext("as typed")
+    if rest == SI and not chosen:
+        return "SI"
+    others = {**({} if rest == SI else _WORKSHOP), **chosen}
+    units = (others.get(kind.unit, "") for kind in KINDS if kind.name in _NAMED_KINDS)
+    return " · ".join(unit_text(unit) for unit in units if unit) or languages.gettext("own units")
+
+
 def _read_only() -> str:
     """Who asks for the page, where that is a viewer; "" for anybody who may change something."""
     grant = current().grant
     return grant.label if grant is not None and grant.role is Role.VIEWER else ""
+
+
+def _reader_name() -> str:
+    """The name of the user who asks for the page; "" for a token without one."""
+    grant = current().grant
+    return (grant.user or "") if grant is not None else ""
 
 
 def _administers() -> bool:
@@ -243,19 +268,23 @@ def marked(text: str) -> Markup:
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))  # noqa: S704 - escaped just before
 
 
-def moment(text: str | None) -> str:
-    """A time stamp to the second, its date as the language writes it."""
-    return f"{datetime.fromisoformat(text).strftime(languages.date_format())} {text[11:19]} UTC" if text else "–"
+def moment(given: str | datetime | None) -> Markup:
+    """A time for the reader, ``today 11:14``, with all of it as its title."""
+    if not given:
+        return Markup("–")
+    at, zone = datetime.fromisoformat(given) if isinstance(given, str) else given, current().zone
+    short, full = times.when(at, datetime.now(UTC), zone), times.in_full(at, zone)
+    return Markup('<time datetime="{}" title="{}">{}</time>').format(at.isoformat(timespec="seconds"), full, short)
+
+
+def moment_in_full(text: str) -> str:
+    """A time stamp to the second in the reader's zone, for paper."""
+    return times.in_full(datetime.fromisoformat(text), current().zone)
 
 
 def day(text: str) -> str:
-    """The date of a time stamp as the language writes it."""
-    return datetime.fromisoformat(text).strftime(languages.date_format())
-
-
-def wall(text: str, zone: str) -> str:
-    """A time stamp on the wall clock of ``zone``."""
-    return wall_clock(datetime.fromisoformat(text), zone)
+    """The date of a time stamp in the reader's zone, as the language writes it."""
+    return datetime.fromisoformat(text).astimezone(ZoneInfo(current().zone)).strftime(languages.date_format())
 
 
 def time_left(seconds: Mapping[str, float]) -> str:

@@ -95,7 +95,7 @@ def _cases(count: int) -> str:
 def links(content: dict[str, Any], public_url: str) -> dict[str, str]:
     """Addresses of the pages of the study, the schedule and the last night."""
     study = {"study": f"{public_url}/studies/{content['study']}"} if content.get("study") else {}
-    return {**study, "schedule": f"{public_url}/schedules/{content['schedule']}", "night": f"{public_url}/night"}
+    return {**study, "schedule": f"{public_url}/nights/{content['schedule']}", "night": f"{public_url}/nights"}
 
 
 def mail(report: Claimed, delivery: Delivery, now: datetime, curve: bytes | None) -> EmailMessage:

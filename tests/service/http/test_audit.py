@@ -167,13 +167,13 @@ CHANGES: dict[str, tuple[str, Change]] = {
         "component.remove",
         lambda w: w.http.delete(f"{API}/components/{w.component()}"),
     ),
-    "POST /components": (
+    "POST /parts": (
         "component.add",
-        lambda w: w.post("/components", data={"kind": "spring", "name": "F", "fields/spring_rate": "9 N/mm"}),
+        lambda w: w.post("/parts", data={"kind": "spring", "name": "F", "fields/spring_rate": "9 N/mm"}),
     ),
-    "POST /components/{component_id}/delete": (
+    "POST /parts/{component_id}/delete": (
         "component.remove",
-        lambda w: w.post(f"/components/{w.component()}/delete"),
+        lambda w: w.post(f"/parts/{w.component()}/delete"),
     ),
     "POST /api/v1/views": (
         "view.save",
@@ -201,14 +201,14 @@ CHANGES: dict[str, tuple[str, Change]] = {
         lambda w: w.post(f"/studies/{swept_study(w.service)}/narrow"),
     ),
     "POST /studies/{study_id}/{verb}": ("study.pause", lambda w: w.post(f"/studies/{w.waiting()}/pause")),
-    "POST /schedules/new": ("schedule.create", lambda w: w.post("/schedules/new", data=_fields(w))),
-    "POST /schedules/{schedule_id}": (
+    "POST /nights/new": ("schedule.create", lambda w: w.post("/nights/new", data=_fields(w))),
+    "POST /nights/{schedule_id}": (
         "schedule.change",
-        lambda w: w.post(f"/schedules/{w.schedule()}", data={**_fields(w), "priority": "3"}),
+        lambda w: w.post(f"/nights/{w.schedule()}", data={**_fields(w), "priority": "3"}),
     ),
-    "POST /schedules/{schedule_id}/{verb}": (
+    "POST /nights/{schedule_id}/{verb}": (
         "schedule.delete",
-        lambda w: w.post(f"/schedules/{w.schedule()}/delete"),
+        lambda w: w.post(f"/nights/{w.schedule()}/delete"),
     ),
 }
 
@@ -296,16 +296,16 @@ def test_administrators_read_filter_and_export_it(office: Office) -> None:
 
 def test_the_page_of_the_log(office: Office) -> None:
     ada, made = office.program("ada"), office.program("dora").post(f"{API}/studies", json=SPEC).json()["id"]
-    shown = ada.get("/audit", params={"actor": "dora"})
+    shown = ada.get("/me/audit", params={"actor": "dora"})
     assert shown.status_code == 200
     assert f'href="/studies/{made}"' in shown.text
     assert "user.add" not in shown.text
-    assert "user.add" in ada.get("/audit").text
+    assert "user.add" in ada.get("/me/audit").text
     assert "<td>API<br>" in shown.text, "the way is called as in the answers of the API"
-    wrong = ada.get("/audit", params={"since": "yesterday"})
+    wrong = ada.get("/me/audit", params={"since": "yesterday"})
     assert wrong.status_code == 422
     assert 'id="wrong-since"' in wrong.text
-    users = ada.get("/users").text
+    users = ada.get("/me/users").text
     assert all(name in users for name in ("vera", "dora", "ada", "of dora"))
-    assert 'href="/audit"' in ada.get("/schedules").text
-    assert 'href="/audit"' not in office.program("dora").get("/schedules").text
+    assert 'href="/me/audit"' in ada.get("/me").text
+    assert 'href="/me/audit"' not in office.program("dora").get("/me").text

@@ -165,7 +165,7 @@ def test_other_sites_may_look_but_not_change(service: Service, headers: dict[str
 
 
 def test_every_answer_has_the_security_headers(service: Service) -> None:
-    for path in ("/", "/docs", "/openapi.json", "/livez", "/nope", "/static/sprag.css", "/api/v1/studies"):
+    for path in ("/", "/help/interface", "/openapi.json", "/livez", "/nope", "/static/sprag.css", "/api/v1/studies"):
         headers = service.http.get(path).headers
         assert headers["content-security-policy"].startswith("default-src 'self'"), path
         assert headers["x-content-type-options"] == "nosniff"

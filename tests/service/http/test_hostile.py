@@ -92,10 +92,10 @@ def test_a_hostile_field_of_a_schedule_is_told_beside_it(service: Service, text:
     source = f"study {service.submit()}"
     for field in ("source", "name", "zone", "cron", "at", "window_begin", "window_end", "priority", "when"):
         form = {"source": source, **FORM, "when": "at" if field == "at" else "cron", field: text}
-        answer = service.http.post("/schedules/new", data=form)
+        answer = service.http.post("/nights/new", data=form)
         assert answer.status_code in (303, 422), (field, answer.text[:300])
         assert "<script>alert" not in answer.text
-    assert "<script>alert" not in service.http.get("/schedules").text
+    assert "<script>alert" not in service.http.get("/nights").text
 
 
 @pytest.mark.parametrize("kind", ["json", "toml"])
@@ -162,11 +162,11 @@ NAMES = (
 def test_a_hostile_name_is_a_name(service: Service, name: str) -> None:
     study_id = service.submit({**SPEC, "name": name})
     service.fill(study_id)
-    for page in ("/", f"/studies/{study_id}", f"/studies/{study_id}/cases", f"/new?clone={study_id}", "/schedules/new"):
+    for page in ("/", f"/studies/{study_id}", f"/studies/{study_id}/cases", f"/new?clone={study_id}", "/nights/new"):
         text = service.http.get(page).text
         assert "<script>alert" not in text
         assert "<img src=x" not in text
-        assert "{{ 7 * 7 }}" in text or "{{ 7 * 7 }}" not in name or page == "/schedules/new"
+        assert "{{ 7 * 7 }}" in text or "{{ 7 * 7 }}" not in name or page == "/nights/new"
     for form in ("csv", "xlsx", "json"):
         disposition = service.http.get(f"/api/v1/studies/{study_id}/results?format={form}").headers[
             "content-disposition"

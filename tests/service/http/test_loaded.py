@@ -16,7 +16,7 @@ from sprag.worker import models
 async def look():
     app = create_app(Settings(database=sys.argv[1]), computer=object(), checker=object())
     async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
-        for path in ("/", "/new?mode=text", "/schedules", "/components", "/api/v1/presets", "/api/v1/models"):
+        for path in ("/", "/new?mode=text", "/nights", "/parts", "/api/v1/presets", "/api/v1/models"):
             answer = await client.get(path)
             assert answer.status_code == 200, (path, answer.text)
 

@@ -184,7 +184,7 @@ def test_a_login_leads_back_and_its_cookie_is_for_the_prefix(
     page = browser.get(refused.headers["location"])
     language, action = [v for tag, name, v in Attributes(page.text).found if (tag, name) == ("form", "action")]
     assert (language, action) == (f"{OWN}/language", f"{OWN}/login")
-    entered = browser.post(action, data={"token": token, "next": "/schedules"})
+    entered = browser.post(action, data={"token": token, "next": "/nights"})
     assert (entered.status_code, entered.headers["location"]) == (303, f"{OWN}/schedules")
     assert re.search(rf"; path={OWN}(;|$)", entered.headers["set-cookie"], re.IGNORECASE)
     assert browser.get(f"{OWN}/schedules").status_code == 200

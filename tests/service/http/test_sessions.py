@@ -272,11 +272,11 @@ def test_a_form_sent_after_its_session_ended_comes_back_as_it_was_typed(office: 
 def test_a_form_sent_with_a_token_to_look_is_kept_for_another_token(office: Office) -> None:
     browser = office.browser(**OWN)
     assert browser.post("/login", data={"token": office.read}).status_code == 303
-    refused = browser.post("/schedules/new", data={"name": "nightly"})
+    refused = browser.post("/nights/new", data={"name": "nightly"})
     assert refused.status_code == 403
     assert "Token manager is read-only." in refused.text
     back = browser.post("/login", data={**fields_of(refused.text), "token": office.write})
-    assert 'action="/schedules/new"' in back.text
+    assert 'action="/nights/new"' in back.text
     assert fields_of(back.text) == {"name": "nightly"}
 
 
@@ -301,7 +301,7 @@ def test_what_is_no_form_is_refused_and_not_kept(office: Office) -> None:
     assert "my &" not in other.text
 
 
-@pytest.mark.parametrize("path", ["/new", "/new?mode=text", "/schedules/new"])
+@pytest.mark.parametrize("path", ["/new", "/new?mode=text", "/nights/new"])
 def test_a_token_to_look_is_told_so_before_anything_is_typed(office: Office, path: str) -> None:
     for token, told in ((office.read, True), (office.write, False)):
         browser = office.browser(**OWN)

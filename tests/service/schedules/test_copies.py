@@ -136,12 +136,12 @@ def test_a_copy_fires_nothing_until_it_is_adopted_and_the_original_goes_on(
     own = settings.model_copy(update={"database": str(target)})
     http = connect(create_app(own, store=copy, computer=InThread(), checker=InThread()))
     assert OFF in http.get("/api/v1/schedules").json()["off"]
-    assert OFF in http.get("/schedules").text
+    assert OFF in http.get("/nights").text
     assert_no_next_run(http, capsys)
-    assert "копія" in http.get("/schedules", headers={"Accept-Language": "uk"}).text
+    assert "копія" in http.get("/nights", headers={"Accept-Language": "uk"}).text
     assert OFF in http.get("/api/v1/night").json()["off"]
-    assert OFF in http.get("/night").text
-    assert "копія" in http.get("/night", headers={"Accept-Language": "uk"}).text
+    assert OFF in http.get("/nights").text
+    assert "копія" in http.get("/nights", headers={"Accept-Language": "uk"}).text
     copy.work.take_over("here:1")
     ready = http.get("/readyz")
     assert ready.status_code == 200
@@ -170,9 +170,9 @@ def test_a_copy_fires_nothing_until_it_is_adopted_and_the_original_goes_on(
     assert schedule["next_due"] == "2026-01-03T01:00:00Z"
     assert http.get(schedule["links"]["self"]).json()["off"] is http.get("/api/v1/schedules").json()["off"] is None
     assert "schedule_next_due_timestamp_seconds{" in http.get("/metrics").text
-    assert OFF not in http.get("/schedules").text
+    assert OFF not in http.get("/nights").text
     assert http.get("/api/v1/night").json()["off"] is None
-    assert OFF not in http.get("/night").text
+    assert OFF not in http.get("/nights").text
 
 
 def assert_no_next_run(http: httpx.Client, capsys: pytest.CaptureFixture[str]) -> None:
@@ -182,7 +182,7 @@ def assert_no_next_run(http: httpx.Client, capsys: pytest.CaptureFixture[str]) -
     for each in (schedule, shown):
         assert each["next_due"] is each["next_due_local"] is None
     assert OFF in shown["off"]
-    assert '<td data-head="Next run">none</td>' in http.get("/schedules").text
+    assert '<td data-head="Next run">none</td>' in http.get("/nights").text
     metrics = http.get("/metrics").text
     assert "schedule_last_run_timestamp_seconds" in metrics
     assert "schedule_next_due_timestamp_seconds{" not in metrics

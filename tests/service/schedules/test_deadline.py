@@ -341,7 +341,7 @@ def test_each_run_of_a_schedule_gets_its_deadline(service: Service, clock: fakes
     (study,) = service.store.studies.page().studies
     assert study.coarse
     assert study.finish_by == due + timedelta(hours=8)
-    assert "finished by 06:00" in service.http.get("/schedules").text
+    assert "finished by 06:00" in service.http.get("/nights").text
     changed = service.http.patch(f"/api/v1/schedules/{kept.json()['id']}", json={"finish_by": None})
     assert changed.json()["finish_by"] is None
     refused = service.http.post("/api/v1/schedules", json={**given, "finish_by": "25:00"})

@@ -161,29 +161,29 @@ def fill_in(**given: str) -> dict[str, str]:
 
 def test_a_schedule_is_kept_changed_and_deleted_by_the_pages(service: Service, clock: Clock) -> None:
     study_id = service.submit()
-    assert f'value="study {study_id}" selected' in service.http.get(f"/schedules/new?study={study_id}").text
+    assert f'value="study {study_id}" selected' in service.http.get(f"/nights/new?study={study_id}").text
     form = fill_in(source=f"study {study_id}", window_begin="22:00", window_end="06:00", name="<b>by form</b>")
-    assert service.http.post("/schedules/new", data=form).status_code == 303
+    assert service.http.post("/nights/new", data=form).status_code == 303
     (kept,) = service.store.schedules.all()
     assert (kept.fields.spec, kept.fields.name) == (SPEC, "<b>by form</b>")
-    listed = service.http.get("/schedules").text
+    listed = service.http.get("/nights").text
     assert "&lt;b&gt;by form" in listed
     assert "22:00–06:00" in listed
-    assert "2026-01-01 22:00 UTC" in listed
-    assert 'value="22:00"' in service.http.get(f"/schedules/{kept.id}").text
+    assert "2026-01-01 22:00</time>" in listed
+    assert 'value="22:00"' in service.http.get(f"/nights/{kept.id}").text
     change = fill_in(source="", when="at", at="2026-01-05T07:30", zone="Europe/Berlin", fresh="on", priority="-2")
-    assert service.http.post(f"/schedules/{kept.id}", data=change).status_code == 303
+    assert service.http.post(f"/nights/{kept.id}", data=change).status_code == 303
     (changed,) = service.store.schedules.all()
     assert changed.next_due == datetime(2026, 1, 5, 6, 30, tzinfo=UTC)
     assert (changed.fields.spec, changed.fields.fresh, changed.fields.priority) == (SPEC, True, -2)
     clock.set("2026-01-06T00:00")
     Scheduler(service.store).look()
-    assert ">its study</a>" in service.http.get("/schedules").text
-    assert service.http.post(f"/schedules/{kept.id}", data={**change, "name": "later"}).status_code == 303
-    service.http.post(f"/schedules/{kept.id}/pause")
-    assert "paused" in service.http.get("/schedules").text
-    assert service.http.post(f"/schedules/{kept.id}/explode").status_code == 404
-    assert service.http.post(f"/schedules/{kept.id}/delete").status_code == 303
+    assert ">its study</a>" in service.http.get("/nights").text
+    assert service.http.post(f"/nights/{kept.id}", data={**change, "name": "later"}).status_code == 303
+    service.http.post(f"/nights/{kept.id}/pause")
+    assert "paused" in service.http.get("/nights").text
+    assert service.http.post(f"/nights/{kept.id}/explode").status_code == 404
+    assert service.http.post(f"/nights/{kept.id}/delete").status_code == 303
     assert service.store.schedules.all() == ()
 
 
@@ -205,7 +205,7 @@ def test_a_schedule_is_kept_changed_and_deleted_by_the_pages(service: Service, c
     ],
 )
 def test_the_form_tells_what_is_wrong_beside_the_field(service: Service, given: dict[str, str], field: str) -> None:
-    answer = service.http.post("/schedules/new", data=fill_in(**given))
+    answer = service.http.post("/nights/new", data=fill_in(**given))
     assert answer.status_code == 422
     assert f'id="wrong-{field}" role="alert">' in answer.text
     assert service.store.schedules.all() == ()

@@ -225,7 +225,7 @@ def test_the_interface_has_times_of_the_zone(service: Service, clock: Clock) -> 
     Scheduler(service.store).look()
     found = service.get(f"/schedules/{made['id']}")
     assert [run["due_local"] for run in found["runs"]] == ["2026-01-02T00:00:00+09:00"]
-    assert "2026-01-02 00:00 JST (Asia/Tokyo)" in service.http.get("/schedules").text
+    assert "2026-01-02 00:00</time>" in service.http.get("/nights", headers={"Cookie": "sprag_here=Asia%2FTokyo"}).text
 
 
 @pytest.mark.parametrize(

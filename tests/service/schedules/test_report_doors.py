@@ -119,13 +119,13 @@ def test_the_form_has_recipients(office: Service) -> None:
         "report_webhook": HOOK,
         "report_when": "trouble",
     }
-    assert office.http.post("/schedules/new", data=form).status_code == 303
+    assert office.http.post("/nights/new", data=form).status_code == 303
     (kept,) = office.store.schedules.all()
     assert kept.fields.report_to.email == ("dora@example.com", "otto@example.org")
-    shown = office.http.get(f"/schedules/{kept.id}").text
+    shown = office.http.get(f"/nights/{kept.id}").text
     assert 'value="dora@example.com, otto@example.org"' in shown
     assert '<option value="trouble" selected>' in shown
-    wrong = office.http.post("/schedules/new", data={**form, "report_email": "dora@elsewhere.example"})
+    wrong = office.http.post("/nights/new", data={**form, "report_email": "dora@elsewhere.example"})
     assert wrong.status_code == 422
     assert 'id="wrong-report_email" role="alert">' in wrong.text
 
@@ -139,7 +139,7 @@ def test_the_last_night_has_its_reports_without_secrets(office: Service, clock: 
         ("email", "dora@example.com", "waiting"),
         ("webhook", "https://hooks.example:443", "waiting"),
     ]
-    assert "Report to dora@example.com: waiting" in office.http.get("/night").text
+    assert "Report to dora@example.com: waiting" in office.http.get("/nights").text
     assert "?to=1" not in json.dumps(run)
 
 

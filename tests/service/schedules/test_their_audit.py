@@ -90,8 +90,8 @@ def test_every_change_by_every_door_is_in_the_log(service: Service, clock: Clock
     made = service.http.post(api, json={"spec": SPEC, "cron": "@hourly", "misfire_grace": "1 min"})
     schedule = made.json()["id"]
     service.http.patch(made.headers["location"], json={"overlap": "skip", "report_when": "trouble"})
-    service.http.post(f"/schedules/{schedule}/pause")
-    service.http.post(f"/schedules/{schedule}/resume")
+    service.http.post(f"/nights/{schedule}/pause")
+    service.http.post(f"/nights/{schedule}/resume")
     for _ in range(2):  # the second one changes nothing
         fields = change_fields(store.schedules.get(schedule).fields, {"priority": 1}, clock.now())
         store.schedules.change(schedule, fields)

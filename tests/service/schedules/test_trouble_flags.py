@@ -114,7 +114,7 @@ def test_a_night_is_judged_by_the_flags_of_its_schedule(
     ended = "9 of 9 cases are done, and 9 of them ended ok. " + end if end else "all 9 cases ended ok."
     assert outcome["sentence"] == f"Finished: {ended}"
     assert service.get("/night")["trouble"] == bool(end)
-    assert ("needs attention" if end else "The only run went as planned") in service.http.get("/night").text
+    assert ("needs attention" if end else "The only run went as planned") in service.http.get("/nights").text
     assert service.get("/schedules")["schedules"][0]["last_run"]["outcome"] == outcome
 
 
@@ -240,7 +240,7 @@ def ticked(page: str) -> set[str]:
 
 
 def test_the_form_has_a_box_for_each_flag(service: Service) -> None:
-    empty = service.http.get("/schedules/new").text
+    empty = service.http.get("/nights/new").text
     assert set(re.findall(r'name="trouble_flags/(\w+)"', empty)) == set(models.flags_of(models.VIBRATION_DRIVE))
     assert ticked(empty) == {"not_settled", "unsettled"}
     usual = {"trouble_flags/unsettled": "on", "trouble_flags/not_settled": "on"}
@@ -250,10 +250,10 @@ def test_the_form_has_a_box_for_each_flag(service: Service) -> None:
         ({"trouble_flags/jumped": "on"}, ("jumped",), {"jumped"}),
         ({"trouble_flags/unsettled": "on"}, ("unsettled",), {"unsettled"}),
     ):
-        assert service.http.post("/schedules/new", data={**FORM, **boxes}).status_code == 303
+        assert service.http.post("/nights/new", data={**FORM, **boxes}).status_code == 303
         record = service.store.schedules.all()[0]
         assert record.fields.trouble_flags == kept
-        page = f"/schedules/{record.id}"
+        page = f"/nights/{record.id}"
         assert ticked(service.http.get(page).text) == shown
         # Saved again as it is shown, with "the current one" for the study.
         again = {**FORM, "source": "", **{f"trouble_flags/{name}": "on" for name in shown}}
@@ -270,7 +270,7 @@ def test_the_form_says_what_is_wrong_in_the_language_of_the_page(service: Servic
         ("en", ("is not a flag of the model machine-shaft, which has none; allowed: no flag", "What needs attention")),
         ("uk", ("; дозволено: жодної позначки<", "Що потребує уваги", "Стрибок")),
     ):
-        answer = service.http.post(f"/schedules/new?language={language}", data=shaft)
+        answer = service.http.post(f"/nights/new?language={language}", data=shaft)
         assert answer.status_code == 422
         fault = re.search(r'id="wrong-trouble_flags" role="alert">([^<]*)<', answer.text)
         assert fault, "beside the boxes"
@@ -279,11 +279,11 @@ def test_the_form_says_what_is_wrong_in_the_language_of_the_page(service: Servic
         assert ticked(answer.text) == {"jumped"}
     usual = {**shaft, "trouble_flags/unsettled": "on", "trouble_flags/not_settled": "on"}
     del usual["trouble_flags/jumped"]
-    assert service.http.post("/schedules/new", data=usual).status_code == 303, "the usual ones fit every model"
+    assert service.http.post("/nights/new", data=usual).status_code == 303, "the usual ones fit every model"
 
 
 def test_the_example_of_a_cron_expression_keeps_its_asterisks(service: Service) -> None:
-    answer = service.http.post("/schedules/new", data={**FORM, "cron": "never"})
+    answer = service.http.post("/nights/new", data={**FORM, "cron": "never"})
     assert 'allowed: five fields, such as "0 22 * * 1-5"' in html.unescape(answer.text)
 
 

@@ -78,7 +78,7 @@ def test_late_runs_are_shown_wherever_people_look(
     assert [(late["schedule"], late["due_local"]) for late in found["late"]] == [
         (schedule, "2026-01-01T02:00:00+01:00")
     ]
-    page = service.http.get("/night").text
+    page = service.http.get("/nights").text
     assert "&lt;b&gt;late&lt;/b&gt;</a> is late" in page
     assert "no worker has taken it up" in page
     (warning,) = service.http.get("/readyz").json()["warnings"]

@@ -95,7 +95,7 @@ def test_it_is_extended_cloned_selected_and_scheduled_as_it_was(service: Service
     assert "20.0000" in page
     assert "20.000;" not in page
     form = {"when": "cron", "cron": "0 22 * * *", "priority": "0", "zone": "UTC", "source": f"study {stored}"}
-    assert service.http.post("/schedules/new", data=form).status_code == 303
+    assert service.http.post("/nights/new", data=form).status_code == 303
     (schedule,) = service.store.schedules.all()
     assert gravity(schedule.fields.spec) == pytest.approx([0.020, 0.025])
 

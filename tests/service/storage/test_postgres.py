@@ -314,7 +314,7 @@ def test_the_service_answers_as_it_does_with_a_file(
             f"/studies/{study}/cases?ending=a%00b": 422,
             f"/studies/{study}/cases/999999999999999999": 404,
             "/studies/a%00b": 404,
-            "/schedules/a%00b": 404,
+            "/nights/a%00b": 404,
         }.items():
             answer = service.http.get(API + address)
             assert answer.status_code == status, (address, answer.text)

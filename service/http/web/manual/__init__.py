@@ -105,4 +105,4 @@ def _address(target: str) -> str:
     if target.startswith("#"):
         return target
     found = _LINK.fullmatch(target)
-    return here(f"/docs/{found['name']}{found['heading'] or ''}") if found and found["name"] in PAGES else ""
+    return here(f"/help/{found['name']}{found['heading'] or ''}") if found and found["name"] in PAGES else ""

@@ -176,7 +176,7 @@ sprag.take = (page, selector, { keep = false } = {}) => {
 };
 
 // The draft of a submitted form is not needed any more, nor is any draft by the next user of this browser.
-if (location.pathname.startsWith(`${sprag.prefix}/studies/`) || location.pathname === `${sprag.prefix}/schedules`) {
+if (location.pathname.startsWith(`${sprag.prefix}/studies/`) || location.pathname === `${sprag.prefix}/nights`) {
   const sent = sessionStorage.getItem("sprag.sent");
   if (sent) localStorage.removeItem(sent);
   sessionStorage.removeItem("sprag.sent");

@@ -164,7 +164,7 @@ def test_pages_load_nothing_from_elsewhere_and_lead_nowhere_wrong(service: Servi
     parts = [f"/studies/{study_id}{part}" for part in ("", "/curves", "/map", "/cases", "/cases?sort=-case")]
     for page in (
         "/",
-        "/docs",
+        "/help/interface",
         "/new",
         "/new?preset=two_pendulums",
         "/new?mode=text",
@@ -201,7 +201,7 @@ def test_a_study_page_names_values_with_units_and_shows_the_spec_as_given(
 
 
 def test_pages_show_code_as_code(service: Service) -> None:
-    for page in ("/docs", "/problems/invalid-spec"):
+    for page in ("/help/interface", "/problems/invalid-spec"):
         text, _ = read_page(service, page)
         assert "`" not in text
         assert "<code>errors</code> lists" in text

@@ -28,26 +28,26 @@ def language_of(page: str) -> str:
     ],
 )
 def test_a_page_is_in_the_language_that_is_accepted(service: Service, accepted: str, expected: str) -> None:
-    answer = service.http.get("/units", headers={"Accept-Language": accepted})
+    answer = service.http.get("/me", headers={"Accept-Language": accepted})
     assert language_of(answer.text) == expected
     assert {"Accept-Language", "Cookie"} <= {name.strip() for name in answer.headers["vary"].split(",")}
 
 
 def test_the_choice_is_kept_and_leads_back(service: Service) -> None:
-    page = service.http.get("/workers?language=en", headers=UKRAINIAN).text
+    page = service.http.get("/me/workers?language=en", headers=UKRAINIAN).text
     assert language_of(page) == "en"
-    assert 'name="back" value="/workers"' in page
+    assert 'name="back" value="/me/workers"' in page
     assert '<button class="plain" name="language" value="uk" lang="uk">Українська</button>' in page
-    answer = service.http.post("/language", data={"language": "uk", "back": "/workers"}, follow_redirects=False)
-    assert (answer.status_code, answer.headers["location"]) == (303, "/workers")
-    chosen = service.http.get("/workers", headers={"Accept-Language": "en"})
+    answer = service.http.post("/me", data={"language": "uk", "back": "/me/workers"}, follow_redirects=False)
+    assert (answer.status_code, answer.headers["location"]) == (303, "/me/workers")
+    chosen = service.http.get("/me/workers", headers={"Accept-Language": "en"})
     assert language_of(chosen.text) == "uk"
     assert ">Дослідження</a>" in chosen.text
     assert 'value="en" lang="en">English</button>' in chosen.text
-    refused = service.http.post("/language", data={"language": "tlh"})
+    refused = service.http.post("/me", data={"language": "tlh"})
     assert (refused.status_code, refused.json()["errors"][0]["allowed"]) == (422, "en, uk")
     assert "set-cookie" not in refused.headers
-    outside = service.http.post("/language", data={"language": "en", "back": "//evil.example"}, follow_redirects=False)
+    outside = service.http.post("/me", data={"language": "en", "back": "//evil.example"}, follow_redirects=False)
     assert outside.headers["location"] == "/"
 
 

@@ -91,9 +91,8 @@ def test_every_kind_of_page_outlives_a_stop_of_the_service(browser: Browser, tmp
             "list": "/",
             "study": f"/studies/{study}",
             "cases": f"/studies/{study}/cases",
-            "schedules": "/schedules",
-            "night": "/night",
-            "workers": "/workers",
+            "schedules": "/nights",
+            "workers": "/me/workers",
             "form": "/new?preset=one_pendulum",
         }
         # Each in a window of its own: a browser has few connections to a host, and one window shows one tab.
@@ -119,7 +118,7 @@ def test_every_kind_of_page_outlives_a_stop_of_the_service(browser: Browser, tmp
             page.get_by_role("button", name="Try now").evaluate_all("buttons => buttons.forEach((one) => one.click())")
             expect(page.locator(".link-lost")).to_have_count(0)
         expect(pages["list"].locator("#studies")).to_contain_text("After")
-        expect(pages["schedules"].locator("#schedules")).to_contain_text("Changed")
+        expect(pages["schedules"].locator("#nights")).to_contain_text("Changed")
         expect(pages["study"].locator("#progress .state")).to_have_text("cancelled")
         expect(pages["cases"].locator("#head")).not_to_contain_text("Cancel the rest")
         expect(dispatcher).not_to_have_text(before)

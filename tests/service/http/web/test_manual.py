@@ -61,7 +61,7 @@ def targets() -> dict[str, set[str]]:
 
 @pytest.mark.parametrize("name", PAGES)
 def test_links_of_a_page_lead_to_headings_that_exist(service: Service, name: str) -> None:
-    answer = service.http.get(f"/docs/{name}", headers={"Accept-Language": "uk"})
+    answer = service.http.get(f"/help/{name}", headers={"Accept-Language": "uk"})
     assert answer.status_code == 200
     assert '<html lang="uk"' in answer.text
     assert '<article class="manual" lang="en">' in answer.text
@@ -70,24 +70,24 @@ def test_links_of_a_page_lead_to_headings_that_exist(service: Service, name: str
     for link in found.links:
         address = urlsplit(link)
         assert not address.netloc
-        page = address.path.removeprefix("/docs/") or name
+        page = address.path.removeprefix("/help/") or name
         assert page in known, link
         assert not address.fragment or address.fragment in known[page], link
     assert "&lt;!--" not in str(manual_page(name).html)
 
 
 def test_a_page_has_the_text_of_its_file(service: Service) -> None:
-    page = service.http.get("/docs/theory-machine-shaft").text
+    page = service.http.get("/help/theory-machine-shaft").text
     assert '<h2 id="the-mean-speed-and-t_0">The mean speed and T_0</h2>' in page
     assert "omega^2 = S1 + S2 + S3 + S4 " in page
     assert re.search(r"<td><code>midrange</code> \(default\)</td>", page)
     assert titles()["theory"] == "Theory of the vibration drive"
-    assert service.http.get("/docs/operations").status_code == 404
+    assert service.http.get("/help/operations").status_code == 404
 
 
 def test_a_service_at_a_path_of_its_own_has_it_in_the_links() -> None:
     with knowing(prefix="/sprag"):
-        assert 'href="/sprag/docs/theory#settled-motion"' in str(manual_page("guide").html)
+        assert 'href="/sprag/help/theory#settled-motion"' in str(manual_page("guide").html)
 
 
 @pytest.mark.parametrize("model", [models.VIBRATION_DRIVE, models.MACHINE_SHAFT])
@@ -104,6 +104,6 @@ def test_every_field_links_to_the_section_that_explains_it(service: Service, add
     found, known = Read(service.http.get(address).text), targets()
     assert len(found.helps) > 10
     for field, link in found.helps.items():
-        page, _, heading = link.removeprefix("/docs/").partition("#")
+        page, _, heading = link.removeprefix("/help/").partition("#")
         assert page in known, (field, link)
         assert not heading or heading in known[page], (field, link)

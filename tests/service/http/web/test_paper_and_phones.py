@@ -152,7 +152,7 @@ def test_the_list_of_schedules_needs_no_scrolling_to_the_side(visitor: Visitor, 
     schedule = {"spec": SPEC, "at": "2099-12-31T23:59", "name": LONG, "zone": "America/Argentina/ComodRivadavia"}
     assert office.http.post("/api/v1/schedules", json=schedule).status_code == 201
     page = visitor.page
-    page.goto("/schedules")
+    page.goto("/nights")
     widths = page.evaluate("() => [...document.querySelectorAll('.scroll')].map((e) => e.scrollWidth - e.clientWidth)")
     assert widths == [0]
     heads = page.locator("#" + office.get("/schedules")["schedules"][0]["id"] + " td[data-head]")

@@ -117,7 +117,7 @@ def test_the_service_says_how_to_build_it(service: Service, tmp_path: Path, monk
     answer = service.http.get("/docs/site/", headers={"Accept": "text/html"})
     assert answer.status_code == 404
     assert "make docs" in answer.text
-    assert "/docs/site/" not in service.http.get("/docs/theory").text
+    assert "/docs/site/" not in service.http.get("/help").text
 
 
 @pytest.mark.usefixtures("shown")
@@ -133,7 +133,7 @@ def test_the_service_shows_it(service: Service) -> None:
     assert service.http.get("/docs/site/adr/0012-one-package.html").status_code == 200
     for name in ("nowhere.html", "../pages.py", "%2e%2e/pages.py", "adr"):
         assert service.http.get(f"/docs/site/{name}").status_code == 404, name
-    for page in ("/docs", "/docs/theory"):
+    for page in ("/help",):
         assert 'href="/docs/site/"' in service.http.get(page).text
 
 

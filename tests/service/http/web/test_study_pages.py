@@ -155,7 +155,7 @@ def test_no_page_asks_another_host(visitor: Visitor, example: str) -> None:
     page = visitor.page
     own = f"/studies/{example}"
     pages = ("/", "/new", "/new?preset=two_pendulums", f"/new?clone={example}", "/new?mode=text", own, f"{own}/curves",
-             f"{own}/map", f"{own}/cases", f"{own}/cases/3", f"/compare?study={example}", "/compare", "/docs",
+             f"{own}/map", f"{own}/cases", f"{own}/cases/3", f"/compare?study={example}", "/compare", "/help/interface",
              "/problems/invalid-spec", "/studies/st_none", "/laboratory")  # fmt: skip
     for address in pages:
         page.goto(address)

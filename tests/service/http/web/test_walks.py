@@ -36,7 +36,7 @@ def test_the_focus_stays_where_somebody_works_on_the_form(visitor: Visitor) -> N
     Keys(page).reach(named(page, "/name"))
     with page.expect_popup() as opening:
         page.keyboard.press("F1")
-    assert opening.value.url.endswith("/docs/guide#a-new-study")
+    assert opening.value.url.endswith("/help/guide#a-new-study")
     opening.value.close()
     for left in (2, 1, 0):
         page.locator(f'button[value="drop-axes {left}"]').press("Enter")

@@ -87,7 +87,7 @@ def test_code_names_are_shown_on_request(service: Service, study_id: str) -> Non
 
 def test_units_are_chosen_once_and_kept(service: Service, study_id: str) -> None:
     form = {"rest": "si", "speed": "rpm", "torque": "N*mm", "names": "captions", "back": f"/studies/{study_id}/cases"}
-    answer = service.http.post("/units", data=form, follow_redirects=False)
+    answer = service.http.post("/me", data=form, follow_redirects=False)
     assert (answer.status_code, answer.headers["location"]) == (303, f"/studies/{study_id}/cases")
     row = service.store.rows.case(study_id, 0)
     assert row is not None
@@ -107,12 +107,12 @@ def test_units_are_chosen_once_and_kept(service: Service, study_id: str) -> None
 
 
 def test_what_is_chosen_on_a_page_leads_back_to_a_page(service: Service) -> None:
-    answered = service.http.post("/components", data={"kind": "belt"}).text  # the address may have no page of its own
-    assert 'href="/units"' in answered
+    answered = service.http.post("/parts", data={"kind": "belt"}).text  # the address may have no page of its own
+    assert 'href="/me"' in answered
     assert 'name="back" value="/"' in answered
-    assert 'href="/units"' in service.http.get("/").text
+    assert 'href="/me"' in service.http.get("/").text
     for length, back in ((3000, f"/compare?x={'a' * 3000}"), (5000, "/")):
-        page = service.http.get("/units", params={"back": f"/compare?x={'a' * length}"})
+        page = service.http.get("/me", params={"back": f"/compare?x={'a' * length}"})
         assert page.status_code == 200
         assert f'name="back" value="{back}"' in page.text
 

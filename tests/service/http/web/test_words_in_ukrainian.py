@@ -45,7 +45,7 @@ def test_fields_examples_and_choices_are_as_they_are_typed(service: Service) -> 
     study_id = service.submit()
     case = f"/studies/{study_id}/cases/0"
     motion, branch, components = (
-        service.http.get(address, headers=UKRAINIAN).text for address in (case, f"{case}?show=branch", "/components")
+        service.http.get(address, headers=UKRAINIAN).text for address in (case, f"{case}?show=branch", "/parts")
     )
     assert "один період — " in motion
     assert re.search(r'placeholder="[^"]* Н/мм?"', components)
