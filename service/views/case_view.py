@@ -1,7 +1,7 @@
 """The views of a case: what each is asked, who has it, how it is computed, and how it is written and drawn.
 
-One description serves the address of the API, the figure of a page, and the command: see
-`sprag.service.http.api.case_views`, `sprag.service.http.web.figures.cases` and `sprag.service.cli.case_views`.
+One description serves the address of the API, the section of a page, and the command: see
+`sprag.service.http.api.case_views`, `sprag.service.http.web.motion` and `sprag.service.cli.case_views`.
 """
 
 from __future__ import annotations

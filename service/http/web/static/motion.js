@@ -2,7 +2,7 @@
 "use strict";
 
 document.addEventListener("DOMContentLoaded", async () => {
-  const parts = [...document.querySelectorAll(".part:has(> [data-later])")];
+  const parts = [...document.querySelectorAll(".seen:has(> [data-later])")];
   if (!parts.length) return;
   const again = new URL(location.href);
   again.searchParams.set("wait", "1");
