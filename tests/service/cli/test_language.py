@@ -34,6 +34,8 @@ Sprag = Callable[..., Any]
 #: Text in the pseudo-language, and what may stand outside it: names of options, commands, codes, files and numbers.
 MARKED = re.compile(r"⟦[^⟦⟧]*⟧")
 WORD = re.compile(r"[A-Za-z]{2,}")
+#: The only values of an option: ``[heatmap|contour]``.
+CHOICES = re.compile(r"\[[\w-]+(?:\|\s*[\w-]+)+\]")
 NAMES = re.compile(
     r"--?[a-z][\w-]*|<[^>]*>|\b[a-z]+_\w+|[\w/-]+\.[\w./-]*\w|\b[A-Z][A-Z_]+\b"
     r"|[\w.]+@[\w.]+|https?://\S+|\[[\w*/^]+\]|\{[a-z]+\}"
@@ -72,6 +74,7 @@ def unmarked(text: str, names: tuple[str, ...] = ()) -> list[str]:
     before = ""
     while before != text:
         before, text = text, MARKED.sub(" ", text)
+    text = CHOICES.sub(" ", text)
     for name in sorted(names, key=len, reverse=True):
         text = re.sub(rf"(?<![\w.-]){re.escape(name)}(?![\w-])", " ", text)
     return WORD.findall(NAMES.sub(" ", text))
