@@ -22,7 +22,7 @@ from sprag.service.jobs.submission import take_in
 from sprag.service.json_text import to_bytes
 from sprag.service.reading.quantities import SI
 from sprag.service.reading.reader import CAPTIONS, Choice
-from sprag.service.report import REPORT_FORMATS, report_file
+from sprag.service.report import REPORT_FORMATS, Office, report_file
 from sprag.service.results.rounds import round_json
 from sprag.service.results.start_states import check_start
 from sprag.service.storage.errors import StoreError
@@ -145,8 +145,8 @@ class Here(Connection, ABC):
                 return row_files.pieces(library, study_id, rows, choice.units, header, "")
             if part == "/report":
                 question, chosen = asked(ReportQuestion, query), choice_of("format", form, REPORT_FORMATS)
-                office, folder = self._settings.report_office, self._settings.report_folder
-                return [report_file(library, study_id, choice, question, office, folder, chosen)]
+                office = Office.of(self._settings)
+                return [report_file(library, study_id, choice, question, office, chosen)]
             if part == "/cases":
                 cases = asked(CasesQuestion, query)
                 page = case_page(library, study_id, wanted(cases), cases.page_token)

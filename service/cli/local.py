@@ -332,13 +332,12 @@ def _rows(done: LocalRun, form: Format | ReportFormat, header: Header, appendix:
     """The rows of a finished study as the service exports them, or its report."""
     from sprag.service.exports import export, stored
     from sprag.service.reading.reader import Choice
-    from sprag.service.report import report_file
+    from sprag.service.report import Office, report_file
     from sprag.service.views.library import Library
     from sprag.service.views.study_questions import ReportQuestion
 
     if form == "html" or form == "pdf":  # noqa: PLR1714 - narrows the type
         settings = read_settings()
         asked = Choice(settings.units), ReportQuestion(appendix=appendix)
-        library, study_id, folder = Library(done.store), done.record.id, settings.report_folder
-        return iter([report_file(library, study_id, *asked, settings.report_office, folder, form)])
+        return iter([report_file(Library(done.store), done.record.id, *asked, Office.of(settings), form)])
     return export(stored(done.store, done.record, done.store.studies.study(done.record.id), header=header), form)

@@ -37,6 +37,7 @@ from sprag.worker.planning.calibrate.plan import CALIBRATE
 
 if TYPE_CHECKING:
     from sprag.service.report.content import Report
+    from sprag.service.report.office import Office
     from sprag.service.results.key_answers import Found
 
 Write = Callable[["Report"], Iterator[Block]]
@@ -74,12 +75,12 @@ def chapters_of(report: Report) -> dict[str, str]:
     return {name: _(_TITLES[name]) for name in CHAPTERS if name not in without}
 
 
-def appendix(report: Report) -> Iterator[Section]:
+def appendix(report: Report, office: Office) -> Iterator[Section]:
     """The chapters that are asked for, without those that have nothing to say."""
     names = report.question.appendix or ()
     for name, title in chapters_of(report).items():
         if name in names or "all" in names:
-            blocks = tuple(_WRITERS[name](report))
+            blocks = tuple(_facts(report, office) if name == "versions" else _WRITERS[name](report))
             if blocks:
                 yield Section(title, blocks)
 
@@ -252,8 +253,8 @@ def _further(report: Report) -> Iterator[Block]:
         yield Text(_("A result that has the same value everywhere on these curves is in the table of ranges only."))
 
 
-def _facts(report: Report) -> Iterator[Block]:
-    facts = [*facts_of(report.record, report.study, report.spec)]
+def _facts(report: Report, office: Office) -> Iterator[Block]:
+    facts = [*facts_of(report.record, report.study, report.spec, office)]
     if report.kinds.regimes:
         facts.append((_("motions"), shown(counted(report.kinds.regimes))))
     origins = "; ".join(origin.sentence for origin in report.library.store.rows.origins(report.study_id))
@@ -296,7 +297,6 @@ _WRITERS: Final[dict[str, Write]] = {
     "ranges": _ranges,
     "inputs": _inputs,
     "given": _given,
-    "versions": _facts,
     "results": _further,
 }
 

@@ -2,33 +2,30 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Final
 
 from sprag.service.faults import choice_of, refused
-from sprag.service.languages import _, date_format, pgettext
+from sprag.service.languages import _, pgettext
 from sprag.service.reading.limits import characters
 from sprag.service.report.blocks import Block, Document, Section, Text, said
 from sprag.service.report.chapters import appendix, further_figures
 from sprag.service.report.content import AS_TYPED, Report
-from sprag.service.report.facts import moment
+from sprag.service.report.office import Office
 from sprag.service.report.sheets import sheets
 from sprag.service.views.study_questions import CHAPTERS, ReportQuestion
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from datetime import datetime
 
     from sprag.service.reading.reader import Choice
     from sprag.service.views.library import Library
 
 #: Most characters of a text of the author.
 LONGEST_TEXT: Final = 2_000
-
-
-def today() -> str:
-    """The date (UTC), as the language writes it."""
-    return datetime.now(UTC).strftime(date_format())
+#: No office: a document without a name, a logo and templates of its own, in UTC.
+NOBODY: Final = Office()
 
 
 def report_of(
@@ -49,30 +46,34 @@ def report_of(
 
 
 def document_of(
-    library: Library, study_id: str, choice: Choice = AS_TYPED, question: ReportQuestion | None = None, office: str = ""
+    library: Library,
+    study_id: str,
+    choice: Choice = AS_TYPED,
+    question: ReportQuestion | None = None,
+    office: Office = NOBODY,
 ) -> Document:
     """The document of a stored study; raises as `report_of` does."""
     return made_document(report_of(library, study_id, choice, question), office)
 
 
-def made_document(report: Report, office: str = "", *, edited: bool = False) -> Document:
+def made_document(report: Report, office: Office = NOBODY, *, edited: bool = False) -> Document:
     """The document of what is known of a study; one that is ``edited`` has a place for each text of the author."""
-    kept = (said(_without(section, edited=edited), report.reading) for section in sections_of(report))
+    kept = (said(_without(section, edited=edited), report.reading) for section in sections_of(report, office))
     return Document(
         report.title,
         tuple(title_block(report.question, office)),
         tuple(section for section in kept if section.blocks),
-        _("computed by Sprag {version}, {time}", version=version("sprag"), time=moment(_computed(report))),
+        _("computed by Sprag {version}, {time}", version=version("sprag"), time=office.moment(_computed(report))),
     )
 
 
-def sections_of(report: Report) -> Iterator[Section]:
+def sections_of(report: Report, office: Office = NOBODY) -> Iterator[Section]:
     """The sections of a document with sentences and amounts, which `said` prints."""
     yield from sheets(report)
     further = further_figures(report)
     if further is not None:
         yield further
-    yield from appendix(report)
+    yield from appendix(report, office)
 
 
 def _computed(report: Report) -> datetime:
@@ -81,17 +82,17 @@ def _computed(report: Report) -> datetime:
     return record.finished_at or record.started_at or record.created_at
 
 
-def title_block(question: ReportQuestion, office: str) -> Iterator[tuple[str, str]]:
+def title_block(question: ReportQuestion, office: Office) -> Iterator[tuple[str, str]]:
     """What the title block says, in its order; what is not given is left blank, to be written by hand."""
-    if office:
-        yield _("Office"), office
+    if office.name:
+        yield _("Office"), office.name
     if question.project:
         yield _("Project"), question.project
     yield _("Customer"), question.customer
     yield _("Quote"), question.quote
     yield pgettext("of a document", "Number"), question.number
     yield _("Author"), question.author
-    yield _("Date"), today() if question.date is None else question.date
+    yield _("Date"), office.today() if question.date is None else question.date
     yield _("Revision"), question.revision
 
 

@@ -8,18 +8,17 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.languages import _, date_format
+from sprag.service.languages import _
 from sprag.service.reading.reader import model_title
 from sprag.service.reading.wording import number
 
 if TYPE_CHECKING:
-    from datetime import datetime
-
+    from sprag.service.report.office import Office
     from sprag.service.storage.studies.records import StudyRecord
     from sprag.worker.study import Study
 
 
-def facts_of(record: StudyRecord, study: Study, spec: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+def facts_of(record: StudyRecord, study: Study, spec: Mapping[str, Any], office: Office) -> tuple[tuple[str, str], ...]:
     """Names and values of a study; ``spec`` is the user's own."""
     ended = record.finished_at
     counts = {"cases": number(record.cases), "done": number(record.done), "ok": number(record.ok)}
@@ -29,8 +28,8 @@ def facts_of(record: StudyRecord, study: Study, spec: Mapping[str, Any]) -> tupl
         (_("state"), f"{_(record.state.value)}: {_(record.state.sentence)}"),
         (_("cases"), _("{cases}, of which {done} are done and {ok} ended ok", **counts)),
         (_("axes"), _combined(study)),
-        (_("submitted"), moment(record.created_at)),
-        (_("ended"), _("not yet") if ended is None else moment(ended)),
+        (_("submitted"), office.moment(record.created_at)),
+        (_("ended"), _("not yet") if ended is None else office.moment(ended)),
         (_("version of Sprag"), version("sprag")),
         (_("engine"), record.engine_version),
         (_("hash of the physics"), record.physics_hash),
@@ -42,11 +41,6 @@ def spec_hash(spec: Mapping[str, Any]) -> str:
     """SHA-256 of a spec as JSON in ASCII with sorted keys and without spaces."""
     text = json.dumps(spec, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode("ascii")).hexdigest()
-
-
-def moment(time: datetime) -> str:
-    """A time in UTC, the date as the language writes it."""
-    return f"{time:{date_format()} %H:%M} UTC"
 
 
 def _combined(study: Study) -> str:

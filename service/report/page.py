@@ -11,6 +11,7 @@ from sprag.service.report.document import made_document, report_of
 if TYPE_CHECKING:
     from sprag.service.reading.reader import Choice
     from sprag.service.report.blocks import Document
+    from sprag.service.report.office import Office
     from sprag.service.views.library import Library
     from sprag.service.views.study_questions import ReportQuestion
 
@@ -23,7 +24,7 @@ class Shown:
     chapters: dict[str, str]
 
 
-def shown_document(library: Library, study_id: str, choice: Choice, question: ReportQuestion, office: str) -> Shown:
+def shown_document(library: Library, study_id: str, choice: Choice, question: ReportQuestion, office: Office) -> Shown:
     """The document of a stored study with a place for each text of its author; raises as `document_of` does."""
     report = report_of(library, study_id, choice, question)
     return Shown(made_document(report, office, edited=True), chapters_of(report))

@@ -26,7 +26,6 @@ from sprag.service.http.routers import api_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
 from sprag.service.reading.quantities import SI
-from sprag.service.report.document import today
 from sprag.service.views import row_files
 from sprag.service.views.study_questions import ReportQuestion
 
@@ -139,16 +138,16 @@ async def get_report(
     shows first. Figures that were put into the report are drawn in their place unless there is `y`.
     """
     chosen = choose_format(work.request, form, report.MEDIA_TYPES)
-    settings, library = work.context.settings, work.context.library
+    office, library = report.Office.of(work.context.settings), work.context.library
 
     def make(_record: StudyRecord) -> Drawing:
         policy = {"Content-Security-Policy": _REPORT_POLICY} if chosen == "html" else {}
-        asked = library, study_id, choice, dated, settings.report_office, settings.report_folder, chosen
+        asked = library, study_id, choice, dated, office, chosen
         return Drawing(report.report_file, asked, report.MEDIA_TYPES[chosen], policy)
 
     choice_of("language", language, languages.available())
     with languages.language(language):
-        dated = replace(question, date=today() if question.date is None else question.date)
+        dated = replace(question, date=office.today() if question.date is None else question.date)
         return await conditional(work, study_id, f"{chosen} {dated.date}", make)
 
 

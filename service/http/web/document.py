@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 from contextlib import suppress
 from contextvars import copy_context
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 from urllib.parse import urlencode
 
@@ -23,8 +22,8 @@ from sprag.service.http.web.saved_views import saved_here, view_actions
 from sprag.service.http.web.templates import fragment, page
 from sprag.service.http.work import Attended
 from sprag.service.languages import _, pgettext
-from sprag.service.report import logo_of
-from sprag.service.report.document import LONGEST_TEXT, today
+from sprag.service.report import Office
+from sprag.service.report.document import LONGEST_TEXT
 from sprag.service.report.html import embedded
 from sprag.service.report.page import Shown, shown_document
 from sprag.service.views.study_questions import ReportQuestion
@@ -50,13 +49,13 @@ _FIELDS: Final = ("customer", "quote", "number", "author", "date", "revision", "
 async def document_page(*, context: Ctx, work: Attended, study_id: StudyId, question: ReportQuestion) -> Response:
     """The document of a study; where it takes long to make, the page says so and goes on when it is made."""
     given = work.request.query_params.multi_items()
-    kept = _kept(given)
+    office = Office.of(context.settings)
+    kept = _kept(given, office.today())
     if kept != given:
         query = urlencode(kept)
         return RedirectResponse(f"/studies/{study_id}/document{'?' if query else ''}{query}", status_code=303)
     shell = await in_thread(_shell, context, study_id)
     begin, end = shell.split(_HERE)
-    office = context.settings.report_office
     making = asyncio.ensure_future(
         work.check(shown_document, context.library, study_id, current().choice, question, office)
     )
@@ -86,7 +85,7 @@ async def document_page(*, context: Ctx, work: Attended, study_id: StudyId, ques
 router.get("/studies/{study_id:study}/document")(asking(document_page, ReportQuestion))
 
 
-def _kept(given: list[tuple[str, str]]) -> list[tuple[str, str]]:
+def _kept(given: list[tuple[str, str]], today: str) -> list[tuple[str, str]]:
     """The parameters of an address that say something: fields are sent empty too, but only of a date that means none.
 
     Of the texts of the author the empty ones before another one count, because they have places.
@@ -95,7 +94,7 @@ def _kept(given: list[tuple[str, str]]) -> list[tuple[str, str]]:
     return [
         (name, value)
         for place, (name, value) in enumerate(given)
-        if (place <= last if name == "text" else value != today() if name == "date" else value or name not in _FIELDS)
+        if (place <= last if name == "text" else value != today if name == "date" else value or name not in _FIELDS)
     ]
 
 
@@ -125,7 +124,7 @@ def _document(
     faults: tuple[Fault, ...],
 ) -> str:
     """The form of the document and its sheets."""
-    found = context.store.views.all(study_id)
+    found, logo = context.store.views.all(study_id), Office.of(context.settings).logo
     name = question.number or _("Report")
     text = fragment(
         "_document_page.html",
@@ -143,7 +142,7 @@ def _document(
         },
         others=[(key, value) for key, value in kept if key not in (*_FIELDS, "language")],
         file=f"{views.study_address(study_id)}/report",
-        logo=_logo(context),
+        logo=None if logo is None else embedded(logo[1], logo[0]),
         longest=LONGEST_TEXT,
         figures=[saved for saved in found if saved.place is not None],
         here_saved=saved_here(found, "document", study_id, page_query(), name),
@@ -151,8 +150,3 @@ def _document(
         choice=current().choice,
     )
     return str(text)
-
-
-def _logo(context: Context) -> str | None:
-    found = logo_of(Path(folder)) if (folder := context.settings.report_folder) else None
-    return None if found is None else embedded(found[1], found[0])

@@ -18,7 +18,7 @@ from sprag.service.faults import FaultError
 from sprag.service.presets import preset_text
 from sprag.service.reading.reader import Choice
 from sprag.service.reading.wording import number
-from sprag.service.report import write_report
+from sprag.service.report import Office, write_report
 from sprag.service.report.blocks import Document, Image, Section, Table, Text
 from sprag.service.report.content import AS_TYPED, Report, ranges
 from sprag.service.report.document import document_of, report_of
@@ -123,18 +123,18 @@ def test_the_document_is_tagged_and_the_same_for_the_same_study(service: Service
 def test_an_office_has_its_own_template_and_logo(service: Service, tmp_path: Path) -> None:
     study_id = service.submit()
     service.fill(study_id)
-    document = document_of(Library(service.store), study_id, office="Own office")
+    document = document_of(Library(service.store), study_id, office=Office("Own office"))
     (tmp_path / "report.html").write_text("{{ document.particulars[0][1] }} {{ logo }}", encoding="utf-8")
     (tmp_path / "logo.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"/>', "utf-8")
-    page = write_report(document, str(tmp_path), "html").decode()
+    page = write_report(document, Office(folder=str(tmp_path)), "html").decode()
     assert page.startswith("Own office data:image/svg+xml;base64,")
-    plain = write_report(document, "", "pdf")
-    assert write_report(document, str(tmp_path), "pdf") != plain  # with the logo
+    plain = write_report(document, Office(), "pdf")
+    assert write_report(document, Office(folder=str(tmp_path)), "pdf") != plain  # with the logo
     (tmp_path / "report.typ").write_text('#set document(title: "x")\n= Own', encoding="utf-8")
-    assert pages(write_report(document, str(tmp_path), "pdf")) == 1
+    assert pages(write_report(document, Office(folder=str(tmp_path)), "pdf")) == 1
     (tmp_path / "report.typ").write_text("#no-such-function()", encoding="utf-8")
     with pytest.raises(FaultError, match="no-such-function"):
-        write_report(document, str(tmp_path), "pdf")
+        write_report(document, Office(folder=str(tmp_path)), "pdf")
 
 
 @pytest.mark.parametrize("title", ["Привод 7", "冷 😀", "a\x00b", "\ud800", '#x *y* $a$ "q"'])

@@ -15,7 +15,7 @@ from sprag.service.reading.numbers import in_language
 from sprag.service.reading.reader import Choice
 from sprag.service.reading.units import parse_quantity
 from sprag.service.reading.wording import unit_text
-from sprag.service.report import write_report
+from sprag.service.report import Office, write_report
 from sprag.service.report.blocks import said
 from sprag.service.report.document import made_document, report_of, sections_of
 from sprag.service.views.library import Library
@@ -123,7 +123,7 @@ def test_a_report_has_two_pages_in_words_of_people_with_numbers_that_are_read_ba
             report = report_of(library, study_id, choice)
             assert can_be_typed_back(report) > 5
             document = made_document(report)
-            assert pages(write_report(document, "", "pdf")) == 2
+            assert pages(write_report(document, Office(), "pdf")) == 2
             written = made_document(report_of(library, study_id, choice, everything)) if code == "uk" else document
         for text in texts(written.sections):
             assert not CODES.search(text.replace(study_id, "")), text

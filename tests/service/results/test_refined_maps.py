@@ -16,7 +16,7 @@ from sprag.service.faults import SelectionError
 from sprag.service.figures.orders import map_edges
 from sprag.service.figures.pictures.maps import draw_map as paint_map
 from sprag.service.http.web.figures.maps import map_figure
-from sprag.service.report import write_report
+from sprag.service.report import Office, write_report
 from sprag.service.report.document import made_document, report_of
 from sprag.service.results.curve_cases import draw_map
 from sprag.service.results.curves import Map
@@ -137,10 +137,10 @@ def test_the_pages_and_files_of_a_service(service: Service, capsys: pytest.Captu
     expected = [(mass, name) for mass in (0.5, 0.4) for name in (SPEED, EFFICIENCY)]
     assert [(one.at[MASS], one.result.name) for one in report.maps] == expected
     document = made_document(report)
-    html = write_report(document, "", "html").decode()
+    html = write_report(document, Office(), "html").decode()
     # One is on the first sheet.
     assert html.count('alt="Mean shaft speed over load torque and excitation frequency"') == 3
-    assert write_report(document, "", "pdf").startswith(b"%PDF")
+    assert write_report(document, Office(), "pdf").startswith(b"%PDF")
     assert (
         dict(document.sections[-1].blocks[0].rows)["rounds"]
         == service.get(f"/studies/{study_id}")["progress"]["rounds"]["sentence"]

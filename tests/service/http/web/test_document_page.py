@@ -9,6 +9,7 @@ from urllib.parse import parse_qs, urlsplit
 import pytest
 
 from sprag.service.http.web import document
+from sprag.service.report import Office
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
@@ -23,7 +24,7 @@ def address(service: Service) -> str:
 
 
 def test_the_address_has_what_is_written_and_no_empty_fields(service: Service, address: str) -> None:
-    sent = {"customer": "Acme", "quote": "", "date": document.today(), "text": ["", "Below.", ""], "point": ""}
+    sent = {"customer": "Acme", "quote": "", "date": Office().today(), "text": ["", "Below.", ""], "point": ""}
     answer = service.http.get(address, params={**sent, "appendix": "inputs"}, follow_redirects=False)
     assert answer.status_code == 303
     kept = parse_qs(urlsplit(answer.headers["location"]).query, keep_blank_values=True)
