@@ -14,7 +14,7 @@ from sprag.service.client.errors import RefusedError
 from sprag.service.client.events import StudyEvent
 from sprag.service.client.synchronous.connection import Connection
 from sprag.service.faults import FaultError, choice_of
-from sprag.service.figures.pictures.curves import PICTURES
+from sprag.service.figures.pictures import PICTURES
 from sprag.service.formats import FORMATS, HEADERS
 from sprag.service.http.views import case_detail, whole_detail
 from sprag.service.jobs import checks

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from sprag.service.languages import gettext
 from sprag.service.reading.reader import Phrase
 
-#: Colours that are distinguishable with any kind of colour vision (after Okabe and Ito), on light and dark backgrounds.
-PALETTE: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f6fc4", "#8c6d31")
+#: Colours of lines on white paper, with a contrast of at least 4.5 : 1; pages have others on dark ground. Markers,
+#: dashes and names repeat what they tell apart.
+PALETTE: Final = ("#0b5cad", "#c2500a", "#17713a", "#8a4a9e", "#00798c", "#7a6a00", "#b0396b", "#6b4f3a")
 #: Colours of numbers in their order, from dark to light, so that they read in grey too (after viridis of matplotlib).
 _SHADES: Final = ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80", "#5ec962", "#addc30", "#fde725")
 #: Colour of what stands for the whole of other lines, or is drawn for reference only.

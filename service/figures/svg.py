@@ -119,7 +119,7 @@ def spark(figure: Figure | Line, width: int = 96, height: int = 32) -> str:
         every = max(int(known.sum()) // (2 * width), 1)
         points = x(line.x[known][::every]), y(line.y[known][::every])
         if line.joined:
-            stroke = "var(--ink)" if line is lines[0] else "var(--strong)"
+            stroke = "var(--ink)" if line is lines[0] else "var(--edge)"
             parts.append(element("path", d=path_of(*points), fill="none", stroke=stroke, stroke_width=1.5))
         else:
             dots = "".join(f"M{short(a)} {short(b)}h0" for a, b in zip(*(one.tolist() for one in points), strict=True))
@@ -190,7 +190,8 @@ class _Painting:
         role = "group" if "<a " in inside or "data-cases" in inside else "img"
         return element(
             "svg", f"{element('desc', escape(described(self._figure)))}{inside}", class_="figure", viewBox=size,
-            width=self._width, height=self._top + 4.0, role=role, aria_label=label, font_size=SIZE, fill="var(--ink)",
+            width=self._width, height=self._top + 4.0, role=role, aria_label=label,
+            data_root=self._cases or None, font_size=SIZE, fill="var(--ink)",
         )  # fmt: skip
 
     def _text(self, text: str, *, bold: bool = False) -> None:
@@ -263,7 +264,7 @@ class _Painting:
             made.placed.append((placed, parts))
             made.named.append(bool(named))
             title = _title_lines(panel.y, column.width + column.numbers)
-            legend = Rows([], 0.0) if named else self._own_legend(panel, column)
+            legend = self._own_legend(panel, column, named=bool(named))
             made.titles.append((title, legend))
             made.head = max(made.head, LINE * len(title) + legend.height + _GAP)
         return made
@@ -340,11 +341,11 @@ class _Painting:
 
     # Legends --------------------------------------------------------------------------------------------------------
 
-    def _own_legend(self, panel: Panel, column: _Column) -> Rows:
-        """The legend of a panel whose lines are its own."""
+    def _own_legend(self, panel: Panel, column: _Column, *, named: bool) -> Rows:
+        """The legend of a panel whose lines are its own: what is not named at its curve."""
         figure = self._figure
-        listed = [line for line in panel.lines if line.listed]
-        if not (figure.motion or figure.apart) or figure.family or len(listed) < 2:
+        listed = [line for line in panel.lines if line.listed and not (named and line.joined)]
+        if not (figure.motion or figure.apart) or figure.family or len(listed) < (1 if named else 2):
             return Rows([], 0.0)
         return rows_of(map(line_entry, listed), column.width + column.numbers)
 

@@ -149,8 +149,8 @@ class _MapPainting:
         ticks = self._y.rising()
         heights = self._y(np.array(ticks)).tolist()
         numbers = "".join(text_at(tick_text(value), -9.0, at + 4.0) for value, at in zip(ticks, heights, strict=True))
-        strokes = element("path", d="".join(f"M-5 {short(at)}h5" for at in heights), stroke="var(--strong)")
-        around = element("rect", width=self._plot, height=self._high, fill="none", stroke="var(--strong)")
+        strokes = element("path", d="".join(f"M-5 {short(at)}h5" for at in heights), stroke="var(--edge)")
+        around = element("rect", width=self._plot, height=self._high, fill="none", stroke="var(--edge)")
         written = element("g", numbers, class_="y", text_anchor="end", font_size=SMALL, fill="var(--soft)")
         ends = {"data_x": f"{self._x.low:.10g} {self._x.high:.10g} 0 {short(self._plot)}",
                 "data_y": f"{self._y.low:.10g} {self._y.high:.10g} {short(self._high)} 0"}  # fmt: skip

@@ -12,7 +12,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from sprag.service import languages
-from sprag.service.figures.pictures import curves as pictures
+from sprag.service.figures import pictures
 from sprag.service.formats import MEDIA_TYPES, Format
 from sprag.service.http.respond import entity_tag, not_modified, tagged
 from sprag.service.http.threads import in_thread

@@ -38,14 +38,9 @@ OPEN_PATHS: Final = frozenset(
 )
 SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 
-#: Hash of an empty style element, which plotly's script fills rule by rule; that needs no further permission.
-_EMPTY_STYLE: Final = "'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='"
-#: Hash of the style for world maps in the same script: no page uses it, but refusing it would log an error.
-_MAP_STYLE: Final = "'sha256-ji27qzEtxXZW+7dun6UwjHXJ18e6WAin1VvNtkzIE/o='"
-
 SECURITY_HEADERS: Final = {
     "Content-Security-Policy": (
-        f"default-src 'self'; style-src 'self' {_EMPTY_STYLE} {_MAP_STYLE}; img-src 'self' data:; object-src 'none'; "
+        "default-src 'self'; img-src 'self' data:; object-src 'none'; "
         "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
     ),
     "X-Content-Type-Options": "nosniff",

@@ -13,7 +13,7 @@ from sprag.service.exports.inputs import Input
 from sprag.service.figures.answers import answers_figure
 from sprag.service.figures.curves import curves_figure
 from sprag.service.figures.drawings import drawings
-from sprag.service.figures.pictures.sensitivity import draw_sensitivity
+from sprag.service.figures.pictures import draw_sensitivity
 from sprag.service.languages import N_, _, gettext
 from sprag.service.reading.catalogue import axes_json
 from sprag.service.reading.directions import ends_in_words

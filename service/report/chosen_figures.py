@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from sprag.service.faults import SelectionError, refused
 from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.pictures.curves import MAX_PICTURE_POINTS, check_size, draw_figure, require_drawable
-from sprag.service.figures.pictures.maps import draw_map
+from sprag.service.figures.pictures import MAX_PICTURE_POINTS, check_size, draw_figure, draw_map, require_drawable
 from sprag.service.figures.read import read_figure, read_map
 from sprag.service.languages import _
 from sprag.service.reading.part_names import lower_first
@@ -22,7 +21,7 @@ from sprag.worker import models
 
 if TYPE_CHECKING:
     from sprag.service.figures.figure import Figure
-    from sprag.service.figures.pictures.curves import Picture
+    from sprag.service.figures.pictures import Picture
     from sprag.service.spec.saved_views import View
     from sprag.service.storage.store import Store
     from sprag.worker.study import Study

@@ -14,8 +14,7 @@ from sprag.service.exports.inputs import Input, inputs
 from sprag.service.exports.source import StoredRows, given_texts
 from sprag.service.faults import SelectionError
 from sprag.service.figures.clutch import clutch_figure
-from sprag.service.figures.pictures.curves import require_drawable
-from sprag.service.figures.pictures.sensitivity import MOST_RESULTS
+from sprag.service.figures.pictures import MOST_RESULTS, require_drawable
 from sprag.service.languages import _
 from sprag.service.reading.directions import case_values
 from sprag.service.reading.quantities import TYPED

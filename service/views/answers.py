@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from sprag.service.answers import key as m
 from sprag.service.faults import refused
 from sprag.service.figures.answers import answers_figure
-from sprag.service.figures.pictures.curves import Picture, require_drawable
+from sprag.service.figures.pictures import Picture, require_drawable
 from sprag.service.results.curve_cases import select
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.key_answer_words import answers_csv, curve_name, curve_named, report

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypeVar
 
-from sprag.service.figures.pictures.curves import draw_figure
+from sprag.service.figures.pictures import draw_figure
 from sprag.service.figures.read import read_figure
 from sprag.service.json_text import to_bytes
 from sprag.service.reading.reader import Reading
@@ -21,7 +21,7 @@ from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
     from sprag.service.figures.figure import Figure
-    from sprag.service.figures.pictures.curves import Picture
+    from sprag.service.figures.pictures import Picture
     from sprag.service.storage.store import Store
     from sprag.service.views.setting import Offered, ViewInfo
     from sprag.worker.models import KernelShape

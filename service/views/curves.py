@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from sprag.service import exports
 from sprag.service.answers import results as m
 from sprag.service.faults import parameter_error
+from sprag.service.figures import pictures
 from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.pictures import curves as pictures
-from sprag.service.figures.pictures.maps import draw_map
+from sprag.service.figures.pictures import draw_map
 from sprag.service.figures.read import read_map
 from sprag.service.json_text import numbers
 from sprag.service.reading.directions import in_words

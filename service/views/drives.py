@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Final
 from sprag.sentences import Name, Whole
 from sprag.service.answers import tolerances as m
 from sprag.service.faults import parameter_error
-from sprag.service.figures.pictures.curves import Picture
-from sprag.service.figures.pictures.maps import draw_map
+from sprag.service.figures.pictures import Picture, draw_map
 from sprag.service.figures.read import read_map
 from sprag.service.figures.ribbons import ribbon_figure, ribbon_map, yield_figure, yield_map
 from sprag.service.reading.catalogue import unit_of

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from sprag.service.answers import goals as m
 from sprag.service.figures.front import front_figure
-from sprag.service.figures.pictures.curves import MAX_PICTURE_POINTS, Picture, check_size
+from sprag.service.figures.pictures import MAX_PICTURE_POINTS, Picture, check_size
 from sprag.service.results.fronts import Designs, front_csv, front_json, goal_of
 from sprag.service.views import study_view
 from sprag.service.views.study_questions import FRONT, FrontQuestion

@@ -11,7 +11,7 @@ from sprag.service import exports
 from sprag.service.answers import results as m
 from sprag.service.faults import warned
 from sprag.service.figures.effects import effects_figure
-from sprag.service.figures.pictures.sensitivity import MOST_RESULTS, draw_sensitivity
+from sprag.service.figures.pictures import MOST_RESULTS, draw_sensitivity
 from sprag.service.languages import N_
 from sprag.service.reading.reader import Phrase, joined, plural
 from sprag.service.results.defaults import drawn_results, varying_axes
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from sprag.service.figures.figure import Figure
-    from sprag.service.figures.pictures.curves import Picture
+    from sprag.service.figures.pictures import Picture
     from sprag.service.reading.reader import Reading
     from sprag.service.views.library import Library
     from sprag.worker.study import Study

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, TypeVar
 
-from sprag.service.figures.pictures.curves import draw_figure
+from sprag.service.figures.pictures import draw_figure
 from sprag.service.figures.read import read_figure
 from sprag.service.json_text import to_bytes
 from sprag.service.views.library import reading_of
@@ -19,7 +19,7 @@ from sprag.service.views.shown import NOTHING, Shown
 
 if TYPE_CHECKING:
     from sprag.service.figures.figure import Figure
-    from sprag.service.figures.pictures.curves import Picture
+    from sprag.service.figures.pictures import Picture
     from sprag.service.reading.reader import Choice, Reading
     from sprag.service.views.library import Library
     from sprag.service.views.setting import Offered, ViewInfo

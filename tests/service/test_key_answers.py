@@ -22,6 +22,7 @@ from sprag.service.cli.console import cell_text
 from sprag.service.client import AsyncClient, Client
 from tests.conftest import Finished
 from tests.service.conftest import API, PortalTransport, Service
+from tests.service.figures.seen import seen
 
 AXES = [
     {"path": "excitation.frequency", "linspace": ["20 Hz", "30 Hz", 11]},
@@ -133,8 +134,8 @@ def test_the_page_says_the_answers_first(filled: tuple[Service, str]) -> None:
     (picture,) = re.findall(r'<noscript>\s*<img src="([^"]+)"', text)
     assert service.http.get(picture.replace("&amp;", "&")).text.startswith("<?xml")
     (address,) = re.findall(r'data-figure="([^"]+)"', text)
-    figure = service.http.get(address.replace("&amp;", "&")).json()
-    assert {"largest of its curve", "working point"} <= {trace["name"] for trace in figure["data"]}
+    figure = seen(service.http.get(address.replace("&amp;", "&")).text)
+    assert figure.has("largest of its curve", "working point")
 
 
 @pytest.mark.parametrize("text", ["3 mm", "abc"])
@@ -154,7 +155,7 @@ def test_a_chosen_family_is_in_the_address_of_curves(filled: tuple[Service, str]
     text = service.http.get(f"/studies/{study_id}/curves?{values}").text
     assert "3 of 11 curves" in text
     (address,) = re.findall(r'data-figure="([^"]+)"', text)
-    figure = service.http.get(address.replace("&amp;", "&")).json()
-    assert [trace["name"] for trace in figure["data"] if trace.get("customdata")] == ["20", "23", "30"]
+    figure = seen(service.http.get(address.replace("&amp;", "&")).text)
+    assert [curve.name for curve in figure.panels[0].curves] == ["20", "23", "30"]
     every = service.http.get(f"/studies/{study_id}/curves?x=shaft.load&by=excitation.frequency&every=1").text
     assert "11 of 11 curves" in every

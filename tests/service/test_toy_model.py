@@ -35,6 +35,7 @@ from sprag.worker.models.presentation import Presentation
 from sprag.worker.models.registry import model_of
 from sprag.worker.study import Study
 from tests.service.conftest import PortalTransport
+from tests.service.figures.seen import seen
 from tests.service.http.web.controls import Controls
 from tests.service.registered import create_table, registered
 
@@ -228,7 +229,7 @@ def test_its_laboratory_has_a_slider_for_each_number(service: Service) -> None:
     moved = service.http.get(f"{own}/figure", params={"body.mass": "500 g", "damping": "0.2"}).json()
     columns = {"body.mass": 0.5, "body.spring_rate": 1.0, "damping": 0.2}
     assert f'data-value="{displacement(columns, END)}"' in moved["answer"]
-    assert len(moved["figure"]["data"][0]["x"]) > 100
+    assert len(seen(moved["figure"]).panels[0].curves[0].values) > 100
     faults = service.http.get(f"{own}/figure", params={"damping": "2"}).json()["faults"]
     assert "out of range" in faults["damping"][0]
     rows = service.http.get(f"{own}/picture.csv").text.splitlines()

@@ -36,8 +36,8 @@ _OTHER: Final = 0.75
 _BOLD: Final = 1.1
 #: Colours that are variables of the pages, as a file has them.
 COLOURS: Final = {
-    "ink": "#1b2430", "soft": "#566273", "grid": "#dfe4eb", "strong": "#8593a5", "paper": "#ffffff",
-    "accent": "#0a5aa6", "look": "#c2410c", "neutral": NEUTRAL,
+    "ink": "#14202b", "soft": "#52606d", "grid": "#dde3e8", "edge": "#7f8c98", "paper": "#ffffff",
+    "accent": "#0b5cad", "look": "#c2500a", "other": NEUTRAL,
     **{f"series-{place}": colour for place, colour in enumerate(PALETTE, 1)},
 }  # fmt: skip
 _VARIABLES: Final = {colour: f"var(--{name})" for name, colour in COLOURS.items()}

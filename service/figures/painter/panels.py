@@ -49,6 +49,8 @@ _DENSE: Final = 3
 #: Different colours of points that are coloured by numbers.
 _SHADES: Final = 32
 _DIGITS: Final = 5
+#: Pixels of a scale of colours with its numbers, at whose right end its name ends.
+_SCALE_WIDTH: Final = 52.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +81,7 @@ class Placed:
         """The colour of a line, which is grey beside the one that is chosen."""
         if not self.chosen or line_key == self.chosen:
             return "var(--ink)" if line_key == self.chosen and self.chosen else colour_of(colour)
-        return "var(--strong)"
+        return "var(--edge)"
 
 
 def panel_parts(placed: Placed) -> tuple[list[str], list[Named]]:
@@ -114,7 +116,7 @@ def _grid(placed: Placed) -> Iterator[str]:
     heights = placed.y(np.array(ticks)).tolist()
     yield element("path", d="".join(f"M0 {short(at)}h{short(placed.width)}" for at in heights), stroke="var(--grid)")
     zero = 0.0 if 0.0 in ticks else placed.y.low
-    yield element("path", d=f"M0 {short(placed.y.at(zero))}h{short(placed.width)}", stroke="var(--strong)")
+    yield element("path", d=f"M0 {short(placed.y.at(zero))}h{short(placed.width)}", stroke="var(--edge)")
     yield element(
         "g",
         "".join(text_at(tick_text(value), -7.0, at + 4.0) for value, at in zip(ticks, heights, strict=True)),
@@ -126,7 +128,7 @@ def x_numbers(x: Scale, top: float) -> Iterator[str]:
     """The numbers below an axis, with short strokes."""
     ticks = x.ticks()
     places = x(np.array(ticks)).tolist()
-    yield element("path", d="".join(f"M{short(at)} {short(top)}v4" for at in places), stroke="var(--strong)")
+    yield element("path", d="".join(f"M{short(at)} {short(top)}v4" for at in places), stroke="var(--edge)")
     yield element(
         "g",
         "".join(text_at(tick_text(value), at, top + 17.0) for value, at in zip(ticks, places, strict=True)),
@@ -352,5 +354,5 @@ def colour_scale(low: float, high: float, height: float, name: str) -> list[str]
         text_at(tick_text(value), 16.0, scale.at(value) + 4.0, font_size=SMALL, fill="var(--soft)") for value in ticks
     ]
     if name:
-        parts.append(text_at(name, 0.0, -8.0, font_size=SMALL, fill="var(--soft)"))
+        parts.append(text_at(name, _SCALE_WIDTH, -8.0, text_anchor="end", font_size=SMALL, fill="var(--soft)"))
     return parts

@@ -8,7 +8,7 @@ from fastapi import Depends, Query, Request
 
 from sprag.service import languages
 from sprag.service.faults import choice_of
-from sprag.service.figures.pictures.curves import PICTURES, Picture
+from sprag.service.figures.pictures import PICTURES, Picture
 from sprag.service.http.api.document import format_query
 from sprag.service.http.asked import one_of
 from sprag.service.http.drawing import DRAWN_FORMATS

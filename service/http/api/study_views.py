@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from starlette.responses import Response
 
-from sprag.service.figures.pictures.curves import PICTURES
+from sprag.service.figures.pictures import PICTURES
 from sprag.service.http.api.document import files, not_modified, problems
 from sprag.service.http.api.drawn_format import DrawnFormat
 from sprag.service.http.asked import asking

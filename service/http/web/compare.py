@@ -13,9 +13,9 @@ from starlette.responses import Response
 from sprag.sentences import Sentence
 from sprag.service.answers.differing import MOST_COMPARED, common_axes, unique_names
 from sprag.service.faults import SelectionError, refused
+from sprag.service.figures import pictures
 from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.pictures import curves as pictures
-from sprag.service.figures.pictures.curves import draw_compare
+from sprag.service.figures.pictures import draw_compare
 from sprag.service.figures.read import read_figure
 from sprag.service.formats import MEDIA_TYPES
 from sprag.service.http import views
@@ -23,9 +23,9 @@ from sprag.service.http.context import Context, Ctx
 from sprag.service.http.current import current
 from sprag.service.http.drawing import Drawing, attached, picture, tag_of, unless_known
 from sprag.service.http.reading import FileChoice, address_pairs
-from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
-from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.http.web.figures.drawn import drawn as drawn_figure
+from sprag.service.http.web.figures.studies import PART
 from sprag.service.http.web.held import fixed_choices
 from sprag.service.http.web.saved_views import saved_here
 from sprag.service.http.web.templates import page
@@ -270,7 +270,7 @@ async def compare_figure(work: Attended, choice: FileChoice) -> Response:
     """The figure of a comparison."""
 
     def show(curves: list[tuple[str, Curves]], reading: Reading) -> Response:
-        return json_response(plotly_figure(read_figure(curves_figure(curves), reading)))
+        return Response(drawn_figure(read_figure(curves_figure(curves), reading)), media_type=PART)
 
     return await _answered(work, choice, show)
 

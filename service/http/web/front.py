@@ -8,7 +8,7 @@ from fastapi import Query
 from starlette.responses import Response
 
 from sprag.service.figures.front import history_figure
-from sprag.service.figures.pictures.curves import draw_figure
+from sprag.service.figures.pictures import draw_figure
 from sprag.service.figures.read import read_figure
 from sprag.service.http.context import StudyId
 from sprag.service.http.drawing import Drawing, conditional, picture
@@ -21,7 +21,7 @@ from sprag.service.views.library import reading_of
 from sprag.service.views.study_questions import FrontQuestion
 
 if TYPE_CHECKING:
-    from sprag.service.figures.pictures.curves import Picture
+    from sprag.service.figures.pictures import Picture
     from sprag.service.reading.reader import Choice
     from sprag.service.storage.studies.records import StudyRecord
     from sprag.service.views.library import Library

@@ -12,13 +12,12 @@ from starlette.staticfiles import StaticFiles
 from sprag.sentences import Sentence
 from sprag.service.http.prefix import here
 from sprag.service.http.problems import PROBLEM_TYPES, ApiError
-from sprag.service.http.respond import entity_tag, json_response, not_modified
+from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.web import apidoc
 from sprag.service.http.web.apidoc import with_token_needed
 from sprag.service.http.web.manual import PAGES, manual_page, titles
-from sprag.service.http.web.plotly_script import plotly_script
 from sprag.service.http.web.templates import page
 from sprag.service.reading.quantities import KINDS
 
@@ -27,8 +26,6 @@ if TYPE_CHECKING:
 
 router = page_router()
 
-#: The script that draws the pictures.
-PLOTLY: Final = "plotly.min.js"
 #: Files change only with the program.
 _KEPT: Final = "max-age=3600"
 
@@ -129,19 +126,6 @@ _SITE_FILES: Final = _SiteFiles(directory=_SITE, check_dir=False)
 
 
 @router.get("/static/{name}")
-async def static(request: Request, name: str) -> Response:
+async def static(name: str) -> Response:
     """Style sheet, icon and scripts of all pages."""
-    return await in_thread(_plotly, request) if name == PLOTLY else _FileAnswer(_FILES, name)
-
-
-def _plotly(request: Request) -> Response:
-    script = plotly_script()
-    packed = "gzip" in request.headers.get("accept-encoding", "")
-    tag = entity_tag(PLOTLY, packed, len(script.plain))
-    headers = {"Cache-Control": _KEPT, "ETag": tag, "Vary": "Accept-Encoding"}
-    if (known := not_modified(request, tag)) is not None:
-        known.headers.update(headers)
-        return known
-    if packed:
-        headers["Content-Encoding"] = "gzip"
-    return Response(script.packed if packed else script.plain, media_type="text/javascript", headers=headers)
+    return _FileAnswer(_FILES, name)

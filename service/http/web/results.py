@@ -6,17 +6,18 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from urllib.parse import urlencode
 
 from fastapi import Query, Request
+from markupsafe import Markup
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.faults import SelectionError
-from sprag.service.figures.pictures import curves as pictures
+from sprag.service.figures import pictures
 from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.current import current
 from sprag.service.http.drawing import Columns
 from sprag.service.http.reading import FileChoice, address_pairs, file_pairs
 from sprag.service.http.routers import page_router
-from sprag.service.http.web.figures.studies import figure_of
+from sprag.service.http.web.figures.studies import figure_here, figure_of
 from sprag.service.http.web.held import fixed_choices, with_held
 from sprag.service.http.web.saved_views import saved_here
 from sprag.service.http.web.study import orders_address, regime_maps, study_frame
@@ -91,6 +92,7 @@ def curves_page(context: Ctx, request: Request, study_id: StudyId) -> Response:
         fixed=fixed_choices(study, (shown.x, *shown.by), shown.at, reading),
         choices=[] if faults else value_choices(study, shown),
         figure=f"/studies/{study_id}/figures/curves?{figure}",
+        drawn=Markup() if faults else figure_here(context, study_id, "curves", query, current().choice, alt),
         files=f"{views.study_address(study_id)}/curves?{files}",
         report=files,
         alt=alt,
@@ -127,6 +129,7 @@ def map_page(
     assert shown is not None
     pairs = [*pairs_of(shown), *address_pairs(current().choice)]
     kind = kind if kind in KINDS else "heatmap"
+    chosen = None if faults else (CurveQuery(shown.x, (shown.z,), (shown.y,), shown.at), kind == "contour")
     query_text = urlencode([*pairs, ("kind", kind)])
     files = urlencode([*pairs_of(shown), *file_pairs(), ("kind", kind)])
     alt = _(
@@ -146,6 +149,7 @@ def map_page(
         results=_mapped_results(study, infos),
         fixed=fixed_choices(study, (shown.x, shown.y), shown.at, reading),
         figure=f"/studies/{study_id}/figures/map?{query_text}",
+        drawn=Markup() if chosen is None else figure_here(context, study_id, "map", chosen, current().choice, alt),
         files=f"{views.study_address(study_id)}/map?{files}",
         alt=alt,
         held=list(map(reading.say, held)),

@@ -13,18 +13,14 @@ from markupsafe import Markup
 from sprag.service import languages
 
 _FOLDER: Final = Path(__file__).parent / "static"
-#: What plotly says on and above its figures.
-_OF_PLOTLY: Final = (
-    "Zoom", "Pan", "Zoom in", "Zoom out", "Autoscale", "Reset axes", "Double-click to zoom back out",
-)  # fmt: skip
 _TEXT: Final = re.compile(r'\bsprag\.say\(\s*("(?:[^"\\\n]|\\.)*")')
 
 
 @cache
 def script_texts() -> tuple[str, ...]:
-    """Every English text that a script marks by ``sprag.say("...")``, and those of plotly."""
+    """Every English text that a script marks by ``sprag.say("...")``."""
     found = {json.loads(text) for file in _FOLDER.glob("*.js") for text in _TEXT.findall(file.read_text("utf-8"))}
-    return tuple(sorted(found.union(_OF_PLOTLY)))
+    return tuple(sorted(found))
 
 
 def translated_texts() -> Markup | None:

@@ -11,7 +11,7 @@ from starlette.responses import RedirectResponse, Response
 
 from sprag.sentences import Sentence
 from sprag.service import formats
-from sprag.service.figures.pictures import curves as pictures
+from sprag.service.figures import pictures
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx, StudyId
 from sprag.service.http.current import current

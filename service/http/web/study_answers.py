@@ -9,7 +9,7 @@ from urllib.parse import urlencode
 from starlette.datastructures import QueryParams
 
 from sprag.service.faults import SelectionError
-from sprag.service.figures.pictures.curves import MAX_PICTURE_POINTS
+from sprag.service.figures.pictures import MAX_PICTURE_POINTS
 from sprag.service.http import views
 from sprag.service.http.language import language_pairs
 from sprag.service.http.reading import address_pairs

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import urlencode
 
 from sprag.service.faults import Fault, FaultError
-from sprag.service.figures.pictures.curves import PICTURES
+from sprag.service.figures.pictures import PICTURES
 from sprag.service.views.setting import NamedSetting, Offered, ViewInfo, question_of, settings_of
 from sprag.service.views.shown import NOTHING, Shown
 

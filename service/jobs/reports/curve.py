@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.figures.pictures.curves import draw_curves
+from sprag.service.figures.pictures import draw_curves
 from sprag.service.reading.quantities import TYPED
 from sprag.service.reading.reader import Choice, reading_for
 from sprag.service.report.chosen_figures import chosen_figures

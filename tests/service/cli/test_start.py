@@ -4,11 +4,11 @@ import subprocess
 import sys
 
 #: Libraries that take longer to load than the command line itself.
-HEAVY = ("fastapi", "httpx", "matplotlib", "numba", "numpy", "pint", "plotly", "scipy", "sqlalchemy", "xarray")
+HEAVY = ("fastapi", "httpx", "matplotlib", "numba", "numpy", "pint", "scipy", "sqlalchemy", "xarray")
 
 
 #: What processes of the service load only where a study needs it.
-LATER = ("matplotlib", "numba", "pandas", "plotly", "scipy", "xarray")
+LATER = ("matplotlib", "numba", "pandas", "scipy", "xarray")
 
 
 def test_the_command_line_and_the_store_load_no_heavy_library() -> None:

@@ -1,26 +1,24 @@
-"""Pictures and pages draw the same description: the same points, colours and marks."""
+"""What figures of curves and motions are about."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.colors import to_hex
-from matplotlib.figure import Figure
 
 from sprag.service import languages
 from sprag.service.figures.curves import curves_figure
 from sprag.service.figures.figure import PALETTE
 from sprag.service.figures.motion import motion_figure, phase_figure
-from sprag.service.figures.pictures.curves import paint_figure, painting
 from sprag.service.figures.portrait import portrait_figure
-from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.figures.svg import svg
 from sprag.service.reading.reader import shown as shown_text
 from sprag.service.results.curve_cases import draw, select
 from sprag.service.results.curves import CurveQuery
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage.studies.records import CaseColumns
 from sprag.worker import models
+from tests.service.figures.seen import seen
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -30,21 +28,6 @@ SPEED, TORQUE = "shaft.speed.mean", "torque.mean"
 
 def fetch(cases: NDArray[np.int64], names: Any) -> CaseColumns:
     return CaseColumns(cases, ["ok"] * cases.size, {name: cases.astype(float) for name in names})
-
-
-def test_both_painters_draw_the_described_lines(spec: dict[str, Any]) -> None:
-    spec["axes"] = [{"path": "excitation.frequency", "values": [20, 25]}, {"path": "shaft.load", "values": [0, 0.1, 1]}]
-    study = parse_spec(spec).study
-    query = CurveQuery("shaft.load", (SPEED, TORQUE), ("excitation.frequency",))
-    described = curves_figure([("", draw(select(study, models.study_results(study), query), fetch))])
-    page, picture = plotly_figure(described), Figure()
-    with painting():
-        paint_figure(picture, described, "")
-    drawn = [line for axes in picture.axes for line in axes.lines]
-    assert [trace["x"] for trace in page["data"]] == [list(line.get_xdata()) for line in drawn]
-    assert [trace["y"] for trace in page["data"]] == [list(line.get_ydata()) for line in drawn]
-    assert [trace["line"]["color"] for trace in page["data"]] == [to_hex(str(line.get_color())) for line in drawn]
-    assert [trace["name"] for trace in page["data"]] == [str(line.get_label()) for line in drawn]
 
 
 def test_a_failed_case_has_no_place_in_a_figure(spec: dict[str, Any]) -> None:
@@ -71,10 +54,9 @@ def test_a_motion_is_drawn_over_its_states_and_as_a_portrait() -> None:
     shown = models.model_of("vibration-drive").presentation
     described = motion_figure(made, shown)
     assert described.spans == {"Shaft": (("held", 0.0, 0.2), ("rotating", 0.2, 0.2))}
-    page = plotly_figure(described)
-    assert page["zoom"] is True
-    assert [trace["name"] for trace in page["data"] if trace["type"] == "bar"] == ["held", "rotating"]
-    assert {trace["xaxis"] for trace in page["data"] if trace["type"] == "scatter"} == {"x"}
+    page = seen(svg(described))
+    assert page.has("States: held rotating", "Shaft")
+    assert len(page.panels) == len(described.panels)
     (orbit,) = phase_figure(made, shown).panels[0].lines
     with languages.language("uk"):
         portrait = portrait_figure(models.Portrait("", 1, made, made, 1, "ok"), shown)

@@ -17,6 +17,7 @@ from sprag.service.presets import preset_text
 from sprag.service.spec.text import load_spec
 from sprag.worker import models
 from tests.service.conftest import Service
+from tests.service.figures.seen import seen
 from tests.service.timed_spec import SPEC
 
 X, Y = "shaft.load", "shaft.speed.mean"
@@ -184,10 +185,8 @@ def test_pages_figures_and_pictures_show_differences(service: Service, three: li
     text = service.http.get("/compare", params=query).text
     assert "Differences from first, whose curves are interpolated" in text
     assert f'<option value="{three[0]}" selected>differences from first' in text
-    names = {
-        line["name"] for line in service.http.get("/compare/figure", params=query).json()["data"] if "name" in line
-    }
-    assert names == {"second &amp; best − first", "third − first"}
+    (panel,) = seen(service.http.get("/compare/figure", params=query).text).panels
+    assert {curve.name for curve in panel.curves} == {"second & best − first", "third − first"}
     for form, start in (("svg", b"<?xml"), ("png", b"\x89PNG"), ("pdf", b"%PDF")):
         answer = service.http.get(f"/compare/picture.{form}", params=query)
         assert (answer.status_code, answer.content[: len(start)]) == (200, start), form

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from sprag.service.figures.pictures.text import writable
+from sprag.service.figures.pictures import picture_file
 from sprag.service.jobs import checks
 from sprag.service.spec.document import parse_spec
 from sprag.worker import models
@@ -20,6 +20,7 @@ from sprag.worker.pool import child_process
 from sprag.worker.pool.child_process import ChildProcess, uncounted
 from tests.worker import fakes
 
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"/>'
 PRESS = tomllib.loads((Path(__file__).resolve().parents[3] / "examples" / "press.toml").read_text())
 
 
@@ -82,7 +83,9 @@ def said(process: ChildProcess, function: Callable[..., Any], *args: Any) -> lis
     return [*found[:-1], child_process._read(pipe, *found[-1], 300.0)[0]]
 
 
-@pytest.mark.parametrize("function", [partial(writable, "a"), partial(parse_spec, PRESS)], ids=["picture", "shaft"])
+@pytest.mark.parametrize(
+    "function", [partial(picture_file, SVG, "png"), partial(parse_spec, PRESS)], ids=["picture", "shaft"]
+)
 def test_what_is_loaded_for_the_first_is_not_counted(checking: ChildProcess, function: Callable[[], Any]) -> None:
     models.warm_up(parse_spec(PRESS).study)  # into the cache on disk
     assert said(checking, function) == ["loading", "loaded", True]

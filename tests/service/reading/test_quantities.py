@@ -17,10 +17,9 @@ from sprag.sentences import Amount, Name
 from sprag.service.exports import read_table
 from sprag.service.faults import SelectionError
 from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.pictures.curves import paint_figure, painting
+from sprag.service.figures.pictures import draw_figure
 from sprag.service.figures.read import read_figure, read_map
-from sprag.service.http.web.figures.maps import map_figure
-from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.figures.svg_map import picture_map
 from sprag.service.reading.quantities import KINDS, UNITS_PATTERN, Units, read_units, typed_units, units_for
 from sprag.service.reading.reader import CODES, Choice, Phrase, Reading, reading_for
 from sprag.service.reading.units import parse_quantity
@@ -31,6 +30,7 @@ from sprag.service.spec.document import parse_spec
 from sprag.service.storage.studies.records import CaseColumns
 from sprag.worker import models
 from sprag.worker.models.vocabulary import caption
+from tests.service.figures.seen import seen
 from tests.service.spec_sample import changed
 
 if TYPE_CHECKING:
@@ -85,26 +85,20 @@ def test_every_offered_unit_is_that_of_a_conversion_by_hand() -> None:
             assert units.values(np.array([3.0]), kind.unit)[0] == units.value(3.0, kind.unit)
 
 
-def test_both_painters_and_the_table_show_one_number_in_one_unit() -> None:
-    from matplotlib.figure import Figure
-
+def test_picture_and_table_show_one_number_in_one_unit() -> None:
     study, spec = study_of()
     infos = models.study_results(study)
     curves = draw(select(study, infos, CurveQuery("shaft.load", (SPEED,), ("excitation.frequency",))), fetch)
     read = reading_for(study, spec, CHOICE)
     figure = read_figure(curves_figure([("", curves)]), read)
-    page, picture = plotly_figure(figure), Figure()
-    with painting():
-        paint_figure(picture, figure, "")
     wanted = [(10.0 + case) * 60.0 / (2.0 * math.pi) for case in (0, 2, 4)]
-    trace = next(trace for trace in page["data"] if trace["name"] == "1200")
-    axes = picture.axes[0]
-    np.testing.assert_allclose(trace["y"], wanted, rtol=1e-13)
-    np.testing.assert_allclose(np.asarray(axes.lines[0].get_ydata(), dtype=float), wanted, rtol=1e-13)
-    np.testing.assert_allclose(trace["x"], [1e3 * load for load in LOADS], rtol=1e-13)
-    titles = ("Load torque (N·mm)", "Mean shaft speed (rpm)")
-    assert (page["layout"]["xaxis"]["title"]["text"], page["layout"]["yaxis"]["title"]["text"]) == titles
-    assert (axes.get_xlabel(), axes.get_ylabel()) == titles
+    line = next(line for line in figure.panels[0].lines if line.name == "1200")
+    np.testing.assert_allclose(line.y, wanted, rtol=1e-13)
+    np.testing.assert_allclose(line.x, [1e3 * load for load in LOADS], rtol=1e-13)
+    picture = seen(draw_figure(figure, "", "svg"))
+    drawn = next(curve for curve in picture.panels[0].curves if curve.name == "1200")
+    np.testing.assert_allclose(drawn.values[:, 1], wanted, rtol=1e-2)
+    assert picture.has("Load torque (N·mm)", "Mean shaft speed (rpm)")
     table = read_table(
         {"shaft.load": LOADS, SPEED: [10.0, 12.0, None]}, {"shaft.load": "N*m", SPEED: "rad/s"}, read.units
     ).decode()
@@ -145,11 +139,10 @@ def test_files_of_all_rows_have_the_chosen_units(service: Service, form: str) ->
 def test_a_map_has_the_units_of_curves() -> None:
     study, spec = study_of()
     drawn = draw_map(study, models.study_results(study), "shaft.load", "excitation.frequency", SPEED, (), fetch)
-    page = map_figure(read_map(drawn, reading_for(study, spec, CHOICE)), contour=False)
-    np.testing.assert_allclose(page["data"][0]["y"], [1200.0, 1500.0], rtol=1e-13)
-    np.testing.assert_allclose(page["data"][0]["z"][0][0], 10.0 * 30.0 / math.pi, rtol=1e-13)
-    assert page["layout"]["yaxis"]["title"]["text"] == "Excitation frequency (rpm)"
-    assert page["data"][0]["colorbar"]["title"]["text"] == "Mean shaft speed (rpm)"
+    read = read_map(drawn, reading_for(study, spec, CHOICE))
+    np.testing.assert_allclose(read.y_values, [1200.0, 1500.0], rtol=1e-13)
+    np.testing.assert_allclose(read.values[0][0], 10.0 * 30.0 / math.pi, rtol=1e-13)
+    assert seen(picture_map(read, "")).has("Excitation frequency (rpm)", "Mean shaft speed (rpm)")
 
 
 def test_units_are_as_typed_unless_others_are_chosen() -> None:

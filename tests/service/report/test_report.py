@@ -296,6 +296,8 @@ def test_the_report_shows_what_results_depend_on_where_two_axes_vary(service: Se
     section = chapter(service, study_id, "sensitivity", "Sensitivity", Choice("rpm"))
     captions = [block.caption for block in section.blocks if isinstance(block, Image)]
     assert captions[0].startswith("What mean shaft speed depends on. 1 case without this result is left out")
+    pictures = [block.svg.decode() for block in section.blocks if isinstance(block, Image)]
+    assert any(">mean of mean shaft speed (rpm)</text>" in svg for svg in pictures)
     single = service.submit({**spec, "name": "One axis", "axes": axes[:1]})
     service.fill(single)
     asked = ReportQuestion(appendix=["all"])

@@ -16,9 +16,9 @@ from sprag.service.faults import Fault
 from sprag.service.figures.branch import special_text
 from sprag.service.figures.figure import Figure, Line, Note, Panel, Quantity
 from sprag.service.figures.orders import motion_text
-from sprag.service.figures.pictures.curves import draw_figure
+from sprag.service.figures.pictures import draw_figure
 from sprag.service.figures.read import read_figure
-from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.figures.svg import svg
 from sprag.service.languages.elsewhere import speak
 from sprag.service.reading.faults import allowed_text, fault_text
 from sprag.service.reading.reader import CODES, Phrase, Reading, joined, part_label, plural, shown, term, titled
@@ -27,6 +27,7 @@ from sprag.service.results.key_answer_words import curve_named
 from sprag.service.results.tolerances.conditions import read_conditions
 from sprag.worker.models import ResultInfo
 from sprag.worker.models.branches import BranchContact, SpecialPoint
+from tests.service.figures.seen import seen
 
 DRIVE, SHAFT = Reading("vibration-drive"), Reading("machine-shaft")
 
@@ -82,21 +83,20 @@ def test_words_of_codes_and_units() -> None:
         ]  # fmt: skip
 
 
-def test_figures_are_read_in_the_language_for_both_painters() -> None:
+def test_figures_are_read_in_the_language() -> None:
     x = np.array([0.0, 0.5, 1.0])
     line = Line("", x, x, "#0072b2", cases=np.arange(3), key="0")
     panel = Panel(Quantity("power.useful.mean", "W"), (line,), notes=(Note(0.5, 0.5, "#0072b2", "largest", key="0"),))
     figure = Figure(Quantity("shaft.load", "N*m"), (panel,), note="")
     english = draw_figure(read_figure(figure, DRIVE), "", "svg")
     with languages.language("uk"):
-        drawn = plotly_figure(read_figure(figure, DRIVE))
-        assert drawn["layout"]["xaxis"]["title"]["text"] == "Момент навантаження (Н·м)"
-        assert drawn["layout"]["yaxis"]["title"]["text"] == "Середня корисна потужність (Вт)"
-        assert drawn["layout"]["separators"][0] == ","
-        assert {trace["name"] for trace in drawn["data"]} >= {"найбільше на своїй кривій"}
-        assert "випадок %{customdata}" in drawn["data"][0]["hovertemplate"]
-        assert draw_figure(read_figure(figure, DRIVE), "", "svg") != english
-    assert plotly_figure(read_figure(figure, DRIVE))["layout"]["separators"] == ".\N{NARROW NO-BREAK SPACE}"
+        read = read_figure(figure, DRIVE)
+        page = svg(read, cases="/studies/st_0/cases/")
+        assert seen(page).has("Момент навантаження (Н·м)", "Середня корисна потужність (Вт)", "0,2")
+        assert seen(page).has("найбільше на своїй кривій")
+        assert "випадок 2</title>" in page
+        assert draw_figure(read, "", "svg") != english
+    assert seen(english).has("0.2")
 
 
 def test_special_points_conditions_and_scales_are_in_words() -> None:

@@ -12,13 +12,14 @@ from scipy.interpolate import interp1d
 
 from sprag.service.faults import SelectionError
 from sprag.service.figures.answers import answers_figure
-from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.figures.svg import svg
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.key_answer_words import answer_facts, note_of, report
 from sprag.service.results.key_answers import answers_query, find_answers
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage.studies.records import CaseColumns
 from sprag.worker import models
+from tests.service.figures.seen import seen
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -201,8 +202,7 @@ def test_answers_stand_on_their_lines(spec: dict[str, Any]) -> None:
     # Where its text has room: to the right in the left half, to the left in the other.
     power = figure.panels[0]
     assert [power.on_the_right(replace(peak, x=x)) for x in (0.55, 1.3)] == [False, True]
-    texts = [trace for trace in plotly_figure(figure)["data"] if "4.95 W at 0.55 N·m" in trace.get("text", ())]
-    assert [trace["textposition"] for trace in texts] == [["top right"]]
+    assert seen(svg(figure)).has("4.95 W at 0.55 N·m")
 
 
 def test_chosen_curves_and_wrong_choices(spec: dict[str, Any]) -> None:

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from sprag.service.figures.curves import curves_figure
 from sprag.service.figures.figure import BANDS, Figure, Line
-from sprag.service.figures.pictures.curves import paint_figure, painting
-from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.figures.svg import svg
 from sprag.service.reading.quantities import Units
 from sprag.service.reading.reader import Reading
 from sprag.service.reading.wording import percent
@@ -32,6 +31,7 @@ from sprag.worker import models
 from sprag.worker.states import StudyState
 from sprag.worker.study import Study
 from tests.service.conftest import API, Service
+from tests.service.figures.seen import seen
 from tests.service.refined_study import EFFICIENCY, JUMP, SPEC, SPEED, TORQUE, fetched, fill, study_of
 
 WIDTH = 1.0 / 256.0
@@ -102,7 +102,7 @@ def test_curves_that_were_not_refined_say_nothing_of_errors() -> None:
     assert not {"error", "jumps", "passed"} & set(curves.to_json()["curves"][0])
 
 
-def test_both_painters_break_lines_where_a_jump_is_told(study: Study) -> None:
+def test_lines_break_where_a_jump_is_told(study: Study) -> None:
     curves = drawn(study)
     (jump,) = curves.to_json()["curves"][0]["jumps"]
     figure = curves_figure([("", curves)])
@@ -112,12 +112,10 @@ def test_both_painters_break_lines_where_a_jump_is_told(study: Study) -> None:
     for line in (whole, *lines_of(figure, EFFICIENCY)):
         assert line.stretches is not None
         assert len(line.stretches) == 1
-    trace = next(trace for trace in plotly_figure(figure)["data"] if trace["name"] == "20")
-    gap = trace["x"].index(None)
-    assert (trace["x"][gap - 1], trace["x"][gap + 1]) == (jump["low"], jump["high"])
-    painted = painted_lines(figure)
-    assert [jump["low"], jump["high"]] not in painted
-    assert sum(ends[1] == jump["low"] for ends in painted) == 1
+    curve = next(curve for curve in seen(svg(figure)).panels[0].curves if curve.name == "20")
+    assert [part[[0, -1], 0].tolist() for part in curve.stretches] == [
+        pytest.approx([0.0, jump["low"]], abs=2e-3), pytest.approx([jump["high"], 1.0], abs=2e-3)
+    ]  # fmt: skip
 
 
 def test_a_point_between_two_jumps_is_seen_in_the_browser_too(study: Study) -> None:
@@ -127,20 +125,8 @@ def test_a_point_between_two_jumps_is_seen_in_the_browser_too(study: Study) -> N
     joined = curve.refined.joined[SPEED].copy()
     joined[:2] = [False, False]
     alone = replace(curve, refined=replace(curve.refined, joined={SPEED: joined}))
-    (trace, _) = plotly_figure(curves_figure([("", replace(curves, curves=(alone,)))]))["data"]
-    shown = [x for x, size in zip(trace["x"], trace["marker"]["size"], strict=True) if size]
-    assert shown == [curve.line.x[0], curve.line.x[1]]
-
-
-def painted_lines(figure: Figure) -> list[list[float]]:
-    """First and last x of every line that matplotlib draws."""
-    from matplotlib.figure import Figure as Canvas
-
-    with painting():
-        canvas = Canvas(figsize=(8.0, 8.0), layout="constrained")
-        paint_figure(canvas, figure, "")
-    lines = [line for axes in canvas.axes for line in axes.lines if line.get_linestyle() == "-"]
-    return [[float(x) for x in np.asarray(line.get_xdata())[[0, -1]]] for line in lines]
+    page = seen(svg(curves_figure([("", replace(curves, curves=(alone,)))]), cases="/studies/st_0/cases/"))
+    assert {int(case) for case in curve.line.cases[:2]} <= set(page.panels[0].cases)
 
 
 def test_no_line_of_another_result_crosses_a_jump_either(study: Study) -> None:
@@ -160,10 +146,9 @@ def test_jumps_are_marked_in_the_panels_of_their_results(study: Study) -> None:
         (jump["low"], jump["high"], speed.lines[0].colour)
     ]
     assert efficiency.bands == ()
-    shown = plotly_figure(figure)
-    (shape,) = shown["layout"]["shapes"]
-    assert (shape["x0"], shape["x1"], shape["yref"]) == (jump["low"], jump["high"], "y domain")
-    assert [trace["name"] for trace in shown["data"] if trace["name"] == BANDS] == [BANDS]
+    shown = seen(svg(figure))
+    assert shown.panels[0].bands == [pytest.approx((jump["low"], jump["high"]), abs=2e-3)]
+    assert shown.texts.count(BANDS) == 1
 
 
 def test_a_sentence_tells_how_right_the_curves_are(study: Study) -> None:
@@ -171,7 +156,6 @@ def test_a_sentence_tells_how_right_the_curves_are(study: Study) -> None:
     (jump,) = drawn(study).to_json()["curves"][0]["jumps"]  # none on the other curve; both are 1 N*m long
     share = percent((jump["high"] - jump["low"]) / 2.0)
     assert told.startswith(f"Within 1 % of the range, as asked, outside 1 jump ({share} of the axis) (estimate: ")
-    assert plotly_figure(curves_figure([("", drawn(study))]))["below"] == told
     smooth = drawn(study, y=(SPEED, TORQUE), by=(), at=(("excitation.frequency", "25"),))
     told = curves_figure([("", smooth)]).below
     assert told.startswith("Within 1 % of the range, as asked (estimate: ")

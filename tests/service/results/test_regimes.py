@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.pictures.curves import draw_compare, draw_curves
-from sprag.service.figures.pictures.maps import draw_map as paint_map
-from sprag.service.http.web.figures.maps import map_figure
-from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.figures.curves import curves_figure, doubtful_marks
+from sprag.service.figures.pictures import draw_compare, draw_curves
+from sprag.service.figures.pictures import draw_map as paint_map
+from sprag.service.figures.svg import svg
 from sprag.service.reading.reader import Reading
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import CurveQuery, Curves
@@ -20,6 +19,7 @@ from sprag.service.spec.document import parse_spec
 from sprag.service.storage.studies.records import CaseColumns
 from sprag.worker import models
 from sprag.worker.study import Study
+from tests.service.figures.seen import seen
 from tests.service.spec_sample import changed
 
 READING = Reading("vibration-drive")
@@ -80,18 +80,16 @@ def drawn() -> Curves:
 
 
 def test_a_figure_breaks_lines_and_marks_regimes() -> None:
-    figure = plotly_figure(curves_figure([("", drawn())]))
-    line, *marks = [trace for trace in figure["data"] if trace["type"] == "scatter"]
-    assert line["customdata"] == [0, 1, 2, None, 3, None, 4, None, 5, None, 6]
-    assert line["connectgaps"] is False
-    assert {trace["name"]: trace["customdata"] for trace in marks} == {
-        "periodic": [None], "coasting": [0], "irregular": [3], "unsettled": [5, 6],
-    }  # fmt: skip
-    assert figure["layout"]["showlegend"]
+    page = svg(curves_figure([("", drawn())]), cases="/studies/st_0/cases/")
+    (panel,) = seen(page).panels
+    (line,) = panel.curves
+    assert [len(stretch) for stretch in line.stretches] == [3, 1, 1, 1, 1]
+    assert sorted(panel.cases) == [0, 0, 1, 2, 3, 3, 4, 5, 5, 6, 6]
+    assert seen(page).has("periodic", "coasting", "irregular", "unsettled")
     plain = (replace(curve, regimes=None, orders=None, usable=None) for curve in drawn().curves)
     transient = replace(drawn(), curves=tuple(plain))
-    (line,) = plotly_figure(curves_figure([("", transient)]))["data"]
-    assert line["customdata"] == list(range(8))
+    (panel,) = seen(svg(curves_figure([("", transient)]), cases="/studies/st_0/cases/")).panels
+    assert panel.cases == list(range(7))  # the last one has no result
 
 
 def test_a_picture_names_the_regimes_that_occur() -> None:
@@ -106,10 +104,9 @@ def test_pictures_of_several_plots_have_room_for_plots_and_marks() -> None:
     one = study(8, 2)
     query = CurveQuery("shaft.load", ("shaft.speed.mean", "torque.mean"), ("excitation.frequency",))
     curves = draw(select(one, models.study_results(one), query), fetched)
-    # A layout without room for its plots is a warning of matplotlib, and so an error here.
     both = [("a", curves), ("b", curves)]
     for picture in (draw_curves(curves, "A study", "svg", READING), draw_compare(both, READING, "svg")):
-        assert picture.count(b"<!-- unsettled -->") == 1
+        assert seen(picture).texts.count("unsettled") == 1
 
 
 @pytest.mark.parametrize("name", ["irregular", "unsettled"])
@@ -118,7 +115,7 @@ def test_a_map_marks_what_is_not_periodic(name: str) -> None:
     found = draw_map(
         two, models.study_results(two), "shaft.load", "excitation.frequency", "shaft.speed.mean", (), fetched
     )
-    marks = {trace["name"]: trace["customdata"] for trace in map_figure(found, contour=False)["data"][1:]}
+    marks = {marks.regime: marks.cases.tolist() for marks in doubtful_marks(found)}
     assert marks[name] == [case for case in range(16) if REGIMES[case % 8] == name]
     assert found.to_json()["regime"][1] == REGIMES
     assert found.to_json()["order"][1] == [None if np.isnan(order) else int(order) for order in ORDERS]

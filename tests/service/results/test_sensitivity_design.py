@@ -12,7 +12,7 @@ from SALib.analyze import rbd_fast
 from scipy.stats import qmc
 
 from sprag.service.cli.shown import _show_effects
-from sprag.service.figures.pictures.sensitivity import draw_sensitivity
+from sprag.service.figures.pictures import draw_sensitivity
 from sprag.service.reading.quantities import Units
 from sprag.service.reading.reader import CODES, Reading
 from sprag.service.results.sensitivity import Sensitivity
@@ -164,9 +164,9 @@ def test_nothing_known_is_told_in_a_sentence(capsys: pytest.CaptureFixture[str])
         assert (found.method, found.cases, found.mean, indices(found)) == ("none", 0, None, {NONE})
         assert found.notes == ("no case has this result",)
         svg = draw_sensitivity([found], "Title", CODE_NAMES, "svg").decode()
-        assert svg.count("<!-- no case has this result -->") == 2  # the panel and the head; no panel without shares
+        assert svg.count(">no case has this result</text>") == 2  # the panel and the head; no panel without shares
         below = draw_sensitivity([found], "Title", CODE_NAMES, "svg", noted=False).decode()
-        assert below.count("<!-- no case has this result -->") == 1
+        assert below.count(">no case has this result</text>") == 1
         assert all(draw_sensitivity([found], "Title", CODE_NAMES, form) for form in ("png", "pdf"))
     _show_effects(found.to_json())
     assert "note: no case has this result" in capsys.readouterr().err

@@ -17,7 +17,7 @@ from sprag.service.cli.shown import held_text
 from sprag.service.client import AsyncClient, Client
 from sprag.service.client.frames import Curves, grid_of, table_of
 from sprag.service.figures.curves import curves_figure
-from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.figures.svg import svg
 from sprag.service.http.web.form.spec import field_of, spec_of, values_of
 from sprag.service.jobs.local import run_here
 from sprag.service.jobs.start_from import with_start
@@ -31,6 +31,7 @@ from sprag.worker import models
 from sprag.worker.models.starts import motion_of
 from sprag.worker.study import Study
 from tests.service.conftest import API, PortalTransport, Service
+from tests.service.figures.seen import seen
 from tests.service.spec_sample import changed
 from tests.service.swept_study import DOWN, SPEC, UP, swept_study
 
@@ -113,8 +114,7 @@ def test_a_figure_tells_directions_by_dashes_and_loads_by_colours(service: Servi
     assert told == figure.below
     assert "up and down differ at 17 to 18 Hz, by up to 71 % of the range of shaft.speed.mean (at 17 Hz); " in told
     assert told.endswith("; 4 jumps, each within 1 Hz.")
-    dashes = [trace["line"]["dash"] for trace in plotly_figure(figure)["data"] if "line" in trace][:2]
-    assert dashes == ["solid", "dash"]
+    assert [curve.dash for curve in seen(svg(figure)).panels[0].curves[:2]] == [None, "7 4"]
     alone = stored_curves(
         service.store,
         study_id,

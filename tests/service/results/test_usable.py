@@ -11,7 +11,6 @@ import pytest
 
 from sprag.engine.vibration_drive.regimes import Regime
 from sprag.service.figures.curves import curves_figure, doubtful_marks
-from sprag.service.http.web.figures.maps import map_figure
 from sprag.service.report.content import ranges
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import CurveQuery
@@ -176,8 +175,6 @@ def test_maps_leave_blank_and_mark_what_does_not_count(run: dict[str, str], flag
     assert drawn.known()[drawn.cases == 1].size == 1
     np.testing.assert_array_equal(np.isnan(drawn.known()), drawn.cases == 1)
     assert not np.isnan(drawn.values).any()
-    figure = map_figure(drawn, contour=False)
-    assert [value is None for row in figure["data"][0]["z"] for value in row] == (drawn.cases == 1).reshape(-1).tolist()
     (marks,) = doubtful_marks(drawn)
     assert (marks.regime, np.asarray(marks.cases).tolist()) == ("unsettled", [1])
 

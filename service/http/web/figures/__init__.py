@@ -1,1 +1,1 @@
-"""Figures that plotly draws in the browser: curves, motions, shafts, clutch fits."""
+"""Figures inside pages: those of studies and cases, motions, shafts, clutch fits."""

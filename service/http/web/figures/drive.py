@@ -8,7 +8,7 @@ import numpy as np
 
 from sprag.service.figures.read import read_figure
 from sprag.service.figures.turn import turn_figure
-from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.http.web.figures.drawn import drawn
 from sprag.service.views.trajectory import trajectory_csv
 from sprag.worker import models
 from sprag.worker.models.abilities import case_turn
@@ -43,7 +43,7 @@ def drive_case(
     others = [(other, case_turn(other, 0, _SAMPLES)) for _name, other in held]
     found = _turn_json(made) | {"held": [_turn_json(turn) for _, turn in others], "figure": None, "frames": None}
     if made.motion.times.size:
-        found["figure"] = plotly_figure(read_figure(_figure(study, made, others), reading))
+        found["figure"] = drawn(read_figure(_figure(study, made, others), reading))
         found["frames"] = frames(made.motion, study.base[_FREQUENCY])
     return found
 

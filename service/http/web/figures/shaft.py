@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.figures.motion import motion_figure
 from sprag.service.figures.read import read_figure
-from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.http.web.figures.drawn import drawn
 from sprag.service.json_text import numbers
 from sprag.service.spec.kinds.registry import without_cases
 from sprag.worker import models
@@ -39,7 +39,7 @@ def machine_case(
             (name, _whole(other)) for (name, other), own in zip(held, beside, strict=True) if own["ending"] == models.OK
         ]
         described = motion_figure(_whole(study), models.presentation_of(study), motions, columns)
-        figure = plotly_figure(read_figure(described, reading))
+        figure = drawn(read_figure(described, reading))
     return {**found, "figure": figure, "held": beside}
 
 

@@ -9,7 +9,7 @@ from fastapi import Query
 from starlette.responses import Response
 
 from sprag.sentences import Sentence
-from sprag.service.figures.pictures.curves import draw_figure, draw_motion
+from sprag.service.figures.pictures import draw_figure, draw_motion
 from sprag.service.figures.read import read_figure
 from sprag.service.http.current import current
 from sprag.service.http.drawing import picture, table

@@ -26,7 +26,7 @@ const take = async (found, query) => {
   release.href = `${place}?${own}`;
   release.hidden = !held.value;
   plot.classList.toggle("stale", !found.figure);
-  if (found.figure) await sprag.show(plot, found.figure);
+  if (found.figure) sprag.show(plot, found.figure);
   sprag.sketch.show(found.frames);
 };
 

@@ -32,11 +32,7 @@ sprag.sketch = (() => {
   const period = (at) => frames.periods * at / last();
 
   // The line in the curves stands where the sketch does, and is absent while it moves.
-  const mark = (at) => {
-    if (!sprag.figures.has(plot)) return;
-    const line = { type: "line", x0: period(at), x1: period(at), y0: 0, y1: 1, xref: "x", yref: "paper", line: { color: sprag.colour("--strong"), width: 1, dash: "dot" } };
-    Plotly.relayout(plot, { shapes: playing ? [] : [line] });
-  };
+  const mark = (at) => sprag.mark(plot, playing ? null : period(at));
 
   const read = (at) => {
     reading.textContent = sprag.say("t = {time} ms, excitation period {at} of {n}; shaft {speed} rad/s.", {

@@ -20,7 +20,7 @@ const ask = async () => {
   busy = true;
   try {
     const asked = query();
-    const found = await sprag.fetchJson(sprag.narrowed(plot, `${own}/figure?columns=2&${asked}`));
+    const found = await sprag.fetchJson(`${own}/figure?columns=2&${asked}`);
     history.replaceState(null, "", `${own}?${asked}`);
     for (const place of document.querySelectorAll(".lab .wrong")) {
       const texts = found.faults[place.id.slice("wrong:".length)] || [];
@@ -33,8 +33,8 @@ const ask = async () => {
     if (found.figure) {
       sketch.innerHTML = found.sketch;
       pose();
-      found.figure.layout.shapes = lines(found.figure);
-      await sprag.show(plot, found.figure);
+      sprag.show(plot, found.figure);
+      point();
     }
   } catch (error) {
     plot.classList.add("stale");
@@ -78,19 +78,8 @@ const pose = () => {
   }
 };
 
-// A line across all panels of the picture, at the angle of the sketch; part of the figure, so that paper has it too.
-const lines = (figure) => {
-  if (!dial) return [];
-  const x = Number(dial.value), line = { type: "line", x0: x, x1: x, y0: 0, y1: 1, yref: "paper", line: { color: sprag.colour("--accent"), width: 1 } };
-  return [...new Set(figure.data.map((trace) => trace.xaxis || "x"))].map((xref) => ({ ...line, xref }));
-};
-
-const point = () => {
-  const figure = sprag.figures.get(plot);
-  if (!figure) return;
-  figure.layout.shapes = lines(figure);
-  Plotly.relayout(plot, { shapes: figure.layout.shapes });
-};
+// A line across all panels of the picture, at the angle of the sketch.
+const point = () => { if (dial) sprag.mark(plot, Number(dial.value)); };
 
 let pointing = false;
 const turned = () => {

@@ -26,7 +26,7 @@ document.addEventListener("keydown", (event) => {
       // A list that has become empty has another shape.
       sprag.take(page, page.getElementById(id) ? `#${id}` : whole, { keep: true });
     }
-    if (slow && window.Plotly) for (const plot of document.querySelectorAll(".plot[data-figure]")) sprag.draw(plot);
+    if (slow && sprag.draw) for (const plot of document.querySelectorAll(".plot[data-figure]")) sprag.draw(plot);
     follow();
   };
   // The page that has come says what else to wait for, such as another of the studies that it compares.

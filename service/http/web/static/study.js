@@ -39,7 +39,7 @@ for (const form of document.querySelectorAll("form[data-swap]")) {
     part.classList.remove("stale");
     for (const also of [form.dataset.also, ...FOLLOW]) if (also) sprag.take(page, also);
     shown = location.search;
-    if (window.Plotly) await sprag.drawAll(part);
+    await sprag.drawAll?.(part);
   };
 
   const swap = async (push) => {

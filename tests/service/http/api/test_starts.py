@@ -22,6 +22,7 @@ from sprag.worker.models import Basin, ChunkResult, FurtherRows
 from sprag.worker.models.starts import motion_of
 from sprag.worker.study import Study
 from tests.service.conftest import API, PortalTransport, Service
+from tests.service.figures.seen import seen
 from tests.service.timed_spec import SPEC
 
 SPEED = "shaft.initial_speed"
@@ -88,9 +89,9 @@ def test_curves_are_those_of_one_regime(service: Service, started: str) -> None:
 
 def test_pictures_mark_the_other_motions(service: Service, started: str) -> None:
     asked = {"x": "shaft.load", "y": "shaft.speed.mean"}
-    traces = service.http.get(f"/studies/{started}/figures/curves", params=asked).json()["data"]
-    (further,) = (trace for trace in traces if trace.get("name") == "other motions of the same cases")
-    assert (further["x"], further["y"], further["mode"]) == ([0.2], [3.5], "markers")
+    page = service.http.get(f"/studies/{started}/figures/curves", params=asked).text
+    assert seen(page).has("other motions of the same cases")
+    assert "<title>0.2 N·m, 3.5 rad/s, other motions of the same cases, case 1</title>" in page
     assert service.http.get(f"{API}/studies/{started}/curves", params={**asked, "format": "svg"}).status_code == 200
     assert "Single points are other motions" in service.http.get(f"/studies/{started}/curves").text
 
@@ -257,7 +258,7 @@ def test_a_basin_is_a_grid_of_two_initial_values(
     assert regimes == [("0", slow), ("1", fast), ("0", slow), ("-1", "")]
     picture = service.http.get(API + own, params={**asked, "format": "svg"})
     assert picture.status_code == 200
-    assert "<!-- 1: 25 %, 3.5 rad/s, order 2 -->" in picture.text
+    assert ">1: 25 %, 3.5 rad/s, order 2</text>" in picture.text
     monkeypatch.undo()
     # This one is run: all four starts come to the motion of two periods.
     page = service.http.get(f"/studies/{started}/cases/1", params={"show": "basin", **asked}).text

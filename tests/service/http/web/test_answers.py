@@ -30,7 +30,7 @@ def ten(office: Office) -> str:
 def test_a_working_point_is_typed_and_marked(visitor: Visitor, office: Office, ten: str) -> None:
     page = visitor.page
     page.goto(f"/studies/{ten}")
-    assert len([line for line in drawn(page) if line["name"] == "25"]) == 4
+    assert len([line for line in drawn(page) if line.name == "25"]) == 4
     page.get_by_label("Working point").fill("50 N*mm")
     page.get_by_label("Working point").press("Tab")
     expect(page.locator("h2.minor")).to_contain_text("50 N·mm")
@@ -39,14 +39,14 @@ def test_a_working_point_is_typed_and_marked(visitor: Visitor, office: Office, t
     (curve,) = [curve for curve in told["curves"] if curve["by"] == {"excitation.frequency": 25.0}]
     torque = next(item for item in curve["working_point"] if item["name"] == "torque.mean")
     assert f"{torque['value']:.4g}" in page.locator(".tiles.small").inner_text()
-    page.wait_for_function("() => document.querySelector('.plot')?.layout?.shapes[0].x0 === 0.05")
+    expect(page.locator(".plot svg.figure:visible .at").first).to_be_attached()
     page.get_by_label("Answers of the curve").select_option("20 Hz")
     expect(page.locator("h2.minor")).to_contain_text("20 Hz")
     page.reload()
     expect(page.get_by_label("Answers of the curve")).to_have_value("20 Hz")
     page.get_by_text("6 of 10 curves").click()
     page.get_by_role("checkbox", name="21 Hz").click()
-    page.wait_for_function("() => document.querySelector('.plot')?.data?.some((line) => line.name === '21')")
+    expect(page.locator('.plot svg.figure:visible path[data-line="21"]').first).to_be_attached()
     expect(page.locator("#family tbody").first.locator("tr")).to_have_count(7)
 
 

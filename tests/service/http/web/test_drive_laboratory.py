@@ -64,7 +64,7 @@ def test_a_moved_slider_goes_on_from_the_motion_before(visitor: Visitor, office:
     expect(page.get_by_role("columnheader", name="Held")).to_be_visible()
     fill(page, {"excitation.amplitude_x": "2.5 mm"})
     page.wait_for_url("**amplitude_x=2.5+mm**")
-    assert any(line["name"] == "Shaft, held" for line in drawn(page, "#lab-plot"))
+    assert any(curve.name == "Shaft, held" for curve in drawn(page, "#lab-plot"))
     fill(page, {"excitation.amplitude_x": "3 kg"})
     expect(wrong(page, "excitation.amplitude_x")).to_contain_text("not a unit of this field")
     fill(page, {"excitation.amplitude_x": "2 mm"})

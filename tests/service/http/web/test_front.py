@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from sprag.service.spec.design import design_spec
 from sprag.service.spec.document import parse_spec
 from tests.service.conftest import Service
+from tests.service.figures.seen import seen
 from tests.service.searching import search
-
-
-def points(figure: dict[str, Any]) -> dict[str, list[int]]:
-    """The first cases of the drawn designs by their kind."""
-    return {trace["name"]: sorted(trace["customdata"]) for trace in figure["data"]}
 
 
 def test_the_scatter_has_every_design_that_has_not_failed(service: Service) -> None:
     study_id = search(service)
-    figure = service.http.get(f"/studies/{study_id}/figures/front").json()
     designs = service.get(f"/studies/{study_id}/front")["designs"]
-    shown = points(figure)
-    assert shown["front"] == sorted(item["cases"][0] for item in designs if item["feasible"] and item["rank"] == 0)
-    assert len(shown["front"]) + len(shown["feasible"]) == sum(item["feasible"] for item in designs)
-    assert (figure["layout"]["dragmode"], figure["cases"]) == ("select", True)
-    assert all(trace["mode"] == "markers" for trace in figure["data"])
-    other = service.http.get(f"/studies/{study_id}/figures/front?x=excitation.frequency&y=shaft.speed.mean").json()
-    assert other["layout"]["xaxis"]["title"]["text"] == "Excitation frequency (Hz)"
+    (panel,) = seen(service.http.get(f"/studies/{study_id}/figures/front").text).panels
+    assert sorted(panel.cases) == sorted(item["cases"][0] for item in designs if None not in item["goals"].values())
+    assert panel.curves == []
+    other = seen(service.http.get(f"/studies/{study_id}/figures/front?x=excitation.frequency&y=shaft.speed.mean").text)
+    assert other.has("Excitation frequency (Hz)", "front", "feasible")
 
 
 def test_designs_that_serve_the_derivatives_of_the_polish_are_not_listed(service: Service) -> None:

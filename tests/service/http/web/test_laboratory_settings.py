@@ -20,6 +20,7 @@ from sprag.service.http.web.laboratory.questions import estimates, study_spec
 from sprag.service.reading.reader import Choice, Reading
 from sprag.service.spec.document import parse_spec
 from sprag.worker import models
+from tests.service.figures.seen import seen
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
@@ -169,7 +170,7 @@ def test_held_machines_are_drawn_beside_the_current_one() -> None:
     press = setting({"machine": "press"}).study
     slow = replace(press, base={**press.base, "mean_speed": 2.0})
     case = machine_case(press, Reading(models.MACHINE_SHAFT), [("A", press), ("B", slow)])
-    names = {trace["name"] for trace in case["figure"]["data"]}
+    names = {curve.name for panel in seen(case["figure"]).panels for curve in panel.curves}
     assert {"A: ω", "A: T", "A: ω² = S₁ + S₂ + S₃ + S₄"} <= names
     # A machine that stops within the cycle has no lines.
     assert case["held"][1]["ending"] == "inertia_insufficient"
@@ -198,8 +199,8 @@ def test_numbers_and_figures_are_in_the_readers_units(
     before, after = cells(plain, part)[name], cells(read, part)[name]
     assert (before[-1], after[-1]) == (si, shown)
     assert _number(after[0]) == pytest.approx(factor * _number(before[0]), rel=1e-4)
-    assert shown in json.dumps(read["figure"]["layout"], ensure_ascii=False)
-    assert shown not in json.dumps(plain["figure"]["layout"], ensure_ascii=False)
+    assert seen(read["figure"]).has(f"({shown})")
+    assert not seen(plain["figure"]).has(f"({shown})")
 
 
 def _number(cell: str) -> float:

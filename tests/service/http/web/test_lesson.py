@@ -42,7 +42,7 @@ def test_a_lesson_without_a_file(visitor: Visitor, office: Office) -> None:
     page.get_by_role("link", name="Hold this machine").click()
     page.locator("#machines select").select_option("shaper")
     page.wait_for_url("**machine=shaper**")
-    names = {line["name"] for line in drawn(page, "#lab-plot")}
+    names = {curve.name for curve in drawn(page, "#lab-plot")}
     assert {"A: ω", "A: T", "A: driving"} <= names
     expect(page.locator("[data-held=A]")).to_have_text(first)
     expect(page.locator("[data-irregularity]")).not_to_have_text(first)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 from sprag.worker import models
+from tests.service.figures.seen import seen
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
@@ -41,7 +42,7 @@ def test_every_shape_of_study_has_its_pages(service: Service, spec: dict[str, An
         for figure in ("curves", "curves?columns=2", "map", "map?kind=contour"):
             answer = service.http.get(f"/studies/{study_id}/figures/{figure}")
             assert answer.status_code == 200, figure
-            assert set(answer.json()) >= {"data", "layout"}
+            assert answer.headers["content-type"].startswith("text/html")
     assert "degree 1 reaches the accuracy" in service.http.get(f"/studies/{study_id}").text
     assert service.http.get(f"/new?clone={study_id}").status_code == 200
 
@@ -51,16 +52,23 @@ def test_figures_have_the_numbers_of_the_interface(service: Service) -> None:
     service.fill(study_id)
     query = {"x": "shaft.load", "by": "excitation.frequency", "y": ["torque.mean", "efficiency"]}
     told = service.get(f"/studies/{study_id}/curves", **query)
-    figure = service.http.get(f"/studies/{study_id}/figures/curves", params=query).json()
-    lines = {(line["legendgroup"], line["yaxis"]): line for line in figure["data"]}
-    for index, curve in enumerate(told["curves"]):
-        for axis, name in (("y", "torque.mean"), ("y2", "efficiency")):
-            assert lines[str(index), axis]["y"] == curve["y"][name]
-            assert lines[str(index), axis]["customdata"] == curve["cases"]
-    drawn = service.get(f"/studies/{study_id}/map", x="shaft.load", y="excitation.frequency", z="efficiency")
+    most = {
+        name: max(abs(value) for curve in told["curves"] for value in curve["y"][name] if value is not None)
+        for name in query["y"]
+    }
+    figure = seen(service.http.get(f"/studies/{study_id}/figures/curves?units=si", params=query).text)
+    for panel, name in zip(figure.panels, query["y"], strict=True):
+        for drawn, curve in zip(panel.curves, told["curves"], strict=True):
+            known = [value for value in curve["y"][name] if value is not None]
+            np.testing.assert_allclose(drawn.values[:, 1], known, atol=2e-3 * most[name])
+            assert {
+                case for case, value in zip(curve["cases"], curve["y"][name], strict=True) if value is not None
+            } <= set(panel.cases)
     query = {"x": "shaft.load", "y": "excitation.frequency", "z": "efficiency"}
-    heat = service.http.get(f"/studies/{study_id}/figures/map", params=query).json()["data"][0]
-    assert (heat["z"], heat["customdata"]) == (drawn["z"]["values"], drawn["cases"])
+    drawn_map = service.get(f"/studies/{study_id}/map", **query)
+    heat = seen(service.http.get(f"/studies/{study_id}/figures/map", params=query).text).panels[0]
+    cases, values = np.array(drawn_map["cases"]), np.array(drawn_map["z"]["values"], dtype=float)
+    assert heat.cases == cases[np.isfinite(values)].tolist()
 
 
 @pytest.mark.parametrize("chunk_cases", [5_000])
@@ -69,27 +77,24 @@ def test_a_long_curve_is_thinned_and_keeps_its_highest_point(service: Service, s
     study_id = service.submit(spec)
     whole = service.fill(study_id)
     query = {"x": "shaft.load", "y": "torque.mean"}
-    (line,) = service.http.get(f"/studies/{study_id}/figures/curves", params=query).json()["data"]
+    (line,) = seen(service.http.get(f"/studies/{study_id}/figures/curves", params=query).text).panels[0].curves
     told = service.get(f"/studies/{study_id}/curves", **query)["curves"][0]["y"]["torque.mean"]
-    assert len(line["y"]) <= 6_000 < len(told) == whole.count
+    assert len(line.values) <= 6_000 < len(told) == whole.count
     known = [value for value in told if value is not None]
-    drawn = [value for value in line["y"] if value is not None]
-    assert (max(drawn), min(drawn)) == (max(known), min(known))
+    assert (line.values[:, 1].max(), line.values[:, 1].min()) == pytest.approx((max(known), min(known)), rel=1e-2)
 
 
 def test_panels_are_as_high_among_many_as_among_few(service: Service) -> None:
     study_id = service.submit()
     service.fill(study_id)
     names = [info.name for info in models.study_results(service.store.studies.study(study_id))]
+    heights = set()
     for count in (2, 12, 24):
         query = {"x": "shaft.load", "y": names[:count]}
-        layout = service.http.get(f"/studies/{study_id}/figures/curves", params=query).json()["layout"]
-        inner = layout["height"] - layout["margin"]["t"] - layout["margin"]["b"]
-        spans = sorted(axis["domain"] for name, axis in layout.items() if name.startswith("yaxis"))
-        assert len(spans) == count
-        assert [(top - low) * inner for low, top in spans] == pytest.approx([230.0] * count)
-        gaps = [(after[0] - before[1]) * inner for before, after in itertools.pairwise(spans)]
-        assert gaps == pytest.approx([45.0] * (count - 1))
+        page = service.http.get(f"/studies/{study_id}/figures/curves", params=query).text
+        assert len(seen(page).panels) == count
+        heights |= set(re.findall(r'class="area" width="[\d.]+" height="([\d.]+)"', page.rpartition("<svg")[2]))
+    assert len(heights) == 1
 
 
 def test_compared_studies_tell_what_is_held_with_its_unit(service: Service, spec: dict[str, Any]) -> None:
@@ -100,11 +105,9 @@ def test_compared_studies_tell_what_is_held_with_its_unit(service: Service, spec
     query = {"study": ids, "x": "shaft.load"}
     page = service.http.get("/compare", params=query).text
     assert page.count("Excitation frequency = 25 Hz") == 2
-    figure = service.http.get("/compare/figure", params=query).json()
-    first, second = (line["name"] for line in figure["data"])
-    assert (first, len(second)) == ("a", 60)
-    assert second.startswith("A name that goes on")
-    assert second.endswith("room for: the end")
+    figure = seen(service.http.get("/compare/figure", params=query).text)
+    assert figure.has("A name that goes on", "room for: the end")
+    assert [curve.name for curve in figure.panels[0].curves] == names
 
 
 def test_a_compared_family_says_the_name_of_a_study_once(service: Service, spec: dict[str, Any]) -> None:
@@ -112,20 +115,14 @@ def test_a_compared_family_says_the_name_of_a_study_once(service: Service, spec:
     for study_id in ids:
         service.fill(study_id)
     query = {"study": ids, "x": "shaft.load", "by": "excitation.frequency"}
-    figure = service.http.get("/compare/figure", params=query).json()
     values = [f"{value:g}" for value in FREQUENCY["values"]]
-    assert [line["name"] for line in figure["data"]] == values * 2
-    titles = [line["legendgrouptitle"]["text"] for line in figure["data"]]
-    rest = [""] * (len(values) - 1)
-    assert titles == ["first &amp; best", *rest, "other", *rest]
-    assert figure["layout"]["legend"]["title"]["text"] == "Excitation frequency (Hz)"
-    # What the pointer shows has no heading above it and says both.
-    assert "<extra>other, " in figure["data"][-1]["hovertemplate"]
+    page = seen(service.http.get("/compare/figure", params=query).text)
+    assert [curve.name for curve in page.panels[0].curves] == values * 2
     picture = service.http.get("/compare/picture.svg", params=query)
     assert picture.status_code == 200
-    texts = re.findall(r"<!-- (.*?) -->", picture.text)
-    assert texts.count("other") == 1
-    assert [text for text in texts if text in values].count(values[0]) >= 2
+    for drawn in (page, seen(picture.text)):
+        assert drawn.has("Excitation frequency (Hz)", " ".join(["first & best", *values, "other", *values]))
+        assert drawn.texts.count("other") == 1
 
 
 def test_a_picture_without_rows_is_a_sentence_and_the_first_one_has_rows(
@@ -136,9 +133,9 @@ def test_a_picture_without_rows_is_a_sentence_and_the_first_one_has_rows(
     loads = {"path": "shaft.load", "linspace": [0, 0.5, 40]}
     study_id = service.submit({**spec, "axes": [masses, frequencies, loads]})
     query = {"x": "shaft.load", "y": "efficiency", "at": ["excitation.frequency=30", "pendulums.0.mass=0.5"]}
-    figure = service.http.get(f"/studies/{study_id}/figures/curves", params=query).json()
-    assert figure["note"] == "No case at excitation frequency = 30 Hz, mass, pendulum 0 = 0.5 kg is done yet."
-    assert figure["data"] == []
+    figure = service.http.get(f"/studies/{study_id}/figures/curves", params=query).text
+    told = "No case at excitation frequency = 30 Hz, mass, pendulum 0 = 0.5 kg is done yet."
+    assert figure == f'<p class="soft">{told}</p>'
     assert "at=pendulums.0.mass%3D0.5" in service.http.get(f"/studies/{study_id}").text
     service.fill(study_id, range(1))
     page = service.http.get(f"/studies/{study_id}").text
@@ -203,7 +200,6 @@ def test_a_form_sent_twice_is_one_study(service: Service) -> None:
 
 def _textarea(page: str) -> str:
     import html
-    import re
 
     found = re.search(r"<textarea[^>]*>(.*?)</textarea>", page, re.DOTALL)
     assert found is not None

@@ -43,7 +43,7 @@ def test_a_designer_works_below_a_path(browser: Browser, tmp_path: Path) -> None
             page.get_by_role("link", name="Schedules").first.click()
             expect(page).to_have_url(f"{started.address}/schedules")
             page.goto(f"{started.address}/laboratory/drive")
-            expect(page.locator("#lab-plot .main-svg").first).to_be_visible()
+            expect(page.locator("#lab-plot svg.figure:visible").first).to_be_visible()
             assert page.evaluate("location.pathname") == "/sprag/laboratory/drive"
             page.close()
     assert len(asked) > 15

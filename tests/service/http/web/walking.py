@@ -112,7 +112,7 @@ def walk(hand: Hand, name: str, file: Path) -> str:
     expect(page.locator("#progress .state")).to_have_text("finished")
     hand.use(page.locator(".tabs a", has_text="Curves"))
     hand.arrive(f"**/studies/{study_id}/curves")
-    expect(page.locator(".plot .main-svg").first).to_be_visible()
+    expect(page.locator(".plot svg.figure:visible").first).to_be_visible()
     hand.use(page.locator(".tabs a", has_text="Cases"))
     hand.arrive(f"**/studies/{study_id}/cases")
     hand.use(page.locator('tbody a[href$="/cases/1"]'))

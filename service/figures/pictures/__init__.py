@@ -1,1 +1,0 @@
-"""Pictures that matplotlib draws: SVG, PNG, PDF."""

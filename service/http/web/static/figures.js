@@ -1,0 +1,216 @@
+// Figures, which the server draws: those that come after their page, values at the pointer and by arrow keys, ranges that are dragged.
+"use strict";
+
+// What a panel shows, from its element: its points with their cases, its curves, and numbers at its pixels.
+const REACH = 30, LEAST = 4; // px from the pointer to a point; a shorter drag is a click
+const panels = new WeakMap();
+const numbersIn = (text) => (text ?? "").split(" ").filter(Boolean).map(Number);
+const starts = (path) => [...path.matchAll(/[ML](-?[\d.]+) (-?[\d.]+)/g)].map(([, x, y]) => [Number(x), Number(y)]);
+
+sprag.panel = (element) => {
+  if (panels.has(element)) return panels.get(element);
+  const ends = { x: numbersIn(element.dataset.x), y: numbersIn(element.dataset.y) }, log = (element.dataset.log ?? "").split(" ");
+  const [x, y] = (element.dataset.units ?? "|").split("|"), units = { x, y };
+  const value = (axis, at) => {
+    const [low, high, first, last] = ends[axis], share = (at - first) / (last - first);
+    return log.includes(axis) ? low * (high / low) ** share : low + (high - low) * share;
+  };
+  const pixel = (axis, number) => {
+    const [low, high, first, last] = ends[axis];
+    const share = log.includes(axis) ? Math.log(number / low) / Math.log(high / low) : (number - low) / (high - low);
+    return first + (last - first) * share;
+  };
+  const written = (axis, at) => {
+    const [low, high] = ends[axis], digits = Math.min(Math.max(3 - Math.ceil(Math.log10(Math.abs(high - low) || 1)), 0), 12);
+    return `${sprag.decimal(String(Number(value(axis, at).toFixed(digits))))} ${units[axis]}`.trim();
+  };
+  const points = [...element.querySelectorAll("a[data-case]")].map((link) => {
+    const shape = link.querySelector("path, rect"), title = link.querySelector("title");
+    // The browser would show the title beside the value.
+    if (title) { link.setAttribute("aria-label", title.textContent); title.remove(); }
+    const at = shape.matches("rect") ? [shape.x.baseVal.value + shape.width.baseVal.value / 2, shape.y.baseVal.value + shape.height.baseVal.value / 2] : starts(shape.getAttribute("d"))[0];
+    return { at, number: link.dataset.case, text: link.getAttribute("aria-label"), href: link.getAttribute("href"), half: shape.matches("rect") ? shape.width.baseVal.value / 2 : 0 };
+  });
+  for (const path of element.querySelectorAll("path[data-cases]")) {
+    const cases = path.dataset.cases.split(" ");
+    starts(path.getAttribute("d")).forEach((at, index) => points.push({
+      at, number: cases[index], href: `${path.closest("svg").dataset.root}${cases[index]}`,
+      text: [written("x", at[0]), written("y", at[1]), path.dataset.line, sprag.say("case {n}", { n: cases[index] })].filter(Boolean).join(", "),
+    }));
+  }
+  const curves = [...element.querySelectorAll("path[data-line]:not([data-cases])")].map((path) => ({ name: path.dataset.line, at: starts(path.getAttribute("d")) }));
+  const found = { points, curves, value, pixel, written };
+  panels.set(element, found);
+  return found;
+};
+
+sprag.show = (element, content) => {
+  element.innerHTML = content;
+  element.dataset.drawn = String(Number(element.dataset.drawn || 0) + 1);
+  element.dispatchEvent(new Event("sprag:drawn", { bubbles: true }));
+};
+
+sprag.draw = async (element) => {
+  try {
+    const answer = await sprag.busy(element, sprag.fetch(element.dataset.figure, { headers: { Accept: "text/html, application/json" } }));
+    if (!answer.ok) throw new Error((await answer.json().catch(() => ({}))).detail || sprag.refusal(answer));
+    sprag.show(element, await answer.text());
+    element.classList.remove("stale");
+  } catch (error) {
+    if (error instanceof sprag.LostError) { element.classList.add("stale"); return; } // out of date until the connection is restored
+    sprag.note(element, error.message, () => sprag.draw(element));
+  }
+};
+
+// Figures that came with their page are there already.
+sprag.drawAll = (root) => Promise.all([...root.querySelectorAll("[data-figure]")].map((element) => {
+  if (!element.querySelector(".drawn, p.soft")) return sprag.draw(element);
+  element.dataset.drawn ||= "1";
+  return element.dispatchEvent(new Event("sprag:drawn", { bubbles: true }));
+}));
+
+// A line across all panels at a value of x; without a value there is none.
+sprag.mark = (element, x = null) => {
+  for (const panel of element.querySelectorAll(".panel")) {
+    let line = panel.querySelector(".at");
+    if (x === null) { line?.remove(); continue; }
+    if (!line) {
+      line = document.createElementNS("http://www.w3.org/2000/svg", "path");
+      line.setAttribute("class", "at");
+      panel.append(line);
+    }
+    line.setAttribute("d", `M${sprag.panel(panel).pixel("x", x)} 0V${panel.querySelector(".area").getAttribute("height")}`);
+  }
+};
+
+// Only the points of these cases are in full colour; null for all.
+sprag.only = (element, cases) => {
+  for (const panel of element.querySelectorAll(".panel")) {
+    for (const link of panel.querySelectorAll("a[data-case]")) link.classList.toggle("out", cases !== null && !cases.has(Number(link.dataset.case)));
+    for (const path of panel.querySelectorAll("path[data-cases]")) {
+      path.whole ||= path.getAttribute("d").split(/(?=M)/);
+      const own = path.dataset.cases.split(" "), inside = (_, index) => cases === null || cases.has(Number(own[index]));
+      path.setAttribute("d", path.whole.filter(inside).join(""));
+      path.pale?.remove();
+      if (cases === null) continue;
+      path.pale = path.cloneNode();
+      delete path.pale.dataset.cases;
+      path.pale.setAttribute("class", "out");
+      path.pale.setAttribute("d", path.whole.filter((part, index) => !inside(part, index)).join(""));
+      path.before(path.pale);
+    }
+  }
+};
+
+(() => {
+  // The value that stands beside the pointer, or at the point that arrow keys have reached.
+  const tip = document.createElement("output");
+  tip.className = "tip";
+  let reached = null;
+  const area = (panel) => panel.querySelector(".area").getBoundingClientRect();
+  const tell = (panel, at, text) => {
+    const frame = panel.closest(".drawn"), box = area(panel), outer = frame.getBoundingClientRect();
+    const scale = box.width / Number(panel.querySelector(".area").getAttribute("width"));
+    if (tip.parentNode !== frame) frame.append(tip);
+    tip.textContent = text;
+    tip.hidden = false;
+    const left = box.left - outer.left + at[0] * scale, top = box.top - outer.top + at[1] * scale;
+    tip.style.left = `${Math.min(Math.max(left - tip.offsetWidth / 2, 0), Math.max(outer.width - tip.offsetWidth, 0))}px`;
+    tip.style.top = `${top - tip.offsetHeight - 10 < 0 ? top + 14 : top - tip.offsetHeight - 10}px`;
+  };
+  const hide = () => { tip.hidden = true; reached = null; };
+  const place = (panel, event) => {
+    const box = area(panel), width = Number(panel.querySelector(".area").getAttribute("width")) / box.width;
+    return [(event.clientX - box.left) * width, (event.clientY - box.top) * width];
+  };
+  const nearest = (points, [x, y], across) => points.reduce((best, point) => {
+    const far = across ? Math.abs(point.at[0] - x) : Math.hypot(point.at[0] - x, point.at[1] - y) - (point.half ?? 0);
+    return far < best.far ? { far, point } : best;
+  }, { far: Infinity, point: null });
+  // Of a motion every curve at one place.
+  const along = (panel, at) => {
+    const { curves, written } = sprag.panel(panel);
+    const found = curves.map((curve) => [curve.name, nearest(curve.at.map((point) => ({ at: point })), at, true).point]).filter(([, point]) => point);
+    return found.length ? [written("x", found[0][1].at[0]), ...found.map(([name, point]) => `${name}: ${written("y", point.at[1])}`)].join("\n") : "";
+  };
+
+  document.addEventListener("pointermove", (event) => {
+    const panel = event.target.closest?.(".drawn .panel");
+    if (!panel || drag?.moved) { if (!tip.hidden && !tip.contains(event.target)) hide(); return; }
+    const at = place(panel, event), { points } = sprag.panel(panel), { far, point } = nearest(points, at);
+    if (point) { if (far <= REACH) tell(panel, point.at, point.text); else hide(); return; }
+    const text = along(panel, at);
+    if (text) tell(panel, [at[0], Math.max(at[1], 0)], text); else hide();
+  });
+  document.addEventListener("click", (event) => {
+    const panel = event.target.closest?.(".drawn .panel");
+    if (!panel || drag?.moved || event.target.closest("a")) return;
+    const { far, point } = nearest(sprag.panel(panel).points, place(panel, event));
+    if (point && far <= 12) location.assign(point.href);
+  });
+
+  // With arrow keys from point to point, and with Enter to its case.
+  document.addEventListener("sprag:drawn", (event) => {
+    for (const figure of event.target.querySelectorAll("svg.figure")) if (figure.querySelector(".panel :is(a, [data-cases], [data-line])")) figure.tabIndex = 0;
+  });
+  document.addEventListener("keydown", (event) => {
+    const figure = event.target.closest?.("svg.figure");
+    if (!figure || event.ctrlKey || event.altKey || event.metaKey) return;
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key], turn = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+    if (event.key === "Escape") { hide(); return; }
+    if (event.key === "Enter" && reached?.point?.href) { location.assign(reached.point.href); return; }
+    if (!step && !turn) return;
+    event.preventDefault();
+    const every = [...figure.querySelectorAll(".panel")], panel = every[(every.indexOf(reached?.panel) + (turn ?? 0) + (reached ? every.length : 1)) % every.length] ?? every[0];
+    const { points, curves } = sprag.panel(panel);
+    const own = (points.length ? [...points] : (curves[0]?.at ?? []).map((at) => ({ at }))).sort((a, b) => a.at[0] - b.at[0] || b.at[1] - a.at[1]);
+    if (!own.length) return;
+    const index = Math.min(Math.max((reached?.index ?? -1) + (step ?? 0), 0), own.length - 1);
+    reached = { panel, index, point: own[index] };
+    const told = reached;
+    tell(panel, own[index].at, own[index].text ?? along(panel, own[index].at));
+    reached = told;
+  });
+  document.addEventListener("focusout", (event) => { if (event.target.closest?.("svg.figure")) hide(); });
+
+  // A range that is dragged over a panel of a figure with data-brush: "x", or "xy" for both quantities.
+  let drag = null;
+  const ranges = (from, to, { value }) => ({ x: [value("x", from[0]), value("x", to[0])].sort((a, b) => a - b), y: [value("y", from[1]), value("y", to[1])].sort((a, b) => a - b) });
+  document.addEventListener("pointerdown", (event) => {
+    const panel = event.target.closest?.("[data-brush] .panel");
+    drag = panel && event.button === 0 ? { panel, from: place(panel, event), whole: panel.closest("[data-brush]"), moved: false } : null;
+  });
+  document.addEventListener("pointermove", (event) => {
+    if (!drag) return;
+    const to = place(drag.panel, event), both = drag.whole.dataset.brush === "xy", box = drag.panel.querySelector(".area");
+    drag.moved ||= Math.hypot(to[0] - drag.from[0], to[1] - drag.from[1]) >= LEAST;
+    if (!drag.moved) return;
+    hide();
+    const inside = (value, most) => Math.min(Math.max(value, 0), most), width = Number(box.getAttribute("width")), height = Number(box.getAttribute("height"));
+    drag.to = [inside(to[0], width), both ? inside(to[1], height) : height];
+    const [left, top] = [Math.min(drag.from[0], drag.to[0]), both ? Math.min(drag.from[1], drag.to[1]) : 0];
+    if (!drag.rect) {
+      drag.rect = document.createElementNS("http://www.w3.org/2000/svg", "rect");
+      drag.rect.setAttribute("class", "range");
+      drag.panel.append(drag.rect);
+    }
+    const size = { x: left, y: top, width: Math.abs(drag.to[0] - drag.from[0]), height: both ? Math.abs(drag.to[1] - drag.from[1]) : height };
+    for (const [name, value] of Object.entries(size)) drag.rect.setAttribute(name, value);
+  });
+  document.addEventListener("pointerup", () => {
+    if (!drag?.moved) return;
+    const { panel, from, to, rect, whole } = drag;
+    rect.remove();
+    whole.dispatchEvent(new CustomEvent("sprag:brushed", { bubbles: true, detail: ranges(from, to, sprag.panel(panel)) }));
+    setTimeout(() => { drag = null; }); // the click that follows is none
+  });
+  document.addEventListener("pointercancel", () => { drag?.rect?.remove(); drag = null; });
+  document.addEventListener("dragstart", (event) => { if (event.target.closest?.("[data-brush]")) event.preventDefault(); });
+  document.addEventListener("dblclick", (event) => {
+    const whole = event.target.closest?.("[data-brush]");
+    if (whole) whole.dispatchEvent(new CustomEvent("sprag:brushed", { bubbles: true, detail: null }));
+  });
+})();
+
+document.addEventListener("DOMContentLoaded", () => sprag.drawAll(document));
+document.addEventListener("sprag:found", () => { for (const plot of document.querySelectorAll(".stale[data-figure]")) sprag.draw(plot); });
