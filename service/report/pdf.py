@@ -25,9 +25,6 @@ if TYPE_CHECKING:
 TEMPLATE: Final = "report.typ"
 #: The conformance asked for: PDF for everybody, with tags, a title, a language and descriptions of pictures.
 _STANDARD: Final = "ua-1"
-#: Fonts in their order: the first has Cyrillic and the signs of units, and matplotlib brings its files.
-FONTS: Final = ("DejaVu Sans", "Libertinus Serif")
-_FONT_FILES: Final = ("DejaVuSans.ttf", "DejaVuSans-Bold.ttf", "DejaVuSans-Oblique.ttf")
 _UNPRINTABLE: Final = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 _ENDINGS: Final = {"image/svg+xml": "svg", "image/png": "png"}
 
@@ -44,8 +41,6 @@ def pdf_report(document: Document, folder: Path | None, logo: tuple[str, bytes] 
     """
     with naming_extra("A report as PDF", "report"):
         import typst
-    import matplotlib as mpl
-
     with TemporaryDirectory(prefix="sprag-report-") as name:
         place = Path(name)
         own = None if folder is None else folder / TEMPLATE
@@ -57,7 +52,6 @@ def pdf_report(document: Document, folder: Path | None, logo: tuple[str, bytes] 
         data: dict[str, Any] = {
             "title": document.title,
             "foot": document.foot,
-            "fonts": FONTS,
             "particulars": document.particulars,
             "sections": list(_sections(document.sections, place)),
             "logo": None,
@@ -75,9 +69,7 @@ def pdf_report(document: Document, folder: Path | None, logo: tuple[str, bytes] 
             data["logo"] = f"logo.{_ENDINGS[logo[0]]}"
             (place / data["logo"]).write_bytes(logo[1])
         (place / "report.json").write_text(json.dumps(_printable(data), ensure_ascii=False), encoding="utf-8")
-        for font in _FONT_FILES:
-            shutil.copy(Path(mpl.get_data_path()) / "fonts" / "ttf" / font, place / font)
-        fonts = [str(place), *([] if folder is None else [str(folder)])]
+        fonts = [] if folder is None else [str(folder)]
         compiled: Callable[..., bytes] = partial(
             cast("Any", typst.compile), str(place / TEMPLATE), root=name, format="pdf", timestamp=0, font_paths=fonts
         )

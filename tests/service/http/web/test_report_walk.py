@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import html
+import re
 from typing import TYPE_CHECKING
 
 import pytest
@@ -54,6 +55,7 @@ def test_a_report_with_a_logo_in_ukrainian(browser: Browser, service: Service) -
     assert sheets.count() == 2
     assert "Бюро приводів" in sheets.first.inner_text()
     assert "Наскільки цьому довіряти" in sheets.last.inner_text()
+    assert re.findall(rb"/Count (\d+)", page.pdf(prefer_css_page_size=True)) == [b"2"]  # the page itself on paper
     # The file of the same address has the same words, the author's as text.
     address = page.locator('[name="format"][value="html"]').get_attribute("formaction") or ""
     asked = page.url.partition("?")[2]
