@@ -70,6 +70,11 @@ class LocalStudy(Study):
     def __reduce__(self) -> tuple[Any, ...]:
         return _restored, (self._client.content(), self.id)
 
+    @property
+    def attrs(self) -> dict[Any, Any]:
+        """Units of the columns, warnings about the spec, and the number of cases of each ending."""
+        return self._table.attrs
+
     @cached_property
     def _table(self) -> pd.DataFrame:
         return self.table()
@@ -97,7 +102,10 @@ class LocalStudy(Study):
         def __getattr__(self, name: str) -> Any:
             if name.startswith("_") and name not in _AS_TABLE:
                 raise AttributeError(f"a study has no {name!r}")
-            return getattr(self._table, name)
+            try:
+                return getattr(self._table, name)
+            except AttributeError:
+                raise AttributeError(f"neither a study nor its table has {name!r}") from None
 
 
 class _Local(Here):

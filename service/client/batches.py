@@ -22,7 +22,7 @@ class Ribbon:
     data: RibbonReport
 
     def __repr__(self) -> str:
-        return f"Ribbon({_shown(self.data['lines'])}, quantiles {', '.join(map(str, self.data['quantiles']))})"
+        return f"Ribbon({_shown(self.data['lines'])}, quantiles={self.data['quantiles']})"
 
     def to_pandas(self) -> pd.DataFrame:
         """A row for each place, result and quantile: parameters, nominal, value, low, high, drives, failed, case."""
@@ -99,7 +99,7 @@ class Yield:
 
 def _shown(lines: Sequence[Any]) -> str:
     """How many lines an answer has, with how many places."""
-    return f"{len(lines)} lines of {len(lines[0]['x']) if lines else 0} places"
+    return f"lines={len(lines)}, places={len(lines[0]['x']) if lines else 0}"
 
 
 def _place(data: YieldReport, one: Any) -> dict[str, float]:

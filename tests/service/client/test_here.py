@@ -116,6 +116,7 @@ def test_so_is_that_of_a_study_of_another_kind(
         "tolerances": [
             lambda study: study.ribbon(LOAD, SPEED, quantiles=(0.1, 0.9), at={FREQUENCY: "20 Hz"}),
             lambda study: study.yields(f"{SPEED} >= 90 % of nominal", LOAD, worst=2),
+            lambda study: repr(study.ribbon(LOAD, SPEED, at={FREQUENCY: "20 Hz"})),
         ],
     }
     for ask in asked[kind]:
@@ -187,7 +188,7 @@ def test_it_is_its_own_table(run: Any) -> None:
     run[[LOAD]].to_csv(text)
     assert text.getvalue().startswith(",shaft.load")
     assert np.asarray(run).shape == (3, len(run.columns))
-    with pytest.raises(AttributeError, match="nothing"):
+    with pytest.raises(AttributeError, match="neither a study nor its table has 'nothing'"):
         run.nothing  # noqa: B018
 
 
