@@ -32,7 +32,7 @@ _GREEK: Final = {
 
 
 #: What `counted` counts.
-NOUNS: Final = ("case", "drive", "generation", "result", "round", "run", "strobe")
+NOUNS: Final = ("case", "design", "drive", "generation", "result", "round", "run", "strobe")
 
 
 def number(value: float | str | None, digits: int = _DIGITS) -> str:

@@ -72,7 +72,6 @@ class ExploreView(StudyView[ExploreQuestion, Chosen, Explored]):
     content = "A selection of cases, as JSON, a table or a picture."
     shape = m.Exploration
     file = "selection"
-    selects = True
 
     def choose(self, study: Study, question: ExploreQuestion) -> Chosen:
         """The query, and the quantities of a picture."""

@@ -25,7 +25,6 @@ class FrontView(StudyView[FrontQuestion, FrontQuestion, Designs]):
     about = FRONT
     content = "Designs, as JSON, a table or a picture."
     shape = m.FrontReport
-    selects = True
 
     def choose(self, study: Study, question: FrontQuestion) -> FrontQuestion:
         """The question; FaultError where the study has no goal."""

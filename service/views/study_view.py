@@ -64,8 +64,6 @@ class StudyView(ABC, Generic[Question, Chosen, Result]):
         The last part of the name of its file, where that is not its name.
     drawn_differs : bool
         Whether what is found to be drawn is more than the numbers.
-    selects : bool
-        Whether dragging in its figure selects what is drawn there.
     """
 
     about: ClassVar[ViewInfo]
@@ -73,7 +71,6 @@ class StudyView(ABC, Generic[Question, Chosen, Result]):
     shape: ClassVar[Any]
     file: ClassVar[str] = ""
     drawn_differs: ClassVar[bool] = False
-    selects: ClassVar[bool] = False
 
     def has(self, study: Study) -> bool:
         """Whether a study has it."""

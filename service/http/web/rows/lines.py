@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 #: Pixels: height of an axis, room above and below it for words, width of the whole, least and most between two axes.
 HEIGHT: Final = 200
-TOP: Final = 46
+TOP: Final = 54
 BELOW: Final = 24
 _WIDTH: Final = 1040
 _STEPS: Final = (104, 240)

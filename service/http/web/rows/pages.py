@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 from urllib.parse import urlencode
 
@@ -48,7 +48,6 @@ from sprag.worker.study import SAME_VALUE
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.http.web.rows.view import Chosen
     from sprag.service.reading.reader import Choice, Reading
     from sprag.service.views.library import Library
     from sprag.worker.study import Study
@@ -59,23 +58,6 @@ router = page_router()
 MOST_POINTS: Final = 1_000
 #: Formats of the rows of the page.
 RowsForm = Literal["csv", "json"]
-
-
-@dataclass(frozen=True, slots=True)
-class Pane:
-    """The chosen row: its main number, other results, and its dimensions beside those of the base.
-
-    ``main`` and ``results`` are names with values (SI) and units; ``dimensions`` have the value of the base too, None
-    where it is the same or there is none.
-    """
-
-    case: int
-    place: int | None
-    main: tuple[str, Any, str] | None
-    results: list[tuple[str, Any, str]]
-    dimensions: list[tuple[str, Any, str, float | None]]
-    before: int | None
-    after: int | None
 
 
 @router.get("/studies/{study_id:study}/rows")
@@ -117,7 +99,9 @@ def _page(context: Context, study_id: str, view: RowsPage) -> Response:
         field_names={"least": _("at least"), "most": _("at most")},
         search=is_search(study),
         chips=chips_of(view, reading),
-        pane=view.chosen and _pane(study, view, view.chosen),
+        pane=view.chosen,
+        was=lambda path, value: _was(study, path, value),
+        own_paths=own_paths(study),
         plot={"top": TOP, "height": HEIGHT, "bottom": TOP + HEIGHT + BELOW, "shades": range(1, SHADES + 1)},
         halves=halves,
         own_endings=list(models.endings_of(study.model)),
@@ -129,7 +113,6 @@ def _page(context: Context, study_id: str, view: RowsPage) -> Response:
         beside_lines=lines_of(study, rows),
         most_in_file=MAX_SELECTED,
         most_points=MOST_POINTS,
-        own_numbers=bool(own_paths(study)),
         along=next(iter(models.presentation_of(study).along), "") if is_search(study) else "",
         files=f"/studies/{study_id}/rows/file?{files}",
         asked_as=f"?{urlencode(file_pairs())}",
@@ -141,27 +124,6 @@ def _beside(context: Context, study_id: str, cases: Sequence[int]) -> tuple[list
     """Rows of the finished cases, and numbers of the others."""
     found = {case: context.store.rows.case(study_id, case) for case in cases}
     return [row for row in found.values() if row is not None], [case for case, row in found.items() if row is None]
-
-
-def _pane(study: Study, view: RowsPage, chosen: Chosen) -> Pane:
-    row, query = chosen.row, view.asked.query
-    own = {**row["results"]}
-    main = query.sort.removeprefix("-")
-    main = main if main in own and main != "rank" else next((name for name in own if name != "rank"), "")
-    cases = [one["case"] for one, _shade in view.rows]
-    at = cases.index(row["case"]) if row["case"] in cases else None
-    return Pane(
-        row["case"],
-        chosen.place,
-        (main, own[main], view.units[main]) if main else None,
-        [(name, value, view.units[name]) for name, value in own.items() if name != main and value is not None],
-        [
-            (path, row["parameters"][path], view.units[path], _was(study, path, row["parameters"][path]))
-            for path in own_paths(study)
-        ],
-        cases[at - 1] if at else None,
-        cases[at + 1] if at is not None and at + 1 < len(cases) else None,
-    )
 
 
 def _was(study: Study, path: str, value: object) -> float | None:
@@ -240,6 +202,7 @@ async def run_rows_longer(context: Ctx, work: Attended, study_id: StudyId, field
 @router.get("/studies/{study_id:study}/cases")
 @router.get("/studies/{study_id:study}/front")
 @router.get("/studies/{study_id:study}/explore/compare")
+@router.get("/studies/{study_id:study}/explore/new")
 def earlier(context: Ctx, request: Request, study_id: StudyId, choice: PageChoice) -> Response:
     """Where the pages of cases, ranges and designs are now, with their choices."""
     study = context.store.studies.study(study_id)
@@ -255,10 +218,5 @@ def earlier(context: Ctx, request: Request, study_id: StudyId, choice: PageChoic
         pairs.append(("where", ""))  # their conditions were all in the address
     if {"x", "y"} & set(dict(pairs)):
         pairs.append(("plot", "points"))
-    return RedirectResponse(f"/studies/{study_id}/rows{f'?{urlencode(pairs)}' if pairs else ''}", status_code=308)
-
-
-@router.get("/studies/{study_id:study}/explore/new")
-def earlier_new(request: Request, study_id: StudyId) -> Response:
-    """Where a study of a selection is made now."""
-    return RedirectResponse(f"/studies/{study_id}/rows/new?{request.url.query}", status_code=308)
+    page_ = "rows/new" if request.url.path.endswith("/new") else "rows"
+    return RedirectResponse(f"/studies/{study_id}/{page_}{f'?{urlencode(pairs)}' if pairs else ''}", status_code=308)

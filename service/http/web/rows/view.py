@@ -12,7 +12,7 @@ from sprag.service.http.web.rows.lines import Lines, lines_of, shades_of
 from sprag.service.http.web.rows.points import points_of
 from sprag.service.results.explore import explored_rows
 from sprag.service.views.library import reading_of
-from sprag.service.views.rows import rows_of
+from sprag.service.views.rows import PLACES, rows_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,10 +29,13 @@ _NO_NUMBERS: Final = frozenset({"case", "ending", "flags", "regime"})
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """The row in the pane; ``place`` is its place among the selected ones, from 1, None where it is outside."""
+    """The row in the pane: its main quantity, "" for none, its place on the page, from 1, and its neighbours there."""
 
     row: ExploredCase
+    main: str
     place: int | None
+    before: int | None
+    after: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,5 +122,11 @@ def _chosen(found: Explored, asked: Asked) -> Chosen | None:
     if not order.size:
         return None
     row = next(explored_rows(found.study, replace(found, order=order[:1])))
-    on_page = np.flatnonzero(found.order == order[0])
-    return Chosen(row, asked.skip + int(on_page[0]) + 1 if on_page.size else None)
+    names = [name for name in row["results"] if name not in PLACES]
+    main = found.plan.sort if found.plan.sort in names else next(iter(names), "")
+    at = np.flatnonzero(found.order == order[0])
+    if not at.size:
+        return Chosen(row, main, None, None, None)
+    cases, own = found.rows.cases[found.order].tolist(), int(at[0])
+    after = cases[own + 1] if own + 1 < len(cases) else None
+    return Chosen(row, main, asked.skip + own + 1, cases[own - 1] if own else None, after)

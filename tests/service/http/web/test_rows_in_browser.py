@@ -49,7 +49,7 @@ def test_the_best_efficiency_below_a_load(visitor: Visitor, office: Office, exam
     expect(page.locator("tbody tr").first).to_have_attribute("data-case", str(best(office, example)))
     expect(page.locator("tr.on")).to_have_attribute("data-case", str(best(office, example)))
     page.get_by_role("link", name="Whole motion").click()
-    page.wait_for_url(f"**/studies/{example}/cases/{best(office, example)}")
+    page.wait_for_url(f"**/studies/{example}/cases/{best(office, example)}", wait_until="commit")
     page.go_back()
     page.get_by_role("link", name=re.compile("^Take away: load torque")).click()
     expect(counted(page)).to_have_text("9 of 9 cases")
@@ -75,7 +75,7 @@ def test_a_drag_along_an_axis_is_a_condition(visitor: Visitor, office: Office, e
 
 def test_arrow_keys_choose_a_row_and_enter_opens_its_motion(visitor: Visitor, example: str) -> None:
     page = visitor.page
-    page.goto(f"/studies/{example}/rows")
+    page.goto(f"/studies/{example}/rows", wait_until="domcontentloaded")
     rows = [row.get_attribute("data-case") for row in page.locator("tbody tr").all()]
     for place in (1, 2):
         page.keyboard.press("ArrowDown")
@@ -88,12 +88,12 @@ def test_arrow_keys_choose_a_row_and_enter_opens_its_motion(visitor: Visitor, ex
     # One link of the table is a stop of the Tab key.
     assert page.locator("tbody tr a[tabindex='0']").count() == 1
     page.keyboard.press("Enter")
-    page.wait_for_url(f"**/cases/{rows[1]}")
+    page.wait_for_url(f"**/cases/{rows[1]}", wait_until="commit")
 
 
 def test_ticked_rows_are_acted_on(visitor: Visitor, example: str) -> None:
     page = visitor.page
-    page.goto(f"/studies/{example}/rows")
+    page.goto(f"/studies/{example}/rows", wait_until="domcontentloaded")
     bar = page.locator(".bulk")
     expect(bar).to_be_hidden()
     for box in page.locator("tbody [type=checkbox]").all()[:2]:
