@@ -15,19 +15,18 @@ from starlette.responses import RedirectResponse, Response
 from sprag.service.faults import Fault, FaultError, SelectionError
 from sprag.service.http.context import ID_PATTERN, Context, Ctx, StudyId
 from sprag.service.http.current import current
-from sprag.service.http.prefix import here
 from sprag.service.http.problems import ApiError, api_error
 from sprag.service.http.reading import file_pairs
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.views import study_address
 from sprag.service.http.web import calibrate
-from sprag.service.http.web.figures.inline import inline
+from sprag.service.http.web.figures.drawn import cases_of
 from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.held import fixed_choices, with_held
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
-from sprag.service.http.web.view_forms import Asked, Seen, asked_of, fact_of, files_of
+from sprag.service.http.web.view_forms import Asked, Seen, asked_of, fact_of, files_of, inline
 from sprag.service.http.work import Attended
 from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
@@ -87,7 +86,7 @@ def seen(
     if isinstance(answer.result, Yield) and answer.result.places.x is None:
         return Seen(shown=shown), head
     reading = reading_of(library.store, study_id, choice)
-    return inline(partial(view.drawn_in, answer), reading, shown, cases=cases), head
+    return inline(view.drawn_in(answer, 2), reading, shown, cases), head
 
 
 @router.get("/studies/{study_id:study}/matters")
@@ -110,7 +109,7 @@ async def answered(
     reading = await in_thread(reading_of, context.store, study_id, current().choice)
     params = _places(study, with_held(work.request.query_params, study, reading))
     opened: list[tuple[Asked, Seen | None]] = []
-    cases = here(f"/studies/{study_id}/cases/")
+    cases = cases_of(study_id)
     head = Headline()
     for place, name in enumerate(ASKS[ask] if ask in known else ()):
         view = STUDY_VIEWS[name]
@@ -124,7 +123,7 @@ async def answered(
         except SelectionError as error:
             asked = replace(asked, faults=error.faults)
         except FaultError as error:
-            found, status = Seen(below=error.detail), api_error(error).type.status
+            found, status = Seen(note=error.detail), api_error(error).type.status
         opened.append((asked, found))
     if any(asked.faults for asked, _found in opened):
         status = 422

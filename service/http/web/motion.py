@@ -18,17 +18,16 @@ from sprag.service.http.context import CaseNumber, StartNumber, StudyId, study_w
 from sprag.service.http.current import current
 from sprag.service.http.drawing import picture, unchanging
 from sprag.service.http.language import language_pairs
-from sprag.service.http.prefix import here
 from sprag.service.http.problems import ApiError, api_error
 from sprag.service.http.reading import FileChoice
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.views import study_address
-from sprag.service.http.web.figures.inline import inline
+from sprag.service.http.web.figures.drawn import cases_of
 from sprag.service.http.web.form.own_machine import case_address
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page, spec_text
-from sprag.service.http.web.view_forms import Asked, Seen, asked_of, fact_of, files_of
+from sprag.service.http.web.view_forms import Asked, Seen, asked_of, fact_of, files_of, inline
 from sprag.service.http.work import Attended
 from sprag.service.languages import _
 from sprag.service.reading.catalogue import unit_of
@@ -97,7 +96,7 @@ def seen(
     shown = NOTHING_MORE if view.about.name == _MOTION.about.name else view.shown(answer)
     if not view.drawn:
         return Seen(shown=shown)
-    return inline(lambda columns: view.figure(answer, columns, rows), reading, shown, cases=cases)
+    return inline(view.figure(answer, 2, rows), reading, shown, cases)
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}")
@@ -160,10 +159,9 @@ async def _seen(
         for kernel in view.kernels(study):
             await work.load(kernel)
         start = which if view.about.starts else None
-        cases = here(f"/studies/{study_id}/cases/")
-        return await work.compute(seen, study, case, view, asked.chosen, start, rows, reading, cases), 200
+        return await work.compute(seen, study, case, view, asked.chosen, start, rows, reading, cases_of(study_id)), 200
     except FaultError as error:
-        return Seen(below=error.detail), api_error(error).type.status
+        return Seen(note=error.detail), api_error(error).type.status
 
 
 def _page(

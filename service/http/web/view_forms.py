@@ -6,20 +6,28 @@ The form is made of the settings of the view's question (`sprag.service.views.se
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from urllib.parse import urlencode
+
+from markupsafe import Markup
 
 from sprag.service.faults import Fault, FaultError
 from sprag.service.figures.pictures import PICTURES
+from sprag.service.figures.read import read_figure
+from sprag.service.http.web.figures.drawn import drawn
 from sprag.service.views.setting import NamedSetting, Offered, ViewInfo, question_of, settings_of
 from sprag.service.views.shown import NOTHING, Shown
 
 if TYPE_CHECKING:
     from starlette.datastructures import QueryParams
 
+    from sprag.service.figures.figure import Figure
     from sprag.service.reading.reader import Reading
     from sprag.service.results.headlines.headline import KeyNumber
+
+#: No figure.
+EMPTY: Final = Markup()
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,15 +85,26 @@ def fact_of(one: KeyNumber, reading: Reading, cases: str = "") -> Fact:
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """A view as a page shows it: its figure as SVG, "" for none, the sentence below, and what people read of it.
+    """A view as a page shows it: its figure, "" for none, and what people read of it; or a note why there is nothing.
 
     ``later`` says that the page has to ask for it once more.
     """
 
-    figure: str = ""
-    below: str = ""
+    figure: Markup = EMPTY
     shown: Shown = NOTHING
+    note: str = ""
     later: bool = False
+
+
+def inline(figure: Figure, reading: Reading, shown: Shown, cases: str) -> Seen:
+    """A view with a figure, as its reader reads it; the sentence below it only where none beside it says the same.
+
+    ``cases`` is the address of the cases of its points, which their numbers follow.
+    """
+    read = read_figure(figure, reading)
+    if any(read.below in reading.say(text) for text in shown.sentences):
+        read = replace(read, below="")
+    return Seen(drawn(read, cases=cases), shown)
 
 
 def asked_of(

@@ -19,7 +19,7 @@ def test_the_page_shows_values_points_and_figure(service: Service) -> None:
     assert "pendulums.0.damping" not in answer.text.partition("Measured values")[0]
     rows = answer.text.partition("Measured values")[2].partition("<tbody>")[2].partition("</tbody>")[0]
     assert rows.count("<tr>") == len(found["points"])
-    figure = answer.text.partition('<div class="broad">')[2].partition("</svg>")[0]
+    figure = answer.text.partition('<svg class="figure double"')[2].partition("</svg>")[0]
     assert "measured" in figure
     assert "Residual" in figure
 
