@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
+
+from cachetools import LRUCache
 
 from sprag.service.reading.reader import Choice, Reading, reading_for
 from sprag.service.results.unaffected import Unaffected
@@ -16,6 +18,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from sprag.worker.chunking import Chunking
+
+
+#: Headlines that are kept.
+_HEADLINES: Final = 2000
 
 
 def reading_of(store: Store, study_id: str, choice: Choice) -> Reading:
@@ -37,6 +43,8 @@ class Library:
         self.columns = Columns(store)
         self.calibrations = Calibrations(store)
         self.unaffected = Unaffected()
+        #: Revision, headline and description of listed studies (`views.listed`).
+        self.headlines: LRUCache[str, Any] = LRUCache(_HEADLINES)
 
     def __reduce__(self) -> tuple[Callable[[str, Chunking], Library], tuple[str, Chunking]]:
         return _library, (

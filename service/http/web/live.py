@@ -22,6 +22,7 @@ from sprag.service.http.web.study_list import listed
 from sprag.service.jobs.nights import HOURS, MOST_HOURS, night
 from sprag.service.jobs.workers import worker_list
 from sprag.service.json_text import to_bytes
+from sprag.service.views.listed import known
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,7 +33,9 @@ router = page_router()
 
 
 def _studies(context: Context, given: QueryParams) -> Any:
-    return [[study.id, study.revision] for study in listed(context, given).studies]
+    records = listed(context, given).studies
+    told = known(context.library, records, current().choice, _SECONDS)
+    return [[record.id, record.revision, one] for record, one in zip(records, told, strict=True)]
 
 
 def _nights(context: Context, given: QueryParams) -> Any:
@@ -51,6 +54,9 @@ _LISTS: Final[dict[str, Callable[[Context, QueryParams], Any]]] = {
     "nights": _nights,
     "workers": _workers,
 }
+
+#: Time in which each look at a list of studies finds more of their answers.
+_SECONDS: Final = 0.5
 
 LastEventId = Annotated[str | None, Header(alias="Last-Event-ID", max_length=40)]
 

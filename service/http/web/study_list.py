@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import secrets
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
+import numpy as np
 from fastapi import Request
+from markupsafe import Markup
 from starlette.datastructures import QueryParams
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.answers.studies import StudyOrder
 from sprag.service.faults import FaultError, choice_of
+from sprag.service.figures.figure import Line
+from sprag.service.figures.svg import spark
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx, StudyId
+from sprag.service.http.current import current
 from sprag.service.http.listing import wanted_studies
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
@@ -24,14 +30,16 @@ from sprag.service.http.web.form.values import Form, RepeatedForm
 from sprag.service.http.web.study import shown_study
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
-from sprag.service.languages import N_
+from sprag.service.languages import N_, _
 from sprag.service.presets import preset_names
 from sprag.service.reading.faults import message
 from sprag.service.spec.labels import StudyChange, read_change, tags_of
 from sprag.service.spec.report import SpecError
 from sprag.service.storage.errors import ChangedMeanwhileError, StoreError
 from sprag.service.storage.studies.listing import StudyFilter
-from sprag.service.storage.studies.records import StudyPage
+from sprag.service.storage.studies.records import StudyPage, StudyRecord
+from sprag.service.views.listed import ANSWERS, Listed
+from sprag.service.views.listed import listed as answers
 from sprag.worker import models
 from sprag.worker.limits import MAX_PAGE_TOKEN, MAX_SEARCH_LENGTH
 from sprag.worker.states import StudyState
@@ -54,7 +62,19 @@ ACTIONS: Final = {
 }
 _UNDO: Final = {"archive": "unarchive", "delete": "restore"}
 #: Parameters of the list itself; others of its address say what was done before.
-_OWN: Final = ("search", "state", "tag", "owner", "model", "archived", "deleted", "sort")
+_OWN: Final = ("search", "state", "tag", "owner", "model", "archived", "deleted", "trouble", "sort")
+#: Tags that have a chip of their own.
+_CHIPS: Final = 8
+#: Time in which a page finds answers of studies that nobody has looked at yet.
+_SECONDS: Final = 0.3
+#: Orders of the list, and what they are called.
+_ORDERS: Final = {
+    StudyOrder.NEWEST: N_("newest first"),
+    StudyOrder.NAME: N_("by name"),
+    StudyOrder.STATE: N_("by state"),
+    StudyOrder.CASES: N_("most cases first"),
+    StudyOrder.ENDED: N_("latest end first"),
+}
 
 
 @router.get("/")
@@ -68,19 +88,21 @@ def _list(context: Context, given: QueryParams, refused: Sequence[tuple[str, str
     found = listed(context, given)
     own = {name: value for name in _OWN if (value := given.get(name))}
     done, general = given.get("done", ""), context.store.views.general()
+    told = answers(context.library, found.studies, current().choice, _SECONDS)
     return page(
         "index.html",
         status,
         key=secrets.token_hex(8),
-        studies=[views.summary(record) for record in found.studies],
+        rows=[_row(record, told.get(record.id)) for record in found.studies],
         filtered=bool(set(own) - {"sort"}),
         own=own,
+        chips=_chips(context, own),
         wanted=wanted,
-        order=order.value,
+        order=order,
+        orders=_ORDERS,
         more=found.next_token,
         after=_after(given),
         states=list(StudyState),
-        tags=context.store.studies.tags(),
         owners=context.store.studies.owners(),
         models=models.model_names(),
         actions=_actions(wanted, context.settings.restore_days),
@@ -94,6 +116,38 @@ def _list(context: Context, given: QueryParams, refused: Sequence[tuple[str, str
         live=_live(given, own),
         presets=[preset_of(name) for name in preset_names()],
     )
+
+
+def _row(record: StudyRecord, told: Listed | None) -> dict[str, Any]:
+    """A study of the list, with its thumbnail and answers where they are known."""
+    own = {"study": views.summary(record), "running": not record.state.terminal, "trouble": record.done - record.ok}
+    if told is None:
+        return {**own, "spark": "", "about": "", "answers": []}
+    trace, reading = told.headline.trace, told.reading
+    numbers = (*told.headline.numbers, *told.headline.dimensions)[:ANSWERS]
+    drawn = "" if trace is None else spark(Line("", np.array(trace.x), np.array(trace.y), ""), 88, 36)
+    return {
+        **own,
+        "spark": Markup(drawn),  # noqa: S704 - numbers alone
+        "about": reading.say(told.about),
+        "answers": [
+            (one.number(reading), one.unit_text(reading), one.title(reading), reading.say(one.where)) for one in numbers
+        ],
+    }
+
+
+def _chips(context: Context, own: Mapping[str, str]) -> list[tuple[str, dict[str, str], bool]]:
+    """What is shown by one click: its name, the parameters of its address, and whether that is shown now."""
+    grant = current().grant
+    chips: list[tuple[str, dict[str, str]]] = [(_("All"), {})]
+    if grant is not None and grant.user:
+        chips.append((_("Mine"), {"owner": grant.user}))
+    chips += [(_("Running"), {"state": StudyState.RUNNING.value}), (_("Needs a look"), {"trouble": "true"})]
+    chips += [(tag, {"tag": tag}) for tag in context.store.studies.tags()[:_CHIPS]]
+    chips += [(_("Archived"), {"archived": "true"}), (_("Deleted"), {"deleted": "true"})]
+    kept = {name: own[name] for name in ("sort",) if name in own}
+    shown = {name: value for name, value in own.items() if name != "sort"}
+    return [(name, {**address, **kept}, address == shown) for name, address in chips]
 
 
 def listed(context: Context, given: QueryParams) -> StudyPage:
@@ -113,8 +167,10 @@ def _asked(given: QueryParams) -> tuple[StudyFilter, StudyOrder]:
     order = StudyOrder(choice_of("sort", asked, orders)) if (asked := given.get("sort")) else StudyOrder.NEWEST
     texts = (given.get(name, "").strip()[:MAX_SEARCH_LENGTH] for name in ("search", "tag", "owner", "model"))
     search, tag, owner, model = texts
-    flags = (given.get(name, "") not in ("", "false") for name in ("archived", "deleted"))
-    return wanted_studies(search, state, tag, owner, model, *flags), order
+    archived, deleted, trouble = (
+        given.get(name, "") not in ("", "false") for name in ("archived", "deleted", "trouble")
+    )
+    return replace(wanted_studies(search, state, tag, owner, model, archived, deleted), trouble=trouble), order
 
 
 def _live(given: QueryParams, own: Mapping[str, str]) -> str:

@@ -64,7 +64,7 @@ class StudyFilter:
 
     ``search``: every word of it is a part of the name, the notes or a tag, or of the id, whatever case and accents.
     ``tag`` is one of its tags. ``archived`` and ``deleted`` choose those only, of the deleted ones those that can be
-    restored; otherwise neither is listed.
+    restored; otherwise neither is listed. ``trouble`` chooses those that failed or have cases that did not end ok.
     """
 
     search: str = ""
@@ -74,6 +74,7 @@ class StudyFilter:
     model: str = ""
     archived: bool = False
     deleted: bool = False
+    trouble: bool = False
 
     def conditions(self, now: int) -> list[sa.ColumnElement[bool]]:
         """The conditions of a query at ``now`` (µs since 1970)."""
@@ -91,6 +92,8 @@ class StudyFilter:
         ]
         if self.state is not None:
             found.append(c.state == self.state.value)
+        if self.trouble:
+            found.append((c.state == StudyState.FAILED.value) | (c.ok < c.done))
         if self.tag:
             found.append(c.search.contains(tag_text(self.tag), autoescape=True))
         found += [c[name] == value for name in ("owner", "model") if (value := getattr(self, name))]

@@ -28,11 +28,11 @@ LONG = {"axes": [{"path": "shaft.load", "linspace": [0, 1, 100_000]}]}
 SCHEDULE = {"spec": SPEC, "cron": "0 22 * * *", "name": "Nightly"}
 
 
-@pytest.mark.parametrize("name", ["studies", "studies?search=first", "schedules", "night", "workers"])
+@pytest.mark.parametrize("name", ["studies", "studies?search=first", "nights", "workers"])
 def test_a_stream_has_one_event_for_each_change(service: Service, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     service.submit({**SPEC, "name": "first"})
     changes = {
-        "schedules": lambda: service.http.post("/api/v1/schedules", json=SCHEDULE),
+        "nights": lambda: service.http.post("/api/v1/schedules", json=SCHEDULE),
         "workers": lambda: service.store.work.take_over("somebody"),
     }
     change = changes.get(name, lambda: service.submit({**SPEC, "name": "first again"}))
@@ -47,7 +47,7 @@ def test_a_stream_has_one_event_for_each_change(service: Service, monkeypatch: p
 
     monkeypatch.setattr(looking, "_pause", between_looks)
     marks = re.findall("^id: (.+)$", service.http.get(f"/live/{name}").text, re.MULTILINE)
-    assert len(set(marks)) == len(marks) == (1 if name == "night" else 2)  # no schedule was due
+    assert len(set(marks)) == len(marks) == 2
     ending.clear()
     again = service.http.get(f"/live/{name}", headers={"Last-Event-ID": marks[-1]})
     assert "id: " not in again.text  # it has changed no more
@@ -55,7 +55,7 @@ def test_a_stream_has_one_event_for_each_change(service: Service, monkeypatch: p
 
 def test_only_lists_have_streams(service: Service) -> None:
     assert service.http.get("/live/nothing").status_code == 404
-    assert service.http.get("/live/night?hours=0").status_code == 422
+    assert service.http.get("/live/nights?hours=0").status_code == 422
     assert service.http.get("/live/studies?state=nothing").status_code == 422
 
 

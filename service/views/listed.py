@@ -1,0 +1,95 @@
+"""What a list tells of each study: what it is in words, up to three answers and a line for a thumbnail.
+
+A headline takes a tenth of a second and is kept by the revision of its study, so a list of fifty is quick once it has
+been looked at: each look finds as many more as its time allows, and shows the others without answers until then.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from sprag.sentences import Name
+from sprag.service.faults import FaultError
+from sprag.service.languages import N_
+from sprag.service.reading.reader import Phrase, Reading, reading_for
+from sprag.service.results.choice import characteristic
+from sprag.service.storage.errors import StoreError
+from sprag.service.views.headline import headline_of, is_small
+from sprag.worker import models
+from sprag.worker.planning.calibrate.plan import CALIBRATE
+from sprag.worker.planning.goals.plan import GOAL
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from sprag.service.reading.reader import Choice
+    from sprag.service.results.headlines.headline import Headline
+    from sprag.service.storage.studies.records import StudyRecord
+    from sprag.service.views.library import Library
+    from sprag.worker.study import Study
+
+#: Answers of a row.
+ANSWERS: Final = 3
+_GOAL: Final = N_("the best of {count} designs")
+_CALIBRATION: Final = N_("parameters that fit a measurement")
+_BATCH: Final = N_("what tolerances do")
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """What a list tells of a study."""
+
+    headline: Headline
+    about: Phrase
+    reading: Reading
+
+
+def listed(library: Library, records: Iterable[StudyRecord], choice: Choice, seconds: float) -> dict[str, Listed]:
+    """What is known of the studies; of those that have changed, as many as ``seconds`` allow.
+
+    A study that runs keeps the headline that it had until there is time for another.
+    """
+    kept, found = library.headlines, dict[str, Listed]()
+    until = time.monotonic() + seconds
+    for record in records:
+        known = kept.get(record.id)
+        if (known is None or known[0] != record.revision) and record.done and time.monotonic() < until:
+            known = kept[record.id] = record.revision, _headline(library, record.id)
+        if known is not None and known[1] is not None:
+            headline, about = known[1]
+            store = library.store
+            reading = reading_for(store.studies.study(record.id), store.studies.spec(record.id), choice)
+            found[record.id] = Listed(headline, about, reading)
+    return found
+
+
+def known(library: Library, records: Iterable[StudyRecord], choice: Choice, seconds: float) -> list[bool]:
+    """Which of the studies have an answer after another look, for a stream of changes."""
+    found = listed(library, records, choice, seconds)
+    return [record.id in found for record in records]
+
+
+def _headline(library: Library, study_id: str) -> tuple[Headline, Phrase] | None:
+    """The headline, and what the study is; None where it is deleted, damaged, or takes long."""
+    try:
+        study = library.store.studies.study(study_id)
+        return (headline_of(library, study_id), _about(study)) if is_small(study) else None
+    except (FaultError, StoreError):
+        return None
+
+
+def _about(study: Study) -> Phrase:
+    """What a study is, in words: ``mean shaft speed along load torque``."""
+    kind = None if study.plan is None else study.plan["kind"]
+    if kind == GOAL:
+        return Phrase(_GOAL, count=study.cases)
+    if kind == CALIBRATE:
+        return Phrase(_CALIBRATION)
+    if study.spread is not None:
+        return Phrase(_BATCH)
+    query = characteristic(study, models.study_results(study))
+    if query is None:
+        return Phrase("")
+    return Phrase("{name} along {path}", name=Name(query.y[0], within=True), path=Name(query.x, within=True))
