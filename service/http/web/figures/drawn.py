@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from sprag.service.figures.svg import DOUBLE, NARROW, WIDE, svg
 from sprag.service.figures.svg_map import map_svg
@@ -28,21 +28,21 @@ def drawn(figure: Figure, label: str = "", cases: str = "", chosen: str = "") ->
         return _note(figure.note)
     single = replace(figure, columns=1)
     sizes = [("narrow", single, NARROW), ("wide", single, WIDE)]
-    if figure.columns > 1:
+    if figure.columns > 1 or figure.motion:
         sizes.append(("double", figure, DOUBLE))
-    pictures = [
+    every = [
         _named(svg(each, width=width, label=label, cases=cases, chosen=chosen), name) for name, each, width in sizes
     ]
-    return _together(pictures, figure.below)
+    return _together(every, figure.below)
 
 
 def drawn_map(drawn: Map, label: str = "", cases: str = "", *, contours: bool = False) -> Markup:
     """A map, already in its reader's units and words, with the sentence below it."""
-    pictures = [
+    every = [
         _named(map_svg(drawn, contours=contours, width=width, label=label, cases=cases), name)
         for name, width in (("narrow", NARROW), ("wide", WIDE))
     ]
-    return _together(pictures, "" if drawn.refined is None else shown(drawn.refined.sentence))
+    return _together(every, "" if drawn.refined is None else shown(drawn.refined.sentence))
 
 
 def _note(text: str) -> Markup:
@@ -54,8 +54,8 @@ def _named(picture: str, name: str) -> Markup:
     return Markup(picture.replace('class="figure"', f'class="figure {name}"', 1))  # noqa: S704
 
 
-def _together(pictures: list[Markup], below: str) -> Markup:
-    """Pictures of several widths, the widest one last."""
-    kind = "drawn two" if len(pictures) == 3 else "drawn"
-    told = Markup('<p class="below">{}</p>').format(below) if below else escape("")
-    return Markup('<div class="{}">{}</div>{}').format(kind, Markup().join(pictures), told)
+def _together(every: list[Markup], below: str) -> Markup:
+    """Pictures of several widths, the widest one last, and the sentence below them."""
+    kind = "drawn two" if len(every) == 3 else "drawn"
+    picture = Markup('<div class="{}">{}</div>').format(kind, Markup().join(every))
+    return picture + Markup('<p class="below">{}</p>').format(below) if below else picture

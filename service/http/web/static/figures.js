@@ -109,9 +109,9 @@ sprag.only = (element, cases) => {
   let reached = null;
   const area = (panel) => panel.querySelector(".area").getBoundingClientRect();
   const tell = (panel, at, text) => {
-    const frame = panel.closest(".drawn"), box = area(panel), outer = frame.getBoundingClientRect();
+    const figure = panel.closest("svg.figure"), frame = figure.closest(".drawn") ?? figure.parentElement, box = area(panel), outer = frame.getBoundingClientRect();
     const scale = box.width / Number(panel.querySelector(".area").getAttribute("width"));
-    if (tip.parentNode !== frame) frame.append(tip);
+    if (tip.parentNode !== frame) { frame.classList.add("told"); frame.append(tip); }
     tip.textContent = text;
     tip.hidden = false;
     const left = box.left - outer.left + at[0] * scale, top = box.top - outer.top + at[1] * scale;
@@ -135,7 +135,7 @@ sprag.only = (element, cases) => {
   };
 
   document.addEventListener("pointermove", (event) => {
-    const panel = event.target.closest?.(".drawn .panel");
+    const panel = event.target.closest?.("svg.figure .panel");
     if (!panel || drag?.moved) { if (!tip.hidden && !tip.contains(event.target)) hide(); return; }
     const at = place(panel, event), { points } = sprag.panel(panel), { far, point } = nearest(points, at);
     if (point) { if (far <= REACH) tell(panel, point.at, point.text); else hide(); return; }
@@ -143,16 +143,18 @@ sprag.only = (element, cases) => {
     if (text) tell(panel, [at[0], Math.max(at[1], 0)], text); else hide();
   });
   document.addEventListener("click", (event) => {
-    const panel = event.target.closest?.(".drawn .panel");
+    const panel = event.target.closest?.("svg.figure .panel");
     if (!panel || drag?.moved || event.target.closest("a")) return;
     const { far, point } = nearest(sprag.panel(panel).points, place(panel, event));
     if (point && far <= 12) location.assign(point.href);
   });
 
   // With arrow keys from point to point, and with Enter to its case.
-  document.addEventListener("sprag:drawn", (event) => {
-    for (const figure of event.target.querySelectorAll("svg.figure")) if (figure.querySelector(".panel :is(a, [data-cases], [data-line])")) figure.tabIndex = 0;
-  });
+  const reachable = (part) => {
+    for (const figure of part.querySelectorAll("svg.figure")) if (figure.querySelector(".panel :is(a, [data-cases], [data-line])")) figure.tabIndex = 0;
+  };
+  document.addEventListener("sprag:drawn", (event) => reachable(event.target));
+  document.addEventListener("DOMContentLoaded", () => reachable(document));
   document.addEventListener("keydown", (event) => {
     const figure = event.target.closest?.("svg.figure");
     if (!figure || event.ctrlKey || event.altKey || event.metaKey) return;
