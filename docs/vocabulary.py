@@ -26,6 +26,7 @@ from sprag.worker.directions import DIRECTIONS
 from sprag.worker.models.machine_shaft import REMARKS
 from sprag.worker.models.model import Model
 from sprag.worker.models.registry import all_models
+from sprag.worker.models.transients import RESULTS as TRANSIENT_RESULTS
 from sprag.worker.models.vocabulary import caption, caption_texts
 from sprag.worker.states import StudyState
 
@@ -58,6 +59,7 @@ def vocabulary() -> Iterator[str]:
     yield from map(_term, Special)
     yield from (NO_ORBIT, *(end.sentence for end in End))
     yield from (*models.ENDING_SENTENCES.values(), *models.REGIME_SENTENCES.values())
+    yield from (meaning for _name, _unit, meaning in TRANSIENT_RESULTS)
     yield from (state.sentence for state in StudyState)
     yield from (kind.title for kind in KINDS)
     for meanings in (MEANINGS, KIND_MEANINGS, WARNING_MEANINGS):
