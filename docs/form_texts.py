@@ -80,7 +80,4 @@ def _texts(items: Iterable[FormField | FormChoice]) -> Iterator[str]:
 
 def _of_laboratory(own: Laboratory) -> Iterator[str]:
     """What the laboratory of a model itself says."""
-    yield from (own.title, own.lead, own.curves, own.note, *own.numbered.values(), *own.main.values())
-    yield from (text for kind in own.sliders for text in (kind.label, kind.group, kind.help))
-    yield from (word for word, _ in own.studies.values())
-    yield from (sentence for sentence, *_ in own.questions.values())
+    yield from (own.note, *own.main.values())

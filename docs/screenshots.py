@@ -81,8 +81,8 @@ def shots(ids: list[str]) -> list[tuple[str, str, tuple[int, int], bool]]:
         ("cases", f"/studies/{one}/cases?sort=-power.useful.mean", DESKTOP, False),
         ("explore", f"/studies/{one}/rows?max:shaft.load=0.15&sort=-efficiency", (1280, 1150), False),
         ("case", f"/studies/{two}/cases/45", DESKTOP, True),
-        ("laboratory", "/laboratory?machine=press", (1280, 1000), False),
-        ("laboratory-drive", "/laboratory/drive?shaft.load=0.2&held=shaft.load%3D0.4", (1280, 1000), False),
+        ("laboratory", "/new?model=machine-shaft&machine=press", (1280, 1000), False),
+        ("laboratory-drive", "/new?shaft.load=0.2", (1280, 1000), False),
         ("schedules", "/nights/new", DESKTOP, True),
         ("compare", f"/compare?study={one}&study={two}&study={fitted}", DESKTOP, True),
     ]

@@ -13,7 +13,6 @@ from sprag.service.actor import Role
 from sprag.service.fault_meanings import KIND_MEANINGS, MEANINGS, WARNING_MEANINGS
 from sprag.service.http.problems import PROBLEM_TYPES
 from sprag.service.http.views import preset_of
-from sprag.service.http.web.laboratory.setting import machines
 from sprag.service.presets import preset_names
 from sprag.service.reading.quantities import KINDS
 from sprag.service.reading.reader import part_label
@@ -68,8 +67,6 @@ def vocabulary() -> Iterator[str]:
     yield "periods"
     yield from map(_term, (*LOGGED, *PAGES, *Role, *TokenScope))
     yield from (preset_of(name)["title"] for name in preset_names())
-    for model in models.model_names():
-        yield from machines(model).values()
     quick = (name for name, *_ in MECHANISM_CHOICES["quick_return"]["kind"].choices)
     yield from map(_term, (*MECHANISM_CHOICES, *quick))
     for problem in PROBLEM_TYPES.values():

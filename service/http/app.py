@@ -56,6 +56,7 @@ from sprag.service.http.web import (
     compare,
     front,
     further,
+    laboratory,
     login,
     matters,
     me,
@@ -73,8 +74,8 @@ from sprag.service.http.web import schedules as schedule_pages
 from sprag.service.http.web import (
     study_list as list_pages,
 )
+from sprag.service.http.web.form import live as live_machine
 from sprag.service.http.web.form import page as form
-from sprag.service.http.web.laboratory import pages as laboratory
 from sprag.service.http.web.rows import motion as row_motion
 from sprag.service.http.web.rows import pages as rows
 from sprag.service.jobs import checks
@@ -166,6 +167,7 @@ ROUTED = (
     motion,
     compare,
     laboratory,
+    live_machine,
     component_pages,
     view_pages,
     document_pages,
@@ -231,6 +233,7 @@ async def _running(
         context.checker.start()
         preparing = asyncio.create_task(_make_ready(context.checker, context))
     reading = asyncio.create_task(keep_reading_ahead(context))
+    warming = asyncio.create_task(live_machine.warm(context)) if context.computer in owned else None
     housekeeping = Housekeeping(store, access.note_uses, Watchdog(store).look)
     housekeeping.start()
     reporter = Reporter(store, reports)
@@ -238,6 +241,8 @@ async def _running(
         reporter.start()
     yield
     reading.cancel()
+    if warming is not None:
+        warming.cancel()
     if preparing is not None:
         preparing.cancel()
     if isinstance(running, Application) and running.drain is not None:

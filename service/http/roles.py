@@ -56,7 +56,7 @@ _VIEWER: Final = (
     "GET /help", "GET /help/interface", "GET /help/{name}", "GET /docs", "GET /docs/{name}",
     "GET /docs/site", "GET /docs/site/{name}",
     "GET /live/{name}", "GET /units",
-    "GET /", "GET /new", "POST /new/check", "GET /calibrate",
+    "GET /", "GET /new", "POST /new/check", "POST /new/live", "POST /new/along", "GET /calibrate",
     f"GET {_PAGE}",
     *(f"GET {_PAGE}/{part}" for part in (
         "delete", "extend", "labels", "front", "figures/front", "explore", "explore/new", "explore/compare",
@@ -69,10 +69,7 @@ _VIEWER: Final = (
         "motion.svg", "laboratory", "engagements", "branch", "diagram", "basin", "transient",
     )),
     "GET /compare", "GET /compare/figure", "GET /compare/picture.{form}", "GET /compare/curves.csv",
-    *(f"GET /laboratory{model}{part}" for model in ("", "/{model}") for part in (
-        "", "/figure", "/picture.{form}", "/form", "/study",
-    )),
-    "GET /laboratory/questions",
+    "GET /laboratory", "GET /laboratory/{model}", "GET /laboratory/{model}/{part}",
     "GET /nights", "GET /nights/new", "GET /nights/{schedule_id}",
     "GET /night", "GET /schedules", "GET /schedules/new", "GET /schedules/{schedule_id}",
 )  # fmt: skip

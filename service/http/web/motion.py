@@ -24,7 +24,6 @@ from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.views import study_address
 from sprag.service.http.web.figures.drawn import cases_of
-from sprag.service.http.web.form.own_machine import case_address
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page, spec_text
 from sprag.service.http.web.view_forms import Asked, Seen, asked_of, fact_of, files_of, inline
@@ -297,13 +296,12 @@ async def motion_picture(
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/laboratory")
 async def in_laboratory(work: Attended, study_id: StudyId, case: CaseNumber, which: StartNumber = None) -> Response:
-    """The machine of a case in the laboratory, in the motion that the case comes to."""
-    study, spec = await work.case_of(study_id, case, lambda _: work.context.store.studies.spec(study_id), which)
+    """The machine of a case as a new study, beginning in the motion that the case comes to."""
+    study, _study = await work.case_of(study_id, case, lambda _: None, which)
     moving = models.has_strobes(study)
     state = await work.run_case(models.run_end_state, *motion_of(study, case, which)) if moving else None
-    mark = f"{study_id}/{case}" if which is None else f"{study_id}/{case}/{which}"
-    address = await work.check(case_address, spec, study, case, mark, state or {})
-    return RedirectResponse(address, status_code=303)
+    given = {"clone": study_id, "case": case, **{path: repr(value) for path, value in (state or {}).items()}}
+    return RedirectResponse(f"/new?{urlencode(given)}", status_code=303)
 
 
 def _add(name: str) -> None:

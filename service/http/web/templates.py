@@ -38,7 +38,7 @@ from sprag.worker import models
 
 #: The beginning of an attribute that is an address: a path of this service, or an expression that may give one.
 _ADDRESS = re.compile(
-    r"""(?<=\s)(?P<name>href|src|action|formaction|data-(?:address|check|engagements|events|figure|front|motion))="
+    r"""(?<=\s)(?P<name>href|src|action|formaction|data-(?:address|along|check|engagements|events|figure|front|live|motion))="
     (?:(?P<path>/(?!/))|\{\{(?P<expression>.*?)\}\})""",
     re.VERBOSE,
 )

@@ -187,13 +187,13 @@ def _doors(service: Service, spec: Any) -> dict[str, Any]:
         "form": lambda: service.http.get("/new?preset=one_pendulum"),
         "live form": lambda: service.http.post("/new/check", content="pendulums=1", headers=form),
         "sent form": lambda: service.http.post("/new", content="pendulums=1&do=submit", headers=form),
-        "laboratory": lambda: service.http.get("/laboratory"),
+        "live machine": lambda: service.http.post("/new/live", content="pendulums=1", headers=form),
     }
 
 
 DOORS = (
     "preview", "submit", "extend", "fit", "schedule", "picture", "report", "form", "live form", "sent form",
-    "laboratory",
+    "live machine",
 )  # fmt: skip
 
 

@@ -1,25 +1,16 @@
-"""A machine of one's own as parameters of the laboratory's address: from a form or a case, and read again."""
+"""A single machine of a spec, as an address describes it or as an example of its model."""
 
 from __future__ import annotations
 
 import json
 import math
-import re
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
-from sprag.sentences import Sentence
-from sprag.service.faults import Fault
 from sprag.service.http.problems import ApiError
-from sprag.service.http.views import preset_of
-from sprag.service.languages import N_
-from sprag.service.reading.faults import message
 from sprag.service.spec.derive import with_values
-from sprag.service.spec.design import design_spec
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.kinds.registry import WHICH_CASES, without_cases
-from sprag.service.spec.report import SpecError
 from sprag.service.spec.stored import accepted
 from sprag.worker import models
 from sprag.worker.limits import MAX_ADDRESS_BYTES
@@ -29,11 +20,8 @@ if TYPE_CHECKING:
 
     from sprag.worker.study import Study
 
-#: Name of a machine that the address itself describes.
-OWN: Final = "own"
-#: Parameters of an own machine besides its name: base and run of its spec as JSON, title, and the case it comes from.
-FIELDS: Final = ("base", "run", "title", "case")
-_CASE: Final = re.compile(r"([A-Za-z0-9_-]{1,64})/([0-9]{1,12})(?:/([0-9]{1,9}))?")
+#: Parameters of an address that describe a machine: base and run of its spec as JSON, and its title.
+FIELDS: Final = ("base", "run", "title")
 _NOT_HERE: Final = {*WHICH_CASES, "derive", "base"}
 
 
@@ -81,47 +69,6 @@ def _gives(base: Any, path: str) -> bool:
     return True
 
 
-def laboratories() -> dict[str, str]:
-    """The address of the laboratory of each model."""
-    names = {model: models.model_of(model).presentation.laboratory.address for model in models.model_names()}
-    return {
-        model: "/laboratory" + ("" if name == "" else f"/{model if name is None else name}")
-        for model, name in names.items()
-    }
-
-
-def laboratory_address(spec: Mapping[str, Any], **further: str) -> str:
-    """The laboratory's address of the machine of a valid spec; raises SpecError where it is not one machine."""
-    made = single_machine(spec)
-    run = made.get("run")
-    texts = {"base": _json(made["base"]), "run": _json(run) if run else "", "title": made.get("name", "")}
-    given = {"machine": OWN, **{name: text for name, text in texts.items() if text}, **further}
-    address = f"{laboratories()[made['model']]}?{urlencode(given)}"
-    if not fits(address):
-        message = N_("is too long for the address of the laboratory: give its tables fewer rows")
-        allowed = Sentence("an address of at most {count} characters", count=MAX_ADDRESS_BYTES)
-        raise SpecError([Fault("/base", "out-of-range", message, f"{len(address):,} characters", allowed)])
-    return address
-
-
-def fits(address: str) -> bool:
-    """Whether a server reads so long an address."""
-    return len(address) <= MAX_ADDRESS_BYTES
-
-
-def case_address(spec: Mapping[str, Any], study: Study, case: int, mark: str, state: Mapping[str, float]) -> str:
-    """The laboratory's address of a case of a study, which begins in ``state`` (SI, by path).
-
-    ``mark`` is the case as `case_page` reads it.
-    """
-    further = {path: repr(value) for path, value in state.items()}
-    return laboratory_address(design_spec(spec, study, case), case=mark, **further)
-
-
-def _json(value: object) -> str:
-    return json.dumps(value, separators=(",", ":"), ensure_ascii=False)
-
-
 def own_spec(given: Mapping[str, str], model: str) -> dict[str, Any]:
     """The spec of a machine that an address describes; ApiError where it does not."""
     long = len(urlencode({name: given.get(name, "") for name in FIELDS}))
@@ -143,36 +90,6 @@ def _object(given: Mapping[str, str], name: str) -> dict[str, Any]:
     return found
 
 
-def machine_of(given: Mapping[str, str], name: str) -> tuple[tuple[str, str], ...]:
-    """The machine of an address as parameters, without the numbers that were changed."""
-    kept = [(field, given[field]) for field in FIELDS if given.get(field)] if name == OWN else []
-    return (("machine", name), *kept)
-
-
-@lru_cache(maxsize=32)
-def read_machine(
-    machine: tuple[tuple[str, str], ...], model: str, known: tuple[str, ...]
-) -> tuple[dict[str, Any], Study]:
-    """The machine that these parameters of a URL describe, as a spec of one case; ApiError where there is none.
-
-    ``known`` are the names of the built-in machines of the model.
-    """
-    name = machine[0][1]
-    if not known and not name:
-        spec = example_spec(model)
-        return spec, parse_spec(spec).study
-    if name not in {OWN, *known}:
-        raise ApiError(
-            "not-found", Sentence("Unknown machine; known machines: {machines}.", machines=", ".join(known) or "none")
-        )
-    try:
-        spec = single_machine(own_spec(dict(machine), model) if name == OWN else preset_of(name)["spec"])
-        return spec, parse_spec(spec).study
-    except SpecError as error:
-        texts = (f"{item.where or 'the spec'}: {message(item)}" for item in error.faults)
-        raise ApiError("invalid-spec", "; ".join(texts)) from error
-
-
 def example_spec(model: str) -> dict[str, Any]:
     """A machine of a model without examples: each number has its default, or 1 where that is in its range."""
     base: dict[str, Any] = {}
@@ -185,11 +102,3 @@ def example_spec(model: str) -> dict[str, Any]:
             usual = entry.default if entry.default is not None and math.isfinite(entry.default) else 1.0
             place[name] = usual if entry.accepts(usual) else min(max(usual, entry.low), entry.high)
     return {"sprag": 1, "model": model, "name": models.model_of(model).presentation.title or model, "base": base}
-
-
-def case_page(mark: str) -> str:
-    """The page of the case that ``mark`` names, as ``st_1/5`` or, with its start, ``st_1/5/2``; "" where it is none."""
-    found = _CASE.fullmatch(mark)
-    if found is None:
-        return ""
-    return f"/studies/{found[1]}/cases/{found[2]}" + (f"?start={found[3]}" if found[3] else "")

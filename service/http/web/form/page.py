@@ -14,7 +14,7 @@ from typing import Annotated, Any, Final
 from fastapi import Query, Request
 from starlette.responses import RedirectResponse, Response
 
-from sprag.sentences import Place, Sentence
+from sprag.sentences import Sentence
 from sprag.service.faults import FaultError
 from sprag.service.figures.drawings import rough_drawings
 from sprag.service.http.context import Context, Ctx, study_with
@@ -25,6 +25,7 @@ from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form import study_check
+from sprag.service.http.web.form.beginning import beginning, examples_of
 from sprag.service.http.web.form.cases import kinds, methods
 from sprag.service.http.web.form.check import Checked
 from sprag.service.http.web.form.columns import take_columns
@@ -40,12 +41,13 @@ from sprag.service.http.web.form.fields import (
     search_fields,
 )
 from sprag.service.http.web.form.goal import GOAL_DEFAULTS
+from sprag.service.http.web.form.live import live_answer, named_numbers
 from sprag.service.http.web.form.machine import BASE, choices_of, entries, form_of, model_name
 from sprag.service.http.web.form.machine_spec import base_of, values_of_base
-from sprag.service.http.web.form.own_machine import example_spec, laboratory_address
+from sprag.service.http.web.form.own_machine import own_spec
 from sprag.service.http.web.form.parts import count_of, parts_of, reshape, share, unshared
 from sprag.service.http.web.form.rows import LIMITS
-from sprag.service.http.web.form.sent import settle
+from sprag.service.http.web.form.sent import let_vary, settle
 from sprag.service.http.web.form.sheet import Sheet, sheet_of
 from sprag.service.http.web.form.spec import REFINE_DEFAULTS, is_search, values_of
 from sprag.service.http.web.form.tolerances import OWN, distributions, drive_fields, own_name, with_batch
@@ -54,15 +56,12 @@ from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.templates import fragment, page, spec_text
 from sprag.service.http.work import Attended, Work
 from sprag.service.jobs.submission import Submission, take_in
-from sprag.service.languages import gettext
 from sprag.service.presets import preset_names
-from sprag.service.reading.faults import message
-from sprag.service.reading.reader import Reading
+from sprag.service.reading.together import split_list
 from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.spec.design import design_spec
 from sprag.service.spec.document import UNNAMED
 from sprag.service.spec.kinds.registry import without_cases
-from sprag.service.spec.report import SpecError
 from sprag.service.spec.stored import accepted
 from sprag.worker import models
 
@@ -92,7 +91,8 @@ async def new_study(
     case of it, alone or along a parameter.
     """
     clone = clone or source
-    spec = await in_thread(_start, context, preset, clone, case, along)
+    given = dict(request.query_params)
+    spec = await in_thread(_start, context, given, model, preset, clone, case, along)
     if spec is None:
         if model not in models.model_names():
             known = ", ".join(models.model_names())
@@ -101,7 +101,7 @@ async def new_study(
             return form_page(request, {"/text": "", "format": "json"}, None)
         if begin == "empty":
             return await in_thread(form_page, request, empty(model), None)
-        spec = {**without_cases(await in_thread(_example, model)), "axes": []}
+        spec = {**without_cases(await in_thread(beginning, model)), "axes": []}
         spec.pop("name", None)
     fields = True
     try:
@@ -119,8 +119,30 @@ async def new_study(
         values["/name"] = f"{values['/name']} (copy)"
     if clone is not None and "/text" not in values:
         values["from"] = clone
-    checked = await look_over(context, work, values)
+    if "/text" not in values:
+        _set(values, given, request.query_params.getlist("vary"), along if clone is None else None)
+    # The page is there at once; its script asks for what is not computed yet.
+    checked = await look_over(context, work, values) if context.ready.is_set() else None
     return await in_thread(form_page, request, values, checked, fields=fields)
+
+
+def _set(values: Values, given: Mapping[str, str], vary: list[str], along: str | None) -> None:
+    """Put the numbers of an address into a form, by their paths, and let those vary that it names."""
+    known = {entry.name: entry for entry in entries(values, hidden=True)}
+    for path, text in given.items():
+        name = f"{BASE}/{path.replace('.', '/')}"
+        listed, _slash, place = name.rpartition("/")
+        if name in known:
+            values[name] = text
+        elif listed in known and place.isdigit():
+            items = split_list(values.get(listed, ""))
+            if int(place) < len(items):
+                items[int(place)] = text
+                values[listed] = "; ".join(items)
+    paths = [choice.path for _group, group in _choices(values) for choice in group]
+    asked = named_numbers(model_name(values), along, paths) if along else []
+    for path in dict.fromkeys((*vary, *asked)):
+        let_vary(values, path)
 
 
 def empty(model: str) -> Values:
@@ -142,7 +164,13 @@ def empty(model: str) -> Values:
 
 
 def _start(
-    context: Context, preset: str | None, clone: str | None, case: int | None = None, along: str | None = None
+    context: Context,
+    given: Mapping[str, str],
+    model: str,
+    preset: str | None,
+    clone: str | None,
+    case: int | None = None,
+    along: str | None = None,
 ) -> dict[str, Any] | None:
     if clone is not None and case is not None:
         study = study_with(context, clone, case)
@@ -153,14 +181,18 @@ def _start(
         spec = accepted(context.store.studies.spec(clone), context.store.studies.study(clone))
         # A study that was given another name is cloned under that.
         return spec if spec.get("name", UNNAMED) == name else {**spec, "name": name}
-    if preset is None:
+    if given.get("base") and model in models.model_names():
+        return {**own_spec(given, model), "axes": []}
+    machine = given.get("machine", "")
+    if preset is None and not machine:
         return None
+    preset = preset or machine
     if preset not in preset_names():
         raise ApiError(
             "not-found", Sentence("Unknown example; known examples: {examples}.", examples=", ".join(preset_names()))
         )
     found: dict[str, Any] = preset_of(preset)["spec"]
-    return found
+    return {**without_cases(found), "axes": []} if machine else found
 
 
 @router.post("/new")
@@ -187,18 +219,8 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
     remember(values, before)
     checked = await look_over(context, work, values)
     checked.faults.update(faults)
-    if wanted == "laboratory" and checked.preview is not None:
-        try:
-            address = await work.check(laboratory_address, checked.spec)
-        except SpecError as error:
-            reading = Reading(checked.spec["model"])
-            text = "; ".join(f"{reading.place(Place(item.where or ''))}: {message(item)}" for item in error.faults)
-            checked.faults.setdefault("", []).append(
-                gettext("The laboratory cannot show this machine: {text}", text=text)
-            )
-        else:
-            return RedirectResponse(address, status_code=303)
-    return await in_thread(form_page, request, values, checked)
+    shown = await live_answer(work, values) if wanted == "live" else None
+    return await in_thread(form_page, request, values, checked, live=None if shown is None else shown["answer"])
 
 
 def _submit(context: Context, request: Request, values: Values, checked: Checked, made: Submission | None) -> Response:
@@ -245,7 +267,13 @@ async def look_over(context: Context, work: Work, values: Mapping[str, str]) -> 
 
 
 def form_page(
-    request: Request, values: Values, checked: Checked | None, status: int = 200, *, fields: bool = True
+    request: Request,
+    values: Values,
+    checked: Checked | None,
+    status: int = 200,
+    *,
+    fields: bool = True,
+    live: str | None = None,
 ) -> Response:
     """The page with the form filled in with ``values``; ``checked`` is None where they were not checked.
 
@@ -267,6 +295,7 @@ def form_page(
         with_fields=fields,
         faults=checked.faults,
         checked=checked,
+        live=live,
         begun=begun,
         address=_address(request),
         key=values.get("key") or secrets.token_hex(8),
@@ -283,7 +312,7 @@ def form_page(
         components=[] if text_mode else component_groups(values, request.app.state.context.store.components.all()),
         component_rows=rows_with_components(values),
         undoable=bool(history_of(values)),
-        presets=[preset_of(name) for name in (preset_names() if text_mode else _presets(model))],
+        presets=[preset_of(name) for name in (preset_names() if text_mode else examples_of(model))],
         run=run_fields(),
         refine=refine_fields(),
         limits=LIMITS,
@@ -335,16 +364,10 @@ def _read_numbers(values: Values) -> dict[str, float]:
     return found
 
 
-def _example(model: str) -> dict[str, Any]:
-    """The machine with which a form begins."""
-    names = _presets(model)
-    return dict(preset_of(names[0])["spec"]) if names else example_spec(model)
-
-
 @lru_cache(maxsize=8)
 def _begun(model: str) -> Values:
     """The form of the example of a model."""
-    return values_of(_example(model))
+    return values_of(beginning(model))
 
 
 def _without_ticks(values: Values) -> Values:
@@ -387,20 +410,6 @@ def _kept(values: Values) -> Values:
         name: text for name, text in values.items()
         if name.startswith(others) or (name.startswith(f"{BASE}/") and name not in shown)
     }  # fmt: skip
-
-
-@lru_cache(maxsize=8)
-def _presets(model: str) -> tuple[str, ...]:
-    """Names of the examples of a model that the form has fields for."""
-
-    def fits(spec: Mapping[str, Any]) -> bool:
-        try:
-            return bool(values_of(spec))
-        except ValueError:
-            return False
-
-    specs = {name: preset_of(name)["spec"] for name in preset_names()}
-    return tuple(name for name, spec in specs.items() if spec["model"] == model and fits(spec))
 
 
 def _address(request: Request) -> str:

@@ -75,6 +75,11 @@ def part_of(values: Mapping[str, str]) -> str:
     return "vary" if is_search(values) else "axes"
 
 
+def let_vary(values: Values, path: str) -> None:
+    """Let a number vary."""
+    _vary(values, part_of(values), path, wanted=True)
+
+
 def _vary(values: Values, name: str, path: str, *, wanted: bool) -> None:
     """Let a number of a list vary, or no longer; nothing where it is so."""
     index = varied(values, name).get(path)
@@ -100,21 +105,20 @@ def _vary(values: Values, name: str, path: str, *, wanted: bool) -> None:
     if count_of(values, name) > row_index:
         row = f"{PARTS[name].pointer}/{row_index}"
         way = str(PARTS[name].new["way"])
-        values |= {f"{row}/path": path, f"{row}/way": way, f"{row}/count": _VALUES, **_ends(values, path, row)}
+        values |= {f"{row}/path": path, f"{row}/way": way, f"{row}/count": _VALUES}
+        ends = ends_of(values, path) or ("", "")
+        values |= {f"{row}/{name}": text for name, text in zip(("from", "to"), ends, strict=True) if text}
 
 
-def _ends(values: Mapping[str, str], path: str, row: str) -> Values:
-    """Ends proposed for a number: around its value, as far as its slider would go."""
+def ends_of(values: Mapping[str, str], path: str) -> tuple[str, str] | None:
+    """Ends proposed for a number: around its value, as far as its slider would go; None where it is 0 or unknown."""
     text = values.get(f"{BASE}/{path.replace('.', '/')}", "").strip()
     try:
         number, unit = split_quantity(text)
     except QuantityError:
-        return {}
+        return None
     kinds = models.model_of(model_name(values)).presentation.laboratory.sliders
     own = row_of(model_name(values), path)[2]
     low, high = next(((kind.low, kind.high) for kind in kinds if re.fullmatch(kind.path, own)), (0.5, 1.5))
-    if not number:
-        return {f"{row}/from": f"0 {unit}".strip()}
-    ends = sorted(float(number) * factor for factor in (low, high))
-    texts = (f"{float(f'{end:.2g}'):g} {unit}".strip() for end in ends)
-    return dict(zip((f"{row}/from", f"{row}/to"), texts, strict=True))
+    ends = sorted(float(f"{float(number) * factor:.2g}") for factor in (low, high))
+    return None if ends[0] == ends[1] else (f"{ends[0]:g} {unit}".strip(), f"{ends[1]:g} {unit}".strip())

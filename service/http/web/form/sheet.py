@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 _NARROW, _STEP, _STEP_TOLERANT, _GAP, _AT = 200.0, 76.0, 104.0, 14.0, 36.0
 _NUMBER: Final = re.compile(r"\s*([-+\u2212]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?)\s*(.*)", re.DOTALL)
 _LONGEST: Final = 9
+#: Controls that leave the drawer where they differ from the example.
+_MOVED: Final = ("line", "lines", "select", "tick")
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,8 +165,8 @@ def sheet_of(
     spots = {entry.name: made.spot(entry, repeated) for entry in found if entry.control == "line"}
     alone = {entry.name for block in every for own in (block, *block.within) for entry in own.entries}
     front = frozenset(
-        entry.name for entry in found if not form.front or _fits(form.front, made.path(entry.name))
-        or (entry.name in alone & spots.keys() and _differs(values, begun, (entry,)))
+        entry.name for entry in found if not form.front or fits(form.front, made.path(entry.name))
+        or (entry.name in alone and entry.control in _MOVED and _differs(values, begun, (entry,)))
     )  # fmt: skip
     by_path = {spot.path: spot for spot in spots.values() if spot.name in front}
     plans, placed = [], set[str]()
@@ -177,8 +179,10 @@ def sheet_of(
         text = with_leaders(drawing, step, _GAP, _AT) if narrow else svg(drawing)
         plans.append(Plan(drawing, Markup(text), *sides))  # noqa: S704 - its texts are escaped where it is made
     inside = {entry.name for entry in found} - front
-    opened = any(name in inside for name in faulty) or _differs(
-        values, begun, (entry for entry in found if entry.name in inside)
+    opened = (
+        any(name in inside for name in faulty)
+        or _differs(values, begun, (entry for entry in found if entry.name in inside))
+        or any(values.get(name) != text for name, text in (begun or {}).items() if name.startswith("/run/"))
     )
     return Sheet(
         tuple(plans), tuple(every), spots, frozenset(placed), front, tuple(made.rows()),
@@ -199,7 +203,7 @@ def _all(entries: Iterable[Entry]) -> list[Entry]:
     return [own for entry in entries for own in (entry, *_all(inner for _, group in entry.groups for inner in group))]
 
 
-def _fits(patterns: Iterable[str], path: str) -> bool:
+def fits(patterns: Iterable[str], path: str) -> bool:
     """Whether a path, with letters for its numbers, is one of those of the patterns."""
     general = re.sub(r"\.\d+(?=\.|$)", ".N", path)
     return any(re.fullmatch(pattern, general) for pattern in patterns)

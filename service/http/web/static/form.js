@@ -77,6 +77,7 @@ const check = async () => {
   panel.querySelectorAll("details").forEach((part, index) => { part.open = Boolean(open[index]); });
   for (const place of form.querySelectorAll(".fit")) place.innerHTML = found.fits[place.id.slice("fit:".length)] || "";
   form.dataset.checked = String(mine);
+  document.dispatchEvent(new Event("sprag:checked"));
 };
 
 // The text of a file in UTF-8, UTF-16 with a byte order mark, or a code page of Windows, as `decoded` in table_text.py has it.
@@ -136,6 +137,8 @@ const newShape = async (extra, body = encoded(extra)) => {
   const { name: chosen, type } = document.activeElement;
   const named = (part) => `${part.closest("fieldset[id]")?.id} ${part.querySelector("summary").textContent}`;
   const opened = new Set([...form.querySelectorAll("details[open]")].map(named));
+  const live = document.getElementById("live");
+  if (live) fresh.querySelector("#live")?.replaceWith(live); // until it is computed for the new form
   form.replaceWith(document.adoptNode(fresh));
   form = fresh;
   for (const part of form.querySelectorAll("details")) part.open ||= opened.has(named(part));
@@ -259,6 +262,7 @@ if (refused) {
   refused.scrollIntoView({ block: "center" });
 }
 listen();
+if ("unchecked" in form.dataset) check();
 const draft = sprag.drafts.waiting(form, Boolean(refused));
 if (draft) sprag.drafts.offer(form, draft, (fields) => newShape([], new URLSearchParams(fields)));
 document.addEventListener("sprag:found", () => { if (old) check(); });

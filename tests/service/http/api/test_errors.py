@@ -253,6 +253,6 @@ def test_operations_refuse_unknown_parameters_and_pages_ignore_them(service: Ser
     for path, answer in asked.items():
         assert assert_problem(answer, 422)["errors"][0]["parameter"] == "utm_source", path
     pages = {path for path in plain - operations if service.http.get(path).status_code == 200}
-    assert {"/", "/nights", "/me/workers", "/help/interface", "/compare", "/laboratory"} <= pages
+    assert {"/", "/nights", "/me/workers", "/help/interface", "/compare", "/new"} <= pages
     for path in pages:
         assert service.http.get(path, params={"utm_source": "mail"}).status_code == 200, path

@@ -15,8 +15,6 @@ from sprag.service.http.web.form.columns import COLUMNS, take_columns
 from sprag.service.http.web.form.machine_spec import step_of
 from sprag.service.http.web.form.page import empty
 from sprag.service.http.web.form.spec import spec_of, values_of
-from sprag.service.http.web.laboratory.questions import _estimate
-from sprag.service.http.web.laboratory.setting import _angle
 from sprag.service.reading.faults import allowed_text
 from sprag.service.schedules.deadline import ALLOWED, ALLOWED_OF_RUNS
 from sprag.service.schedules.fields import read_fields
@@ -94,24 +92,6 @@ def test_operating_points_of_a_goal() -> None:
     ]
     for name in wrong:
         assert not words(ukrainian[name][0]), ukrainian[name]
-
-
-@pytest.mark.parametrize("text", ["1e9", "north"])
-def test_the_angle_of_a_sketch(text: str) -> None:
-    faults: dict[str, list[str]] = {}
-    _angle(text, faults)
-    assert "; got " in faults["angle"][0]
-    with languages.language("uk"):
-        _angle(text, faults)
-    assert "; задано " in faults["angle"][0]
-    assert not words(faults["angle"][0].replace(text, ""))
-
-
-def test_an_estimate_out_of_range() -> None:
-    assert _estimate("3")[1] == "is out of range; got 3; allowed: 0 to 2"
-    with languages.language("uk"):
-        assert not words(_estimate("3")[1])
-        assert not words(_estimate("?")[1])
 
 
 @pytest.mark.parametrize(

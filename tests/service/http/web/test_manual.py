@@ -22,11 +22,10 @@ FORMS = (
     *(f"/new?preset={name}" for name in ("press", "punching_press", "slotter", "compressor", "cam_machine",
                                          "four_cylinder_engine", "least_flywheel")),
 )  # fmt: skip
-LABORATORIES = ("/laboratory?machine=punching_press", "/laboratory?machine=four_cylinder_engine", "/laboratory/drive")
 
 
 class Read(HTMLParser):
-    """Ids, addresses of links, what a page loads, and the explanation of each help by the help's id."""
+    """Ids, addresses of links, what a page loads, and the explanation of each field by its name."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -34,7 +33,6 @@ class Read(HTMLParser):
         self.links: list[str] = []
         self.loaded: list[str] = []
         self.helps: dict[str, str] = {}
-        self._open = ""
         self.feed(text)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
@@ -43,15 +41,8 @@ class Read(HTMLParser):
         self.loaded += [values[name] for name in ("src", "srcset", "data") if name in values]
         if tag == "a" and "href" in values:
             self.links.append(values["href"])
-        if tag == "small" and values.get("class") == "help" and values.get("id", "").startswith("help:"):
-            self._open = values["id"]
-            self.helps[self._open] = ""
-        if tag == "a" and values.get("class") == "explained":
-            assert self._open, values
-            self.helps[self._open] = values["href"]
-
-    def handle_endtag(self, tag: str) -> None:
-        self._open = "" if tag == "small" else self._open
+        if "data-more" in values:
+            self.helps[values["name"]] = values["data-more"]
 
 
 def targets() -> dict[str, set[str]]:
@@ -99,7 +90,7 @@ def test_every_parameter_has_a_section(model: str) -> None:
         assert heading in known[page], entry.path
 
 
-@pytest.mark.parametrize("address", [*FORMS, *LABORATORIES])
+@pytest.mark.parametrize("address", FORMS)
 def test_every_field_links_to_the_section_that_explains_it(service: Service, address: str) -> None:
     found, known = Read(service.http.get(address).text), targets()
     assert len(found.helps) > 10

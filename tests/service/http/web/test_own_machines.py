@@ -1,34 +1,25 @@
-"""Machines of one's own in the laboratory's address: plain numbers of a spec, wherever they come from."""
+"""Single machines: of a spec with formulas, measured clutches and axes, and in addresses of a new study."""
 
 from __future__ import annotations
 
 import copy
-from functools import partial
-from urllib.parse import parse_qsl, urlsplit
+import json
+from typing import TYPE_CHECKING
 
 import pytest
 
-from sprag.service.http.problems import ApiError
 from sprag.service.http.views import preset_of
-from sprag.service.http.web.form.own_machine import (
-    case_address,
-    case_page,
-    laboratory_address,
-    own_spec,
-    single_machine,
-)
-from sprag.service.http.web.laboratory.setting import setting
+from sprag.service.http.web.form.live import drawn_machine
+from sprag.service.http.web.form.own_machine import single_machine
+from sprag.service.http.web.form.spec import spec_of, values_of
 from sprag.service.spec.document import parse_spec
-from sprag.service.spec.report import SpecError
-from sprag.worker.limits import MAX_ADDRESS_BYTES
+from tests.service.http.web.controls import Controls
 
-shaft_setting, drive_setting = partial(setting, "machine-shaft"), partial(setting, "vibration-drive")
+if TYPE_CHECKING:
+    from tests.service.conftest import Service
+
 DRIVE = preset_of("one_pendulum")["spec"]
 INERTIA = "pendulums.0.inertia"
-
-
-def _given(address: str) -> dict[str, str]:
-    return dict(parse_qsl(urlsplit(address).query))
 
 
 def test_a_drive_with_a_formula_a_measured_clutch_and_an_axis_is_one_drive_of_numbers() -> None:
@@ -38,66 +29,53 @@ def test_a_drive_with_a_formula_a_measured_clutch_and_an_axis_is_one_drive_of_nu
     spec["derive"] = {INERTIA: "2 * pendulums.0.mass * pendulums.0.arm^2"}
     rows = [["1 deg", "4 N*m"], ["2 deg", "8 N*m"], ["3 deg", "12 N*m"]]
     spec["base"]["clutch"] = {"data": rows, "accuracy": "0.05 N*m"}
-    chosen = drive_setting(_given(laboratory_address(spec)))
-    study = parse_spec(spec).study
-    assert chosen.study.base[INERTIA] == pytest.approx(2 * 0.5 * 0.03**2)
+    chosen, study = parse_spec(single_machine(spec)).study, parse_spec(spec).study
+    assert chosen.base[INERTIA] == pytest.approx(2 * 0.5 * 0.03**2)
     # Of four amplitudes the third, which only the axis gives; the frequency is that of the base.
-    assert chosen.study.base["excitation.amplitude_x"] == 2e-3
-    assert chosen.study.base["excitation.frequency"] == 25.0
+    assert chosen.base["excitation.amplitude_x"] == 2e-3
+    assert chosen.base["excitation.frequency"] == 25.0
     law = [path for path in study.base if path.startswith("clutch.")]
-    assert {path: chosen.study.base[path] for path in law} == {path: study.base[path] for path in law}
-    # A slider of the fitted stiffness moves it.
-    moved = drive_setting(_given(laboratory_address(spec)) | {"clutch.coefficients.1": "300"})
-    assert (moved.faults, moved.study.base["clutch.coefficients.1"]) == ({}, 300.0)
+    assert {path: chosen.base[path] for path in law} == {path: study.base[path] for path in law}
 
 
-def test_a_case_is_in_the_address_with_its_values_its_state_and_its_page() -> None:
-    study = parse_spec(DRIVE).study
-    address = case_address(DRIVE, study, 100, "st_1/100/2", {"shaft.initial_speed": 3.25})
-    chosen = drive_setting(_given(address))
-    assert address.startswith("/laboratory/drive?machine=own&")
-    assert {path: chosen.study.base[path] for path in study.axis_paths} == study.case_parameters(100)
-    assert chosen.state == {"shaft.initial_speed": "3.25"}
-    assert chosen.case == "/studies/st_1/cases/100?start=2"
-    assert chosen.study.run["at_most"] == study.run["at_most"]
+def test_what_is_drawn_is_the_machine_as_it_stands_in_the_form() -> None:
+    drawn = drawn_machine(values_of(DRIVE) | {"/base/shaft/load": "0.25 N*m"})
+    assert drawn is not None
+    assert (drawn[0].base["shaft.load"], drawn[0].cases) == (0.25, 1)
+    assert drawn_machine(values_of(DRIVE) | {"/base/shaft/load": "0.25 mm"}) is None
 
 
-def test_a_case_of_drawn_drives_is_the_drawn_one() -> None:
-    spec = copy.deepcopy(DRIVE) | {
-        "axes": [], "tolerances": [{"path": "shaft.inertia", "plus_minus": "10 %"}], "drives": 4, "seed": 1,
-    }  # fmt: skip
-    study = parse_spec(spec).study
-    drawn = [drive_setting(_given(case_address(spec, study, case, "", {}))).study for case in (0, 1)]
-    assert drawn[0].base["shaft.inertia"] == 2e-3
-    assert drawn[1].base["shaft.inertia"] == study.case_parameters(1)["shaft.inertia"] != 2e-3
+def _sent(service: Service, address: str) -> dict[str, str]:
+    answer = service.http.get(address, follow_redirects=True)
+    assert answer.status_code == 200, answer.text
+    return Controls(answer.text).values
 
 
-def test_a_machine_shaft_goes_to_its_own_page() -> None:
-    spec = preset_of("press")["spec"]
-    address = laboratory_address(spec)
-    assert address.startswith("/laboratory?machine=own&")
-    assert shaft_setting(_given(address)).study.base == parse_spec(single_machine(spec)).study.base
+def test_addresses_of_laboratories_lead_to_a_new_study_with_what_they_held(service: Service) -> None:
+    answer = service.http.get("/laboratory/drive?machine=two_pendulums&shaft.load=0.2", follow_redirects=False)
+    assert answer.status_code == 308
+    assert answer.headers["location"].startswith("/new?model=vibration-drive&")
+    shown = _sent(service, "/laboratory/drive?machine=two_pendulums&shaft.load=0.2&clutch.coefficients.1=300&held=x")
+    assert (shown["model"], shown["pendulums"], shown["/base/shaft/load"]) == ("vibration-drive", "2", "0.2")
+    assert shown["/base/clutch/coefficients"] == "0; 300; 0; 20000"
+    own = json.dumps(preset_of("press")["spec"]["base"])
+    shown = _sent(service, f"/laboratory?machine=own&base={own}&title=Mine&drive.inertia=20")
+    assert (shown["/name"], shown["/base/drive/inertia"]) == ("Mine", "20")
+    study = _sent(service, "/laboratory/study?along=inertia&machine=press")
+    assert study["/axes/0/path"] == "drive.inertia"
+    for part in ("figure", "picture.svg", "questions", "form"):
+        assert service.http.get(f"/laboratory/{part}", follow_redirects=False).status_code == 308
+    assert service.http.get("/laboratory/perpetual-motion").status_code == 404
+    assert service.http.get("/new?machine=nothing").status_code == 404
+    assert service.http.get("/new?base=1").status_code == 422
 
 
-def test_a_text_that_is_too_long_is_refused() -> None:
-    with pytest.raises(ApiError, match=f"at most {MAX_ADDRESS_BYTES} characters in an address; got "):
-        own_spec({"base": "{}", "title": "x" * MAX_ADDRESS_BYTES}, "vibration-drive")
-
-
-@pytest.mark.parametrize(("rows", "allowed"), [(2000, True), (4900, False)])
-def test_a_table_of_a_machine_fits_the_address_or_is_refused(rows: int, allowed: bool) -> None:
-    spec = copy.deepcopy(preset_of("press")["spec"])
-    text = "angle [deg],force [kN]\n" + "\n".join(f"{360 * k / rows:.8g},{k % 20}" for k in range(rows))
-    spec["base"]["operation"] = {"quantity": "force", "csv": text, "interpolation": "linear"}
-    if allowed:
-        address = laboratory_address(spec)
-        assert 12_000 < len(address) <= MAX_ADDRESS_BYTES
-        assert own_spec(_given(address), "machine-shaft")["base"]["operation"]["csv"] == text
-    else:
-        with pytest.raises(SpecError, match="too long for the address"):
-            laboratory_address(spec)
-
-
-@pytest.mark.parametrize("mark", ["", "//evil.example/5", "st_1", "st_1/x", "st_1/5/", "https:st/1"])
-def test_a_mark_that_is_no_case_has_no_page(mark: str) -> None:
-    assert case_page(mark) == ""
+def test_a_case_is_a_new_study_in_the_motion_that_it_comes_to(service: Service) -> None:
+    study_id = service.submit(DRIVE)
+    service.fill(study_id)
+    shown = _sent(service, f"/studies/{study_id}/cases/100/laboratory")
+    study = service.store.studies.study(study_id)
+    base = parse_spec(spec_of(shown)[0]).study.base
+    assert {path: base[path] for path in study.axis_paths} == pytest.approx(study.case_parameters(100))
+    assert base["pendulums.0.initial_angle"] != 0.0
+    assert shown["from"] == study_id

@@ -15,7 +15,7 @@ TOKEN = "a-token-of-the-tests"
 
 
 def test_a_designer_works_below_a_path(browser: Browser, tmp_path: Path) -> None:
-    """From the login to an ended study, its curves, the schedules and the laboratory; no request leaves the prefix."""
+    """From the login to an ended study, its curves, the schedules and a new drive; no request leaves the prefix."""
     settings = {"SPRAG_URL_PREFIX": "/sprag", "SPRAG_TOKEN": TOKEN, "SPRAG_PROCESSES": "1"}
     asked: list[Response] = []
 
@@ -43,8 +43,8 @@ def test_a_designer_works_below_a_path(browser: Browser, tmp_path: Path) -> None
             page.get_by_role("link", name="Schedules").first.click()
             expect(page).to_have_url(f"{started.address}/schedules")
             page.goto(f"{started.address}/laboratory/drive")
-            expect(page.locator("#lab-plot svg.figure:visible").first).to_be_visible()
-            assert page.evaluate("location.pathname") == "/sprag/laboratory/drive"
+            expect(page.locator(".live-figure svg")).to_be_visible()
+            assert page.evaluate("location.pathname") == "/sprag/new"
             page.close()
     assert len(asked) > 15
     assert [(answer.url, answer.status) for answer in asked if answer.status >= 400] == []

@@ -161,6 +161,38 @@ def test_a_drive_of_ones_own_with_three_axes(visitor: Visitor, office: Office) -
     assert spec["base"]["pendulums"][0]["mass"] == 0.4
 
 
+def test_the_machine_moves_while_it_is_drawn(visitor: Visitor) -> None:
+    page = visitor.page
+    page.emulate_media(reduced_motion="reduce")
+    page.goto("/new")
+    speed = page.locator('[data-result="shaft.speed.mean"]')
+    expect(speed).to_be_visible()
+    before, arm = speed.get_attribute("data-value"), page.locator(".picture [data-arm]")
+    still = arm.get_attribute("transform")
+    page.locator("#instant").press("ArrowRight")
+    expect(arm).not_to_have_attribute("transform", str(still))
+    named(page, "/base/shaft/load").fill("0.3")
+    expect(speed).not_to_have_attribute("data-value", str(before))
+    expect(page.locator(".live-figure svg")).to_be_visible()
+    page.goto("/new?model=machine-shaft")
+    expect(page.locator('[id="spark:/base/drive/inertia"]')).to_contain_text("irregularity")
+    rod = page.locator("[data-bar='pin ram']")
+    still = rod.get_attribute("points")
+    page.locator("#instant").press("ArrowRight")
+    expect(rod).not_to_have_attribute("points", str(still))
+
+
+@pytest.mark.parametrize("visitor", [{"java_script_enabled": False}], indirect=True)
+def test_its_motion_is_shown_without_scripts(visitor: Visitor) -> None:
+    page = visitor.page
+    page.goto("/new")
+    page.get_by_role("button", name="Show its motion").click()
+    expect(page.locator(".live-figure svg")).to_be_visible()
+    page.locator('[name="vary:shaft.load"]').check()
+    page.get_by_role("button", name="Apply the ticks").click()
+    expect(named(page, "/axes/0/to")).to_have_value("0.4")
+
+
 def test_enter_opens_the_unit_of_a_dimension(visitor: Visitor) -> None:
     page = visitor.page
     page.goto("/new")

@@ -38,17 +38,13 @@ def settings(settings: Settings) -> Settings:
     return settings
 
 
-def test_a_study_of_the_model_from_the_laboratory_to_its_case(service: Service, browser: Browser) -> None:
+def test_a_study_of_the_model_from_its_numbers_to_its_case(service: Service, browser: Browser) -> None:
     with served(service.app) as address, browser.new_context(base_url=address) as context:
         page = context.new_page()
-        page.goto(f"/laboratory/{NAME}")
-        drawn(page, "#lab-plot")
-        fill(page, {"body.spring_rate": "1.5"})
-        page.wait_for_url("**body.spring_rate=1.5**")
-        page.get_by_role("link", name="Change parts of this machine in the form").click()
-        expect(named(page, "/base/body/spring_rate")).to_have_value("1.5")
-        page.get_by_role("button", name="Add an axis").click()
-        named(page, "/axes/0/path").select_option("damping")
+        page.goto(f"/new?model={NAME}&body.spring_rate=1.5")
+        expect(page.locator(".live-figure svg")).to_be_visible()
+        page.locator('[name="vary:damping"]').check()
+        expect(named(page, "/axes/0/count")).to_have_value("9")
         fill(page, {"/axes/0/from": "0", "/axes/0/to": "0.8", "/axes/0/count": "3"})
         page.locator("#go").click()
         page.wait_for_url("**/studies/st_*")
@@ -59,6 +55,5 @@ def test_a_study_of_the_model_from_the_laboratory_to_its_case(service: Service, 
         assert drawn(page, ".plot")
         page.goto(f"/studies/{study_id}/cases/1")
         expect(page.locator("figure svg.figure:visible")).to_have_count(1)
-        page.get_by_role("link", name="Move it with sliders").click()
-        page.wait_for_url(f"**/laboratory/{NAME}?machine=own**")
-        expect(named(page, "damping")).to_have_value("0.4")
+        page.get_by_role("link", name="Change this machine").click()
+        expect(named(page, "/base/damping")).to_have_value("0.4")

@@ -1,0 +1,187 @@
+"""The machine of a form while it is drawn: its motion and results at once, and a result along each of its numbers."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import re
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+from fastapi import Query
+from starlette.responses import Response
+
+from sprag.service.http.current import current
+from sprag.service.http.problems import ApiError
+from sprag.service.http.respond import json_response
+from sprag.service.http.routers import page_router
+from sprag.service.http.threads import in_thread
+from sprag.service.http.web.figures.live import along, live_case
+from sprag.service.http.web.form.beginning import beginning
+from sprag.service.http.web.form.entries import Values, plain
+from sprag.service.http.web.form.machine import choices_of, entries, form_of, row_of
+from sprag.service.http.web.form.machine_spec import base_of
+from sprag.service.http.web.form.own_machine import single_machine
+from sprag.service.http.web.form.sent import ends_of, settle
+from sprag.service.http.web.form.sheet import fits
+from sprag.service.http.web.form.spec import spec_of, values_of
+from sprag.service.http.web.form.values import Form
+from sprag.service.http.web.templates import fragment
+from sprag.service.http.work import Attended, Work
+from sprag.service.reading.reader import meanings, reading_for
+from sprag.service.results.regimes import motion_sentence
+from sprag.service.spec.document import parse_spec
+from sprag.service.spec.kinds.registry import without_cases
+from sprag.service.spec.machine.shaft_check import NotCompiledError
+from sprag.service.spec.report import SpecError
+from sprag.worker import models
+from sprag.worker.pool.child_pool import JobStoppedError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from sprag.service.http.context import Context
+    from sprag.service.reading.reader import Reading
+    from sprag.worker.study import Study
+
+router = page_router()
+_LOG: Final = logging.getLogger("sprag.service")
+
+#: Values of a number along which a result is drawn.
+_VALUES: Final = 25
+#: Seconds between two looks whether checks are possible.
+_LOOK: Final = 0.5
+#: Width of the picture (px), unless the page says another.
+_WIDTH: Final = 560
+
+
+def drawn_machine(values: Mapping[str, str]) -> tuple[Study, dict[str, Any]] | None:
+    """The machine of a form as a study of one case, with its spec; None while it has faults."""
+    spec, _faults = spec_of(values)
+    try:
+        parsed = parse_spec({**without_cases(spec), "axes": []})
+    except SpecError:
+        try:
+            parsed = parse_spec(single_machine(spec))  # what only an axis gives has a value of it
+        except SpecError:
+            return None
+    study = parsed.study
+    unsettled = models.has_strobes(study) and not models.is_settled(study.run)
+    return (models.settled_study(study) if unsettled else study), parsed.spec
+
+
+def studies_along(values: Mapping[str, str], spec: Mapping[str, Any]) -> list[tuple[str, Study]]:
+    """By the name of its field, a study along each number in sight of a machine that can be computed at once."""
+    found = []
+    for entry in entries(values):
+        path = entry.name.removeprefix("/base/").replace("/", ".")
+        usual = {entry.name: values.get(entry.name, "").strip() or entry.field.default}
+        ends = ends_of({**values, **usual}, path) if entry.tolerant and fits(form_of(values).front, path) else None
+        if ends is not None:
+            axis = {"path": path, "linspace": [*map(plain, ends), _VALUES]}
+            try:
+                study = parse_spec({**spec, "axes": [axis]}).study
+            except SpecError:
+                continue
+            found.append((entry.name, study))
+    return found
+
+
+async def live_answer(work: Work, values: Values, width: int = _WIDTH) -> dict[str, Any] | None:
+    """The answer to a form: its text with the picture, and the frames of the drawing; None while it has faults."""
+    drawn = await work.check(drawn_machine, values)
+    if drawn is None:
+        return None
+    study, spec = drawn
+    reading = reading_for(study, spec, current().choice)
+    case = await work.run_case(live_case, study, reading, width)
+    text = await in_thread(_text, study, reading, case)
+    return {"answer": text, "frames": case["frames"]}
+
+
+def _text(study: Study, reading: Reading, case: dict[str, Any]) -> str:
+    shown = models.presentation_of(study)
+    own, infos = shown.laboratory, {info.name: info for info in models.study_results(study)}
+    main = own.main or dict.fromkeys(name for name in shown.drawn if name in infos)
+    rows = [
+        (infos[name], main.get(name) or "", case["results"].get(name))
+        for name in (*main, *shown.main[:4]) if name in infos and case["results"].get(name) is not None
+    ]  # fmt: skip
+    return fragment(
+        "_live.html",
+        case=case,
+        rows={info.name: (info, label, value) for info, label, value in rows}.values(),
+        reading=reading,
+        sentence=meanings(models.ENDING_SENTENCES).get(case["ending"], ""),
+        motion=motion_sentence(case["regime"], case["order"] or None) if case["regime"] else "",
+        turns=study.structure is not None,
+        degrees=360 * int((study.structure or {}).get("cycle", 1)),
+        note=own.note,
+    )
+
+
+@router.post("/new/live")
+async def live(work: Attended, values: Form, width: Annotated[int, Query(ge=240, le=1200)] = _WIDTH) -> Response:
+    """Motion and results of the machine as it is drawn."""
+    settle(values)
+    return json_response(await live_answer(work, values, width) or {"answer": "", "frames": None})
+
+
+@router.post("/new/along")
+async def curves_along(work: Attended, values: Form) -> Response:
+    """Thumbnails of the main result along each number, where the model is computed at once."""
+    settle(values)
+    drawn = await work.check(drawn_machine, values)
+    result = "" if drawn is None else models.presentation_of(drawn[0]).laboratory.along
+    if drawn is None or not result:
+        return json_response({"sparks": {}})
+    studies = await work.check(studies_along, values, drawn[1])
+    found = await work.run_case(_along, drawn[0], studies, result)
+    reading = reading_for(drawn[0], drawn[1], current().choice)
+    label = models.presentation_of(drawn[0]).laboratory.main.get(result) or result
+    info = next(info for info in models.study_results(drawn[0]) if info.name == result)
+
+    def made() -> dict[str, str]:
+        return {
+            name: fragment("_spark.html", curve=curve, ends=ends, info=info, reading=reading, label=label)
+            for name, (curve, *ends) in found.items()
+        }
+
+    return json_response({"sparks": await in_thread(made)})
+
+
+def _along(_study: Study, studies: list[tuple[str, Study]], result: str) -> dict[str, tuple[str, float, float]]:
+    return along(studies, result)
+
+
+def _read_ahead() -> None:
+    """Read in this process what the forms begin with."""
+    for model in models.model_names():
+        values = values_of(beginning(model))
+        choices_of(values, base_of(values, {}))
+
+
+async def warm(context: Context) -> None:
+    """Compute the machine with which the form of each model begins, so that nobody waits for the first one."""
+    try:
+        await in_thread(_read_ahead)
+        while not context.ready.is_set():
+            await asyncio.sleep(_LOOK)
+        for model in models.model_names():
+            values = values_of(beginning(model)) | {"axes": "0"}
+            drawn = await context.checker.run(drawn_machine, values)
+            if drawn is not None:
+                study, spec = drawn
+                await context.computer.load(models.shape_of(study))
+                await context.computer.run(live_case, study, reading_for(study, spec, current().choice), _WIDTH)
+                if result := models.presentation_of(study).laboratory.along:
+                    await context.computer.run(_along, study, studies_along(values, spec)[:1], result)
+    except (ApiError, JobStoppedError, NotCompiledError) as error:
+        _LOG.info("The first machines are not computed ahead: %s", error)
+
+
+def named_numbers(model: str, key: str, paths: list[str]) -> list[str]:
+    """The numbers that a question such as "the load" is about, among those of a machine."""
+    word = models.model_of(model).presentation.laboratory.studies.get(key)
+    if word is None:
+        return [path for path in paths if path == key]
+    return [path for path in paths if re.fullmatch(word[1], row_of(model, path)[2])]

@@ -1,1 +1,0 @@
-"""The laboratory: a machine whose numbers change while its motion is redrawn."""

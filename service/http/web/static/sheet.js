@@ -1,0 +1,106 @@
+// The motion of the machine as it is drawn: computed again whenever the form is sound, and played in its drawing.
+"use strict";
+
+sprag.sheet = (() => {
+  const SECONDS = 3, TURN = 4; // of an excitation period and of a turn of the shaft on the page
+  let frames = null, playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, at = 0, began = 0, busy = false, again = false, started = false;
+  const one = (id) => document.getElementById(id);
+  const drawings = () => [...document.querySelectorAll(".picture svg")];
+
+  const drive = (step) => {
+    drawings().forEach((svg, index) => {
+      const pendulum = frames.pendulums[index], wheel = svg.querySelector("[data-clutch]");
+      if (!pendulum || !wheel) return;
+      svg.classList.add("moving");
+      const [x, y] = [wheel.getAttribute("cx"), wheel.getAttribute("cy")], angle = pendulum.angle[step];
+      svg.querySelector("[data-base]").setAttribute("transform", `translate(${frames.x[step]} ${-frames.y[step]})`);
+      svg.querySelector("[data-arm]").setAttribute("transform", `rotate(${-angle} ${x} ${y})`);
+      svg.querySelector("[data-shaft]").setAttribute("transform", `rotate(${-frames.shaft[step]} ${x} ${y})`);
+      wheel.classList.toggle("engaged", pendulum.engaged[step]);
+      const spring = svg.querySelector("[data-spring]"), sine = (degrees) => Math.sin(degrees * Math.PI / 180);
+      if (spring) {
+        const span = Number(spring.dataset.span), moved = Number(spring.dataset.spring) * (sine(angle) - sine(7));
+        spring.setAttribute("transform", `scale(${Math.max(span - moved, 8) / span} 1)`);
+      }
+    });
+  };
+
+  // Frames of a linkage a few degrees apart, and straight lines between them.
+  const linkage = (svg, degrees) => {
+    svg.frames ||= JSON.parse(svg.dataset.frames);
+    const between = (list) => {
+      const place = ((degrees % 360 + 360) % 360) / 360 * (list.length - 1), first = Math.min(Math.floor(place), list.length - 2), share = place - first;
+      const [a, b] = [list[first], list[first + 1]];
+      return Array.isArray(a) ? a.map((value, index) => value + (b[index] - value) * share) : a + (b - a) * share;
+    };
+    const joints = Object.fromEntries(Object.entries(svg.frames.joints).map(([name, list]) => [name, between(list)]));
+    for (const bar of svg.querySelectorAll("[data-bar]")) bar.setAttribute("points", bar.dataset.bar.split(" ").map((name) => joints[name].join(",")).join(" "));
+    for (const plate of svg.querySelectorAll("[data-plate]")) {
+      const [name, turn] = plate.dataset.plate.split(" ");
+      plate.setAttribute("transform", `translate(${joints[name].join(" ")}) rotate(${between(svg.frames.turns[turn])})`);
+    }
+    for (const joint of svg.querySelectorAll("[data-joint]")) {
+      const [x, y] = joints[joint.dataset.joint];
+      joint.setAttribute("cx", x);
+      joint.setAttribute("cy", y);
+    }
+  };
+
+  const show = () => {
+    const dial = one("instant");
+    if (frames) drive(Math.min(Math.round(at), frames.x.length - 1));
+    else for (const svg of drawings().filter((each) => each.dataset.frames)) linkage(svg, at);
+    if (dial) dial.value = Math.round(at);
+  };
+
+  const moves = () => frames || drawings().some((svg) => svg.dataset.frames);
+  const step = (now) => {
+    if (!playing || !moves() || !one("instant")) { started = false; return; }
+    const last = Number(one("instant").max), whole = 1000 * (frames ? SECONDS * frames.periods : TURN * last / 360);
+    at = ((now - began) % whole) / whole * last;
+    show();
+    requestAnimationFrame(step);
+  };
+  const play = (on) => {
+    playing = on;
+    const button = one("play");
+    if (!button) return;
+    button.textContent = playing ? sprag.say("Pause") : sprag.say("Play");
+    button.setAttribute("aria-pressed", String(playing));
+    if (playing && !started) { started = true; began = performance.now(); requestAnimationFrame(step); }
+  };
+
+  const post = (address, body) => sprag.fetchJson(address, { method: "POST", body });
+  // One request at a time; of later changes the last is sent when the answer has arrived.
+  const ask = async () => {
+    if (busy) { again = true; return; }
+    busy = true;
+    const place = one("live");
+    try {
+      const body = encoded(), found = await post(`${place.dataset.live}?width=${Math.max(Math.min(Math.round(place.clientWidth), 1200), 240)}`, body);
+      place.classList.toggle("stale", !found.answer);
+      if (found.answer) {
+        const focused = document.activeElement?.id;
+        place.innerHTML = found.answer;
+        frames = found.frames;
+        if (["play", "instant"].includes(focused)) one(focused)?.focus();
+        one("play")?.addEventListener("click", () => play(!playing));
+        one("instant")?.addEventListener("input", (event) => { play(false); at = Number(event.target.value); show(); });
+        show();
+        play(playing);
+        const { sparks } = await post(place.dataset.along, body);
+        for (const each of document.querySelectorAll(".spark")) if (each.id) each.innerHTML = sparks[each.id.slice("spark:".length)] || "";
+      }
+    } catch (error) {
+      place.classList.add("stale");
+    } finally {
+      busy = false;
+      place.dataset.shown = String(Number(place.dataset.shown || 0) + 1);
+      if (again) { again = false; ask(); }
+    }
+  };
+  return { ask };
+})();
+
+document.addEventListener("sprag:checked", () => { if (document.getElementById("live")) sprag.sheet.ask(); });
+document.addEventListener("DOMContentLoaded", () => { if (document.getElementById("live")) { sprag.sheet.ask(); } });
