@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import TYPE_CHECKING, Any
 
@@ -107,9 +108,9 @@ def points_of(curve: Curve) -> list[float]:
     return [float(value) for value in curve.values[:, 1]]
 
 
-def near(values: list[float | None]) -> Any:
-    """The same values, as exactly as a picture has them."""
-    known = [value for value in values if value is not None]
+def near(speeds: list[float | None]) -> Any:
+    """The same speeds in rpm, as pages have them, as exactly as a picture has them."""
+    known = [value * 30.0 / math.pi for value in speeds if value is not None]
     return pytest.approx(known, abs=3e-3 * max(map(abs, known)))
 
 
