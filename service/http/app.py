@@ -76,7 +76,6 @@ from sprag.service.http.web import (
 )
 from sprag.service.http.web.form import live as live_machine
 from sprag.service.http.web.form import page as form
-from sprag.service.http.web.rows import motion as row_motion
 from sprag.service.http.web.rows import pages as rows
 from sprag.service.jobs import checks
 from sprag.service.jobs.housekeeping import Housekeeping
@@ -161,7 +160,6 @@ ROUTED = (
     study,
     front,
     rows,
-    row_motion,
     results,
     matters,
     motion,

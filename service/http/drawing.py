@@ -31,7 +31,7 @@ DRAWN_FORMATS: Final = dict[Literal["json", "csv"] | pictures.Picture, str](
 #: Formats of the tables of one case.
 TABLE_FORMATS: Final[dict[Literal["json", "csv"], str]] = {"json": MEDIA_TYPES["json"], "csv": MEDIA_TYPES["csv"]}
 #: matplotlib embeds its styles in the picture, which the pages' policy forbids; everything else is disabled.
-PICTURE_POLICY = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
+_PICTURE_POLICY = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ class Drawing:
 
 def picture(draw: Callable[..., bytes], form: pictures.Picture, *shown: object) -> Drawing:
     """A picture, with a policy that disables everything active in it."""
-    headers = {"Content-Security-Policy": PICTURE_POLICY} if form == "svg" else {}
+    headers = {"Content-Security-Policy": _PICTURE_POLICY} if form == "svg" else {}
     return Drawing(draw, (*shown, form), pictures.MEDIA_TYPES[form], headers)
 
 

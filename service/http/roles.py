@@ -60,7 +60,7 @@ _VIEWER: Final = (
     f"GET {_PAGE}",
     *(f"GET {_PAGE}/{part}" for part in (
         "delete", "extend", "labels", "front", "figures/front", "explore", "explore/new", "explore/compare",
-        "rows", "rows/new", "rows/file", "rows/search.svg", "rows/{case}/motion.svg",
+        "rows", "rows/new", "rows/file", "rows/search.svg",
         "matters", "calibration", "drives", "sensitivity", "figures/calibration", "curves", "map", "figures/curves",
         "figures/answers", "figures/map", "cases", "document",
     )),

@@ -13,7 +13,7 @@ from starlette.responses import RedirectResponse, Response
 from sprag.sentences import Part, Whole
 from sprag.service.faults import FaultError
 from sprag.service.figures.read import read_figure
-from sprag.service.figures.svg import WIDE, picture_svg
+from sprag.service.figures.svg import NARROW, WIDE, picture_svg
 from sprag.service.http.context import CaseNumber, StartNumber, StudyId, study_with
 from sprag.service.http.current import current
 from sprag.service.http.drawing import picture, unchanging
@@ -61,6 +61,8 @@ if TYPE_CHECKING:
 router = page_router()
 
 _MOTION: Final = CASE_VIEWS["trajectory"]
+#: Panels of a small picture.
+_FEW_PANELS: Final = 2
 #: The views below the motion, in their order.
 PARTS: Final[dict[str, CaseView[Any, Any, Any]]] = {
     **{name: CASE_VIEWS[name] for name in ("engagements", "strobes", "section")},
@@ -271,16 +273,24 @@ def _number(study: Study, info: ResultInfo, row: CaseRow) -> KeyNumber:
     )
 
 
-def draw(answer: CaseAnswer[Any, Any], reading: Reading, title: str, _form: str) -> bytes:
-    """The motion as a picture of its own."""
-    return picture_svg(read_figure(_MOTION.figure(answer, 1), reading), title, width=WIDE).encode()
+def draw(answer: CaseAnswer[Any, Any], reading: Reading, title: str, small: bool, _form: str) -> bytes:
+    """The motion as a picture of its own; a ``small`` one has its first panels only."""
+    figure = read_figure(_MOTION.figure(answer, 1), reading)
+    if small:
+        return picture_svg(replace(figure, panels=figure.panels[:_FEW_PANELS]), "", width=NARROW).encode()
+    return picture_svg(figure, title, width=WIDE).encode()
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/motion.svg")
 async def motion_picture(
-    work: Attended, study_id: StudyId, case: CaseNumber, choice: FileChoice, which: StartNumber = None
+    work: Attended,
+    study_id: StudyId,
+    case: CaseNumber,
+    choice: FileChoice,
+    which: StartNumber = None,
+    small: bool = False,
 ) -> Response:
-    """The part of the motion that the address asks for, as a picture."""
+    """The part of the motion that the address asks for, as a picture; a ``small`` one stands beside a table."""
     params = work.request.query_params
     study, asked = await work.case_of(study_id, case, lambda study: _motion(study, case, params), which)
     if asked.faults:
@@ -289,7 +299,7 @@ async def motion_picture(
     async def make() -> Response:
         reading = await in_thread(reading_of, work.context.store, study_id, choice)
         answer = await work.run_case(see, study, case, _MOTION, asked.chosen, which)
-        return await picture(draw, "svg", answer, reading, f"{study.name}, case {case}").response(work)
+        return await picture(draw, "svg", answer, reading, f"{study.name}, case {case}", small).response(work)
 
     return await unchanging(work, study_id, make)
 
