@@ -36,7 +36,7 @@ _HUES: Final = {
 }
 #: The number from which on the colour stays the same.
 _DARKEST: Final = 32
-#: Patterns of the regimes for plotly and matplotlib, which tell the same in grey.
+#: Patterns of the regimes, which tell the same in grey.
 _PATTERNS: Final = {"held": ("-", "--"), "coasting": (".", ".."), "irregular": ("x", "xx"), "unsettled": ("+", "++")}
 
 

@@ -26,14 +26,13 @@ _CONTINUOUS: Final = frozenset({"coasting", "periodic"})
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """How points of one regime are marked: colour, symbol of plotly and marker of matplotlib.
+    """How points of one regime are marked: colour and shape.
 
     Periodic points have the colour of their curve.
     """
 
     colour: str
     symbol: str
-    marker: str
 
 
 def left_out(count: int) -> Phrase:
@@ -60,11 +59,11 @@ def motion_sentence(regime: str, order: int | None) -> Phrase:
 
 #: Colours that are distinguishable with any kind of colour vision, and shapes that replace them in grey.
 MARKS: Final[dict[str, Mark]] = {
-    "periodic": Mark("#777777", "circle", "o"),
-    "held": Mark("#8c6d31", "square", "s"),
-    "coasting": Mark("#56b4e9", "diamond", "D"),
-    "irregular": Mark("#cc79a7", "triangle-up", "^"),
-    UNSETTLED: Mark("#d55e00", "x", "x"),
+    "periodic": Mark("#777777", "circle"),
+    "held": Mark("#8c6d31", "square"),
+    "coasting": Mark("#56b4e9", "diamond"),
+    "irregular": Mark("#cc79a7", "triangle-up"),
+    UNSETTLED: Mark("#d55e00", "x"),
 }
 #: Regimes that are marked on their curves.
 MARKED: Final = tuple(name for name in MARKS if name != "periodic")
