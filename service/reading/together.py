@@ -16,7 +16,7 @@ from typing import Final
 from sprag.sentences import Sentence, Typed, joined
 from sprag.service.faults import Code
 from sprag.service.reading.cyrillic import latin
-from sprag.service.reading.units import PERIOD_NAMES, QuantityError, measure, parse_exact, split_typed
+from sprag.service.reading.units import PERCENT, PERIOD_NAMES, QuantityError, measure, parse_exact, split_typed
 
 #: Code of a bare number that could be in several units.
 AMBIGUOUS_UNIT: Final[Code] = "ambiguous-unit"
@@ -131,6 +131,8 @@ def _kind(unit: str) -> Hashable:
     """Equal for units that mean the same, as "N*mm" and "Nmm"; None for what is no unit, as "%"."""
     if latin(unit) in PERIOD_NAMES:
         return "periods"
+    if unit in PERCENT:  # a share of each value, or a number of its own
+        return None
     try:
         factor, powers = measure(unit)
     except QuantityError:
@@ -139,7 +141,12 @@ def _kind(unit: str) -> Hashable:
 
 
 def _differs(name: str, unit: str) -> bool:
-    """Whether a unit of the quantity is another one than its SI unit; False for a unit of another quantity."""
+    """Whether a unit of the quantity is another one than its SI unit; False for a unit of another quantity.
+
+    A number without a unit beside per cent is none of these: 0.4 beside 40 %.
+    """
+    if unit == "1":
+        return False
     if latin(name) in PERIOD_NAMES and unit in {"s", "rad"}:
         return True
     try:

@@ -56,6 +56,8 @@ _EXAMPLES: Final = {
 PERCENT: Final = frozenset({"%", "percent", "per cent"})
 _PER_MINUTE: Final = Fraction(1, 60)
 _QUANTITY: Final = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?)\s*(.*)", re.DOTALL)
+#: Fractions of two whole numbers, as of inches: "3/4 in".
+_FRACTION: Final = re.compile(r"([+-]?[0-9]{1,3})/([1-9][0-9]{0,2})(?![0-9.,/])\s*(.*)", re.DOTALL)
 _LETTERS: Final = "%A-Za-zµ°А-Яа-яЁёІіЇїЄєҐґ"
 _TOKEN: Final = re.compile(
     rf"\s*(?:(?P<name>[{_LETTERS}][{_LETTERS}_0]*)|(?:\*\*|\^)\s*(?P<power>[+-]?[0-9]{{1,2}})(?![0-9])"
@@ -219,6 +221,8 @@ def split_typed(text: str) -> tuple[Fraction, str]:
         )
     text = keyboard(text.strip()).translate(_SIGNS).strip()
     _refuse_ambiguous(text)
+    if (part := _FRACTION.fullmatch(text)) is not None:
+        return Fraction(int(part[1]), int(part[2])), part[3].strip()
     match = _QUANTITY.fullmatch(with_point(text))
     if match is None:
         raise QuantityError("not-a-number", "must begin with a number (no thousands separators) followed by its unit")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from sprag.sentences import Place
 from sprag.service.reading.numbers import assumption, settle, settled
 from sprag.service.reading.printed import could_be_values
+from sprag.service.reading.ranges import could_be_several
 from sprag.service.reading.together import AMBIGUOUS_UNIT, questions, split_list, with_last_unit
 from sprag.service.spec.node import Node
 
@@ -27,6 +28,8 @@ def refuse_blanks(nodes: Sequence[Node]) -> bool:
     """Record a fault where an item of a list could also be several values between blanks; whether there is one."""
     written = [node for node in nodes if isinstance(node.value, str)]
     place = could_be_values([node.value for node in written])
+    if place is None:
+        place = next((place for place, node in enumerate(written) if could_be_several(node.value)), None)
     if place is None:
         return False
     written[place].refuse("invalid-text", "could be one value or several", allowed="separate values, or no blanks")

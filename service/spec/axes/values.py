@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.sentences import Sentence
+from sprag.sentences import Sentence, Typed
 from sprag.service.languages import N_
 from sprag.service.reading.limits import values_to
+from sprag.service.reading.ranges import TypedRange, typed_range
 from sprag.service.reading.units import QuantityError, parse_exact, to_float
 from sprag.service.spec.lists import read_list, read_list_text, read_together
 from sprag.service.spec.node import Node
@@ -32,6 +33,8 @@ _DIVIDED: Final = N_('a list of both ends and the count, such as ["2 mm", "5 mm"
 _STEPPED: Final = N_('a list of both ends and the step, such as ["2 mm", "5 mm", "0.5 mm"]')
 #: Integers up to this are exact as doubles.
 _EXACT: Final = 2**53
+#: Parts into which a form splits "20 to 35 Hz, 4 values".
+_RANGE_PARTS: Final = 2
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,8 @@ def plan_values(node: Node, parameter: Parameter) -> Plan | None:
         node.refuse("empty" if empty else "wrong-type", "has no values" if empty else "must be a list of values",
                     allowed=values_to(MAX_AXIS_VALUES))  # fmt: skip
         return None
+    if (text := _whole_text(data)) and (written := typed_range(text)) is not None:
+        return _written_range(node, parameter, written)
     plain = _plain_numbers(data) if isinstance(data, list) else None
     if plain is not None and in_range(plain, parameter).all():
         return Plan(node, plain.size, lambda: plain, listed=True)
@@ -76,6 +81,28 @@ def plan_values(node: Node, parameter: Parameter) -> Plan | None:
     if len(known) < len(numbers):
         return None
     return Plan(node, len(known), lambda: np.array(known), listed=True)
+
+
+def _whole_text(data: list[Any] | str) -> str:
+    """What was typed as one text, also where a form has split it at a comma; "" for a list of values."""
+    if isinstance(data, str):
+        return data
+    return ", ".join(data) if len(data) <= _RANGE_PARTS and all(isinstance(item, str) for item in data) else ""
+
+
+def _written_range(node: Node, parameter: Parameter, written: TypedRange) -> Plan | None:
+    """The plan of a range that was typed as one text; None, and a question recorded, where it says too little."""
+    if not written.step and written.count is None:
+        ends = {"first": Typed(written.first), "last": Typed(written.last)}
+        node.refuse(
+            "invalid-text",
+            N_("is a range: in which steps, or how many values?"),
+            allowed=Sentence("{first} to {last}, 5 values; or with a step behind it", **ends),
+        )
+        return None
+    third = written.step if written.count is None else written.count
+    own = Node(node.report, node.pointer, [written.first, written.last, third])
+    return (plan_range if written.count is None else plan_linspace)(own, parameter)
 
 
 def _read_items(node: Node, unit: str, about: str) -> Sequence[Node] | None:
