@@ -119,9 +119,11 @@ def walk(hand: Hand, name: str, file: Path) -> str:
     hand.arrive(f"**/studies/{study_id}/cases/1")
     hand.use(page.locator(".crumbs a").nth(1))
     hand.arrive(f"**/studies/{study_id}")
-    hand.type(page.locator('form[action$="/report"] [name="project"]'), "Feeder 7")
+    hand.use(page.locator(f'a[href^="/studies/{study_id}/document"]'))
+    hand.arrive(f"**/studies/{study_id}/document*")
+    hand.type(page.locator('.sheet [name="customer"]'), "Acme")
     with page.expect_download() as waiting:
-        hand.use(page.locator('form[action$="/report"] button[value="pdf"]'))
+        hand.use(page.locator('#document button[value="pdf"]'))
     waiting.value.save_as(file)
     assert file.read_bytes().startswith(b"%PDF")
     return study_id
