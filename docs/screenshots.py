@@ -78,7 +78,6 @@ def shots(ids: list[str]) -> list[tuple[str, str, tuple[int, int], bool]]:
             True,
         ),
         ("map-order", f"/studies/{one}/map?x=shaft.load&y=excitation.frequency&z=regime.order", DESKTOP, True),
-        ("cases", f"/studies/{one}/cases?sort=-power.useful.mean", DESKTOP, False),
         ("explore", f"/studies/{one}/rows?max:shaft.load=0.15&sort=-efficiency", (1280, 1150), False),
         ("case", f"/studies/{two}/cases/45", DESKTOP, True),
         ("laboratory", "/new?model=machine-shaft&machine=press", (1280, 1000), False),
