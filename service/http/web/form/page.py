@@ -279,6 +279,14 @@ def form_page(
 
     ``fields`` is False where the form has no fields for the study, so that its spec is shown as text.
     """
+    template = "new_text.html" if "/text" in values else "new.html"
+    return page(template, status=status, with_fields=fields, live=live, **sheet_form(request, values, checked))
+
+
+def sheet_form(request: Request, values: Values, checked: Checked | None) -> dict[str, Any]:
+    """What the templates of a form are filled with, also those of its parts: ``_machine.html``, ``_varies.html`` and
+    ``_drawer.html``, beside the macros of ``_fields.html`` imported with their context.
+    """
     begun, checked = checked is not None, checked or Checked({})
     text_mode, model, own = "/text" in values, model_name(values), form_of(values)
     parts = parts_of(values)
@@ -288,45 +296,41 @@ def form_page(
     def results(*, numbers: bool = False) -> Groups:
         return result_choices(model, lambda name: len(rows.get(name, ())), numbers=numbers)
 
-    return page(
-        "new_text.html" if text_mode else "new.html",
-        status=status,
-        values=values,
-        with_fields=fields,
-        faults=checked.faults,
-        checked=checked,
-        live=live,
-        begun=begun,
-        address=_address(request),
-        key=values.get("key") or secrets.token_hex(8),
-        model=model,
-        standard=model == FORM_MODEL,
-        form=own,
-        models=[(name, _called(name)) for name in models.model_names() if name != model],
-        sheet=sheet,
-        parts=parts,
-        rows=rows,
-        search=is_search(values),
-        kept=_kept(values),
-        choices=[] if text_mode else _choices(values),
-        components=[] if text_mode else component_groups(values, request.app.state.context.store.components.all()),
-        component_rows=rows_with_components(values),
-        undoable=bool(history_of(values)),
-        presets=[preset_of(name) for name in (preset_names() if text_mode else examples_of(model))],
-        run=run_fields(),
-        refine=refine_fields(),
-        limits=LIMITS,
-        categories=categories(model),
-        search_fields=search_fields(),
-        goals=results(numbers=True),
-        limited=results(),
-        batch=with_batch(values),
-        own_name=own_name,
-        drive_fields=drive_fields(),
-        distributions=distributions(),
-        sample_methods=methods(),
-        exclusion_kinds=kinds(),
-    )
+    return {
+        "values": values,
+        "faults": checked.faults,
+        "checked": checked,
+        "begun": begun,
+        "address": _address(request),
+        "key": values.get("key") or secrets.token_hex(8),
+        "model": model,
+        "standard": model == FORM_MODEL,
+        "form": own,
+        "models": [(name, _called(name)) for name in models.model_names() if name != model],
+        "sheet": sheet,
+        "parts": parts,
+        "rows": rows,
+        "search": is_search(values),
+        "kept": _kept(values),
+        "choices": [] if text_mode else _choices(values),
+        "components": [] if text_mode else component_groups(values, request.app.state.context.store.components.all()),
+        "component_rows": rows_with_components(values),
+        "undoable": bool(history_of(values)),
+        "presets": [preset_of(name) for name in (preset_names() if text_mode else examples_of(model))],
+        "run": run_fields(),
+        "refine": refine_fields(),
+        "limits": LIMITS,
+        "categories": categories(model),
+        "search_fields": search_fields(),
+        "goals": results(numbers=True),
+        "limited": results(),
+        "batch": with_batch(values),
+        "own_name": own_name,
+        "drive_fields": drive_fields(),
+        "distributions": distributions(),
+        "sample_methods": methods(),
+        "exclusion_kinds": kinds(),
+    }
 
 
 def _sheet(request: Request, values: Values, checked: Checked) -> Sheet:

@@ -39,7 +39,7 @@ const fail = (text) => {
 const check = async () => {
   const mine = ++latest, panel = document.getElementById("panel");
   old = true;
-  panel.classList.add("stale"); // until it matches the current input
+  panel.classList.toggle("stale", panel.querySelector("[data-cases]") !== null); // until it matches the current input
   let found = null;
   try {
     const answer = await sprag.fetch(form.dataset.check, { method: "POST", body: encoded() });

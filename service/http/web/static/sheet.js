@@ -48,7 +48,7 @@ sprag.sheet = (() => {
 
   const show = () => {
     const dial = one("instant");
-    if (frames) drive(Math.min(Math.round(at), frames.x.length - 1));
+    if (frames) drive(Math.min(Math.max(Math.round(at), 0), frames.x.length - 1));
     else for (const svg of drawings().filter((each) => each.dataset.frames)) linkage(svg, at);
     if (dial) dial.value = Math.round(at);
   };
@@ -57,7 +57,7 @@ sprag.sheet = (() => {
   const step = (now) => {
     if (!playing || !moves() || !one("instant")) { started = false; return; }
     const last = Number(one("instant").max), whole = 1000 * (frames ? SECONDS * frames.periods : TURN * last / 360);
-    at = ((now - began) % whole) / whole * last;
+    at = (Math.max(now - began, 0) % whole) / whole * last; // the first frame can be older than the click
     show();
     requestAnimationFrame(step);
   };
