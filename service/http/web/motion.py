@@ -12,6 +12,7 @@ from starlette.responses import RedirectResponse, Response
 
 from sprag.sentences import Part, Whole
 from sprag.service.faults import FaultError
+from sprag.service.figures.drawings import drawings
 from sprag.service.figures.read import read_figure
 from sprag.service.figures.svg import NARROW, WIDE, picture_svg
 from sprag.service.http.context import CaseNumber, StartNumber, StudyId, study_with
@@ -24,6 +25,7 @@ from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.views import study_address
 from sprag.service.http.web.figures.drawn import cases_of
+from sprag.service.http.web.figures.live import frames
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page, spec_text
 from sprag.service.http.web.view_forms import Asked, Seen, asked_of, fact_of, files_of, inline
@@ -97,7 +99,12 @@ def seen(
     shown = NOTHING_MORE if view.about.name == _MOTION.about.name else view.shown(answer)
     if not view.drawn:
         return Seen(shown=shown)
-    return inline(view.figure(answer, 2, rows), reading, shown, cases)
+    made = inline(view.figure(answer, 2, rows), reading, shown, cases)
+    motion = answer.result
+    if view.about.name != _MOTION.about.name or not (models.has_clutches(study) and motion.times.size):
+        return made
+    frequency = {**study.base, **_own(study, case)}["excitation.frequency"]
+    return replace(made, frames=frames(replace(motion, times=motion.times - motion.times[0]), frequency))
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}")
@@ -206,6 +213,7 @@ def _page(
         parts={name: view.about.title for name, view in PARTS.items() if view.has(study)},
         opened=[(*one, files[place]) for place, one in enumerate(opened)],
         only=urlencode(only),
+        drawings=drawings(replace(study, base={**study.base, **_own(study, case)})),
         spec=spec_text(design_spec(context.store.studies.spec(study_id), study, case)),
         goes_on=models.has_strobes(study) and row is not None and row.ending == "ok",
         has_motion=row is None or row.ending != _NO_MOTION,
@@ -245,6 +253,11 @@ def _said(study: Study, row: CaseRow) -> list[str]:
     if isinstance(regime, str) and regime not in row.flags:
         said.append(motion_sentence(regime, order if isinstance(order, int) else None))
     return [joined("", [text]) for text in said]
+
+
+def _own(study: Study, case: int) -> dict[str, float]:
+    """The numbers of the machine that a case has for itself."""
+    return {path: value for path, value in study.case_parameters(case).items() if path in study.base}
 
 
 def _parameters(study: Study, case: int, reading: Reading) -> list[tuple[str, str, str]]:

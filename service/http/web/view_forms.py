@@ -87,13 +87,14 @@ def fact_of(one: KeyNumber, reading: Reading, cases: str = "") -> Fact:
 class Seen:
     """A view as a page shows it: its figure, "" for none, and what people read of it; or a note why there is nothing.
 
-    ``later`` says that the page has to ask for it once more.
+    ``later`` says that the page has to ask for it once more; ``frames`` move the drawing of a machine.
     """
 
     figure: Markup = EMPTY
     shown: Shown = NOTHING
     note: str = ""
     later: bool = False
+    frames: Mapping[str, Any] | None = None
 
 
 def inline(figure: Figure, reading: Reading, shown: Shown, cases: str) -> Seen:

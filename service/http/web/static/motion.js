@@ -1,7 +1,14 @@
-// The page of a case: what was not ready when the page came is asked for once more.
+// The page of a case: its drawing moves, and what was not ready when the page came is asked for once more.
 "use strict";
 
+// The drawing moves as the motion does.
+const moved = () => {
+  const data = document.getElementById("frames");
+  if (document.getElementById("instant")) sprag.sheet.move(data ? JSON.parse(data.textContent) : null);
+};
+
 document.addEventListener("DOMContentLoaded", async () => {
+  moved();
   const parts = [...document.querySelectorAll(".seen:has(> [data-later])")];
   if (!parts.length) return;
   const again = new URL(location.href);
@@ -9,6 +16,7 @@ document.addEventListener("DOMContentLoaded", async () => {
   try {
     const page = await sprag.busy(parts[0], sprag.page(again.pathname + again.search));
     for (const part of parts) sprag.take(page, `#${part.id}`);
+    moved();
   } catch (error) {
     for (const part of parts) sprag.note(part, error.message, () => location.reload());
   }

@@ -70,6 +70,15 @@ sprag.sheet = (() => {
     if (playing && !started) { started = true; began = performance.now(); requestAnimationFrame(step); }
   };
 
+  // Move the drawings by frames, or by their own; the button plays, the slider shows an instant.
+  const move = (given) => {
+    frames = given;
+    one("play")?.addEventListener("click", () => play(!playing));
+    one("instant")?.addEventListener("input", (event) => { play(false); at = Number(event.target.value); show(); });
+    show();
+    play(playing);
+  };
+
   const post = (address, body) => sprag.fetchJson(address, { method: "POST", body });
   // One request at a time; of later changes the last is sent when the answer has arrived.
   const ask = async () => {
@@ -82,12 +91,8 @@ sprag.sheet = (() => {
       if (found.answer) {
         const focused = document.activeElement?.id;
         place.innerHTML = found.answer;
-        frames = found.frames;
         if (["play", "instant"].includes(focused)) one(focused)?.focus();
-        one("play")?.addEventListener("click", () => play(!playing));
-        one("instant")?.addEventListener("input", (event) => { play(false); at = Number(event.target.value); show(); });
-        show();
-        play(playing);
+        move(found.frames);
         const { sparks } = await post(place.dataset.along, body);
         for (const each of document.querySelectorAll(".spark")) if (each.id) each.innerHTML = sparks[each.id.slice("spark:".length)] || "";
       }
@@ -99,7 +104,7 @@ sprag.sheet = (() => {
       if (again) { again = false; ask(); }
     }
   };
-  return { ask };
+  return { ask, move };
 })();
 
 document.addEventListener("sprag:checked", () => { if (document.getElementById("live")) sprag.sheet.ask(); });

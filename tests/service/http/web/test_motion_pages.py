@@ -96,6 +96,19 @@ def test_a_basin_is_chosen_by_keyboard_without_scripts(visitor: Visitor, motions
     expect(page.get_by_role("region", name="Regimes", exact=True)).to_contain_text("periodic")
 
 
+def test_the_drawing_moves_by_the_slider(visitor: Visitor, motions: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{motions}/cases/0?wait=1")
+    arm, slider = page.locator(".picture [data-arm]"), page.locator("#instant")
+    page.get_by_role("button", name="Pause").click()
+    places = set()
+    for part in (0, 0.1, 0.2, 0.3):
+        slider.evaluate("(e, part) => { e.value = part * e.max; e.dispatchEvent(new Event('input')); }", part)
+        places.add(arm.get_attribute("transform"))
+    assert len(places) == 4
+    assert page.locator(".picture .engaged").count() in (0, 1)
+
+
 def test_jumps_are_narrowed_by_a_button(visitor: Visitor, swept: str, office: Office) -> None:
     page = visitor.page
     page.goto(f"/studies/{swept}")
