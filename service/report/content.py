@@ -146,8 +146,7 @@ class Report:
     @cached_property
     def headline(self) -> Headline:
         """The answer in a sentence or two, and its numbers."""
-        curve = self.curve if self.question.curve else None
-        return headline_of(self.library, self.study_id, self.chosen, self.question.point, curve)
+        return headline_of(self.library, self.study_id, self.chosen, self.question.point, self.question.curve)
 
     @cached_property
     def effects(self) -> tuple[Sensitivity, ...]:

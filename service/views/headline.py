@@ -18,9 +18,9 @@ from sprag.service.reading.reader import Phrase, joined, plural, term
 from sprag.service.results.choice import characteristic
 from sprag.service.results.curve_cases import select
 from sprag.service.results.headlines.along import along_headline
-from sprag.service.results.headlines.batch import batch_headline
+from sprag.service.results.headlines.batch import asked_like, batch_headline
 from sprag.service.results.headlines.calibrated import calibrated_headline
-from sprag.service.results.headlines.headline import Gap, Headline, KeyNumber, Trace, amount, digits, shared, shown_unit
+from sprag.service.results.headlines.headline import Gap, Headline, KeyNumber, Trace, amount, digits
 from sprag.service.results.headlines.search import search_headline
 from sprag.service.results.key_answers import answers_query, find_answers
 from sprag.service.results.refined_maps import map_plan
@@ -53,7 +53,7 @@ def headline_of(
     study_id: str,
     query: CurveQuery | None = None,
     point: str | None = None,
-    curve: int | None = None,
+    curve: str = "",
 ) -> Headline:
     """The headline of a study, all of one moment.
 
@@ -61,7 +61,7 @@ def headline_of(
     ----------
     query : the curves that it is about; by default those of the page
     point : the working point, a text with or without a unit; between two cases both of them are told
-    curve : the place of the curve among several; by default that nearest to the machine of the base
+    curve : the name of the curve among several; by default that nearest to the machine of the base
 
     Raises
     ------
@@ -70,15 +70,14 @@ def headline_of(
     return in_one_moment(_headline, library, study_id, query, point, curve)
 
 
-def _headline(
-    library: Library, study_id: str, query: CurveQuery | None, point: str | None, curve: int | None
-) -> Headline:
+def _headline(library: Library, study_id: str, query: CurveQuery | None, point: str | None, curve: str) -> Headline:
     (record, progress), study = library.store.studies.look(study_id), library.store.studies.study(study_id)
     if not progress.done:
         return Headline((_not_begun(record),))
     if not progress.ok:
         return Headline((_nothing_ok(progress),))
-    found = _found(library, study_id, study, record, query, point, curve)
+    key = study_id, record.revision, query, point, curve
+    found = library.told.of(key, lambda: _found(library, study_id, study, record, query, point, curve))
     sentence = found.sentence or (
         Phrase("There is no answer yet.") if not record.over else Phrase("There is no answer."),
     )
@@ -122,7 +121,7 @@ def _found(
     record: StudyRecord,
     query: CurveQuery | None,
     point: str | None,
-    curve: int | None,
+    curve: str,
 ) -> Headline:
     """The headline of what has been run."""
     kind = None if study.plan is None else study.plan["kind"]
@@ -132,7 +131,7 @@ def _found(
         return calibrated_headline(library.calibrations.of(study_id))
     infos, fetch = models.study_results(study), partial(library.store.rows.for_cases, study_id)
     if study.spread is not None and kind is None and query is None:
-        return batch_headline(study, infos, point, fetch)
+        return batch_headline(study, infos, asked_like(usual_query(library, study_id)), point, fetch)
     mapped = map_plan(study)
     if mapped is not None and query is None:
         return _of_map(study, mapped, fetch(np.arange(study.cases, dtype=np.int64), mapped.results))
@@ -156,14 +155,14 @@ def _of_map(study: Study, plan: RefinePlan, columns: CaseColumns) -> Headline:
     paths = [axis.paths[0] for axis in plan.adaptive]
     numbers = []
     for title, place in (("Largest", int(np.nanargmax(values))), ("Smallest", int(np.nanargmin(values)))):
-        value, own = shared(study, info, float(values[place])), study.case_parameters(place)
+        value, own = float(values[place]), study.case_parameters(place)
         x, y = (Amount(own[path], unit_of(study, path), 4) for path in paths)
         label = Phrase("Largest {name}" if title == "Largest" else "Smallest {name}", name=Name(name, within=True))
         where = Phrase("at {x} and {y}", x=x, y=y)
-        numbers.append(KeyNumber(label, value, shown_unit(study, info), digits(value), where=where, case=place))
+        numbers.append(KeyNumber(label, value, info.unit, digits(value), where=where, case=place))
     ends = {
-        "low": amount(study, info, float(np.nanmin(values))),
-        "high": amount(study, info, float(np.nanmax(values))),
+        "low": amount(info, float(np.nanmin(values))),
+        "high": amount(info, float(np.nanmax(values))),
     }
     text = Phrase("Over the map {name} reaches from {low} to {high}.", name=Name(name, within=True), **ends)
     return Headline((text,), tuple(numbers))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from functools import partial
 from threading import Lock
-from typing import TYPE_CHECKING, Final, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
 from cachetools import LRUCache
 
@@ -23,6 +23,8 @@ Found = TypeVar("Found")
 
 #: Calibrations that are kept.
 _CALIBRATIONS: Final = 16
+#: Headlines that are kept.
+_HEADLINES: Final = 512
 #: Designs that are kept, of all studies together: some 20 MB.
 _DESIGNS: Final = 50_000
 
@@ -57,6 +59,24 @@ class Calibrations(_Kept["Calibration"]):
     def of(self, study_id: str) -> Calibration:
         """A calibration; raises StudyNotFoundError, and FaultError for a study that is not one."""
         return self._of(study_id, calibration_of)
+
+
+class Headlines:
+    """The headlines of studies, each found anew only when its study has other rows."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._kept: LRUCache[tuple[object, ...], Any] = LRUCache(_HEADLINES)
+
+    def of(self, key: tuple[object, ...], find: Callable[[], Found]) -> Found:
+        """What is kept of the key, which has the revision of the study, or what ``find`` finds."""
+        with self._lock:
+            known: Found | None = self._kept.get(key)
+        if known is None:
+            known = find()
+            with self._lock:
+                self._kept[key] = known
+        return known
 
 
 class Fronts(_Kept["Designs"]):

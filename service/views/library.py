@@ -11,7 +11,7 @@ from sprag.service.reading.reader import Choice, Reading, reading_for
 from sprag.service.results.unaffected import Unaffected
 from sprag.service.storage.store import Store
 from sprag.service.views.columns import Columns
-from sprag.service.views.kept import Calibrations, Fronts
+from sprag.service.views.kept import Calibrations, Fronts, Headlines
 from sprag.worker.pool.child_process import uncounted
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ class Library:
         self.fronts = Fronts(store)
         self.columns = Columns(store)
         self.calibrations = Calibrations(store)
+        self.told = Headlines()
         self.unaffected = Unaffected()
         #: Revision, headline and description of listed studies (`views.listed`).
         self.headlines: LRUCache[str, Any] = LRUCache(_HEADLINES)

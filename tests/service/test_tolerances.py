@@ -106,7 +106,7 @@ def test_pages_show_the_drive_of_a_case_and_its_values(filled: tuple[Service, st
     assert BACKLASH in text
     own = service.http.get(f"/studies/{study_id}").text
     assert "varies from drive to drive" in own
-    for page in ("cases", "curves"):
+    for page in ("cases", "explore"):
         assert service.http.get(f"/studies/{study_id}/{page}").status_code == 200
     file = service.http.get(f"/api/v1/studies/{study_id}/results", params={"format": "json"}).json()
     assert file["given"]["tolerances"][0] == {"path": BACKLASH, "plus_minus": "60 %"}

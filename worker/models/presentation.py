@@ -116,6 +116,7 @@ class Presentation:
     along, apart : paths of the axes to draw along, and of those distinguished by colour, in order of preference
     drawn : results of the main curve
     main : the main results of a machine; ``heading`` is their common title
+    below : results of the chart below that of the first result of ``clauses``, in order of preference
     answers : what a page says first; where there are none, the largest and smallest values of the drawn results
     clauses : what is said of a case in a sentence
     shares : results that are a share of something, with N and K for indices: people may read them in per cent
@@ -143,6 +144,7 @@ class Presentation:
     drawn: tuple[str, ...] = ()
     main: tuple[str, ...] = ()
     heading: str = "Main results"
+    below: tuple[str, ...] = ()
     answers: tuple[Answer, ...] = ()
     clauses: Clauses = field(default_factory=Clauses)
     shares: tuple[str, ...] = ()

@@ -35,7 +35,7 @@ from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.reader import Phrase, joined, meanings
 from sprag.service.results.defaults import main_results
 from sprag.service.results.headlines.along import told
-from sprag.service.results.headlines.headline import MOST, NOTHING, KeyNumber, amount, digits, shared, shown_unit
+from sprag.service.results.headlines.headline import MOST, NOTHING, KeyNumber, amount, digits
 from sprag.service.results.regimes import ORDER, motion_sentence
 from sprag.service.results.selection import axis_name, own_paths
 from sprag.service.results.start_states import check_start
@@ -205,7 +205,7 @@ def _page(
         flags=[] if row is None else [(flag, flags.get(flag, "")) for flag in row.flags],
         parameters=_parameters(study, case, reading),
         main=main,
-        main_facts=[] if row is None else [fact_of(_number(study, info, row), reading) for info in main[:MOST]],
+        main_facts=[] if row is None else [fact_of(_number(info, row), reading) for info in main[:MOST]],
         infos=infos,
         shown=models.presentation_of(study),
         settled=models.is_settled(study.run),
@@ -270,18 +270,18 @@ def _parameters(study: Study, case: int, reading: Reading) -> list[tuple[str, st
     ]
 
 
-def _number(study: Study, info: ResultInfo, row: CaseRow) -> KeyNumber:
+def _number(info: ResultInfo, row: CaseRow) -> KeyNumber:
     """A main result, with as many digits as its interval leaves."""
     value, half = row.results[info.name], row.results.get(models.half_width(info.name))
     if not isinstance(value, float):
         return KeyNumber(info.name, None if value is None else str(value))
     width = half if isinstance(half, float) and half > 0.0 else None
-    note = NOTHING if width is None else Phrase("± {width}", width=replace(amount(study, info, width), digits=2))
+    note = NOTHING if width is None else Phrase("± {width}", width=replace(amount(info, width), digits=2))
     return KeyNumber(
         info.name,
-        shared(study, info, value),
-        shown_unit(study, info),
-        digits(shared(study, info, value), width),
+        value,
+        info.unit,
+        digits(value, width),
         note=note,
     )
 

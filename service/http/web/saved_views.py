@@ -5,30 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import count
 from typing import TYPE_CHECKING, Any, Final
-from urllib.parse import urlencode
 
 from starlette.responses import RedirectResponse, Response
 
-from sprag.service.faults import SelectionError, choice_of
-from sprag.service.http import views
+from sprag.service.faults import choice_of
 from sprag.service.http.context import Context, Ctx
-from sprag.service.http.current import current
-from sprag.service.http.language import language_pairs
-from sprag.service.http.reading import address_pairs, page_query
+from sprag.service.http.reading import page_query
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.form.values import Form
 from sprag.service.jobs.saved_views import change_view, save_view
 from sprag.service.languages import N_, _
-from sprag.service.report.chosen_figures import figure_query
-from sprag.service.results.choice import Address, MapQuery, pairs_of
 from sprag.service.spec.saved_views import FIGURES, read_view, read_view_change
 from sprag.worker.limits import MAX_NAME_LENGTH, MAX_REPORT_FIGURES
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable
 
     from sprag.service.storage.saved_views import SavedView
-    from sprag.worker.study import Study
 
 router = page_router()
 
@@ -41,8 +34,6 @@ ACTIONS: Final = {
     "take-out": N_("Out of the report"),
     "delete": N_("Delete"),
 }
-#: Parameters of how a figure is read.
-_READING: Final = ("units", "names")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,16 +52,6 @@ class SavedHere:
         return self.page in FIGURES
 
 
-@dataclass(frozen=True, slots=True)
-class ReportFigure:
-    """A figure of the report on the page of its study: addresses of the figure and of its picture, or a fault."""
-
-    saved: SavedView
-    figure: str = ""
-    picture: str = ""
-    fault: str = ""
-
-
 def saved_here(
     found: Iterable[SavedView], page: str, study: str | None, query: str | None = None, name: str = ""
 ) -> SavedHere:
@@ -81,30 +62,6 @@ def saved_here(
     name = name[: MAX_NAME_LENGTH - 5]
     names = (name if number == 1 else f"{name} ({number})" for number in count(1))
     return SavedHere(page, study, query, next(text for text in names if text not in taken), mine)
-
-
-def report_figures(study: Study, study_id: str, found: Sequence[SavedView]) -> list[ReportFigure]:
-    """The figures of the report among the views of a study, in order."""
-    return [_figure(study, study_id, saved) for saved in found if saved.place is not None]
-
-
-def _figure(study: Study, study_id: str, saved: SavedView) -> ReportFigure:
-    try:
-        query = figure_query(study, saved.view)
-    except SelectionError as error:
-        return ReportFigure(saved, fault=str(error))
-    given = Address(saved.view.query)
-    own = [(name, value) for name in _READING if (value := given.get(name))]
-    own += [pair for pair in address_pairs(current().choice) if pair[0] not in dict(own)]
-    kind = [("kind", given.get("kind") or "heatmap")] if isinstance(query, MapQuery) else []
-    shown, columns = [*pairs_of(query), *kind, *own], "" if kind else "&columns=2"
-    picture = urlencode([*shown, *language_pairs(), ("format", "svg")])
-    page = saved.view.page
-    return ReportFigure(
-        saved,
-        f"/studies/{study_id}/figures/{page}?{urlencode(shown)}{columns}",
-        f"{views.study_address(study_id)}/{page}?{picture}",
-    )
 
 
 def view_actions() -> dict[str, str]:

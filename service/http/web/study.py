@@ -1,59 +1,55 @@
-"""The page of one study: its progress, mechanical characteristic, inputs and actions."""
+"""The sheet of one study and what its buttons do."""
 
 from __future__ import annotations
 
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Final
-from urllib.parse import urlencode
 
-from starlette.datastructures import QueryParams
+from fastapi import Request
 from starlette.responses import RedirectResponse, Response
 
 from sprag.sentences import Sentence
 from sprag.service import formats
-from sprag.service.figures import pictures
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx, StudyId
 from sprag.service.http.current import current
+from sprag.service.http.prefix import here
 from sprag.service.http.problems import ApiError
-from sprag.service.http.reading import address_pairs, file_pairs
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.web.figures.fits import fits_of, has_measured_clutch
 from sprag.service.http.web.form.values import changed_meanwhile
-from sprag.service.http.web.held import fixed_choices
-from sprag.service.http.web.saved_views import report_figures, saved_here, view_actions
-from sprag.service.http.web.study_answers import AnswersOnPage, answers_view
+from sprag.service.http.web.saved_views import saved_here, view_actions
+from sprag.service.http.web.sheet.drawer import drawer_of, map_pairs, with_query
+from sprag.service.http.web.sheet.side import trust_of
+from sprag.service.http.web.sheet.view import sheet_of
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended, Work
 from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.json_text import timestamp
-from sprag.service.languages import N_, _
+from sprag.service.languages import N_
 from sprag.service.reading.directions import ends_in_words
-from sprag.service.reading.reader import Reading, meanings, reading_for
-from sprag.service.results.choice import map_query, pairs_of
-from sprag.service.results.defaults import caption, drawn_numbers, main_query, no_curves, varying_axes
-from sprag.service.results.refined_maps import map_plan
-from sprag.service.results.regimes import DOUBTFUL, ORDER, counted
+from sprag.service.reading.reader import meanings, reading_for
+from sprag.service.results.defaults import no_curves
+from sprag.service.results.regimes import DOUBTFUL
 from sprag.service.results.shown_inputs import inputs, run_settings
 from sprag.service.spec.narrow import narrowed_cases
 from sprag.service.storage.studies.records import Kinds
-from sprag.service.views.headline import is_small, usual_query
+from sprag.service.views.headline import is_small
 from sprag.worker import models
 from sprag.worker.limits import MAX_CASES, NARROW_STEPS
-from sprag.worker.models.starts import has_starts
-from sprag.worker.planning.calibrate.plan import CALIBRATE
-from sprag.worker.planning.goals.plan import GOAL
 from sprag.worker.states import TRANSITIONS, StudyEvent, StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from starlette.datastructures import QueryParams
+
     from sprag.service.answers.studies import ClutchFitReport
     from sprag.service.http.web.figures.fit import FitChart
     from sprag.service.http.web.form.entries import Faults, Values
-    from sprag.service.results.curves import CurveQuery
+    from sprag.service.http.web.sheet.view import Sheet
     from sprag.worker.study import Study
 
 router = page_router()
@@ -79,13 +75,8 @@ def study_frame(context: Context, study_id: str) -> dict[str, Any]:
     # Counting kinds takes time in proportion to the rows, so only the page that shows them does it.
     spec, choice = context.store.studies.spec(study_id), current().choice
     shown = views.detail(record, progress, study, spec, Kinds({}, {}), ())
-    varying = len(varying_axes(study))
-    grid = study.combine == "grid" and varying > 1
-    mapped = grid or map_plan(study) is not None
     tabs = [
-        ("", N_("Overview")),
-        *([("/curves", N_("Curves"))] if main_query(study, models.study_results(study)) is not None else []),
-        *([("/map", N_("Map"))] if mapped else []),
+        ("", N_("Sheet")),
         ("/matters", N_("What matters")),
     ]
     return {
@@ -110,7 +101,7 @@ def _verbs(state: StudyState, some_failed: bool) -> list[str]:
 
 @router.get("/studies/{study_id:study}")
 async def study_page(context: Ctx, work: Attended, study_id: StudyId) -> Response:
-    """One study: its progress, answers, mechanical characteristic and inputs."""
+    """The sheet of a study."""
     return await shown_study(context, work, study_id)
 
 
@@ -129,63 +120,50 @@ async def shown_study(
     with what is ``untaken`` of it.
     """
     spec = await in_thread(context.store.studies.spec, study_id)
-    fits = (
-        await work.check(fits_of, spec, await in_thread(context.store.studies.study, study_id))
-        if has_measured_clutch(spec)
-        else {}
-    )
-    usual, many = await in_thread(_usual_curves, context, study_id)
-    asked = (context.library, study_id, work.request.query_params.multi_items(), usual, current().choice)
-    view = await (work.check(answers_view, *asked) if many else in_thread(answers_view, *asked))
+    study = await in_thread(context.store.studies.study, study_id)
+    fits = await work.check(fits_of, spec, study) if has_measured_clutch(spec) else {}
+    cases = here(f"/studies/{study_id}/cases/")
+    asked = (context.library, study_id, work.request.query_params.multi_items(), current().choice, cases)
+    sheet = await (in_thread(sheet_of, *asked) if is_small(study) else work.check(sheet_of, *asked))
     extension = {"further": further or {}, "wrong": wrong or {}, "labels": labels or {}, "untaken": untaken or {}}
     if labels and not untaken:
         extension["changed_meanwhile"] = changed_meanwhile()
-    return await in_thread(_study_page, context, study_id, fits, view, usual, extension)
-
-
-def _usual_curves(context: Context, study_id: str) -> tuple[CurveQuery | None, bool]:
-    """The curves that are shown first, and whether reading the answers of the study takes long."""
-    return usual_query(context.library, study_id), not is_small(context.store.studies.study(study_id))
+    return await in_thread(_study_page, context, study_id, fits, sheet, work.request.query_params, extension)
 
 
 def _study_page(
     context: Context,
     study_id: str,
     fits: Mapping[str, tuple[ClutchFitReport, FitChart]],
-    view: AnswersOnPage,
-    usual: CurveQuery | None,
+    sheet: Sheet,
+    given: QueryParams,
     extension: Mapping[str, Any],
 ) -> Response:
     study = context.store.studies.study(study_id)
     frame = study_frame(context, study_id)
-    query = view.query or usual
-    first = context.store.rows.case(study_id, 0) if query is None and study.cases == 1 else None
     kinds = context.store.rows.kinds(study_id)
+    single = study.cases == 1 and study.plan is None
+    first = context.store.rows.case(study_id, 0) if single else None
+    progress = context.store.studies.progress(study_id)
     return page(
         "study.html",
-        status=_status(view, extension),
+        status=_status(sheet, extension),
         **frame,
         **extension,
+        sheet=sheet,
+        faults=sheet.faults,
+        trust=trust_of(study_id, progress, kinds),
+        settled=models.is_settled(study.run),
+        without=no_curves(study) if study.cases > 1 and study.plan is None and progress.done else "",
+        **drawer_of(study, study_id, sheet, given, frame["saved"]),
         origins=context.store.rows.origins(study_id),
-        tab="",
-        shown=models.presentation_of(study),
-        answers=view,
-        faults=view.faults,
-        fixed=[]
-        if view.query is None
-        else fixed_choices(study, (view.query.x, *view.query.by), view.query.at, frame["reading"]),
-        **_main_figure(study, study_id, query, view, frame["reading"]),
         view_actions=view_actions(),
-        report_figures=report_figures(study, study_id, frame["saved"]),
-        orders=orders_address(study, study_id),
-        regime_maps=regime_maps(study, study_id),
         only_row=None if first is None else first.results.items(),
         units={info.name: info.unit for info in models.study_results(study)},
         inputs=inputs(study, frame["study"]["spec"]),
         run=run_settings(study, frame["study"]["spec"], frame["reading"]),
         fits=fits,
         regimes=kinds.regimes,
-        counts=counted(kinds.regimes),
         regime_meanings=meanings(models.REGIME_SENTENCES),
         flags={flag: count for flag, count in kinds.flags.items() if flag not in models.REGIME_SENTENCES},
         flag_meanings=meanings(models.flags_of(study.model)),
@@ -195,9 +173,9 @@ def _study_page(
     )
 
 
-def _status(view: AnswersOnPage, extension: Mapping[str, Any]) -> int:
+def _status(sheet: Sheet, extension: Mapping[str, Any]) -> int:
     """The status of the page: whether one of its forms is refused, or its labels were changed meanwhile."""
-    if extension["untaken"] or view.faults or extension["wrong"]:
+    if extension["untaken"] or sheet.faults or extension["wrong"]:
         return 422
     return 412 if extension["labels"] else 200
 
@@ -211,90 +189,18 @@ def _narrowed(context: Context, study: Study, study_id: str) -> int:
     return count if count <= MAX_CASES else 0
 
 
-def _has_goal(study: Study) -> bool:
-    return study.plan is not None and study.plan["kind"] == GOAL
+@router.get("/studies/{study_id:study}/curves")
+def curves_page(request: Request, study_id: StudyId) -> Response:
+    """The former page of curves, whose choices the sheet has."""
+    return RedirectResponse(with_query(f"/studies/{study_id}", request.query_params.multi_items()), status_code=308)
 
 
-def _calibrates(study: Study) -> bool:
-    return study.plan is not None and study.plan["kind"] == CALIBRATE
-
-
-def _drawable(points: int) -> bool:
-    """Whether a picture can show so many points."""
-    return points <= pictures.MAX_PICTURE_POINTS
-
-
-def _main_figure(
-    study: Study, study_id: str, query: CurveQuery | None, view: AnswersOnPage, reading: Reading
-) -> dict[str, Any]:
-    """The addresses of the figure on the page, of its picture and of the page where others are chosen; its caption."""
-    chosen, in_file = address_pairs(current().choice), file_pairs()
-    own = urlencode(chosen)
-    picture = f"format=svg&{urlencode(in_file)}"
-    if _has_goal(study):
-        return {
-            "heading": _("Designs"),
-            "figure": f"/studies/{study_id}/figures/front?{own}",
-            "picture": f"{views.study_address(study_id)}/front?{picture}" if _drawable(study.cases) else None,
-            "others": f"/studies/{study_id}/rows",
-            "kind": _("Designs"),
-            "invitation": _("More on the page"),
-            "caption": _("Every design of the search; grey ones are outside the limits"),
-        }
-    if _calibrates(study):
-        return {
-            "heading": _("Calibration"),
-            "figure": f"/studies/{study_id}/figures/calibration?columns=2&{own}",
-            "picture": f"{views.study_address(study_id)}/calibration?{picture}",
-            "others": f"/studies/{study_id}/calibration",
-            "kind": _("Calibration"),
-            "invitation": _("More on the page"),
-            "caption": _("Measured points on the fitted curve, and the residuals"),
-        }
-    if query is None:
-        return {
-            "heading": "",
-            "without": "" if study.cases == 1 or study.plan is not None else no_curves(study),
-            "figure": None,
-            "picture": None,
-            "others": None,
-            "kind": "",
-            "invitation": "",
-            "caption": None,
-        }
-    return _chosen_figure(study, study_id, query, view, reading)
-
-
-def _chosen_figure(
-    study: Study, study_id: str, query: CurveQuery, view: AnswersOnPage, reading: Reading
-) -> dict[str, Any]:
-    """The curves of a query, or the map of a study that refines one, as of `_main_figure`."""
-    chosen, in_file = address_pairs(current().choice), file_pairs()
-    mapped = map_query(study, models.study_results(study), QueryParams()) if map_plan(study) is not None else None
-    if mapped is not None:
-        kind, pairs, more = "map", pairs_of(mapped), ("kind", "heatmap")
-        text = _(
-            "{z} over {x} and {y}",
-            z=reading.caption(mapped.z), x=reading.within(mapped.x), y=reading.within(mapped.y),
-        )  # fmt: skip
-        drawable = True
-    else:
-        kind, pairs, more = "curves", pairs_of(query), ("columns", "2")
-        text = caption(study, query).said(reading)
-        drawable = _drawable(drawn_numbers(study, query))
-    picture = f"{views.study_address(study_id)}/{kind}?{urlencode([*pairs, ('format', 'svg'), *in_file])}"
-    figure = f"/studies/{study_id}/figures/{kind}?{urlencode([*pairs, more, *chosen])}"
-    if view.figure is not None:  # with the answers on the curves
-        figure, picture = view.figure, view.picture or picture
-    return {
-        "heading": models.presentation_of(study).heading,
-        "figure": figure,
-        "picture": picture if drawable else None,
-        "others": f"/studies/{study_id}/{kind}?{urlencode(pairs)}",
-        "kind": _("Map") if mapped is not None else _("Curves"),
-        "invitation": _("Choose others with"),
-        "caption": text,
-    }
+@router.get("/studies/{study_id:study}/map")
+def map_page(request: Request, study_id: StudyId) -> Response:
+    """The former page of a map, whose choices the sheet has: the axis upwards has another name there."""
+    return RedirectResponse(
+        with_query(f"/studies/{study_id}", map_pairs(request.query_params.multi_items())), status_code=308
+    )
 
 
 @router.get("/studies/{study_id:study}/delete")
@@ -358,25 +264,3 @@ def act(context: Ctx, study_id: StudyId, verb: str) -> Response:
         raise ApiError("not-found", Sentence("Unknown action."))
     wishes[verb](study_id)
     return RedirectResponse(f"/studies/{study_id}", status_code=303)
-
-
-def orders_address(study: Study, study_id: str) -> str | None:
-    """URL of the map of the periods after which motions repeat; None where there is none."""
-    return _map_address(study, study_id, ORDER) if models.is_settled(study.run) else None
-
-
-def regime_maps(study: Study, study_id: str) -> list[tuple[str, str]]:
-    """Text and URL of each map of how many motions cases have; none of cases with one start."""
-    if not has_starts(study.run):
-        return []
-    shown = ((N_("number of motions"), "regime.count"), (N_("share of the rarest motion"), "regime.share.least"))
-    addresses = [(_(text), _map_address(study, study_id, name)) for text, name in shown]
-    return [(text, address) for text, address in addresses if address is not None]
-
-
-def _map_address(study: Study, study_id: str, z: str) -> str | None:
-    """URL of the map of a result; None where no two parameters span one."""
-    query = map_query(study, models.study_results(study), QueryParams({"z": z}))
-    if query is None or map_plan(study) is not None:
-        return None
-    return f"/studies/{study_id}/map?{urlencode(pairs_of(query))}"

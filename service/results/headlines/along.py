@@ -19,14 +19,13 @@ from sprag.service.results.headlines.headline import (
     KeyNumber,
     amount,
     digits,
-    shared,
-    shown_unit,
     trace_of,
 )
-from sprag.service.results.key_answer_words import answer_facts, curve_name, note_of, place_text
+from sprag.service.results.key_answer_words import answer_facts, curve_name, curve_named, note_of, place_text
 from sprag.service.results.key_answers import answers_at, usual_curve
 from sprag.service.results.selection import axis_name
 from sprag.worker import models
+from sprag.worker.directions import SWEEP, direction
 from sprag.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
@@ -89,7 +88,7 @@ def told(
     clauses = models.presentation_of(study).clauses
     names = {place: name for place, name in clauses.results.items() if name in infos}
     parts: dict[str, Part] = {
-        place: amount(study, infos[name], values[name], widths.get(name))
+        place: amount(infos[name], values[name], widths.get(name))
         for place, name in names.items()
         if np.isfinite(values.get(name, np.nan))
     }
@@ -103,7 +102,7 @@ def told(
     name = next((name for name in values if name in infos and np.isfinite(values[name])), None)
     if name is None:
         return NOTHING
-    value = amount(study, infos[name], values[name], widths.get(name))
+    value = amount(infos[name], values[name], widths.get(name))
     return Phrase("{name} is {value}", name=Name(name, within=True), value=value)
 
 
@@ -132,15 +131,18 @@ def place_on(curve: Curve, name: str, x: float | None, *, asked: bool) -> tuple[
 
 
 def along_headline(
-    study: Study, infos: Sequence[ResultInfo], found: StudyAnswers, chosen: int | None = None, *, asked: bool = False
+    study: Study, infos: Sequence[ResultInfo], found: StudyAnswers, name: str = "", *, asked: bool = False
 ) -> Headline:
-    """The answer of the ``chosen`` curve at the point of ``found``; at its nearest case unless it was ``asked`` for."""
+    """The answer of a curve at the point of ``found``, the nearest case of it unless that was ``asked`` for.
+
+    The curve with the ``name`` that it has in pictures; by default it is that nearest to the machine of the base.
+    """
     if found.query is None or found.drawn is None or not found.curves:
         return _no_curve(study, infos, found)
-    place = usual_curve(study, found) if chosen is None else chosen
+    place = curve_place(study, found, name)
     curve = found.drawn.curves[place]
     spot = place_on(curve, judged_by(study, curve.y), found.point, asked=asked)
-    of = curve_name(found.curves[place], study) if len(found.curves) > 1 else NOTHING
+    of = _curve_of(study, found.curves[place]) if len(found.curves) > 1 else NOTHING
     if spot is None:
         return Headline(of=of)
     own = Along(study, {info.name: info for info in infos}, curve, found.query.x, *spot)
@@ -156,19 +158,40 @@ def along_headline(
         of=of,
         trace=trace_of(curve.line.x, y, spot[1][0]),
         gap=gap,
+        case=int(curve.line.cases[spot[1][0]]),
+    )
+
+
+def curve_place(study: Study, found: StudyAnswers, name: str) -> int:
+    """The place of a curve by its name in any language; without one, or for an unknown one, that of the usual curve."""
+    named = curve_named([curve_name(one, study) for one in found.curves], name) if name else None
+    return usual_curve(study, found) if named is None else named
+
+
+def _curve_of(study: Study, one: CurveAnswers) -> Phrase:
+    """What tells a curve apart, with its names."""
+    return joined(
+        ", ",
+        (
+            term(direction(value))
+            if path == SWEEP
+            else joined(" ", (Name(path, within=True), Amount(value, unit_of(study, path), OF_PLACES)))
+            for path, value in one.line.by.items()
+        ),
     )
 
 
 def _sentences(own: Along) -> list[Phrase]:
     """What is said of the place: of its case, or that it has none and what its neighbours have."""
     if len(own.places) == 1:
-        return [_of_case(own, own.places[0])]
+        return [case_sentence(own, own.places[0])]
     wanted = Amount(own.x, unit_of(own.study, own.path), OF_PLACES)
     missing = Phrase("No case was run at {place}.", place=wanted)
-    return [missing, *(_of_case(own, place) for place in own.places)]
+    return [missing, *(case_sentence(own, place) for place in own.places)]
 
 
-def _of_case(own: Along, place: int) -> Phrase:
+def case_sentence(own: Along, place: int) -> Phrase:
+    """The sentence about the case at a place of a curve."""
     clause = _clause(own, place)
     if not clause:
         clause = _without(own, place)
@@ -218,7 +241,7 @@ def _next(own: Along, answers: CurveAnswers) -> Phrase:
         value = own.value(following, name)
         if 0.0 < value < _LEFT * here:
             place = next(iter(clauses.results))
-            left = Phrase(clauses.left, **{place: amount(own.study, own.first, value)})
+            left = Phrase(clauses.left, **{place: amount(own.first, value)})
             return Phrase("At {place} {clause}.", place=own.at(following), clause=left)
     stall = next((one for one in answers.answers if one.answer.kind == "until_zero" and one.value is not None), None)
     if stall is None or not clauses.stalls:
@@ -227,7 +250,7 @@ def _next(own: Along, answers: CurveAnswers) -> Phrase:
         there = stall.there or 0.0
         if not clauses.left or not 0.0 < there < _LEFT * here:
             return NOTHING
-        left = Phrase(clauses.left, **{next(iter(clauses.results)): amount(own.study, own.first, there)})
+        left = Phrase(clauses.left, **{next(iter(clauses.results)): amount(own.first, there)})
         return Phrase("At {place} {clause}.", place=Amount(stall.value, stall.unit, OF_PLACES), clause=left)
     ends = {
         "low": Amount(stall.low, stall.unit, OF_PLACES, bare=True),
@@ -237,27 +260,33 @@ def _next(own: Along, answers: CurveAnswers) -> Phrase:
 
 
 def _numbers(own: Along, answers: CurveAnswers, x_unit: str) -> tuple[KeyNumber, ...]:
-    found = [_number(own, one, x_unit) for one in answers.answers if one.value is not None]
-    if not found:
-        found = [_number(own, one, x_unit) for one in answers.working_point if one.value is not None]
-    return tuple(found[:MOST])
+    for items in (answers.answers, answers.working_point):
+        found = [_number(one, x_unit, own) for one in items if one.value is not None]
+        if found:
+            return tuple(found[:MOST])
+    return ()
 
 
-def _number(own: Along, found: Found, x_unit: str) -> KeyNumber:
-    """An answer as a key number; between two cases what both of them have."""
-    if found.answer.kind == "until_zero":
-        return _stall(own, found)
-    label, value = found.answer.title, shared(own.study, found.info, found.value or 0.0)
-    made = KeyNumber(
-        label, value, shown_unit(own.study, found.info),
-        digits=digits(value, found.half_width),
-        where=_where(found, x_unit),
-        note=_doubt(found),
-        case=found.case,
-    )  # fmt: skip
+def curve_numbers(answers: CurveAnswers, x_unit: str) -> list[KeyNumber]:
+    """Every answer of a curve; those that lie between two of its cases have no value."""
+    return [_number(one, x_unit, None) for one in answers.answers or answers.working_point]
+
+
+def _number(found: Found, x_unit: str, own: Along | None) -> KeyNumber:
+    """An answer as a key number; between two cases of its ``own`` curve what both of them have."""
+    if found.answer.kind == "until_zero" and found.value is not None:
+        return _stall(found)
+    value = None if found.value is None else found.value
+    unit, count = found.info.unit, digits(value or 0.0, found.half_width)
+    made = KeyNumber(found.answer.title, value, unit, count, where=NOTHING, note=_doubt(found), case=found.case)
+    if value is None:
+        return made
+    made = replace(made, where=_where(found, x_unit))
     if found.other is None:
         return made
-    ends = sorted(shared(own.study, found.info, own.value(place, found.info.name)) for place in own.places)
+    if own is None:
+        return replace(made, value=None)
+    ends = sorted(own.value(place, found.info.name) for place in own.places)
     return replace(made, value=None, low=ends[0], high=ends[-1])
 
 
@@ -276,10 +305,10 @@ def _doubt(found: Found) -> Phrase:
     return joined(", ", parts)
 
 
-def _stall(own: Along, found: Found) -> KeyNumber:
+def _stall(found: Found) -> KeyNumber:
     there = NOTHING
     if found.above and found.there is not None:
-        there = Phrase("there {value}", value=amount(own.study, found.info, found.there))
+        there = Phrase("there {value}", value=amount(found.info, found.there))
     elif found.high is not None:
         there = Phrase("below {place}", place=Amount(found.high, found.unit, OF_PLACES))
     return KeyNumber(found.answer.title, found.value, found.unit, OF_PLACES, above=True, where=there, case=found.case)
@@ -293,12 +322,12 @@ def _no_curve(study: Study, infos: Sequence[ResultInfo], found: StudyAnswers) ->
         values = {item.info.name: item.value for item in (*one.working_point, *one.answers) if item.value is not None}
         widths = {item.info.name: item.half_width for item in one.working_point if item.half_width}
         clause = told(study, known, values, widths)
-        numbers = [_plain(study, item) for item in (*one.answers, *one.working_point) if item.value is not None]
+        numbers = [_plain(item) for item in (*one.answers, *one.working_point) if item.value is not None]
         numbers = list({number.label: number for number in numbers}.values())
         says = (joined("", [Whole(clause)]),) if clause else ()
         return Headline(says, tuple(numbers[:MOST]))
     best = [item for item in found.overall if item.value is not None]
-    numbers = [replace(_plain(study, item), where=place_text(study, item.case or 0)) for item in best]
+    numbers = [replace(_plain(item), where=place_text(study, item.case or 0)) for item in best]
     says = ()
     if best:
         title = best[0].answer.title
@@ -306,15 +335,15 @@ def _no_curve(study: Study, infos: Sequence[ResultInfo], found: StudyAnswers) ->
             Phrase(
                 "{title}: {value}, {place}.",
                 title=title if isinstance(title, Phrase) else Phrase(title),
-                value=amount(study, best[0].info, best[0].value or 0.0, best[0].half_width),
+                value=amount(best[0].info, best[0].value or 0.0, best[0].half_width),
                 place=place_text(study, best[0].case or 0),
             ),
         )
     return Headline(says, tuple(numbers[:MOST]))
 
 
-def _plain(study: Study, item: Found) -> KeyNumber:
-    value = shared(study, item.info, item.value or 0.0)
+def _plain(item: Found) -> KeyNumber:
+    value = item.value or 0.0
     note = note_of(answer_facts(item), "1") if item.flags or item.regime else NOTHING
-    unit, count = shown_unit(study, item.info), digits(value, item.half_width)
+    unit, count = item.info.unit, digits(value, item.half_width)
     return KeyNumber(item.answer.title, value, unit, count, note=note, case=item.case)

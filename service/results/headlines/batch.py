@@ -21,8 +21,6 @@ from sprag.service.results.headlines.headline import (
     Trace,
     amount,
     digits,
-    shared,
-    shown_unit,
     trace_of,
 )
 from sprag.service.results.selection import value_of
@@ -31,12 +29,13 @@ from sprag.service.results.tolerances.conditions import first_condition
 from sprag.service.results.tolerances.ribbons import QUANTILES, ribbon
 from sprag.service.results.tolerances.yields import yields
 from sprag.worker import models
+from sprag.worker.spread import DRIVE
 from sprag.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.results.curves import Fetch
+    from sprag.service.results.curves import CurveQuery, Fetch
     from sprag.service.results.tolerances.ribbons import Ribbon, RibbonLine
     from sprag.service.results.tolerances.yields import Yield
     from sprag.worker.models import ResultInfo
@@ -45,13 +44,23 @@ if TYPE_CHECKING:
 _LOW, _MIDDLE, _HIGH = range(len(QUANTILES))
 
 
-def batch_headline(study: Study, infos: Sequence[ResultInfo], point: str | None, fetch: Fetch) -> Headline:
+def asked_like(query: CurveQuery | None) -> Asked:
+    """The places of a batch that curves of its nominal drive go through."""
+    if query is None:
+        return Asked()
+    at = tuple(pair for pair in query.at if pair[0] != DRIVE)
+    return Asked(query.x, tuple(path for path in query.by if path != DRIVE), at)
+
+
+def batch_headline(
+    study: Study, infos: Sequence[ResultInfo], asked: Asked, point: str | None, fetch: Fetch
+) -> Headline:
     """The answer of a batch at a value of its axis, the usual one unless a ``point`` is given.
 
     Raises SelectionError about ``point`` where it is no value of the axis.
     """
     name = judged_by(study, drawn_results(study, infos))
-    found = ribbon(study, infos, (name,), Asked(), QUANTILES, fetch)
+    found = ribbon(study, infos, (name,), asked, QUANTILES, fetch)
     line, place = _usual_line(study, found), 0
     gap = None
     if found.places.x is not None:
@@ -59,12 +68,13 @@ def batch_headline(study: Study, infos: Sequence[ResultInfo], point: str | None,
         place, gap = _place(found.places.x, line, x, asked=bool(point))
     if not line.spreads[name].quantiles.drives[place]:
         return Headline(gap=gap)
-    reached = yields(study, infos, (first_condition(study, name),), Asked(), 0, fetch)
+    reached = yields(study, infos, (first_condition(study, name),), asked, 0, fetch)
     return Headline(
         _sentences(found, line, name, place, gap),
         _numbers(found, line, name, place, reached),
         trace=trace_of(line.line.x, line.spreads[name].nominal, place) if found.places.x else _spread(line, name),
         gap=gap,
+        case=int(line.line.cases[place]),
     )
 
 
@@ -105,7 +115,7 @@ def _sentences(found: Ribbon, line: RibbonLine, name: str, place: int, gap: Gap 
 
 def _sentence(found: Ribbon, line: RibbonLine, name: str, place: int) -> Phrase:
     study, info = found.places.study, found.results[0]
-    low, middle, high = (amount(study, info, float(value)) for value in line.spreads[name].quantiles.values[:, place])
+    low, middle, high = (amount(info, float(value)) for value in line.spreads[name].quantiles.values[:, place])
     low = replace(low, bare=True)
     clauses = models.presentation_of(study).clauses
     clause = Phrase("half of the drives have a {name} above {middle}, 9 of 10 between {low} and {high}",
@@ -121,16 +131,16 @@ def _sentence(found: Ribbon, line: RibbonLine, name: str, place: int) -> Phrase:
 
 
 def _numbers(found: Ribbon, line: RibbonLine, name: str, place: int, reached: Yield) -> tuple[KeyNumber, ...]:
-    study, info, quantiles = found.places.study, found.results[0], line.spreads[name].quantiles
-    low, middle, high = (shared(study, info, float(value)) for value in quantiles.values[:, place])
-    unit, own = shown_unit(study, info), found.places.x
+    info, quantiles = found.results[0], line.spreads[name].quantiles
+    low, middle, high = (float(value) for value in quantiles.values[:, place])
+    unit, own = info.unit, found.places.x
     where = (
         NOTHING
         if own is None
         else Phrase("at {place}", place=Amount(line.line.x[place], found.places.units[own], OF_PLACES))
     )
     half = _half_width(float(quantiles.low[_MIDDLE, place]), float(quantiles.high[_MIDDLE, place]))
-    nominal = shared(study, info, float(line.spreads[name].nominal[place]))
+    nominal = float(line.spreads[name].nominal[place])
     count = digits(high)
     numbers = [
         KeyNumber(Phrase("Half of the drives above"), middle, unit, digits(middle, half), where=where),
@@ -152,10 +162,10 @@ def _yield(line: RibbonLine, place: int, reached: Yield) -> list[KeyNumber]:
     own = next((one for one in reached.lines if one.line.by == line.line.by), None)
     if own is None or not np.isfinite(own.each.value[place]):
         return []
-    share, low, high = (100.0 * float(ends[place]) for ends in (own.each.value, own.each.low, own.each.high))
+    share, low, high = (float(ends[place]) for ends in (own.each.value, own.each.low, own.each.high))
     count = digits(share, 0.5 * (high - low))
     where = reached.conditions[0].text
-    return [KeyNumber(Phrase("Yield"), share, "%", count, low, high, where=where)]
+    return [KeyNumber(Phrase("Yield"), share, models.SHARE, count, low, high, where=where)]
 
 
 def _spread(line: RibbonLine, name: str) -> Trace | None:

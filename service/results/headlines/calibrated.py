@@ -24,14 +24,14 @@ def calibrated_headline(found: Calibration) -> Headline:
     values = joined(
         "; ",
         (
-            Phrase("{name} = {value}", name=Name(one.label, within=True), value=value)
-            for one, value in zip(every, amounts, strict=True)
+            joined(" ", (Name(one.label, within=place > 0), value))
+            for place, (one, value) in enumerate(zip(every, amounts, strict=True))
         ),
     )
     count = len(found.plan.values)
     fits = plural(
-        "{count} measured value is explained best by {values}.",
-        "{count} measured values are explained best by {values}.",
+        "{values}: that explains the {count} measured value best.",
+        "{values}: that explains the {count} measured values best.",
         count, values=values,
     )  # fmt: skip
     doubts = found.sentences

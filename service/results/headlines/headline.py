@@ -11,7 +11,6 @@ import numpy as np
 from sprag.sentences import Amount, Name
 from sprag.service.reading.reader import Phrase
 from sprag.service.reading.wording import number, unit_text
-from sprag.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
 
     from sprag.service.reading.reader import Reading
     from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
 
 #: Key numbers at most.
 MOST: Final = 4
@@ -41,7 +39,7 @@ class KeyNumber:
     Attributes
     ----------
     label : what it is: a phrase, a text of the model, or the name of a quantity
-    value : SI, or a share in per cent where ``unit`` is that; None where there is an interval only
+    value : SI; None where there is an interval only
     unit : of ``value``, ``low`` and ``high``
     digits : significant digits that are shown
     low, high : ends of an interval, or what two neighbouring cases have
@@ -82,6 +80,11 @@ class KeyNumber:
         return Phrase("{low} to {high}", low=self._shown(self.low, reading), high=self._shown(self.high, reading)).said(
             reading
         )
+
+    def said(self, reading: Reading) -> str:
+        """Its value with the unit, and where it holds."""
+        value = f"{self.number(reading)} {self.unit_text(reading)}".strip()
+        return " ".join(filter(None, (value, reading.say(self.where))))
 
     def unit_text(self, reading: Reading) -> str:
         """Its unit for a reader."""
@@ -124,6 +127,7 @@ class Headline:
     of : what the curve is of that the sentence is about, among several; "" for the only one
     trace : a line for a thumbnail; None where there is none
     gap : where the sentence is about a place without a case
+    case : the case that the sentence is about
     """
 
     sentence: tuple[Phrase, ...] = ()
@@ -133,6 +137,7 @@ class Headline:
     of: Phrase = NOTHING
     trace: Trace | None = None
     gap: Gap | None = None
+    case: int | None = None
 
     def said(self, reading: Reading) -> str:
         """Its sentences for a reader."""
@@ -152,20 +157,9 @@ def digits(value: float, half_width: float | None = None) -> int:
     return min(max(_DIGITS, size + 1), _WHOLE)
 
 
-def amount(study: Study, info: ResultInfo, value: float, half_width: float | None = None) -> Amount:
-    """A result for a sentence; of one that people read in per cent, that."""
-    shown, unit = shared(study, info, value), shown_unit(study, info)
-    return Amount(shown, unit, digits(shown, half_width))
-
-
-def shared(study: Study, info: ResultInfo, value: float) -> float:
-    """A result as it is shown: in per cent where people read it so."""
-    return 100.0 * value if info.name in models.presentation_of(study).shares else value
-
-
-def shown_unit(study: Study, info: ResultInfo) -> str:
-    """The unit of `shared`."""
-    return "%" if info.name in models.presentation_of(study).shares else info.unit
+def amount(info: ResultInfo, value: float, half_width: float | None = None) -> Amount:
+    """A result for a sentence."""
+    return Amount(value, info.unit, digits(value, half_width))
 
 
 def trace_of(x: Sequence[float], y: NDArray[np.float64], at: int | None = None) -> Trace | None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from sprag.sentences import Amount, Name, Part
 from sprag.service.languages import N_
 from sprag.service.reading.reader import Phrase, joined
-from sprag.service.results.headlines.headline import MOST, NOTHING, Headline, KeyNumber, digits, shared, shown_unit
+from sprag.service.results.headlines.headline import MOST, NOTHING, Headline, KeyNumber, digits
 from sprag.service.results.sensitivity import in_order, per_tenth, weight
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def influence_headline(study: Study, item: Sensitivity) -> Headline:
             Phrase("Over these ranges {parameter} matters most for {name}.", parameter=_within(first), name=name)
         )
     if change:
-        parts: dict[str, Part] = {"name": name, "amount": _amount(study, item, abs(change))}
+        parts: dict[str, Part] = {"name": name, "amount": _amount(item, abs(change))}
         text = (
             N_("10 % more {parameter} lowers {name} by about {amount}.")
             if change < 0.0
@@ -77,16 +77,14 @@ def _tenth(study: Study, effect: Effect) -> float | None:
     return None if change is None or change == 0.0 else change
 
 
-def _amount(study: Study, item: Sensitivity, value: float) -> Amount:
-    return Amount(shared(study, item.info, value), shown_unit(study, item.info), 2)
+def _amount(item: Sensitivity, value: float) -> Amount:
+    return Amount(value, item.info.unit, 2)
 
 
 def _number(study: Study, item: Sensitivity, effect: Effect) -> KeyNumber:
     change, share = _tenth(study, effect), _share(effect)
-    more = NOTHING if change is None else Phrase("10 % more: {change}", change=_amount(study, item, change))
+    more = NOTHING if change is None else Phrase("10 % more: {change}", change=_amount(item, change))
     if share is not None:
         return KeyNumber(_name(effect), share, "%", 2, where=Phrase("of the variation"), note=more)
-    value = shared(study, item.info, weight(effect))
-    return KeyNumber(
-        _name(effect), value, shown_unit(study, item.info), digits(value), where=Phrase("over its range"), note=more
-    )
+    value = weight(effect)
+    return KeyNumber(_name(effect), value, item.info.unit, digits(value), where=Phrase("over its range"), note=more)

@@ -18,14 +18,10 @@ from sprag.service.results.headlines.headline import (
     Trace,
     amount,
     digits,
-    shared,
-    shown_unit,
     trace_of,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from sprag.service.results.fronts import Designs
     from sprag.worker.planning.goals import Limit
 
@@ -49,6 +45,7 @@ def search_headline(found: Designs, *, over: bool) -> Headline:
         dimensions=tuple(_dimension(found, best, place) for place in range(len(found.plan.vary))),
         limits=tuple(_limit(found, best, limit) for limit in found.plan.subject_to),
         trace=_trace(found),
+        case=int(found.front.cases[best, 0]),
     )
 
 
@@ -79,14 +76,14 @@ def _best(found: Designs, best: int) -> Phrase:
 
 
 def _amount(found: Designs, name: str, value: float) -> Amount:
-    return amount(found.study, found.infos[name], value)
+    return amount(found.infos[name], value)
 
 
 def _goal(found: Designs, best: int, place: int) -> KeyNumber:
     name = found.plan.best[place].name
-    info, value = found.infos[name], shared(found.study, found.infos[name], float(found.front.goals[best, place]))
+    info, value = found.infos[name], float(found.front.goals[best, place])
     known = value if np.isfinite(value) else None
-    unit, case = shown_unit(found.study, info), int(found.front.cases[best, 0])
+    unit, case = info.unit, int(found.front.cases[best, 0])
     return KeyNumber(name, known, unit, digits(value), where=_points(found), case=case)
 
 
@@ -127,8 +124,8 @@ def _limit(found: Designs, best: int, limit: Limit) -> KeyNumber:
         left = signs[limit.kind] * (values - limit.value)
         place = int(np.argmin(left))
         reserve = float(left[place])
-    value = shared(found.study, info, float(values[place]))
-    unit, bound = shown_unit(found.study, info), _amount(found, limit.name, limit.value)
+    value = float(values[place])
+    unit, bound = info.unit, _amount(found, limit.name, limit.value)
     note = _reserve(limit, bound, reserve / limit.scale)
     return KeyNumber(limit.name, value, unit, digits(value), note=note, case=case)
 
@@ -188,8 +185,3 @@ def _converged(found: Designs, *, over: bool) -> Phrase:
 def _trace(found: Designs) -> Trace | None:
     bests = np.array(_bests(found))
     return trace_of(range(len(bests)), bests, len(bests) - 1)
-
-
-def case_of_best(found: Designs) -> Sequence[int]:
-    """The cases of the best design, one for each operating point."""
-    return [] if not len(found.numbers) else found.front.cases[int(found.order[0])].tolist()

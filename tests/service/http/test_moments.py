@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from tests.service.conftest import Service
 
-PAGES = ("", "/rows", "/curves", "/cases/3")
+PAGES = ("", "/rows", "?z=shaft.speed.mean", "/cases/3")
 ANSWERS = ("", "/curves", "/answers", "/explore")
 
 

@@ -125,7 +125,7 @@ def test_every_address_of_every_page_has_the_prefix(below: tuple[Service, OnlyBe
                 waiting.append(parts.path + (f"?{parts.query}" if parts.query else ""))
     assert proxy.refused == []
     assert {f"{OWN}/{name}" for name in ("new", "docs", "schedules", "workers", "units")} <= pages
-    assert {f"{OWN}/studies/x{part}" for part in ("", "/curves", "/rows", "/cases/0")} <= pages
+    assert {f"{OWN}/studies/x{part}" for part in ("", "/rows", "/cases/0")} <= pages
     assert len(pages) > 20
 
 

@@ -190,8 +190,6 @@ def test_the_answers_of_a_service(service: Service) -> None:
     axes = service.get(f"/studies/{study_id}")["axes"]
     assert (axes[0]["values"], axes[0]["first"], axes[0]["last"]) == (2, 20.0, 25.0)
     assert (axes[1]["first"], axes[1]["last"]) == (0.0, 1.0)
-    for address in ("curves", "figures/curves"):
-        assert service.http.get(f"/studies/{study_id}/{address}").status_code == 200
     pictures, _ = report_of(Library(service.store), study_id).further
     told = [[len(curve.refined.jumps) if curve.refined else None for curve in part.curves] for part in pictures]
     assert told == [[1, 0]] * len(pictures)

@@ -131,11 +131,11 @@ def test_pictures_pages_and_files_of_a_sweep(service: Service, study_id: str) ->
     assert '<td class="num">up</td><td class="num">down</td>' in service.http.get(f"/studies/{study_id}").text
     report = service.http.get(f"{API}/studies/{study_id}/report").text
     assert '<td class="number">up</td><td class="number">down</td>' in report
-    for page in ("", "/cases", "/cases/0", "/curves?x=excitation.frequency&y=shaft.speed.mean&at=sweep%3Ddown"):
+    for page in ("", "/cases", "/cases/0", "?x=excitation.frequency&y=shaft.speed.mean&at=sweep%3Ddown"):
         found = service.http.get(f"/studies/{study_id}{page}")
         assert found.status_code == 200, page
-    figure = service.http.get(f"/studies/{study_id}/figures/curves", params=QUERY)
-    assert "Hysteresis: up and down differ at 17 to 18 Hz" in figure.text
+    sheet = service.http.get(f"/studies/{study_id}", params=QUERY)
+    assert "Hysteresis: up and down differ at 17 to 18 Hz" in sheet.text
     rows = list(csv.DictReader(io.StringIO(service.http.get(f"{API}/studies/{study_id}/results?format=csv").text)))
     assert [row["sweep"] for row in rows[:4]] == ["up", "down", "up", "down"]
     assert [row["flags"] for row in rows if row["flags"]] == ["jumped"] * 4

@@ -86,6 +86,7 @@ PRESENTATION: Final = Presentation(
     apart=("mean_speed",),
     drawn=("irregularity",),
     main=("irregularity", "omega.max", "omega.min", "energy.fluctuation", "drive_torque.mean", "required_inertia"),
+    below=("required_inertia", "energy.fluctuation"),
     answers=(
         Answer("irregularity", "Irregularity", "irregularity", "here"),
         Answer("required_inertia", "Required inertia", "required_inertia", "here"),

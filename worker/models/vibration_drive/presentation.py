@@ -56,6 +56,7 @@ PRESENTATION: Final = Presentation(
     drawn=("shaft.speed.mean", "shaft.speed.max"),
     main=("shaft.speed.mean", "torque.mean", "power.useful.mean", "efficiency"),
     heading="Mechanical characteristic",
+    below=("power.useful.mean", "efficiency"),
     answers=(
         Answer("no_load_speed", "No-load speed", "shaft.speed.mean", "at_zero", along="shaft.load"),
         Answer("largest_power", "Largest useful power", "power.useful.mean", "largest"),

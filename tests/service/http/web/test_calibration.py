@@ -8,7 +8,7 @@ from tests.service.conftest import Service
 
 def test_the_page_shows_values_points_and_figure(service: Service) -> None:
     study_id = calibration(service)
-    for address in (f"/studies/{study_id}/curves", f"/studies/{study_id}/rows", f"/new?clone={study_id}"):
+    for address in (f"/studies/{study_id}", f"/studies/{study_id}/rows", f"/new?clone={study_id}"):
         assert service.http.get(address).status_code == 200, address
     answer = service.http.get(f"/studies/{study_id}/matters")
     assert answer.status_code == 200

@@ -38,15 +38,14 @@ def mend(page: Page) -> None:
 
 def test_an_old_picture_is_pale_under_a_new_choice_until_it_is_drawn(visitor: Visitor, example: str) -> None:
     page = visitor.page
-    page.goto(f"/studies/{example}/curves?x=shaft.load&y=shaft.speed.mean&at=excitation.frequency=16")
-    shown = "document.querySelector('.plot path[data-line]')?.getAttribute('d')"
-    old = page.evaluate(f"() => {shown}")
+    page.goto(f"/studies/{example}?x=shaft.load&y=shaft.speed.mean&at=excitation.frequency=16")
+    old = page.locator("#chart .wide").inner_html()
     cut(page)
     named(page, "at").select_option(index=2)
     expect(page.get_by_role("alert")).to_contain_text(LOST)
-    expect(page.locator("#curves")).to_have_class(re.compile("stale"))
+    expect(page.locator("#told")).to_have_class(re.compile("stale"))
     mend(page)
-    page.wait_for_function(f"(old) => ![undefined, old].includes({shown})", arg=old)
+    page.wait_for_function("(old) => document.querySelector('#chart .wide').innerHTML !== old", arg=old)
     expect(page.locator(".stale")).to_have_count(0)
 
 
@@ -83,10 +82,10 @@ def test_a_running_study_is_followed_on_every_page_and_through_a_lost_connection
     row = page.locator("#studies tr", has=page.locator(f"a[href='/studies/{study_id}']"))
     expect(row.locator(".state")).to_have_text("running")
 
-    page.goto(f"/studies/{study_id}/curves?x=shaft.load&y=shaft.speed.mean&at=excitation.frequency=20")
-    page.wait_for_function("() => Number(document.querySelector('.plot')?.dataset.drawn) >= 3")
-    page.goto(f"/studies/{study_id}/map")
-    page.wait_for_function("() => Number(document.querySelector('.plot')?.dataset.drawn) >= 3")
+    for query in ("x=shaft.load&y=shaft.speed.mean&at=excitation.frequency=20", "z=shaft.speed.mean"):
+        page.goto(f"/studies/{study_id}?{query}")
+        page.evaluate("() => { document.querySelector('#chart').dataset.mine = '1'; }")
+        page.wait_for_function("() => document.querySelector('#chart:not([data-mine])')")
 
     page.goto(f"/studies/{study_id}/rows?where=shaft.load+%3E%3D+0")
     # What is half typed stays when the rows follow the run.

@@ -20,10 +20,10 @@ def test_pages_and_parts_of_a_study_by_keys(visitor: Visitor, example: str) -> N
     expect(dialog).to_be_visible()
     shown = dict(zip(dialog.locator("dt").all_inner_texts(), dialog.locator("dd").all_inner_texts(), strict=True))
     assert shown["g c"] == "Compare"
-    assert shown["2"] == "Curves"
+    assert shown["2"] == "Sensitivity"
     page.keyboard.press("Escape")
     expect(dialog).to_be_hidden()
-    part = page.locator(".tabs a", has_text="Rows").get_attribute("data-key")
+    part = page.locator(".menu a", has_text="Rows").get_attribute("data-key")
     page.keyboard.press(str(part))
     page.wait_for_url("**/rows")
     page.keyboard.press("/")
@@ -54,10 +54,10 @@ def test_under_a_layout_without_latin_letters_keys_mean_their_places(visitor: Vi
     press("т", "KeyN")
     press("!", "Digit2", shift=True)
     press("é", "Digit2")
-    page.wait_for_url("**/curves*")
+    page.wait_for_url("**/sensitivity*")
     press(".", "Slash")
     expect(page.get_by_role("searchbox", name="Find a study")).to_be_focused()
-    page.locator(".tabs a").first.focus()
+    page.locator(".crumbs a").focus()
     press("п", "KeyG")
     press("т", "KeyN")
     page.wait_for_url("**/new*")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from sprag.worker import models
+from tests.service.conftest import API
 from tests.service.figures.seen import seen
 
 if TYPE_CHECKING:
@@ -37,12 +37,8 @@ def test_every_shape_of_study_has_its_pages(service: Service, spec: dict[str, An
             service.fill(study_id)
         for part in ("", "/rows", "/rows?sort=-shaft.speed.mean&ending=ok", "/cases/0"):
             assert service.http.get(f"/studies/{study_id}{part}").status_code == 200, part
-        for part in ("/curves", "/map"):
-            assert service.http.get(f"/studies/{study_id}{part}").status_code in (200, 303), part
-        for figure in ("curves", "curves?columns=2", "map", "map?kind=contour"):
-            answer = service.http.get(f"/studies/{study_id}/figures/{figure}")
-            assert answer.status_code == 200, figure
-            assert answer.headers["content-type"].startswith("text/html")
+        for query in ("x=shaft.load", "z=efficiency", "z=efficiency&kind=contour", "lower=efficiency&point=0.2"):
+            assert service.http.get(f"/studies/{study_id}?{query}").status_code in (200, 422), query
     assert "degree 1 reaches the accuracy" in service.http.get(f"/studies/{study_id}").text
     assert service.http.get(f"/new?clone={study_id}").status_code == 200
 
@@ -52,49 +48,12 @@ def test_figures_have_the_numbers_of_the_interface(service: Service) -> None:
     service.fill(study_id)
     query = {"x": "shaft.load", "by": "excitation.frequency", "y": ["torque.mean", "efficiency"]}
     told = service.get(f"/studies/{study_id}/curves", **query)
-    most = {
-        name: max(abs(value) for curve in told["curves"] for value in curve["y"][name] if value is not None)
-        for name in query["y"]
-    }
-    figure = seen(service.http.get(f"/studies/{study_id}/figures/curves?units=si", params=query).text)
-    for panel, name in zip(figure.panels, query["y"], strict=True):
+    picture = service.http.get(f"{API}/studies/{study_id}/curves", params={**query, "format": "svg"}).text
+    for panel, name in zip(seen(picture).panels, query["y"], strict=True):
+        most = max(abs(value) for curve in told["curves"] for value in curve["y"][name] if value is not None)
         for drawn, curve in zip(panel.curves, told["curves"], strict=True):
             known = [value for value in curve["y"][name] if value is not None]
-            np.testing.assert_allclose(drawn.values[:, 1], known, atol=2e-3 * most[name])
-            assert {
-                case for case, value in zip(curve["cases"], curve["y"][name], strict=True) if value is not None
-            } <= set(panel.cases)
-    query = {"x": "shaft.load", "y": "excitation.frequency", "z": "efficiency"}
-    drawn_map = service.get(f"/studies/{study_id}/map", **query)
-    heat = seen(service.http.get(f"/studies/{study_id}/figures/map", params=query).text).panels[0]
-    cases, values = np.array(drawn_map["cases"]), np.array(drawn_map["z"]["values"], dtype=float)
-    assert heat.cases == cases[np.isfinite(values)].tolist()
-
-
-@pytest.mark.parametrize("chunk_cases", [5_000])
-def test_a_long_curve_is_thinned_and_keeps_its_highest_point(service: Service, spec: dict[str, Any]) -> None:
-    spec["axes"] = [{"path": "shaft.load", "linspace": [0, 1, 20_000]}]
-    study_id = service.submit(spec)
-    whole = service.fill(study_id)
-    query = {"x": "shaft.load", "y": "torque.mean"}
-    (line,) = seen(service.http.get(f"/studies/{study_id}/figures/curves", params=query).text).panels[0].curves
-    told = service.get(f"/studies/{study_id}/curves", **query)["curves"][0]["y"]["torque.mean"]
-    assert len(line.values) <= 6_000 < len(told) == whole.count
-    known = [value for value in told if value is not None]
-    assert (line.values[:, 1].max(), line.values[:, 1].min()) == pytest.approx((max(known), min(known)), rel=1e-2)
-
-
-def test_panels_are_as_high_among_many_as_among_few(service: Service) -> None:
-    study_id = service.submit()
-    service.fill(study_id)
-    names = [info.name for info in models.study_results(service.store.studies.study(study_id))]
-    heights = set()
-    for count in (2, 12, 24):
-        query = {"x": "shaft.load", "y": names[:count]}
-        page = service.http.get(f"/studies/{study_id}/figures/curves", params=query).text
-        assert len(seen(page).panels) == count
-        heights |= set(re.findall(r'class="area" width="[\d.]+" height="([\d.]+)"', page.rpartition("<svg")[2]))
-    assert len(heights) == 1
+            np.testing.assert_allclose(drawn.values[:, 1], known, atol=2e-3 * most)
 
 
 def test_compared_studies_tell_what_is_held_with_its_unit(service: Service, spec: dict[str, Any]) -> None:
@@ -133,11 +92,10 @@ def test_a_picture_without_rows_is_a_sentence_and_the_first_one_has_rows(
     loads = {"path": "shaft.load", "linspace": [0, 0.5, 40]}
     study_id = service.submit({**spec, "axes": [masses, frequencies, loads]})
     query = {"x": "shaft.load", "y": "efficiency", "at": ["excitation.frequency=30", "pendulums.0.mass=0.5"]}
-    figure = service.http.get(f"/studies/{study_id}/figures/curves", params=query).text
-    told = "No case at excitation frequency = 30 Hz, mass, pendulum 0 = 0.5 kg is done yet."
-    assert figure == f'<p class="soft">{told}</p>'
-    assert "at=pendulums.0.mass%3D0.5" in service.http.get(f"/studies/{study_id}").text
+    assert "no case has been run yet" in service.http.get(f"/studies/{study_id}").text
     service.fill(study_id, range(1))
+    told = service.http.get(f"/studies/{study_id}", params=query).text
+    assert "No case at excitation frequency = 30 Hz, mass, pendulum 0 = 0.5 kg is done" in told
     page = service.http.get(f"/studies/{study_id}").text
     assert "at=pendulums.0.mass%3D0.4" in page
 
@@ -145,20 +103,20 @@ def test_a_picture_without_rows_is_a_sentence_and_the_first_one_has_rows(
 @pytest.mark.parametrize(
     ("part", "text"),
     [
-        ("curves?x=shaft.lod", "did you mean"),
-        ("curves?x=shaft.load&y=efficency", "did you mean"),
-        ("curves?x=shaft.load&by=&at=excitation.frequency=99", "the axis has no such value"),
-        ("curves?x=shaft.load&at=nonsense", "must be path=value"),
-        ("map?z=none", "unknown result"),
-        ("rows?sort=nothing", "is neither a parameter that varies nor a numeric result"),
-        ("rows?ending=nothing", "is not an ending"),
-        ("rows?at=shaft.load=7", "the axis has no such value"),
-        ("cases/0?from=9&to=3", "outside the run"),
+        ("?x=shaft.lod", "did you mean"),
+        ("?x=shaft.load&y=efficency", "did you mean"),
+        ("?x=shaft.load&by=&at=excitation.frequency=99", "the axis has no such value"),
+        ("?x=shaft.load&at=nonsense", "must be path=value"),
+        ("?z=none", "unknown result"),
+        ("/rows?sort=nothing", "is neither a parameter that varies nor a numeric result"),
+        ("/rows?ending=nothing", "is not an ending"),
+        ("/rows?at=shaft.load=7", "the axis has no such value"),
+        ("/cases/0?from=9&to=3", "outside the run"),
     ],
 )
 def test_wrong_choices_are_told_on_the_page(service: Service, part: str, text: str) -> None:
     study_id = service.submit()
-    answer = service.http.get(f"/studies/{study_id}/{part}", headers={"Accept": "text/html"})
+    answer = service.http.get(f"/studies/{study_id}{part}", headers={"Accept": "text/html"})
     assert answer.status_code == 422
     assert answer.headers["content-type"].startswith("text/html")
     assert text in answer.text

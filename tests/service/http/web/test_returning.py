@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING
 
 from playwright.sync_api import expect
 
-from benchmarks.faults.harness import until
-from tests.service.http.web.fields import drawn, named
+from tests.service.http.web.fields import named
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page, Route
+    from playwright.sync_api import Page
 
     from tests.service.http.web.conftest import Office, Visitor
 
@@ -103,8 +102,7 @@ def test_drafts_of_a_calibration_and_a_schedule(visitor: Visitor, office: Office
 
 def test_back_undoes_a_choice_and_comes_back_to_the_same_view(visitor: Visitor, example: str) -> None:
     page = visitor.page
-    page.goto(f"/studies/{example}/curves?x=shaft.load&y=shaft.speed.mean&at=excitation.frequency=16")
-    drawn(page)
+    page.goto(f"/studies/{example}?x=shaft.load&y=shaft.speed.mean&at=excitation.frequency=16")
     first = page.url
     at = named(page, "at")
     was = at.input_value()
@@ -114,28 +112,3 @@ def test_back_undoes_a_choice_and_comes_back_to_the_same_view(visitor: Visitor, 
     expect(named(page, "at")).to_have_value(was)
     assert page.url == first
     expect(page.locator(".stale")).to_have_count(0)
-    drawn(page)
-
-    page.set_viewport_size({"width": 1280, "height": 400})
-    page.evaluate("() => scrollTo({ top: 250, behavior: 'instant' })")
-    page.wait_for_function("() => scrollY === 250")
-    page.locator('.plot svg.figure:visible a[data-case="0"]').first.dispatch_event("click")
-    page.wait_for_url("**/cases/0")
-    page.go_back()
-    drawn(page)
-    page.wait_for_function("() => scrollY === 250")
-
-
-def test_a_figure_that_does_not_come_is_tried_again(visitor: Visitor, example: str) -> None:
-    page = visitor.page
-    waiting: list[Route] = []
-    page.route("**/figures/curves**", lambda route: waiting.append(route))  # noqa: PLW0108 - playwright marks it
-    page.goto(f"/studies/{example}/curves")
-    expect(page.locator('.plot[aria-busy="true"]')).to_have_count(1)
-    until(lambda: page.evaluate("0") or waiting, "the figure is requested")  # routes are called while a page answers
-    waiting[0].fulfill(status=500, json={"detail": "A fault of the program."})
-    expect(page.locator(".plot [role=alert]")).to_contain_text("A fault of the program.")
-    expect(page.locator("[aria-busy]")).to_have_count(0)
-    page.unroute("**/figures/curves**")
-    page.locator(".plot").get_by_role("button", name="Try again").click()
-    assert drawn(page)

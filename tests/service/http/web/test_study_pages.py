@@ -34,7 +34,7 @@ def test_progress_is_watched_held_and_cancelled(visitor: Visitor, office: Office
     study_id = office.submit(wait=False, name="Long", **MANY)
     page.goto(f"/studies/{study_id}")
     expect(page.locator("#progress .state")).to_have_text("running")
-    expect(page.locator("#progress")).to_contain_text(re.compile(r"cases/s, .* left"))
+    expect(page.locator("#progress")).to_contain_text(re.compile(r"of .* cases, .* left"))
     page.get_by_role("button", name="Pause").click()
     expect(page.locator("#progress .state")).to_have_text("paused")
     page.get_by_role("button", name="Resume").click()
@@ -52,6 +52,7 @@ def test_cases_that_are_not_settled_are_run_longer(visitor: Visitor, office: Off
     study_id = office.submit(name="Too short", run={"until": "settled", "at_most": "100 periods"}, **HARD)
     assert office.get(f"/studies/{study_id}")["regimes"] == {"periodic": 1, "unsettled": 1}
     page.goto(f"/studies/{study_id}")
+    page.get_by_text("How cases ended").click()
     page.get_by_role("button", name="Run these longer").click()
     page.wait_for_url(re.compile(rf"/studies/st_(?!{study_id.removeprefix('st_')})\w+$"))
     longer = page.url.rpartition("/")[2]
@@ -59,10 +60,11 @@ def test_cases_that_are_not_settled_are_run_longer(visitor: Visitor, office: Off
     found = office.get(f"/studies/{longer}")
     assert found["regimes"] == {"periodic": 1}
     page.reload()
-    expect(page.locator("main")).to_contain_text("1 periodic")
+    expect(page.locator("#trust")).to_contain_text("1 of 1 cases certified")
     expect(page.get_by_role("button", name="Run these longer")).to_have_count(0)
     # Pressed again, it shows the same study.
     page.goto(f"/studies/{study_id}")
+    page.get_by_text("How cases ended").click()
     page.get_by_role("button", name="Run these longer").click()
     page.wait_for_url(f"**/studies/{longer}")
 
@@ -71,6 +73,7 @@ def test_failed_cases_are_seen_and_run_again(visitor: Visitor, office: Office) -
     page = visitor.page
     study_id = office.submit(name="Too stiff", **STIFF)
     page.goto(f"/studies/{study_id}")
+    page.get_by_text("How cases ended").click()
     ending = page.locator("#endings .ending.chatter")
     assert "✕" in ending.evaluate("element => getComputedStyle(element, '::before').content")
     ending.click()
@@ -78,6 +81,7 @@ def test_failed_cases_are_seen_and_run_again(visitor: Visitor, office: Office) -
     expect(page.locator("#cases dl")).to_contain_text("event budget")
     before = office.get(f"/studies/{study_id}")["finished_at"]
     page.goto(f"/studies/{study_id}")
+    page.locator(".menu summary").click()
     page.get_by_role("button", name="Run failed cases again").click()
     page.wait_for_url(f"**/studies/{study_id}")
     office.wait(study_id)
@@ -116,25 +120,25 @@ def near(speeds: list[float | None]) -> Any:
 
 def test_choices_of_curves_and_maps_are_in_the_address(visitor: Visitor, office: Office, example: str) -> None:
     page = visitor.page
-    page.goto(f"/studies/{example}/curves")
-    drawn(page)
+    page.goto(f"/studies/{example}")
+    page.get_by_text("Other curves").click()
     page.locator('select[name="x"]').select_option("excitation.frequency")
     page.wait_for_url("**x=excitation.frequency**")
     page.locator('select[name="by"]').select_option("shaft.load")
     page.wait_for_url("**by=shaft.load**")
-    page.wait_for_function("() => document.querySelectorAll('.plot .wide path[data-line]').length >= 3")
+    expect(page.locator("#chart .wide")).to_contain_text("Excitation frequency")
     shared = page.url
     page.goto("about:blank")
     page.goto(shared)
-    lines = drawn(page)
     told = office.get(f"/studies/{example}/curves", x="excitation.frequency", y="shaft.speed.mean", by="shaft.load")
-    for line, curve in zip(lines, told["curves"], strict=True):
-        assert points_of(line) == near(curve["y"]["shaft.speed.mean"])
-    page.get_by_role("link", name="Map").click()
-    expect(page.locator(".plot svg.figure:visible .panel rect").nth(3)).to_be_attached()
+    cases = {case for curve in told["curves"] for case in curve["cases"]}
+    drawn = page.locator("#chart .wide .panel").first.locator("a[data-case]")
+    assert {int(one.get_attribute("data-case") or -1) for one in drawn.all()} <= cases
+    page.get_by_label("Map of").select_option("efficiency")
+    expect(page.locator("#chart svg.wide")).to_have_attribute("aria-label", re.compile("^Efficiency over "))
+    page.reload()
     page.get_by_label("Lines of equal value").check()
-    expect(page.locator(".plot svg.figure:visible .level").first).to_be_attached()
-    assert "kind=contour" in page.url
+    page.wait_for_url("**kind=contour**")
 
 
 def test_two_studies_are_compared(visitor: Visitor, office: Office, example: str) -> None:
@@ -156,9 +160,9 @@ def test_two_studies_are_compared(visitor: Visitor, office: Office, example: str
 def test_no_page_asks_another_host(visitor: Visitor, example: str) -> None:
     page = visitor.page
     own = f"/studies/{example}"
-    pages = ("/", "/new", "/new?preset=two_pendulums", f"/new?clone={example}", "/new?mode=text", own, f"{own}/curves",
-             f"{own}/map", f"{own}/cases", f"{own}/cases/3", f"/compare?study={example}", "/compare", "/help/interface",
-             "/problems/invalid-spec", "/studies/st_none", "/laboratory")  # fmt: skip
+    pages = ("/", "/new", "/new?preset=two_pendulums", f"/new?clone={example}", "/new?mode=text", own,
+             f"{own}?z=efficiency", f"{own}/cases", f"{own}/cases/3", f"/compare?study={example}", "/compare",
+             "/help/interface", "/problems/invalid-spec", "/studies/st_none", "/laboratory")  # fmt: skip
     for address in pages:
         page.goto(address)
         for plot in page.locator(".plot").all():
@@ -171,13 +175,12 @@ def test_no_page_asks_another_host(visitor: Visitor, example: str) -> None:
     # Requests to other hosts are noted by the fixture too, whatever made them.
 
 
-def test_a_study_prints_as_a_report(visitor: Visitor, example: str) -> None:
+def test_a_study_prints_its_answer(visitor: Visitor, example: str) -> None:
     page = visitor.page
     page.goto(f"/studies/{example}")
-    drawn(page)
     page.emulate_media(media="print")
-    for hidden in ("header.site", ".tabs", ".actions", ".downloads"):
+    for hidden in ("header.site", ".acts", ".kin", ".sheet-choices"):
         assert not page.locator(hidden).first.is_visible(), hidden
-    for shown in ("Mechanical characteristic", "Inputs", "engine version", "Printed"):
-        expect(page.get_by_text(shown).first).to_be_visible()
+    for shown in ("h1", ".say", "#chart svg", ".machine svg"):
+        assert page.locator(shown).first.is_visible(), shown
     assert page.pdf(format="A4").startswith(b"%PDF")

@@ -1,0 +1,303 @@
+"""The charts of a sheet: curves with the working point, a map, designs, a calibration, or ribbons of drives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import urlencode
+
+import numpy as np
+from markupsafe import Markup
+from starlette.datastructures import QueryParams
+
+from sprag.service.figures.curves import curves_figure
+from sprag.service.figures.figure import Note
+from sprag.service.figures.read import read_figure, read_map
+from sprag.service.http.web.figures.drawn import drawn, drawn_map
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.reader import Phrase, joined
+from sprag.service.results.choice import curve_query, map_query, pairs_of
+from sprag.service.results.curves import CurveQuery
+from sprag.service.results.defaults import caption, main_results
+from sprag.service.results.headlines.along import Along, case_sentence, curve_numbers, curve_place, judged_by, place_on
+from sprag.service.results.headlines.batch import asked_like
+from sprag.service.results.headlines.headline import amount
+from sprag.service.results.key_answer_words import curve_name
+from sprag.service.results.key_answers import answers_query, find_answers
+from sprag.service.results.refined import curve_plan
+from sprag.service.results.refined_maps import map_plan
+from sprag.service.results.stored_curves import drawn_curves, stored_map
+from sprag.service.results.tolerances.ribbons import QUANTILES
+from sprag.service.views.calibration import CalibrationView
+from sprag.service.views.drives import RibbonQuery, RibbonView
+from sprag.service.views.front import FrontView
+from sprag.service.views.study_questions import FrontQuestion
+from sprag.service.views.study_view import StudyAnswer
+from sprag.worker import models
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sprag.service.figures.figure import Figure
+    from sprag.service.reading.reader import Reading
+    from sprag.service.results.choice import MapQuery
+    from sprag.service.results.key_answers import StudyAnswers
+    from sprag.service.results.tolerances.batch import Asked
+    from sprag.service.views.library import Library
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.study import Study
+
+#: Parameters of the address that choose curves.
+CHOICES: Final = ("x", "y", "by", "at", "of", "every")
+#: In the place of the result of a map: the usual one.
+_ANY: Final = "-"
+#: Cases of a curve that a script tells about while the working point is moved.
+_TOLD: Final = 250
+
+
+@dataclass(frozen=True, slots=True)
+class Slider:
+    """The working point as a range: in the reader's units, with the cases of the chosen curve and what each says."""
+
+    path: str
+    low: float
+    high: float
+    value: float
+    unit: str
+    cases: list[tuple[float, str]]
+    missing: str
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """What a sheet draws.
+
+    Attributes
+    ----------
+    figure : the chart for wide and narrow places, with the sentence below it
+    title : what it shows, for those who do not see it; ``held`` is what is held
+    view, query : the view of the interface with its numbers, and what that is asked
+    curves : the curves, a map, or neither
+    chosen : place of the curve that is told of, of the ``names`` of all
+    lower : what the lower chart can show: name, whether it does
+    family : of several curves the name and the answers of each, by their titles
+    """
+
+    figure: Markup
+    title: str
+    view: str
+    query: str
+    held: list[str]
+    slider: Slider | None = None
+    curves: CurveQuery | None = None
+    map: MapQuery | None = None
+    chosen: int = 0
+    names: tuple[Phrase, ...] = ()
+    lower: tuple[tuple[str, bool], ...] = ()
+    family: list[tuple[str, list[tuple[str, str]]]] = field(default_factory=list)
+
+
+def chart_of(
+    library: Library, study_id: str, params: QueryParams, usual: CurveQuery | None, reading: Reading, cases: str
+) -> Chart | None:
+    """The chart that an address asks for, by default that of the kind of the study; None where there is none.
+
+    Raises SelectionError. ``cases`` is the address of the cases.
+    """
+    study = library.store.studies.study(study_id)
+    kind = "" if study.plan is None else study.plan["kind"]
+    draw = partial(_drawn, reading=reading, cases=cases)
+    if kind == "goal":
+        found = FrontView().find(library, study_id, FrontQuestion())
+        answer: Any = StudyAnswer(library, study_id, FrontQuestion(), found)
+        return draw(FrontView().figure(answer), Phrase("Every design of the search"), "front", "")
+    if kind == "calibrate":
+        known = library.calibrations.of(study_id)
+        answer = StudyAnswer(library, study_id, None, known)
+        return draw(
+            CalibrationView().figure(answer, 1), Phrase("Measured points on the fitted curve"), "calibration", ""
+        )
+    infos = models.study_results(study)
+    if params.get("z") or (map_plan(study) is not None and not params.get("x")):
+        return _map(library, study_id, study, infos, params, reading, cases)
+    if study.spread is not None and not any(params.get(name) for name in CHOICES):
+        return _ribbon(library, study_id, study, infos, asked_like(usual), draw)
+    return _curves(library, study_id, study, infos, params, usual, reading, cases)
+
+
+def _drawn(
+    figure: Figure | None, title: Phrase, view: str, query: str, *, reading: Reading, cases: str
+) -> Chart | None:
+    if figure is None:
+        return None
+    label = reading.say(title)
+    read = read_figure(figure, reading)
+    return Chart(drawn(replace(read, columns=1), label, cases), label, view, query, list(read.held))
+
+
+def _ribbon(
+    library: Library, study_id: str, study: Study, infos: tuple[ResultInfo, ...], asked: Asked, draw: Any
+) -> Chart | None:
+    names = (judged_by(study, [info.name for info in infos]),)
+    query = RibbonQuery(names, asked, QUANTILES, False)
+    view = RibbonView()
+    answer = StudyAnswer(library, study_id, query, view.find(library, study_id, query))
+    roles = [("x", asked.x)] if asked.x else []
+    pairs = [*roles, *(("y", name) for name in names), *(("by", path) for path in asked.by)]
+    pairs += [("at", f"{path}={value}") for path, value in asked.at]
+    return draw(view.figure(answer, 1), Phrase("9 of 10 drives lie in the band"), "ribbon", urlencode(pairs))  # type: ignore[no-any-return]
+
+
+def as_map(params: QueryParams) -> QueryParams:
+    """The parameters of a map: the axis upwards has a name of its own beside the results of curves."""
+    names = {"up": "y", "y": ""}
+    pairs = [(names.get(name, name), value) for name, value in params.multi_items() if value != _ANY]
+    return QueryParams([pair for pair in pairs if pair[0]])
+
+
+def _map(
+    library: Library,
+    study_id: str,
+    study: Study,
+    infos: tuple[ResultInfo, ...],
+    params: QueryParams,
+    reading: Reading,
+    cases: str,
+) -> Chart | None:
+    query = map_query(study, infos, as_map(params))
+    if query is None:
+        return None
+    found = stored_map(library.store, study_id, CurveQuery(query.x, (query.z,), (query.y,), query.at))
+    read = read_map(found, reading)
+    label = Phrase(
+        "{z} over {x} and {y}", z=reading.caption(query.z), x=reading.within(query.x), y=reading.within(query.y)
+    )
+    title, contours = reading.say(label), params.get("kind") == "contour"
+    figure = drawn_map(read, title, cases, contours=contours)
+    return Chart(figure, title, "map", urlencode(pairs_of(query)), list(read.held), map=query)
+
+
+def results_of(study: Study, infos: tuple[ResultInfo, ...], params: QueryParams) -> tuple[tuple[str, ...], list[str]]:
+    """The results that are drawn, and those that the lower chart can show: none where others are asked for."""
+    asked = tuple(name for name in params.getlist("y") if name)
+    if asked:
+        return asked, []
+    plan = curve_plan(study)
+    known = plan.results if plan is not None else tuple(info.name for info in infos if info.kind != "category")
+    first = judged_by(study, known)
+    others = (*models.presentation_of(study).below, *main_results(study, infos))
+    below = list(dict.fromkeys(name for name in others if name in known and name != first))[:4]
+    lower = params.get("lower")
+    second = lower if lower in below else next(iter(below), None)
+    return (first, *([second] if second else ())), below
+
+
+def _curves(
+    library: Library,
+    study_id: str,
+    study: Study,
+    infos: tuple[ResultInfo, ...],
+    params: QueryParams,
+    usual: CurveQuery | None,
+    reading: Reading,
+    cases: str,
+) -> Chart | None:
+    found = answers_of_address(library, study_id, params, usual, reading)
+    if found.query is None or found.drawn is None:
+        return None
+    names, below = results_of(study, infos, params)
+    curves = drawn_curves(library.store, study_id, replace(found.query, y=names))
+    figure = curves_figure([("", curves)], 1)
+    if below:  # after how many periods motions repeat is for those who choose curves
+        figure = replace(figure, spans={}, looks={})
+    titles = tuple(curve_name(one, study) for one in found.curves)
+    chosen = curve_place(study, found, params.get("curve") or "")
+    curve, by_name = found.drawn.curves[chosen], {info.name: info for info in infos}
+    asked = bool((params.get("point") or "").strip())
+    spot = place_on(curve, judged_by(study, curve.y), found.point, asked=asked)
+    slider = None
+    if spot is not None and not figure.note:
+        own = Along(study, by_name, curve, found.query.x, *spot)
+        figure = _with_point(figure, own, names, chosen)
+        slider = _slider(own, reading)
+    read = read_figure(figure, reading)
+    title = caption(study, replace(found.query, y=names)).said(reading)
+    if study.sweep is not None:  # the answer says it
+        read = replace(read, below="")
+    picture = drawn(read, title, cases, str(chosen) if len(found.curves) > 1 else "")
+    query = replace(found.query, y=names)
+    return Chart(
+        picture, title, "curves", urlencode(pairs_of(query)), list(read.held),
+        slider=slider, curves=query, chosen=chosen, names=titles,
+        lower=tuple((name, name in names) for name in below),
+        family=_family(found, titles, reading) if len(found.curves) > 1 else [],
+    )  # fmt: skip
+
+
+def _family(found: StudyAnswers, titles: Sequence[Phrase], reading: Reading) -> list[tuple[str, list[tuple[str, str]]]]:
+    """The answers of every curve in words."""
+    return [
+        (
+            reading.say(title),
+            [(one.title(reading), one.said(reading)) for one in curve_numbers(answers, found.unit)],
+        )
+        for title, answers in zip(titles, found.curves, strict=True)
+    ]
+
+
+def answers_of_address(
+    library: Library, study_id: str, params: QueryParams, usual: CurveQuery | None, reading: Reading
+) -> StudyAnswers:
+    """The answers of the curves and the point that an address asks for. Raises SelectionError."""
+    study = library.store.studies.study(study_id)
+    infos = models.study_results(study)
+    query = answers_query(study, infos, chosen_curves(study, params, usual))
+    point = point_of(study, query, params, reading)
+    return find_answers(study, infos, query, point, partial(library.store.rows.for_cases, study_id))
+
+
+def chosen_curves(study: Study, params: QueryParams, usual: CurveQuery | None) -> CurveQuery | None:
+    """The curves that an address asks for, otherwise the ``usual`` ones. Raises SelectionError."""
+    infos = models.study_results(study)
+    if answers_query(study, infos) is None:
+        return None
+    if not any(params.getlist(name) for name in CHOICES if name != "y"):
+        return usual
+    return curve_query(study, infos, params)
+
+
+def point_of(study: Study, query: CurveQuery | None, params: QueryParams, reading: Reading) -> str | None:
+    """The working point of an address; a bare number is in the unit that the page shows."""
+    text = (params.get("point") or "").strip()
+    return (text if query is None else reading.typed(text, unit_of(study, query.x))) or None
+
+
+def _with_point(figure: Figure, own: Along, names: tuple[str, ...], chosen: int) -> Figure:
+    """The figure with the working point: a line across its panels, and a mark on the chosen curve."""
+    panels = []
+    for panel, name in zip(figure.panels, names, strict=True):
+        notes: tuple[Note, ...] = ()
+        value = own.value(own.places[0], name) if name in own.curve.y else np.nan
+        if len(own.places) == 1 and np.isfinite(value):
+            colour = next((line.colour for line in panel.lines if line.key == str(chosen)), "")
+            text = joined("", [amount(own.infos[name], value)])
+            notes = (Note(own.x, value, colour, "point", text, str(chosen)),)
+        panels.append(replace(panel, notes=notes))
+    return replace(figure, panels=tuple(panels), at=own.x)
+
+
+def _slider(own: Along, reading: Reading) -> Slider | None:
+    si = unit_of(own.study, own.path)
+    run = own.curve.run().tolist()
+    x = np.asarray(own.curve.line.x)[run]
+    if np.unique(x).size < 2:
+        return None
+    told = [
+        (float(reading.value(float(x[at]), si)), case_sentence(own, place).said(reading))
+        for at, place in enumerate(run)
+    ]
+    missing = Phrase("No case was run at {place}.", place="#").said(reading)
+    low, high = (float(reading.value(float(end), si)) for end in (x.min(), x.max()))
+    value = float(f"{reading.value(own.x, si):.10g}")
+    return Slider(own.path, low, high, value, reading.unit(si), told if len(told) <= _TOLD else [], missing)

@@ -1,0 +1,53 @@
+"""The machine of a sheet: drawn to scale, with the value at each dimension; of a search its best design."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
+
+from markupsafe import Markup
+
+from sprag.service.figures.drawing import svg
+from sprag.service.figures.drawings import drawings
+from sprag.service.languages import gettext
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.wording import number, unit_text
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from sprag.service.reading.reader import Reading
+    from sprag.worker.study import Study
+
+#: Digits of a value beside a drawing.
+_DIGITS: Final = 4
+
+
+def machine_drawings(study: Study, reading: Reading, best: Mapping[str, float]) -> list[Markup]:
+    """The drawings of a study's machine as elements of a page; ``best`` are the numbers of a design (SI)."""
+    shown = replace(study, base={**study.base, **_tied(study, best)}) if best else study
+    found = []
+    for drawing in drawings(shown):
+        labels = {each.path: _label(shown, reading, each.path, best) for each in drawing.dimensions}
+        drawn = replace(drawing, about=gettext(drawing.about))
+        found.append(Markup(svg(drawn, labels)))  # noqa: S704 - its texts are escaped
+    return found
+
+
+def _tied(study: Study, best: Mapping[str, float]) -> dict[str, float]:
+    """The numbers of a design with those tied to them."""
+    tied = [paths for paths in (axis.paths for axis in study.axes) if paths[0] in best]
+    return {path: best[paths[0]] for paths in tied for path in paths if path in study.base}
+
+
+def _label(study: Study, reading: Reading, path: str, best: Mapping[str, float]) -> str:
+    """The value at a dimension: the ends of what varies, a sign at what has a tolerance."""
+    si = unit_of(study, path)
+    axis = study.axis_of(path)
+    if axis is not None and not best and len(study.axes[axis]) > 1:
+        values = study.axes[axis].array
+        low, high = (number(reading.value(float(end), si), _DIGITS) for end in (values.min(), values.max()))
+        return f"{low}…{high} {unit_text(reading.unit(si))}".strip()
+    value = float(study.axes[axis].array[0]) if axis is not None and not best else study.base[path]
+    drawn = study.spread is not None and path in study.spread.paths
+    return f"{reading.quantity(value, si, _DIGITS)}{' ±' if drawn else ''}"

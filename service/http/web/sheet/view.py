@@ -1,0 +1,137 @@
+"""What the sheet of a study shows of its rows, found in one place so that another process can do it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from markupsafe import Markup
+from starlette.datastructures import QueryParams
+
+from sprag.service.faults import SelectionError
+from sprag.service.http.web.held import fixed_choices, with_held
+from sprag.service.http.web.sheet.chart import CHOICES, chart_of, chosen_curves, point_of
+from sprag.service.http.web.sheet.machine import machine_drawings
+from sprag.service.http.web.sheet.side import Side, short_titles, side_of
+from sprag.service.http.web.view_forms import Fact, fact_of
+from sprag.service.reading.catalogue import unit_of
+from sprag.service.results.choice import value_choices
+from sprag.service.views.headline import headline_of, usual_query
+from sprag.service.views.library import reading_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sprag.service.faults import Fault
+    from sprag.service.http.web.sheet.chart import Chart
+    from sprag.service.reading.reader import Choice, Reading
+    from sprag.service.results.curves import CurveQuery
+    from sprag.service.views.headline import Headline
+    from sprag.service.views.library import Library
+    from sprag.worker.study import Study
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """What a sheet shows of its rows.
+
+    Attributes
+    ----------
+    faults : why it is not what was asked for
+    say : the sentences of the answer; ``of`` says of which curve
+    gap : path, value and value as in print of a case that was asked for and is missing, in the reader's unit
+    fixed, choices : axes that are held, and values of the axes that tell curves apart
+    """
+
+    faults: tuple[Fault, ...]
+    say: list[str]
+    of: str
+    numbers: list[Fact]
+    dimensions: list[Fact]
+    limits: list[Fact]
+    chart: Chart | None
+    drawings: list[Markup]
+    side: Side
+    gap: tuple[str, str, str] | None = None
+    fixed: list[dict[str, Any]] = field(default_factory=list)
+    choices: list[dict[str, Any]] = field(default_factory=list)
+
+
+def sheet_of(library: Library, study_id: str, given: Sequence[tuple[str, str]], choice: Choice, cases: str) -> Sheet:
+    """The sheet of a study for the parameters of its address; without them where they cannot be shown.
+
+    ``cases`` is the address of the cases of the study. Raises StudyNotFoundError.
+    """
+    study = library.store.studies.study(study_id)
+    reading = reading_of(library.store, study_id, choice)
+    params = with_held(QueryParams(list(given)), study, reading)
+    usual = usual_query(library, study_id)
+    try:
+        return _sheet(library, study_id, study, params, usual, reading, cases)
+    except SelectionError as error:
+        found = _sheet(library, study_id, study, QueryParams(), usual, reading, cases)
+        return replace(found, faults=error.faults)
+
+
+def _sheet(
+    library: Library,
+    study_id: str,
+    study: Study,
+    params: QueryParams,
+    usual: CurveQuery | None,
+    reading: Reading,
+    cases: str,
+) -> Sheet:
+    headline = _headline(library, study_id, study, params, usual, reading)
+    progress = library.store.studies.progress(study_id)
+    asked = any(params.get(name) for name in (*CHOICES, "z", "point"))
+    chart = chart_of(library, study_id, params, usual, reading, cases) if progress.done or asked else None
+    best = {
+        one.label: one.value
+        for one in (*headline.numbers, *headline.dimensions)
+        if isinstance(one.value, float) and one.label in study.base
+    }
+    gap, own = None, f"/studies/{study_id}/cases/"
+    if headline.gap is not None:
+        si = unit_of(study, headline.gap.path)
+        value, unit = reading.value(headline.gap.value, si), reading.unit(si)
+        typed = f"{value:.10g}" if unit == "1" else f"{value:.10g} {unit}"
+        gap = headline.gap.path, typed, reading.quantity(headline.gap.value, si)
+    drawn, at = _roles(chart)
+    return Sheet(
+        (),
+        list(map(reading.say, headline.sentence)),
+        reading.say(headline.of),
+        [fact_of(one, reading, own) for one in headline.numbers],
+        [
+            fact_of(one, reading, own)._replace(title=title)
+            for one, title in zip(headline.dimensions, short_titles(headline.dimensions, reading), strict=True)
+        ],
+        [fact_of(one, reading, own) for one in headline.limits],
+        chart,
+        machine_drawings(study, reading, best),
+        side_of(library, study_id, headline, reading),
+        gap,
+        fixed_choices(study, drawn, at, reading) if drawn else [],
+        value_choices(study, chart.curves) if chart is not None and chart.curves is not None else [],
+    )
+
+
+def _roles(chart: Chart | None) -> tuple[tuple[str, ...], tuple[tuple[str, str], ...]]:
+    """The drawn axes of a chart, and what is held."""
+    if chart is None:
+        return (), ()
+    if chart.map is not None:
+        return (chart.map.x, chart.map.y), chart.map.at
+    return ((chart.curves.x, *chart.curves.by), chart.curves.at) if chart.curves is not None else ((), ())
+
+
+def _headline(
+    library: Library, study_id: str, study: Study, params: QueryParams, usual: CurveQuery | None, reading: Reading
+) -> Headline:
+    """The headline of the curves and the point of the address."""
+    if params.get("z"):
+        return headline_of(library, study_id)
+    query = chosen_curves(study, params, usual)
+    point = point_of(study, query or usual, params, reading)
+    return headline_of(library, study_id, query if query != usual else None, point, params.get("curve") or "")

@@ -1,0 +1,205 @@
+"""The sheet of a study in the browser: the answer in the first screen, few words, and a working point that is moved."""
+
+from __future__ import annotations
+
+import copy
+import re
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import expect
+
+from sprag.worker import models
+from sprag.worker.models import ChunkResult
+from tests.service.calibrating import calibration
+from tests.service.http.web.test_accessibility import BEYOND, preset, serve
+from tests.service.rounds import run_round
+from tests.service.searching import search
+from tests.service.timed_spec import SPEC
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from playwright.sync_api import Browser, Locator, Page
+
+    from sprag.worker.study import Study
+    from tests.service.conftest import Service
+
+#: Words that people read: without numbers of figures, choices of lists, and what is closed or hidden.
+WORDS: Final = """() => {
+  const walker = document.createTreeWalker(document.querySelector("main"), NodeFilter.SHOW_TEXT);
+  let count = 0;
+  while (walker.nextNode()) {
+    const parent = walker.currentNode.parentElement;
+    if (parent.closest("svg, noscript, .hidden, option") || !parent.checkVisibility()) continue;
+    count += walker.currentNode.data.split(/\\s+/).filter(Boolean).length;
+  }
+  return count;
+}"""
+PLAIN: Final = {name: value for name, value in SPEC.items() if name not in {"axes", "combine", "exclude"}}
+LOADS: Final = {"axes": [{"path": "shaft.load", "values": [0, 0.1, 0.2, 0.3]}]}
+BATCH: Final[dict[str, Any]] = {
+    "axes": [{"path": "shaft.load", "values": [0.1, 0.2]}],
+    "tolerances": [{"path": "pendulums.*.backlash", "plus_minus": "60 %"}],
+    "drives": 24,
+}
+WIDE: Final = {"width": 1440, "height": 900}
+PHONE: Final = {"width": 390, "height": 844}
+
+
+def rows_of(study: Study, cases: range) -> ChunkResult:
+    """A speed that falls linearly with the load and the backlash; the irregularity of a machine falls with the case."""
+    columns = {path: np.full(len(cases), value) for path, value in study.base.items()} | study.columns(cases)
+    load, backlash = (columns.get(name, np.zeros(len(cases))) for name in ("shaft.load", "pendulums.0.backlash"))
+    named = {
+        "shaft.speed.mean": 40.0 - 100.0 * load - 1000.0 * backlash,
+        "efficiency": load * 2.0,
+        "irregularity": 1.0 / (1.0 + np.arange(cases.start, cases.stop)),
+    }
+    infos = models.study_results(study)
+    values = np.stack([named.get(info.name, np.ones(len(cases))) for info in infos], axis=1)
+    return ChunkResult(cases.start, [models.OK] * len(cases), [""] * len(cases), values)
+
+
+def run(service: Service, spec: dict[str, Any]) -> str:
+    """The id of a study with these rows, which has ended."""
+    study_id = service.submit(spec)
+    store = service.store
+    number, epoch = store.studies.get(study_id).number, store.work.take_over("test")
+    run_round(store, number, epoch, rows_of)
+    store.work.settle(epoch, number)
+    return study_id
+
+
+@pytest.fixture
+def kinds(service: Service) -> dict[str, str]:
+    """A study of every kind, and a variant."""
+    variant = copy.deepcopy(PLAIN)
+    variant["base"]["pendulums"][0]["arm"] = "36 mm"
+    return {
+        "search": search(service, best=[{"result": "efficiency", "max": True}], generations=4),
+        "calibration": calibration(service),
+        "variant": run(service, {**variant, "name": "Longer", **LOADS}),
+        "batch": run(service, {**PLAIN, "name": "Batch", **BATCH}),
+        "shaft": run(service, {**preset("question_masses"), "name": "Shaft"}),
+        "single": run(service, {**PLAIN, "name": "One"}),
+        "grid": run(service, {**PLAIN, "name": "As drawn", **LOADS}),
+    }
+
+
+@pytest.fixture
+def page(service: Service, browser: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
+    """A page whose requests this process answers."""
+    options = {"base_url": "http://localhost", "viewport": WIDE, **getattr(request, "param", {})}
+    context = browser.new_context(**options)
+    opened = context.new_page()
+    serve(opened, service)
+    yield opened
+    context.close()
+
+
+def within(page: Page, part: Locator) -> bool:
+    """Whether a part is whole in the first screen."""
+    box = part.bounding_box()
+    size = page.viewport_size
+    assert box is not None
+    assert size is not None
+    return box["y"] >= 0 and box["y"] + box["height"] <= size["height"] and box["x"] + box["width"] <= size["width"] + 1
+
+
+@pytest.mark.parametrize("page", [{"viewport": WIDE}, {"viewport": PHONE}], indirect=True)
+def test_the_answer_of_every_kind_is_in_the_first_screen(page: Page, kinds: dict[str, str]) -> None:
+    for kind, study_id in kinds.items():
+        page.goto(f"/studies/{study_id}")
+        assert within(page, page.locator(".say")), kind
+        assert page.evaluate(BEYOND) == "", kind
+        assert page.evaluate(WORDS) <= 250, kind
+        assert page.locator(".button.main:visible, button.main:visible").count() == 1, kind
+        for fact in page.locator(".facts > div").all():
+            assert within(page, fact), kind
+    page.goto(f"/studies/{kinds['search']}")
+    design = page.locator("table.design").first
+    assert within(page, design)
+    expect(design.locator("tr")).to_have_count(3)
+    expect(design).to_contain_text("25 Hz before")
+    expect(design).to_contain_text("2 mm before")
+    page.goto(f"/studies/{kinds['batch']}")
+    assert within(page, page.locator(".facts > div", has_text="Yield"))
+    page.goto(f"/studies/{kinds['calibration']}")
+    for name in ("Damping", "Inertia of the driven side"):
+        assert within(page, page.locator(".facts > div", has_text=name)), name
+
+
+def test_axe_finds_nothing_with_every_drawer_open(page: Page, kinds: dict[str, str]) -> None:
+    for kind, scheme in (("grid", "light"), ("search", "dark")):
+        page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+        page.goto(f"/studies/{kinds[kind]}")
+        page.locator("main details:not(.menu)").evaluate_all("(all) => all.forEach((one) => { one.open = true; })")
+        found = Axe().run(page, options={"resultTypes": ["violations"]}).response["violations"]
+        assert [(one["id"], one["nodes"][0]["html"][:200]) for one in found] == [], kind
+
+
+def test_the_working_point_tells_its_case_or_both_neighbours(page: Page, kinds: dict[str, str]) -> None:
+    page.goto(f"/studies/{kinds['grid']}")
+    slider = page.locator("input[name=point]")
+    slider.evaluate("(field) => { field.value = 0.299; field.dispatchEvent(new Event('input', { bubbles: true })); }")
+    expect(page.locator("#say")).to_have_text(re.compile(r"^At 0\.3 N·m it runs at [\d.]+ \S+ with .*efficiency\.$"))
+    expect(slider).to_have_value("0.3")
+    before = page.locator("#chart .wide .at").first.get_attribute("d")
+    slider.evaluate("(field) => { field.value = 0.25; field.dispatchEvent(new Event('input', { bubbles: true })); }")
+    neighbours = re.compile(r"^No case was run at 0\.25 N·m\. At 0\.2 N·m .* At 0\.3 N·m ")
+    expect(page.locator("#say")).to_have_text(neighbours)
+    assert page.locator("#chart .wide .at").first.get_attribute("d") != before
+    slider.evaluate("(field) => field.dispatchEvent(new Event('change', { bubbles: true }))")
+    expect(page.get_by_role("button", name="Run it at 0.25 N·m too")).to_be_visible()
+    expect(page).to_have_url(re.compile("point=0.25"))
+    page.reload()
+    expect(page.locator("#say")).to_have_text(neighbours)
+    page.get_by_role("button", name="Run it at 0.25 N·m too").click()
+    expect(page.locator("#say")).to_contain_text("it waits for its turn", ignore_case=True)
+
+
+@pytest.mark.parametrize("page", [{"java_script_enabled": False}], indirect=True)
+def test_without_scripts_it_is_a_plain_form(page: Page, service: Service, kinds: dict[str, str]) -> None:
+    page.goto(f"/studies/{kinds['grid']}")
+    assert page.locator("#chart svg.wide").is_visible()
+    page.goto(f"/studies/{kinds['grid']}?point=0.3&lower=efficiency")
+    told = service.get(f"/studies/{kinds['grid']}/answers", point="0.3")["curves"][0]["working_point"]
+    share = 100.0 * next(item["value"] for item in told if item["name"] == "efficiency")
+    expect(page.locator("#say")).to_contain_text(f"{share:.3g} %")
+    expect(page.locator("#chart .wide")).to_contain_text("Efficiency (%)")
+    page.get_by_text("Other curves").click()
+    page.get_by_label("Map of").select_option("efficiency")
+    page.get_by_role("button", name="Draw").click()
+    expect(page).to_have_url(re.compile("z=efficiency"))
+    assert page.locator(".say").is_visible()
+
+
+def test_questions_and_variants_lead_to_relatives(page: Page, kinds: dict[str, str]) -> None:
+    page.goto(f"/studies/{kinds['grid']}")
+    ask = page.locator(".ask")
+    expect(ask.locator(".here")).to_contain_text("How does it run along the load torque?")
+    for kind, question in (
+        ("search", "Which design is best?"),
+        ("batch", "What do tolerances do?"),
+        ("calibration", "Does it match the measurement?"),
+    ):
+        expect(ask.get_by_role("link", name=question)).to_have_attribute("href", f"/studies/{kinds[kind]}")
+    expect(ask.get_by_role("link", name="How does it move?")).to_have_attribute("href", re.compile(r"/cases/1$"))
+    strip = page.locator(".kin")
+    expect(strip.get_by_role("link", name="Arm of the mass, pendulum 0 36 mm")).to_be_visible()
+    strip.get_by_role("checkbox", name="compare Arm").check()
+    strip.get_by_role("button", name="Compare the ticked ones").click()
+    page.wait_for_url(f"**/compare?study={kinds['grid']}&study={kinds['variant']}")
+
+
+def test_former_addresses_keep_their_choices(service: Service, kinds: dict[str, str]) -> None:
+    own = f"/studies/{kinds['grid']}"
+    for former, now in (
+        ("/curves?x=shaft.load&y=efficiency", "?x=shaft.load&y=efficiency"),
+        ("/map?x=shaft.load&y=gravity&z=efficiency", "?x=shaft.load&up=gravity&z=efficiency"),
+    ):
+        answer = service.http.get(own + former, follow_redirects=False)
+        assert (answer.status_code, answer.headers["location"]) == (308, own + now)
