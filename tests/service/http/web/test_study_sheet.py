@@ -171,9 +171,8 @@ def test_without_scripts_it_is_a_plain_form(page: Page, service: Service, kinds:
     expect(page.locator("#say")).to_contain_text(f"{share:.3g} %")
     expect(page.locator("#chart .wide")).to_contain_text("Efficiency (%)")
     page.get_by_text("Other curves").click()
-    page.get_by_label("Map of").select_option("efficiency")
     page.get_by_role("button", name="Draw").click()
-    expect(page).to_have_url(re.compile("z=efficiency"))
+    expect(page).to_have_url(re.compile("x=shaft.load"))
     assert page.locator(".say").is_visible()
 
 
