@@ -88,7 +88,7 @@ async def choose(values: Form) -> Response:
     if PARAMETER in values:
         keep_language(response, choice_of(PARAMETER, values[PARAMETER], dict.fromkeys(languages.available())))
     if "rest" in values or "names" in values:
-        choice = Choice(_units(values), values.get("names", CAPTIONS))
+        choice = Choice(_fitting_units(values), values.get("names", CAPTIONS))
         read_units(choice.units)
         keep(response, choice)
     if "zone" in values:
@@ -96,7 +96,7 @@ async def choose(values: Form) -> Response:
     return response
 
 
-def _units(given: Mapping[str, str]) -> str:
+def _fitting_units(given: Mapping[str, str]) -> str:
     """The choice as `read_units` takes it."""
     rest = given.get("rest", WORKSHOP)
     return ",".join(
