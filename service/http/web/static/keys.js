@@ -10,7 +10,7 @@
   on.addEventListener("change", () => { on.checked ? localStorage.removeItem(OFF) : localStorage.setItem(OFF, "1"); });
 
   const withKey = (prefix, key) => [...document.querySelectorAll(prefix)].find((link) => link.dataset.key === key);
-  const PAGES = "header.site [data-key], footer.site [data-key]", PARTS = ".tabs [data-key]";
+  const PAGES = "header.site [data-key], footer.site [data-key]", PARTS = "main [data-key]";
   // The shortcuts that a key may mean: its own, and under a layout that has no Latin letter on it, that at its place on a US keyboard.
   const meant = ({ key, code, shiftKey }) => {
     const place = code === "Slash" ? (shiftKey ? "?" : "/") : !shiftKey && /^(?:Key|Digit)(.)$/.exec(code)?.[1].toLowerCase();

@@ -20,12 +20,14 @@ def test_pages_and_parts_of_a_study_by_keys(visitor: Visitor, example: str) -> N
     expect(dialog).to_be_visible()
     shown = dict(zip(dialog.locator("dt").all_inner_texts(), dialog.locator("dd").all_inner_texts(), strict=True))
     assert shown["g c"] == "Compare"
-    assert shown["2"] == "Sensitivity"
+    assert shown["2"] == "What matters"
     page.keyboard.press("Escape")
     expect(dialog).to_be_hidden()
     part = page.locator(".menu a", has_text="Rows").get_attribute("data-key")
     page.keyboard.press(str(part))
     page.wait_for_url("**/rows")
+    page.keyboard.press("1")
+    page.wait_for_url(f"**/studies/{example}")
     page.keyboard.press("/")
     found = page.get_by_role("searchbox", name="Find a study")
     expect(found).to_be_focused()
@@ -54,7 +56,7 @@ def test_under_a_layout_without_latin_letters_keys_mean_their_places(visitor: Vi
     press("т", "KeyN")
     press("!", "Digit2", shift=True)
     press("é", "Digit2")
-    page.wait_for_url("**/sensitivity*")
+    page.wait_for_url("**/matters*")
     press(".", "Slash")
     expect(page.get_by_role("searchbox", name="Find a study")).to_be_focused()
     page.locator(".crumbs a").focus()
