@@ -16,7 +16,8 @@ from sprag.service.answers.tolerances import RibbonLine, YieldLine
 from sprag.service.cli.shown import yield_text
 from sprag.service.jobs.local import run_here
 from sprag.service.spec.document import parse_spec
-from sprag.service.views.drives import RibbonQuery, YieldQuery, both
+from sprag.service.views.drives import RibbonQuery, RibbonView, YieldQuery, YieldView
+from sprag.service.views.study_view import found
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "guide-tolerances.md").read_text(encoding="utf-8")
@@ -29,8 +30,9 @@ def answers(spec: dict[str, Any]) -> Iterator[tuple[RibbonLine, YieldLine]]:
     parsed = parse_spec(spec)
     with run_here(parsed.spec, parsed.study, processes=0) as done:
         library: Any = SimpleNamespace(store=done.store)
-        queries = RibbonQuery((SPEED,)), YieldQuery((f"{SPEED} >= 90 % of nominal",))
-        ribbon, reached = both(library, done.record.id, *queries)
+        ribbons, yields, study = RibbonView(), YieldView(), done.record.id
+        ribbon = ribbons.json(found(library, study, ribbons, RibbonQuery((SPEED,))))
+        reached = yields.json(found(library, study, yields, YieldQuery((f"{SPEED} >= 90 % of nominal",))))
         yield ribbon["lines"][0], reached["lines"][0]
 
 
