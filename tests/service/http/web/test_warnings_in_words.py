@@ -13,9 +13,9 @@ from sprag.sentences import WarningText
 from sprag.service.faults import WarningCode
 from sprag.service.http.views import preset_of
 from sprag.service.languages import language
+from sprag.service.reading.quantities import WORKSHOP
 from sprag.service.reading.reader import Choice
 from sprag.service.report.blocks import Text
-from sprag.service.report.content import AS_TYPED
 from sprag.service.report.document import document_of
 from sprag.service.spec.document import parse_spec
 from sprag.service.views.library import Library
@@ -71,6 +71,8 @@ SHAFT: dict[WarningCode, str] = {
     "no-effect": "/base/operation/sense: is not used: a positive torque always resists; `sense` is for forces",
     "implausible-value": "/base/mean_speed: 3000 rad/s is more than 1000 rad/s; was it in rpm?",
 }
+#: The units of a page that nobody has chosen others for.
+PAGE = Choice(WORKSHOP)
 POINTER = re.compile(r"/(?:axes|base|derive|goal|points|run|starts|tolerances)\b")
 #: Names of the spec; letters of formulas such as c_1 and T_mean, and the name of a setting, are none.
 CODE = re.compile(r"(?<![\w.])(?!c_\d|T_mean)[a-z]+(?:\.\d+)?[._][a-z]\w*")
@@ -99,7 +101,7 @@ def shown(service: Service, study_id: str, spoken: str, **params: str) -> list[s
     return [html.unescape(text) for text in re.findall(r'<p class="warning">(.*?)</p>', answer.text, re.DOTALL)]
 
 
-def told(service: Service, study_id: str, choice: Choice = AS_TYPED) -> list[str]:
+def told(service: Service, study_id: str, choice: Choice = PAGE) -> list[str]:
     """The warnings in the report of a study, its sheet and its appendix."""
     asked = ReportQuestion(appendix=["warnings"])
     document = document_of(Library(service.store), study_id, choice, asked)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 #: What people read of a page: without the spec itself, code, scripts and attributes.
 _HIDDEN = re.compile(r"<(pre|code|style|script|title)\b.*?</\1>|<[^>]*>|Name in specs.*?</table>", re.DOTALL)
-_PARTS = ("", "/curves", "/map", "/rows", "/rows?plot=points", "/cases/0")
+_PARTS = ("", "?x=excitation.frequency", "?z=efficiency", "/rows", "/rows?plot=points", "/cases/0")
 _FIGURES = ("figures/curves?y=shaft.speed.mean&y=torque.mean&", "figures/answers?")
 
 
@@ -65,7 +65,7 @@ def test_a_comparison_is_read_as_its_first_study(service: Service, study_id: str
 
 
 def test_code_names_are_shown_on_request(service: Service, study_id: str) -> None:
-    seen = _HIDDEN.sub(" ", service.http.get(f"/studies/{study_id}/curves?names=codes").text)
+    seen = _HIDDEN.sub(" ", service.http.get(f"/studies/{study_id}?names=codes").text)
     assert "shaft.speed.mean" in seen
     assert "Mean shaft speed" not in seen
 
@@ -85,10 +85,12 @@ def test_units_are_chosen_once_and_kept(service: Service, study_id: str) -> None
     head, first = table.text.splitlines()[:2]
     cell = dict(zip(head.split(","), first.split(","), strict=True))["shaft.speed.mean [rpm]"]
     assert float(cell) == pytest.approx(speed * 30.0 / math.pi, rel=1e-12)
-    page = service.http.get(f"/studies/{study_id}/curves").text
+    page = service.http.get(f"/studies/{study_id}").text
     assert 'Mean shaft speed <span class="soft">rpm</span>' in page
-    assert "speed%3Drpm" in page  # figures and files of the page have it in their addresses
-    assert "Load torque (N·mm)" in page
+    assert re.search(r'href="[^"]*/curves\?[^"]*speed%3Drpm[^"]*format=csv"', page)  # its files are in the same units
+    chart = page.partition('<figure id="chart"')[2].partition("</figure>")[0]
+    assert ">Mean shaft speed (rpm)<" in chart
+    assert ">Load torque (N·mm)<" in chart
 
 
 def test_what_is_chosen_on_a_page_leads_back_to_a_page(service: Service) -> None:
@@ -115,17 +117,17 @@ def test_a_value_of_an_axis_with_many_is_typed_in_the_unit_beside_it(service: Se
     ]
     study_id = service.submit(spec)
     over = "x=excitation.frequency&units=torque%3DN*mm&at%3Apendulums.0.mass=0.5&at%3Ashaft.load="
-    for part in ("", "/curves", "/map"):
+    for chart in ("", "&z=efficiency"):
         for typed in ("105", "0.105 N*m"):
-            answer = service.http.get(f"/studies/{study_id}{part}?{over}{typed}")
-            assert answer.status_code == 200, part
+            answer = service.http.get(f"/studies/{study_id}?{over}{typed}{chart}")
+            assert answer.status_code == 200, chart
             field = re.search(r'<input name="at:shaft\.load" value="([^"]*)"', answer.text)
-            assert field is not None, part
-            assert field[1] == "105", part
-        refused = service.http.get(f"/studies/{study_id}{part}?{over}0.105")
-        assert (refused.status_code, "the axis has no such value" in refused.text) == (422, True), part
-    drawn = service.http.get(f"/studies/{study_id}/curves?{over}105").text
-    assert "Load torque = 105 N·mm" in drawn
+            assert field is not None, chart
+            assert field[1] == "105", chart
+        refused = service.http.get(f"/studies/{study_id}?{over}0.105{chart}")
+        assert (refused.status_code, "the axis has no such value" in refused.text) == (422, True), chart
+    service.fill(study_id)
+    assert "Load torque = 105 N·mm" in service.http.get(f"/studies/{study_id}?{over}105").text
 
 
 def test_a_bare_number_is_in_the_unit_beside_it(service: Service, study_id: str) -> None:
