@@ -203,7 +203,7 @@ def test_a_part_of_a_run_in_periods(sprag: Sprag, examples: Path) -> None:
 def test_a_shaft_that_stops_has_no_points_and_is_told_why(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
     done = sprag("trajectory", examples / "press.toml", "--points", "5", "-o", tmp_path / "rows.csv")
     assert done.code != 0
-    assert "case 0: inertia_insufficient, no points: The inertia is insufficient" in done.err
+    assert "case 0: inertia insufficient, no points: The inertia is insufficient" in done.err
     assert "5 points" not in done.err
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import html
 import math
 import re
@@ -14,7 +15,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from sprag.service import languages
+from sprag.service import languages, views
 from sprag.service.cli.extend import _values
 from sprag.service.http.web.form.entries import list_of, plain
 from sprag.service.http.web.form.fields import Field, refine_fields, run_fields, search_fields
@@ -153,6 +154,16 @@ def examples() -> Iterator[str]:
         yield from models.model_of(model).presentation.form.examples.values()
 
 
+def hints() -> Iterator[str]:
+    """What the fields of a view show while they are empty, and the examples of their settings."""
+    for file in sorted(Path(views.__file__).parent.glob("*.py")):
+        for call in ast.walk(ast.parse(file.read_text())):
+            for word in call.keywords if isinstance(call, ast.Call) else ():
+                if word.arg in {"hint", "examples"}:
+                    yield from (one.value for one in ast.walk(word.value)
+                                if isinstance(one, ast.Constant) and isinstance(one.value, str))  # fmt: skip
+
+
 def templates() -> Iterator[tuple[str, str]]:
     """Every text in a template that could be a placeholder: of the attribute, and quoted beside it in calls."""
     for file in sorted(TEMPLATES.glob("*.html")):
@@ -170,6 +181,7 @@ EXAMPLES: Final = sorted(
             *(text for field in fields() for text in (field.example, field.default, field.unit and f"1 {field.unit}")),
             *(text for _, text in templates()),
             *examples(),
+            *hints(),
             *(text for one in units._EXAMPLES.values() for text in one),
         )
         if text and _is_quantity(text)
@@ -206,7 +218,9 @@ def test_no_placeholder_escapes() -> None:
         r"\(default or example\) \| typed", r"example( \| typed)?", r"help",
         r"ends\[[01]\].*", r"usual_points", r".* \| number(\(4\))?",
         r"_\(\"[^\"]*\"\)", r".*\| unit", r".*\| safe( if .*)?",
-        r"\"[^\"]*\" \| typed",
+        r"\"[^\"]*\" \| typed", r"paste\.example",  # headings of columns, without numbers
+        r"\(_\(one\.offered\.hint\) \| typed\) if one\.offered\.hint else .*",  # of `hints`
+        r"\(_\(field\.default\) or \(field\.example if .*\)\) \| typed",  # of `fields`
     )  # fmt: skip
     for file in sorted(TEMPLATES.glob("*.html")):
         for expression in re.findall(r'placeholder="\{\{ (.*?) \}\}', file.read_text()):
