@@ -121,17 +121,17 @@ async def motion_page(
     check_start(study, which)
     if show and not (show in PARTS and PARTS[show].has(study)):
         raise ApiError("not-found", "The cases of this study have no such view.")
-    reading = await in_thread(reading_of, context.store, study_id, current().choice)
+    frame = await in_thread(study_frame, context, study_id)  # of the same moment: the views are computed meanwhile
     params, nothing = work.request.query_params, type(work.request.query_params)()
     motion = await in_thread(_motion, study, case, nothing if show else params)
     part = await in_thread(_asked, PARTS[show], study, case, params) if show else None
     status, opened = 200, []
     for view, asked in ((_MOTION, motion), *([(PARTS[show], part)] if part else [])):
-        found, own = await _seen(work, study_id, study, case, view, asked, which, reading)
+        found, own = await _seen(work, study_id, study, case, view, asked, which, frame["reading"])
         status = max(status, own)
         opened.append((asked, found))
     values = {"row": row, "regimes": rows if row and row.results.get("regime.number") is not None else (), "show": show}
-    return await in_thread(_page, context, study_id, study, case, which, opened, status, values)
+    return await in_thread(_page, frame, study_id, study, case, which, opened, status, values)
 
 
 def _asked(view: CaseView[Any, Any, Any], study: Study, case: int, params: QueryParams) -> Asked:
@@ -173,10 +173,10 @@ async def _seen(
 
 
 def _page(
-    context: Context, study_id: str, study: Study, case: int, which: int | None,
+    frame: dict[str, Any], study_id: str, study: Study, case: int, which: int | None,
     opened: list[tuple[Asked, Seen | None]], status: int, values: dict[str, Any],
 ) -> Response:  # fmt: skip
-    frame, infos, row = study_frame(context, study_id), models.study_results(study), values["row"]
+    infos, row = models.study_results(study), values["row"]
     reading = frame["reading"]
     own, address = f"/studies/{study_id}/cases/{case}", f"{study_address(study_id)}/cases/{case}"
     only = [] if which is None else [("start", str(which))]
@@ -214,7 +214,7 @@ def _page(
         opened=[(*one, files[place]) for place, one in enumerate(opened)],
         only=urlencode(only),
         drawings=drawings(replace(study, base={**study.base, **_own(study, case)})),
-        spec=spec_text(design_spec(context.store.studies.spec(study_id), study, case)),
+        spec=spec_text(design_spec(frame["study"]["spec"], study, case)),
         goes_on=models.has_strobes(study) and row is not None and row.ending == "ok",
         has_motion=row is None or row.ending != _NO_MOTION,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -35,6 +36,7 @@ def reading(service: Service, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple
             rows.append(arguments[2])
 
     with monkeypatch.context() as patch:
+        patch.setattr("sprag.service.http.access.BELIEVED_SECONDS", math.inf)  # tokens are read again besides
         patch.setattr(service.store.session, "on_wait", lambda kind, _: begun.append(kind))
         sa.event.listen(sa.Engine, "before_cursor_execute", told)
         yield begun, rows
