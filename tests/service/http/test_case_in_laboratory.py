@@ -1,4 +1,4 @@
-"""The way from the page of a case to the laboratory."""
+"""The way from the page of a case to a new study."""
 
 from __future__ import annotations
 
@@ -21,4 +21,4 @@ def test_a_machine_without_a_motion_has_no_link_but_a_sentence(service: Service)
         page = service.http.get(f"/studies/{study_id}/cases/{case}").text
         linked = f'href="/studies/{study_id}/cases/{case}/laboratory"' in page
         assert linked == (ending == "ok")
-        assert ("this machine has none at its mean speed" in page) == (ending != "ok")
+        assert ("This machine has no motion at its mean speed." in page) == (ending != "ok")

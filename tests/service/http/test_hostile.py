@@ -162,7 +162,7 @@ NAMES = (
 def test_a_hostile_name_is_a_name(service: Service, name: str) -> None:
     study_id = service.submit({**SPEC, "name": name})
     service.fill(study_id)
-    for page in ("/", f"/studies/{study_id}", f"/studies/{study_id}/cases", f"/new?clone={study_id}", "/nights/new"):
+    for page in ("/", f"/studies/{study_id}", f"/studies/{study_id}/rows", f"/new?clone={study_id}", "/nights/new"):
         text = service.http.get(page).text
         assert "<script>alert" not in text
         assert "<img src=x" not in text
