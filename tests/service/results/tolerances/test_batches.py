@@ -217,7 +217,7 @@ def test_the_page_shows_ribbon_yield_and_the_worst_drives(service: Service) -> N
         assert refused.status_code == 422, wrong
         assert 'role="alert"' in refused.text
         assert next(iter(wrong.values())).replace(">", "&gt;") in refused.text
-    report = service.http.get(f"{API}{own}/report", params={"format": "html"}).text
+    report = service.http.get(f"{API}{own}/report", params={"format": "html", "appendix": "drives"}).text
     assert '<img src="data:image/svg+xml;base64,' in report.partition("<h2>Drives</h2>")[2]
     both = service.get(f"{own}/yield", condition="speed >= 90 % of nominal")["lines"]
     for line in both:
