@@ -16,7 +16,6 @@ from sprag.service.figures.drawings import drawings
 from sprag.service.figures.read import read_figure
 from sprag.service.figures.svg import NARROW, WIDE, picture_svg
 from sprag.service.http.context import CaseNumber, StartNumber, StudyId, study_with
-from sprag.service.http.current import current
 from sprag.service.http.drawing import picture, unchanging
 from sprag.service.http.language import language_pairs
 from sprag.service.http.problems import ApiError, api_error

@@ -196,6 +196,10 @@ CHANGES: dict[str, tuple[str, Change]] = {
         "study.create",
         lambda w: w.post(f"/studies/{w.ended(examples.SPEC)}/longer/unsettled"),
     ),
+    "POST /studies/{study_id}/rows/longer": (
+        "study.create",
+        lambda w: w.post(f"/studies/{w.ended(examples.SPEC)}/rows/longer", data={"case": "0"}),
+    ),
     "POST /studies/{study_id}/narrow": (
         "study.create",
         lambda w: w.post(f"/studies/{swept_study(w.service)}/narrow"),

@@ -93,7 +93,8 @@ def test_pictures_mark_the_other_motions(service: Service, started: str) -> None
     assert seen(page).has("other motions of the same cases")
     assert "<title>0.2 N·m, 3.5 rad/s, other motions of the same cases, case 1</title>" in page
     assert service.http.get(f"{API}/studies/{started}/curves", params={**asked, "format": "svg"}).status_code == 200
-    assert "Single points are other motions" in service.http.get(f"/studies/{started}/curves").text
+    sheet = service.http.get(f"/studies/{started}").text
+    assert "other motions of the same cases" in sheet
 
 
 def test_maps_of_the_motions_are_a_click_away(service: Service) -> None:
@@ -105,10 +106,13 @@ def test_maps_of_the_motions_are_a_click_away(service: Service) -> None:
         {"path": "excitation.frequency", "values": [20, 25]},
     ]
     study_id = service.submit({**spec, "starts": {"count": 8, "ranges": {SPEED: [1, 30]}}})
-    text = html.unescape(service.http.get(f"/studies/{study_id}/curves").text)
-    for name in ("regime.count", "regime.share.least"):
-        (address,) = re.findall(rf'href="(/studies/{study_id}/map\?[^"]*z={re.escape(name)}[^"]*)"', text)
-        assert service.http.get(address).status_code == 200
+    service.fill(study_id)
+    text = html.unescape(service.http.get(f"/studies/{study_id}").text)
+    for name, title in (("regime.count", "number of motions"), ("regime.share.least", "share of the rarest motion")):
+        (address,) = re.findall(rf'<a href="(/studies/{study_id}\?[^"]*)">{title}</a>', text)
+        map_ = service.http.get(address)
+        assert map_.status_code == 200
+        assert f'<option value="{name}" selected>' in map_.text
 
 
 def test_other_studies_have_one_regime_a_case(service: Service) -> None:
