@@ -10,7 +10,6 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.acceptance.processes import EXAMPLES
-from tests.service.http.web.fields import drawn
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -112,13 +111,13 @@ def test_the_drawing_moves_by_the_slider(visitor: Visitor, motions: str) -> None
 def test_jumps_are_narrowed_by_a_button(visitor: Visitor, swept: str, office: Office) -> None:
     page = visitor.page
     page.goto(f"/studies/{swept}")
-    drawn(page)
     expect(page.locator("main")).to_contain_text("1 jump, within 0.475 Hz")
+    page.get_by_text("How cases ended").click()
     page.get_by_role("button", name="Narrow these jumps").click()
     page.wait_for_url(re.compile(rf"/studies/st_(?!{swept.removeprefix('st_')})\w+$"))
     office.wait(page.url.rpartition("/")[2])
     page.reload()
-    drawn(page)
     expect(page.locator("main")).to_contain_text("1 jump, within 0.029688 Hz")
+    page.get_by_text("What varies").click()
     axes = page.get_by_role("region", name="Table of the axes")
     assert axes.get_by_role("cell", name="down", exact=True).count() == 1

@@ -37,11 +37,12 @@ def test_a_designer_works_below_a_path(browser: Browser, tmp_path: Path) -> None
             expect(page).to_have_url(f"{started.address}/studies/{study}")
             office.wait(study)
             expect(page.locator("#progress .state")).to_have_text("finished")  # told by the events
-            page.goto(f"{started.address}/studies/{study}/curves")
-            plot = page.locator("[data-figure]").first
-            expect(plot).to_have_attribute("data-drawn", "1")
-            page.get_by_role("link", name="Schedules").first.click()
-            expect(page).to_have_url(f"{started.address}/schedules")
+            page.goto(f"{started.address}/studies/{study}/curves?y=efficiency")
+            expect(page.locator("#chart svg.wide")).to_be_visible()
+            page.locator("#chart svg.wide a[data-case]").first.press("Enter")
+            expect(page.locator("#motion svg.figure:visible")).to_be_visible()
+            page.get_by_role("link", name="Nights").first.click()
+            expect(page).to_have_url(f"{started.address}/nights")
             page.goto(f"{started.address}/laboratory/drive")
             expect(page.locator(".live-figure svg")).to_be_visible()
             assert page.evaluate("location.pathname") == "/sprag/new"

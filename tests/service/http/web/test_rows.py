@@ -254,6 +254,7 @@ def test_kinds_of_rows_are_conditions_too(service: Service, spec: dict[str, Any]
     text = read(service, f"/studies/{study_id}/rows?ending=chatter")
     failed = [row["case"] for row in service.get(f"/studies/{study_id}/cases")["cases"] if row["ending"] == "chatter"]
     assert (sorted(cases(text)), list(chips(text))) == (failed, ["chatter"])
+    assert f"{30 - len(failed)} by chatter alone" in text
     none = read(service, f"/studies/{study_id}/rows?ending=diverged")
     assert "diverged leaves none of 30." in none
 
