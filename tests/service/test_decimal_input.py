@@ -21,8 +21,8 @@ def test_ranges_of_explore_and_values_of_curves(service: Service, spec: dict[str
     service.fill(study_id)
     for text in ("250,5 Н·мм", "0,2505", "0.2505 N*m"):
         assert service.get(f"/studies/{study_id}/explore", where=f"shaft.load <= {text}")["selected"] == 2
-    page = service.http.get(f"/studies/{study_id}/explore?max:shaft.load=0,2505").text
-    assert "<strong>2</strong> of 3 finished cases" in page
+    page = service.http.get(f"/studies/{study_id}/rows?max:shaft.load=0,2505").text
+    assert '<b role="status">2 of 3 cases</b>' in page
     assert value_of("shaft.load", "250,0 Н*мм", "N*m") == 0.25
     with pytest.raises(SelectionError) as caught:
         value_of("shaft.load", "1,234", "N*m")
