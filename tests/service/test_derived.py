@@ -48,8 +48,8 @@ def test_a_derived_value_is_shown_as_such(filled: tuple[Service, str]) -> None:
     assert re.search(r'aria-sort="ascending"><a [^>]*>Inertia, pendulum 0</a>', rows)
     # The first two cases have the larger mass, and therefore the larger inertia.
     assert re.findall(r'<tr data-case="(\d+)"', rows) == ["2", "3", "0", "1"]
-    report = service.http.get(f"/api/v1{own}/report", params={"format": "html", "appendix": "all"}).text
-    assert f'<th scope="row">Inertia, pendulum 0</th><td class="number">{STORED}</td>' in report
+    report = service.http.get(f"/api/v1{own}/report", params={"names": "codes", "appendix": "inputs"}).text
+    assert f'<th scope="row">{INERTIA}</th><td class="number">{STORED}</td>' in report
     assert "<td>derived</td>" in report
     assert service.http.get(f"/api/v1{own}/report", params={"format": "pdf"}).status_code == 200
     assert service.http.get(f"/new?clone={study_id}").text.count(f'value="= {FORMULA}"') == 1

@@ -90,7 +90,7 @@ def test_the_designs_have_their_quantiles_and_yields(ended: tuple[Service, str])
         assert design["feasible"] == bool(np.sort(speeds)[1] >= 6.0 and (speeds >= 6.0).mean() >= 0.75)
     table = service.http.get(f"/api/v1/studies/{study_id}/front", params={"format": "csv"})
     assert "efficiency (25 % quantile)" in table.text
-    for page in ("", "/front", "/cases", "/curves"):
+    for page in ("", "/rows", "/cases/0", "/document"):
         assert service.http.get(f"/studies/{study_id}{page}").status_code == 200
     assert service.http.get(f"/studies/{study_id}/figures/front").status_code == 200
 

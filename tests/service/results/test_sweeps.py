@@ -129,9 +129,9 @@ def test_pictures_pages_and_files_of_a_sweep(service: Service, study_id: str) ->
     )
     assert picture.status_code == 200
     assert '<td class="num">up</td><td class="num">down</td>' in service.http.get(f"/studies/{study_id}").text
-    report = service.http.get(f"{API}/studies/{study_id}/report?appendix=inputs").text
+    report = service.http.get(f"{API}/studies/{study_id}/report?appendix=axes").text
     assert '<td class="number">up</td><td class="number">down</td>' in report
-    for page in ("", "/cases", "/cases/0", "?x=excitation.frequency&y=shaft.speed.mean&at=sweep%3Ddown"):
+    for page in ("", "/rows", "/cases/0", "?x=excitation.frequency&y=shaft.speed.mean&at=sweep%3Ddown"):
         found = service.http.get(f"/studies/{study_id}{page}")
         assert found.status_code == 200, page
     sheet = service.http.get(f"/studies/{study_id}", params=QUERY)
