@@ -88,7 +88,8 @@ class QuantityError(ValueError):
     def __init__(self, code: Code, message: str) -> None:
         super().__init__(message)
         self.code: Code = code
-        self.message = message
+        # Within another sentence it is translated too.
+        self.message = message if isinstance(message, Sentence) else Sentence(message)
 
 
 class AmbiguousCommaError(QuantityError):

@@ -17,7 +17,7 @@ from sprag.service.json_text import numbers
 from sprag.service.languages import N_, _
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.directions import case_values
-from sprag.service.reading.reader import Phrase, plural
+from sprag.service.reading.reader import Phrase, joined, plural
 from sprag.service.reading.units import QuantityError, typed_value
 from sprag.service.results.selection import axis_name, ends_of_range
 from sprag.service.views.case_questions import BRANCH, BranchQuestion
@@ -302,7 +302,8 @@ class BranchView(CaseView[BranchQuestion, tuple[Along, str], CaseBranch]):
         """How far the branch goes, and what is special on it; or why there is none."""
         made = answer.result
         if made.note:
-            return Shown((Phrase("This case has no branch: {why}", why=Phrase(made.note)),))
+            why = joined(": ", map(Phrase, made.note.split(": ", 1)))
+            return Shown((Phrase("This case has no branch: {why}", why=why),))
         ends = {"first": Phrase(made.ends[0]), "last": Phrase(made.ends[1])}
         sentence = plural(
             "{count} orbit of order {order}; from {first} to {last}",
