@@ -94,7 +94,11 @@ class EngagementsQuestion:
     table: Annotated[
         str,
         Setting(
-            "the table of a CSV file; JSON has both", choices=("engagements", "periods"), metavar="TABLE", of_files=True
+            "the table of a CSV file; JSON has both",
+            choices=("engagements", "periods"),
+            metavar="TABLE",
+            of_files=True,
+            words=(N_("engagements"), N_("periods")),
         ),
     ] = "engagements"
 
@@ -110,6 +114,7 @@ class StrobesQuestion:
             choices=("strobes", "orbit"),
             metavar="TABLE",
             of_files=True,
+            words=(N_("strobes"), N_("orbit")),
         ),
     ] = "strobes"
 

@@ -17,6 +17,8 @@ _HALF_WIDTH: Final = ".half_width"
 HALF_WIDTH: Final = "{caption}, half width"
 #: What a numbered part is called, by the first words of its paths.
 _PARTS: Final = (("pendulums", "pendulum"), ("parts", "part"), ("drive.stages", "stage"))
+#: What designs of a search have beside their goals and limits.
+_OF_DESIGNS: Final = ("rank", "violation", "miss")
 #: Where the short form of a description ends.
 _END: Final = re.compile(r"[;,:(]| / ")
 
@@ -73,7 +75,7 @@ def caption_texts(model: str) -> list[str]:
     names = [entry.path for entry in known.parameters()] + [info.name for info in known.result_catalogue()]
     own = (name for name in names if not name.endswith(_HALF_WIDTH))
     found = [*known.presentation.captions.values(), *(_caption(model, name)[0] for name in own)]
-    axes = map(words, (DRIVE, SWEEP))  # of no machine
+    axes = map(words, (DRIVE, SWEEP, *_OF_DESIGNS))  # of no machine
     return list(dict.fromkeys([HALF_WIDTH, *(word for _, word in _PARTS), *axes, *found]))
 
 

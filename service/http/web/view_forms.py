@@ -16,6 +16,7 @@ from sprag.service.faults import Fault, FaultError
 from sprag.service.figures.pictures import PICTURES
 from sprag.service.figures.read import read_figure
 from sprag.service.http.web.figures.drawn import drawn
+from sprag.service.languages import gettext
 from sprag.service.views.setting import NamedSetting, Offered, ViewInfo, question_of, settings_of
 from sprag.service.views.shown import NOTHING, Shown
 
@@ -132,7 +133,9 @@ def files_of(address: str, asked: Asked, further: Sequence[tuple[str, str]] = ()
     query = [*asked.pairs, *further]
     tables = [one for one in settings_of(asked.about.question) if one.setting.choices and not one.setting.label]
     csv = [
-        (f"csv, {choice}", [("format", "csv"), (one.alias, choice)]) for one in tables for choice in one.setting.choices
+        (f"csv, {gettext(word)}", [("format", "csv"), (one.alias, choice)])
+        for one in tables
+        for choice, word in zip(one.setting.choices, one.setting.words or one.setting.choices, strict=True)
     ] or [("csv", [("format", "csv")])]
     others = [(form, [("format", form)]) for form in ("json", *(PICTURES if asked.about.pictures else ()))]
     return [(name, f"{address}?{urlencode([*query, *own])}") for name, own in (*csv, *others)]

@@ -63,7 +63,10 @@ PAGES: Final[dict[str, list[str]]] = {
     "/nights/new": ["/nights/new"],
     "/nights/{schedule_id}": ["/nights/{SCHEDULE}"],
     "/compare": ["/compare?study={STUDY}&study={OTHER}"],
-    "/studies/{study_id}": ["/studies/{STUDY}", "/studies/{SHAFT}", "/studies/{RUNNING}", "/studies/none"],
+    "/studies/{study_id}": [
+        *(f"/studies/{{STUDY}}{chosen}" for chosen in ("", "?y=nothing", "?z=shaft.speed.mean")),
+        *(f"/studies/{{{name}}}" for name in ("SHAFT", "RUNNING", "GOAL", "DRIVES", "CALIBRATION")), "/studies/none",
+    ],
     "/studies/{study_id}/document": [
         "/studies/{STUDY}/document?appendix=inputs&text=A", "/studies/{GOAL}/document", "/studies/{DRIVES}/document",
     ],
@@ -79,8 +82,6 @@ PAGES: Final[dict[str, list[str]]] = {
         "/studies/{STUDY}/matters", "/studies/{STUDY}/matters?ask=measurement", "/studies/{DRIVES}/matters",
         "/studies/{CALIBRATION}/matters", "/studies/{SHAFT}/matters", "/studies/{GOAL}/matters",
     ],
-    "/studies/{study_id}/curves": ["/studies/{STUDY}/curves", "/studies/{STUDY}/curves?y=nothing"],
-    "/studies/{study_id}/map": ["/studies/{STUDY}/map"],
     "/studies/{study_id}/cases/{case}": [
         "/studies/{STUDY}/cases/0", "/studies/{SHAFT}/cases/0", "/studies/{SHAFT}/cases/0?show=transient",
         *(f"/studies/{{STUDY}}/cases/0?show={part}" for part in ("engagements", "strobes", "section", "branch")),

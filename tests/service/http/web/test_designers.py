@@ -54,8 +54,9 @@ def test_from_an_empty_form_to_a_curve_and_a_file(visitor: Visitor, office: Offi
     spec = office.get(f"/studies/{study_id}")["spec"]
     assert spec["base"]["excitation"]["frequency"] == "1500 rpm"
     assert spec["base"]["pendulums"][0]["inertia"] == 0.001
+    page.locator("#files > summary").click()
     with page.expect_download() as waiting:
-        page.get_by_role("link", name="csv", exact=True).click()
+        page.locator("#files p", has_text="All rows").get_by_role("link", name="csv", exact=True).click()
     file = tmp_path / "rows.csv"
     waiting.value.save_as(file)
     rows = list(csv.DictReader(file.read_text().splitlines()))
@@ -138,13 +139,13 @@ def test_everything_works_without_javascript(visitor: Visitor, example: str) -> 
     study_id = page.url.rsplit("/", 1)[-1]
     # The page loads itself again until the study has ended, which would interrupt another navigation.
     expect(page.locator("#progress .state")).to_have_text("finished")
-    addresses = (f"/studies/{study_id}/cases/1", f"/compare?study={study_id}&study={example}")  # fmt: skip
-    for address in addresses:
-        page.goto(address)  # until its pictures are there
-        picture = page.locator("figure img").first
-        expect(picture).to_be_visible()
-        found = page.request.get(picture.evaluate("image => image.src"))
-        assert found.headers["content-type"] == "image/svg+xml", address
+    for address in (f"/studies/{study_id}", f"/studies/{study_id}/cases/1"):
+        page.goto(address)
+        expect(page.locator("figure svg.figure:visible").first).to_be_visible()
+    page.goto(f"/compare?study={study_id}&study={example}")
+    picture = page.locator("figure img").first
+    expect(picture).to_be_visible()
+    assert page.request.get(picture.evaluate("image => image.src")).headers["content-type"] == "image/svg+xml"
     page.goto(f"/studies/{study_id}/rows?sort=-shaft.load&show=shaft.load")
     assert [cell.inner_text() for cell in page.locator("tbody td:nth-child(2)").all()] == ["0.2", "0.1", "0"]
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 #: Bytes of a first visit of curves, and of all scripts, compressed.
 MOST_LOADED = 450_000
 MOST_SCRIPTS = 80_000
-FIGURE = ".plot svg.figure:visible"
+FIGURE = "#chart svg.figure:visible"
 #: How far the parts of a page have moved.
 SHIFTS = """window.moved = 0; new PerformanceObserver((list) => {
   for (const one of list.getEntries()) window.moved += one.value;
@@ -26,15 +26,15 @@ SHIFTS = """window.moved = 0; new PerformanceObserver((list) => {
 
 def test_arrow_keys_go_from_point_to_point_and_enter_opens_a_case(visitor: Visitor, example: str) -> None:
     page = visitor.page
-    page.goto(f"/studies/{example}/curves")
+    page.goto(f"/studies/{example}")
     drawn = page.locator(FIGURE).first
     expect(drawn).to_have_attribute("tabindex", "0")
     drawn.focus()
     page.keyboard.press("ArrowRight")
-    first = page.locator(".tip").inner_text()
+    first = page.locator("output.tip").inner_text()
     assert re.search(r"case \d+$", first)
     page.keyboard.press("ArrowRight")
-    second = page.locator(".tip").inner_text()
+    second = page.locator("output.tip").inner_text()
     assert second != first
     page.keyboard.press("Enter")
     page.wait_for_url(f"**/cases/{second.rpartition(' ')[2]}")
@@ -42,11 +42,11 @@ def test_arrow_keys_go_from_point_to_point_and_enter_opens_a_case(visitor: Visit
 
 def test_the_pointer_is_told_the_nearest_point(visitor: Visitor, example: str) -> None:
     page = visitor.page
-    page.goto(f"/studies/{example}/curves")
+    page.goto(f"/studies/{example}")
     point = page.locator(f"{FIGURE} a[data-case]").nth(1)
     number = point.get_attribute("data-case")
     point.hover(force=True)
-    expect(page.locator(".tip")).to_contain_text(f"case {number}")
+    expect(page.locator("output.tip")).to_contain_text(f"case {number}")
     point.click(force=True)
     page.wait_for_url(f"**/cases/{number}")
 
@@ -55,14 +55,14 @@ def test_a_first_visit_of_curves_loads_little_and_nothing_moves(visitor: Visitor
     page, loaded = visitor.page, list[int]()
     page.on("response", lambda answer: loaded.append(len(answer.body()) if answer.ok else 0))
     page.add_init_script(SHIFTS)
-    page.goto(f"/studies/{example}/curves", wait_until="networkidle")
+    page.goto(f"/studies/{example}", wait_until="networkidle")
     expect(page.locator(FIGURE)).to_have_count(1)
     assert sum(loaded) <= MOST_LOADED
     assert page.evaluate("window.moved") < 0.05
 
 
 def test_without_scripts_points_are_links(office: Office, example: str) -> None:
-    text = office.http.get(f"/studies/{example}/curves").text
+    text = office.http.get(f"/studies/{example}").text
     assert f'href="/studies/{example}/cases/0" tabindex="-1" data-case="0"' in text
 
 

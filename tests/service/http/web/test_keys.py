@@ -59,7 +59,7 @@ def test_under_a_layout_without_latin_letters_keys_mean_their_places(visitor: Vi
     page.wait_for_url("**/matters*")
     press(".", "Slash")
     expect(page.get_by_role("searchbox", name="Find a study")).to_be_focused()
-    page.locator(".crumbs a").focus()
+    page.locator(".crumbs a").first.focus()
     press("п", "KeyG")
     press("т", "KeyN")
     page.wait_for_url("**/new*")
@@ -85,5 +85,5 @@ def test_shortcuts_are_switched_off_and_on(visitor: Visitor) -> None:
 def test_without_scripts_there_is_no_button_for_them(visitor: Visitor) -> None:
     page = visitor.page
     page.goto("/compare")
-    expect(page.get_by_role("link", name="Units and names")).to_be_visible()
+    expect(page.get_by_role("link", name="Compare", exact=True)).to_be_visible()
     expect(page.get_by_role("button", name="Keyboard shortcuts")).to_be_hidden()

@@ -1,0 +1,33 @@
+"""Why transients end is told in the reader's language, with each number in its units."""
+
+from __future__ import annotations
+
+import pytest
+
+from sprag.engine.machine_shaft.transient_causes import Ends, cause_of
+from sprag.service.languages import language
+from sprag.service.reading.reader import Reading
+from sprag.service.results.transient_causes import cause_phrase
+
+ENDS = Ends(
+    angle=1.25, drive=2.0, largest_drive=3.0, resistance=-2.5, mean_resistance=-1.5, turns_back=True, within=0.05,
+    cycle=True, no_cycle="",
+)  # fmt: skip
+RESULTS = {"duration": 1.8725, "turns": 2.4142, "omega.end": 12.345}
+
+
+@pytest.mark.parametrize(
+    ("kind", "outcome"),
+    [
+        *(("run-up", outcome) for outcome in ("too_stiff", "reached", "not_reached", "not_started", "stalled")),
+        *(("coasting", outcome) for outcome in ("not_reached", "stopped")),
+        ("load step", "reached"),
+    ],
+)
+def test_each_cause_is_told_in_ukrainian(kind: str, outcome: str) -> None:
+    english = cause_of(kind, outcome, RESULTS, ENDS)
+    with language("uk"):
+        told = Reading("machine-shaft").say(cause_phrase(english))
+    assert told != english
+    assert not any(word in told for word in ("shaft", "torque", "The "))
+    assert ("1,872" in told) == ("1.872" in english)
