@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +11,8 @@ import pytest
 
 from sprag.service.faults import SelectionError
 from sprag.service.figures.explore import explore_figure
-from sprag.service.http.web.figures.linked import GRID, HEIGHT, TOP, linked
-from sprag.service.results.explore import ExploreQuery, explore, explored_json, histogram, plan_of
+from sprag.service.http.web.rows.lines import HEIGHT, TOP, lines_of
+from sprag.service.results.explore import ExploreQuery, explore, histogram, plan_of
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage.rows.columns import RowColumns
 from sprag.worker import models
@@ -174,82 +173,28 @@ def test_a_study_without_rows_has_no_cases(study: Study) -> None:
     assert explore_figure(shown).note
 
 
-def test_linked_plots_have_every_case_or_say_how_many_are_left_out(study: Study, rows: RowColumns) -> None:
-    names = ("shaft.load", "excitation.frequency", "efficiency")
-    explored = found(study, rows, "shaft.load <= 0.5", sort="-efficiency", limit=5, show=names)
-    plots = linked(explored, explored_json("st", explored)["quantities"], ("shaft.load", "efficiency"))
-    assert plots is not None
-    drawn = {kind: [case for case, _ in lines] for kind, lines in plots.parallel.lines.items()}
-    assert drawn["first"] == first(explored)[::-1]
-    assert sorted(drawn["first"] + drawn["inside"]) == rows.cases[explored.selected].tolist()
-    assert sorted(drawn["outside"]) == rows.cases[~explored.selected].tolist()
-    assert plots.parallel.left_out == 0
-    load = plots.parallel.axes[0]
-    assert (load.name, load.low, load.high) == ("shaft.load", 0.0, 1.0)
-    assert load.range == (TOP + HEIGHT, TOP + HEIGHT / 2)
-    # A case without an efficiency has a line that ends before that axis, at its ending.
-    gap = int(rows.cases[np.flatnonzero(np.isnan(rows.values["efficiency"]) & ~explored.selected)[0]])
-    assert dict(plots.parallel.lines["outside"])[gap].count("L") == 2
-    # The squares that a pair has are those of numpy's histogram.
-    cell = plots.cells[1][0]
-    assert (cell.x, cell.y) == ("shaft.load", "efficiency")
-    efficiency, load_values = rows.values["efficiency"], study.columns(rows.cases)["shaft.load"]
-    known = np.isfinite(efficiency) & ~explored.selected
-    ends = [(0.0, 1.0), (np.nanmin(efficiency), np.nanmax(efficiency))]
-    counts, _, _ = np.histogram2d(load_values[known], efficiency[known], bins=GRID, range=ends)
-    assert sum(map(squares, cell.squares["outside"])) == np.count_nonzero(counts)
-    assert cell.box == (0.0, 0.0, GRID / 2, GRID)
-
-
-def test_endings_and_regimes_are_axes_with_names_between_inputs_and_results(study: Study, rows: RowColumns) -> None:
+def test_lines_have_every_row_or_say_how_many_are_left_out(study: Study, rows: RowColumns) -> None:
     names = ("shaft.load", "efficiency")
-    explored = found(study, rows, ending="chatter", limit=5, show=names)
-    plots = linked(explored, explored_json("st", explored)["quantities"], names)
-    assert plots is not None
-    axes = plots.parallel.axes
-    assert [axis.name for axis in axes] == ["shaft.load", "ending", "regime", "efficiency"]
-    info = models.regime_info(models.study_results(study))
-    assert info is not None
-    assert axes[1].words == (("ok", TOP + HEIGHT * 0.75), ("chatter", TOP + HEIGHT * 0.25))
-    assert [word for word, _ in axes[2].words] == list(info.categories[:2])
-    # The chosen ending is marked, and each line goes through the name of its own.
-    middle = dict(axes[1].words)["chatter"]
-    assert axes[1].range == (middle + HEIGHT / 4, middle - HEIGHT / 4)
-    assert axes[2].range is None
-    for kind, ending in (("first", "chatter"), ("inside", "chatter"), ("outside", "ok")):
-        lines = plots.parallel.lines[kind]
-        assert lines
-        assert all(f"L{axes[1].x} {round(dict(axes[1].words)[ending])}" in line for _, line in lines)
-    # One name alone tells nothing.
-    same = replace(rows, kinds=(("ok", ""),) * 3)
-    alone = found(study, same, show=names)
-    plain = linked(alone, explored_json("st", alone)["quantities"], names)
-    assert plain is not None
-    assert "ending" not in [axis.name for axis in plain.parallel.axes]
-
-
-def squares(path: str) -> int:
-    """The number of squares that the path covers."""
-    return sum(int(run) for run in re.findall(r"h(\d+)", path))
-
-
-def test_of_many_cases_some_evenly_have_lines_and_all_are_in_the_squares(study: Study) -> None:
+    explored = found(study, rows, "shaft.load <= 0.5", sort="-efficiency", limit=5, show=names)
+    shades = np.ones(rows.cases.size, dtype=np.int64)
+    plot = lines_of(explored, (), (), shades, outside=True)
+    assert plot is not None
+    drawn = [case for case, _, _ in plot.lines]
+    assert sorted(drawn) == rows.cases.tolist()
+    assert {case for case, shade, _ in plot.lines if shade} == set(rows.cases[explored.selected].tolist())
+    assert (drawn[-1], plot.left_out) == (first(explored)[0], 0)
+    load = next(axis for axis in plot.axes if axis.name == "shaft.load")
+    assert (load.ends[0], load.ends[2], load.range) == (0.0, 1.0, (TOP + HEIGHT, TOP + HEIGHT / 2))
+    assert lines_of(found(study, rows, show=names[:1]), (), (), shades, outside=True) is None
+    # Of many rows some evenly have lines, the first ones of the table among them.
     wide = replace(study, axes=(Axis(("shaft.load",), tuple(np.linspace(0.0, 1.0, 5_000).tolist())),))
     cases = np.arange(5_000)
-    many = RowColumns(cases, (("ok", ""),), np.zeros(5_000, dtype=np.int32), {
-        "efficiency": cases % 7 / 7.0, "regime": np.ones(5_000),
-    })  # fmt: skip
-    explored = found(wide, many, "efficiency >= 0.5", limit=10, show=("shaft.load", "efficiency"))
-    plots = linked(explored, explored_json("st", explored)["quantities"], ("shaft.load", "efficiency"))
-    assert plots is not None
-    shown = {case for lines in plots.parallel.lines.values() for case, _ in lines}
-    assert plots.parallel.left_out == 5_000 - len(shown) > 3_000
-    assert max(shown) > 4_900
+    values = {"efficiency": cases % 7 / 7.0, "regime": np.ones(5_000)}
+    many = RowColumns(cases, (("ok", ""),), np.zeros(5_000, dtype=np.int32), values)
+    explored = found(wide, many, limit=10, show=names)
+    plot = lines_of(explored, (), (), np.ones(5_000, dtype=np.int64), outside=False)
+    assert plot is not None
+    shown = {case for case, _, _ in plot.lines}
+    assert plot.left_out == 5_000 - len(shown) > 3_000
     assert {*first(explored)} <= shown
-    ((cell,),) = plots.cells
-    assert sum(map(squares, cell.squares["inside"])) + sum(map(squares, cell.squares["outside"])) == 7 * GRID
-
-
-def test_without_two_quantities_with_numbers_there_are_no_linked_plots(study: Study, rows: RowColumns) -> None:
-    explored = found(study, rows, show=("efficiency",))
-    assert linked(explored, explored_json("st", explored)["quantities"], ("efficiency", "efficiency")) is None
+    assert max(shown) > 4_900
