@@ -221,8 +221,8 @@ def test_the_page_shows_ribbon_yield_and_the_worst_drives(service: Service) -> N
     assert '<img src="data:image/svg+xml;base64,' in report.partition("<h2>Drives</h2>")[2]
     both = service.get(f"{own}/yield", condition="speed >= 90 % of nominal")["lines"]
     for line in both:
-        place = f"The grade parameter = {line['by']['grade']:g} m: "
-        assert f"<p>{place}" in text
+        place = f"The grade parameter = {1000 * line['by']['grade']:g} mm: "
+        assert f">{place}" in text
         assert f"{place}{100 * line['all']['value']:.1f} % of 128 drives" in report
     assert service.http.get(f"{API}{own}/report", params={"format": "pdf"}).content.startswith(b"%PDF")
     plain = service.submit({key: value for key, value in SPEC.items() if key not in ("tolerances", "drives", "seed")})
