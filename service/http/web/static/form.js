@@ -115,7 +115,7 @@ const reshape = async (extra) => {
 // After a button: the first new field, the same button, or the one beside it where it has nothing left to do. After a choice: the choice.
 const focusAfter = (asked, known, chosen, type) => {
   const button = (value) => form.querySelector(`button[value="${CSS.escape(value)}"]:enabled`);
-  const first = [...form.elements].find((element) => element.id && !known.has(element.id));
+  const first = [...form.elements].find((element) => element.id && !known.has(element.id) && !element.matches("fieldset"));
   const same = asked ? [asked, asked.replace(/^drop-(\S+).*/, "add-$1"), "check"].map(button).find(Boolean)
     : chosen ? form.querySelector(`[name="${CSS.escape(chosen)}"]${type === "radio" ? ":checked" : ""}`) : null;
   (asked ? first || same : same)?.focus();

@@ -1,4 +1,5 @@
-// The working point of a sheet: while it is moved, the line follows and the sentence tells the case, or both neighbours.
+// The working point of a sheet: while it is moved, the line follows and the sentence tells the case, or both neighbours;
+// links to drawers open them.
 "use strict";
 
 (() => {
@@ -29,4 +30,17 @@
     document.getElementById("say").textContent = told.filter(Boolean).join(" ");
     field.setAttribute("aria-valuetext", printed(value));
   });
+
+  // A link to a drawer opens it, and closes the menu that it stands in; so does an address that has it.
+  const open = (id) => {
+    const part = id && document.getElementById(id);
+    if (part?.matches("details")) part.open = true;
+  };
+  document.addEventListener("click", (event) => {
+    const link = event.target.closest?.('a[href^="#"]');
+    if (!link) return;
+    open(link.hash.slice(1));
+    link.closest("details.menu")?.removeAttribute("open");
+  });
+  open(location.hash.slice(1));
 })();

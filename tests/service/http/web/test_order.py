@@ -15,7 +15,8 @@ def test_studies_are_named_found_deleted_and_restored(visitor: Visitor, office: 
     page = visitor.page
     first, second = office.submit(name="order: gamma"), office.submit(name="order: beta")
     page.goto(f"/studies/{first}")
-    page.get_by_text("Name, notes and tags").click()
+    page.locator("details.menu > summary").click()
+    page.get_by_role("link", name="Name, notes and tags").click()
     page.get_by_label("Name", exact=True).fill("order: alpha")
     page.get_by_label("Notes").fill("softer spring")
     page.get_by_label("Tags, between commas").fill("Bank 7, night")
