@@ -33,7 +33,7 @@
 
   // A link to a drawer opens it, and closes the menu that it stands in; so does an address that has it.
   const open = (id) => {
-    const part = id && document.getElementById(id);
+    const part = document.getElementById(id);
     if (part?.matches("details")) part.open = true;
   };
   document.addEventListener("click", (event) => {
