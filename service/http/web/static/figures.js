@@ -1,8 +1,8 @@
-// Figures, which the server draws: those that come after their page, values at the pointer and by arrow keys, ranges that are dragged.
+// Figures, which the server draws: those that come after their page, values at the pointer and by arrow keys.
 "use strict";
 
-// What a panel shows, from its element: its points with their cases, its curves, and numbers at its pixels.
-const REACH = 30, LEAST = 4; // px from the pointer to a point; a shorter drag is a click
+// What a panel shows, from its element: its points with their cases, its curves, and how numbers at its pixels are written.
+const REACH = 30; // px from the pointer to a point
 const panels = new WeakMap();
 const numbersIn = (text) => (text ?? "").split(" ").filter(Boolean).map(Number);
 const starts = (path) => [...path.matchAll(/[ML](-?[\d.]+) (-?[\d.]+)/g)].map(([, x, y]) => [Number(x), Number(y)]);
@@ -14,11 +14,6 @@ sprag.panel = (element) => {
   const value = (axis, at) => {
     const [low, high, first, last] = ends[axis], share = (at - first) / (last - first);
     return log.includes(axis) ? low * (high / low) ** share : low + (high - low) * share;
-  };
-  const pixel = (axis, number) => {
-    const [low, high, first, last] = ends[axis];
-    const share = log.includes(axis) ? Math.log(number / low) / Math.log(high / low) : (number - low) / (high - low);
-    return first + (last - first) * share;
   };
   const written = (axis, at) => {
     const [low, high] = ends[axis], digits = Math.min(Math.max(3 - Math.ceil(Math.log10(Math.abs(high - low) || 1)), 0), 12);
@@ -39,7 +34,7 @@ sprag.panel = (element) => {
     }));
   }
   const curves = [...element.querySelectorAll("path[data-line]:not([data-cases])")].map((path) => ({ name: path.dataset.line, at: starts(path.getAttribute("d")) }));
-  const found = { points, curves, value, pixel, written };
+  const found = { points, curves, written };
   panels.set(element, found);
   return found;
 };
@@ -68,39 +63,6 @@ sprag.drawAll = (root) => Promise.all([...root.querySelectorAll("[data-figure]")
   element.dataset.drawn ||= "1";
   return element.dispatchEvent(new Event("sprag:drawn", { bubbles: true }));
 }));
-
-// A line across all panels at a value of x; without a value there is none.
-sprag.mark = (element, x = null) => {
-  for (const panel of element.querySelectorAll(".panel")) {
-    let line = panel.querySelector(".at");
-    if (x === null) { line?.remove(); continue; }
-    if (!line) {
-      line = document.createElementNS("http://www.w3.org/2000/svg", "path");
-      line.setAttribute("class", "at");
-      panel.append(line);
-    }
-    line.setAttribute("d", `M${sprag.panel(panel).pixel("x", x)} 0V${panel.querySelector(".area").getAttribute("height")}`);
-  }
-};
-
-// Only the points of these cases are in full colour; null for all.
-sprag.only = (element, cases) => {
-  for (const panel of element.querySelectorAll(".panel")) {
-    for (const link of panel.querySelectorAll("a[data-case]")) link.classList.toggle("out", cases !== null && !cases.has(Number(link.dataset.case)));
-    for (const path of panel.querySelectorAll("path[data-cases]")) {
-      path.whole ||= path.getAttribute("d").split(/(?=M)/);
-      const own = path.dataset.cases.split(" "), inside = (_, index) => cases === null || cases.has(Number(own[index]));
-      path.setAttribute("d", path.whole.filter(inside).join(""));
-      path.pale?.remove();
-      if (cases === null) continue;
-      path.pale = path.cloneNode();
-      delete path.pale.dataset.cases;
-      path.pale.setAttribute("class", "out");
-      path.pale.setAttribute("d", path.whole.filter((part, index) => !inside(part, index)).join(""));
-      path.before(path.pale);
-    }
-  }
-};
 
 (() => {
   // The value that stands beside the pointer, or at the point that arrow keys have reached.
@@ -136,7 +98,7 @@ sprag.only = (element, cases) => {
 
   document.addEventListener("pointermove", (event) => {
     const panel = event.target.closest?.("svg.figure .panel");
-    if (!panel || drag?.moved) { if (!tip.hidden && !tip.contains(event.target)) hide(); return; }
+    if (!panel) { if (!tip.hidden && !tip.contains(event.target)) hide(); return; }
     const at = place(panel, event), { points } = sprag.panel(panel), { far, point } = nearest(points, at);
     if (point) { if (far <= REACH) tell(panel, point.at, point.text); else hide(); return; }
     const text = along(panel, at);
@@ -144,7 +106,7 @@ sprag.only = (element, cases) => {
   });
   document.addEventListener("click", (event) => {
     const panel = event.target.closest?.("svg.figure .panel");
-    if (!panel || drag?.moved || event.target.closest("a")) return;
+    if (!panel || event.target.closest("a")) return;
     const { far, point } = nearest(sprag.panel(panel).points, place(panel, event));
     if (point && far <= 12) location.assign(point.href);
   });
@@ -174,44 +136,6 @@ sprag.only = (element, cases) => {
     reached = told;
   });
   document.addEventListener("focusout", (event) => { if (event.target.closest?.("svg.figure")) hide(); });
-
-  // A range that is dragged over a panel of a figure with data-brush: "x", or "xy" for both quantities.
-  let drag = null;
-  const ranges = (from, to, { value }) => ({ x: [value("x", from[0]), value("x", to[0])].sort((a, b) => a - b), y: [value("y", from[1]), value("y", to[1])].sort((a, b) => a - b) });
-  document.addEventListener("pointerdown", (event) => {
-    const panel = event.target.closest?.("[data-brush] .panel");
-    drag = panel && event.button === 0 ? { panel, from: place(panel, event), whole: panel.closest("[data-brush]"), moved: false } : null;
-  });
-  document.addEventListener("pointermove", (event) => {
-    if (!drag) return;
-    const to = place(drag.panel, event), both = drag.whole.dataset.brush === "xy", box = drag.panel.querySelector(".area");
-    drag.moved ||= Math.hypot(to[0] - drag.from[0], to[1] - drag.from[1]) >= LEAST;
-    if (!drag.moved) return;
-    hide();
-    const inside = (value, most) => Math.min(Math.max(value, 0), most), width = Number(box.getAttribute("width")), height = Number(box.getAttribute("height"));
-    drag.to = [inside(to[0], width), both ? inside(to[1], height) : height];
-    const [left, top] = [Math.min(drag.from[0], drag.to[0]), both ? Math.min(drag.from[1], drag.to[1]) : 0];
-    if (!drag.rect) {
-      drag.rect = document.createElementNS("http://www.w3.org/2000/svg", "rect");
-      drag.rect.setAttribute("class", "range");
-      drag.panel.append(drag.rect);
-    }
-    const size = { x: left, y: top, width: Math.abs(drag.to[0] - drag.from[0]), height: both ? Math.abs(drag.to[1] - drag.from[1]) : height };
-    for (const [name, value] of Object.entries(size)) drag.rect.setAttribute(name, value);
-  });
-  document.addEventListener("pointerup", () => {
-    if (!drag?.moved) return;
-    const { panel, from, to, rect, whole } = drag;
-    rect.remove();
-    whole.dispatchEvent(new CustomEvent("sprag:brushed", { bubbles: true, detail: ranges(from, to, sprag.panel(panel)) }));
-    setTimeout(() => { drag = null; }); // the click that follows is none
-  });
-  document.addEventListener("pointercancel", () => { drag?.rect?.remove(); drag = null; });
-  document.addEventListener("dragstart", (event) => { if (event.target.closest?.("[data-brush]")) event.preventDefault(); });
-  document.addEventListener("dblclick", (event) => {
-    const whole = event.target.closest?.("[data-brush]");
-    if (whole) whole.dispatchEvent(new CustomEvent("sprag:brushed", { bubbles: true, detail: null }));
-  });
 })();
 
 document.addEventListener("DOMContentLoaded", () => sprag.drawAll(document));
