@@ -11,6 +11,10 @@ from sprag.sentences import Amount
 from sprag.service.languages import N_
 from sprag.service.reading.reader import Phrase
 
+#: The words for outcomes, of which `term` makes phrases.
+_OUTCOMES: Final = (
+    N_("reached"), N_("not reached"), N_("stopped"), N_("not started"), N_("too stiff"),
+)  # fmt: skip
 _CAUSES: Final = (
     N_(
         "The motion was followed for {time} and {turns} revolutions only: the drive reacts too fast to the speed, or "

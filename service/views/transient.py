@@ -12,7 +12,7 @@ from sprag.service.figures.transient import transient_figure
 from sprag.service.languages import N_, _
 from sprag.service.reading.limits import span
 from sprag.service.reading.numbers import in_language
-from sprag.service.reading.reader import Phrase, joined
+from sprag.service.reading.reader import Phrase, joined, term
 from sprag.service.reading.units import QuantityError, typed_value
 from sprag.service.results.transient_causes import cause_phrase
 from sprag.service.views.case_questions import TRANSIENT, TransientQuestion
@@ -215,7 +215,7 @@ class TransientView(CaseView[TransientQuestion, tuple[Course, int], Transient]):
             for name, unit, meaning in RESULTS
             if math.isfinite(made.results[name])
         ]
-        end = joined(" ", (Whole(Phrase(made.outcome)), cause_phrase(made.cause)))
+        end = joined(" ", (Whole(term(made.outcome)), cause_phrase(made.cause)))
         return Shown((end,), (ShownTable(_("Results"), (Column(Phrase("Meaning")), Column(Phrase("Value"))), rows),))
 
     def said(self, answer: CaseAnswer[tuple[Course, int], Transient]) -> Said:

@@ -48,7 +48,8 @@ def test_from_an_empty_form_to_a_curve_and_a_file(visitor: Visitor, office: Offi
     study_id = page.url.rsplit("/", 1)[-1]
     told = office.get(f"/studies/{study_id}/curves", x="shaft.load", y=["shaft.speed.mean", "torque.mean"])
     assert told["x"]["values"] == [0.0, 0.1, 0.2, 0.4]
-    expect(page.locator("#chart .wide .panel").first.locator("a[data-case]")).to_have_count(4)
+    points = "[...document.querySelectorAll('#chart .wide a[data-case]')].map((point) => point.dataset.case)"
+    page.wait_for_function(f"() => new Set({points}).size === 4")
     rpm = told["curves"][0]["y"]["shaft.speed.mean"][0] * 30.0 / math.pi
     expect(page.locator(".facts")).to_contain_text(f"{rpm:.3g}")
     spec = office.get(f"/studies/{study_id}")["spec"]

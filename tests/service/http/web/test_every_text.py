@@ -50,7 +50,7 @@ _CHOSEN = {
     *(f"mechanism.{kind}.{name}" for kind, own in MECHANISM_CHOICES.items() for name in own),
     *(f"{part}.interpolation" for part in ("drive.torque", "mechanism", "operation")),
 }
-_NAMES = {*_CHOSEN, *SETTLED_RUN, *ANY_RUN, *ENDING_SENTENCES, *_CHOICES, "duration"}
+_NAMES = {*_CHOSEN, *SETTLED_RUN, *ANY_RUN, *ENDING_SENTENCES, *_CHOICES, "duration", "window", "drive"}
 for _model in all_models():
     _NAMES |= {_model.name, *_model.flags}
     _NAMES |= {*(entry.path for entry in _model.parameters()), *(info.name for info in _model.result_catalogue())}
