@@ -46,7 +46,7 @@ _QUESTIONS: Final[dict[Asked, tuple[str, str, str]]] = {
     "measured": (
         N_("Does it match the measurement?"),
         N_("No measured points yet: paste a table"),
-        "/calibrate?study={id}",
+        "/studies/{id}/matters?ask=measurement",
     ),
 }
 
