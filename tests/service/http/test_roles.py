@@ -48,9 +48,12 @@ def test_every_route_declares_its_role_and_none_else_does(service: Service) -> N
         "GET /livez", "GET /readyz", "GET /login", "POST /login", "POST /logout", "GET /static/{name}",
         "GET /me", "POST /me",
     }  # fmt: skip
-    # Viewers change nothing: three compute an answer.
+    # Viewers change nothing: five compute an answer.
     changing = {route for route, role in ROLES.items() if role is Role.VIEWER and not route.startswith("GET ")}
-    assert changing == {"POST /api/v1/studies:preview", "POST /api/v1/clutch-fits", "POST /new/check"}
+    assert changing == {
+        "POST /api/v1/studies:preview", "POST /api/v1/clutch-fits", "POST /new/check", "POST /new/live",
+        "POST /new/along",
+    }  # fmt: skip
     assert {f"POST {path}" for path in LOOKING} == changing | {"POST /login", "POST /logout", "POST /me"}
 
 
