@@ -183,7 +183,7 @@ def test_axe_finds_nothing_on_any_page_and_each_fits_the_screen(service: Service
 
 
 def test_no_other_route_answers_with_a_page(service: Service) -> None:
-    """A new page has to be judged too."""
+    """A new page has to be judged too; a figure that a script puts into its page is none."""
     study = service.submit()
     service.fill(study)
     schedule = service.http.post("/api/v1/schedules", json={"spec": SPEC, "cron": "0 22 * * *"}).json()["id"]
@@ -196,4 +196,4 @@ def test_no_other_route_answers_with_a_page(service: Service) -> None:
         if pattern not in PAGES:
             answer = service.http.get(pattern.format(**(ids if "docs" not in pattern else {"name": "theory"})))
             assert answer.status_code in (200, 303, 308, 422), pattern
-            assert not answer.headers.get("content-type", "").startswith("text/html"), pattern
+            assert "<html" not in answer.text[:200], pattern

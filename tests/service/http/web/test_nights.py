@@ -133,7 +133,7 @@ def test_what_was_typed_outlives_the_session(house: House, tab: Page) -> None:
     secret, _ = house.store.people.create_token("design office", TokenScope.WRITE)
     tab.goto("/new")
     log_in(tab, secret)
-    load = tab.get_by_label("Load", exact=False).first
+    load = tab.get_by_role("textbox", name="Load").first
     load.fill("1")
     tab.context.clear_cookies()
     load.fill("1.25")
@@ -142,7 +142,7 @@ def test_what_was_typed_outlives_the_session(house: House, tab: Page) -> None:
     log_in(tab, secret)
     tab.get_by_role("button", name="Continue").click()
     tab.wait_for_url("**/new")
-    assert tab.get_by_label("Load", exact=False).first.input_value() == "1.25"
+    assert tab.get_by_role("textbox", name="Load").first.input_value() == "1.25"
 
 
 def test_a_token_to_look_sees_every_page_and_may_change_nothing(house: House, tab: Page) -> None:
