@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.service.http.web.fields import drawn
 from tests.service.http.web.test_accessibility import LONG, PHONE
 from tests.service.timed_spec import SPEC
 
@@ -42,7 +41,7 @@ def cut_off(page: Page, width: float) -> list[str]:
     """Texts that are not wholly within the picture and a width."""
     texts: list[str] = page.evaluate(
         """(width) => {
-          const plot = [...document.querySelectorAll(".plot svg.figure")].find((one) => one.getClientRects().length);
+          const plot = [...document.querySelectorAll("#chart svg.figure")].find((one) => one.getClientRects().length);
           const box = plot.getBoundingClientRect(), right = Math.min(box.right, box.left + width);
           return [...plot.querySelectorAll("text")].filter((text) => {
             const own = text.getBoundingClientRect();
@@ -58,7 +57,7 @@ def cut_off(page: Page, width: float) -> list[str]:
 def test_paper_has_the_whole_legend(visitor: Visitor, family: str) -> None:
     page = visitor.page
     page.goto(f"/studies/{family}")
-    drawn(page)
+    page.locator("#chart svg.figure:visible").wait_for()
     assert cut_off(page, 1280) == []
     page.emulate_media(media="print")
     page.set_viewport_size({"width": 690, "height": 1000})
@@ -70,7 +69,7 @@ def test_a_phone_has_the_whole_legend(visitor: Visitor, family: str) -> None:
     page = visitor.page
     for address in (f"/studies/{family}", f"/studies/{family}/curves?x=shaft.load&by=excitation.amplitude_x"):
         page.goto(address)
-        drawn(page)
+        page.locator("#chart svg.figure:visible").wait_for()
         assert cut_off(page, 390) == [], address
         assert page.evaluate("() => document.documentElement.scrollWidth") == 390, address
 
@@ -79,7 +78,7 @@ def test_a_phone_has_the_whole_legend(visitor: Visitor, family: str) -> None:
 OVERLAPS = """() => {
   const inner = (box, other) => Math.min(box.right, other.right) - Math.max(box.left, other.left) > 1
     && Math.min(box.bottom, other.bottom) - Math.max(box.top, other.top) > 3;
-  const texts = [...document.querySelectorAll(".plot svg.figure text")].filter((text) => text.getClientRects().length)
+  const texts = [...document.querySelectorAll("#chart svg.figure text")].filter((text) => text.getClientRects().length)
     .map((text) => [text.textContent, text.getBoundingClientRect()]);
   return texts.flatMap(([text, box], at) => texts.slice(at + 1)
     .filter(([, other]) => inner(box, other)).map(([other]) => [text, other]));
@@ -92,8 +91,8 @@ def test_texts_of_a_figure_lie_nowhere_on_each_other(visitor: Visitor, settled: 
     for width in (1280, 820, 390):
         page.set_viewport_size({"width": width, "height": 900})
         page.goto(f"/studies/{settled}")
-        drawn(page)
-        assert page.locator(".plot svg.figure:visible").count() == 1
+        page.locator("#chart svg.figure:visible").wait_for()
+        assert page.locator("#chart svg.figure:visible").count() == 1
         assert page.evaluate(OVERLAPS) == [], width
         page.emulate_media(media="print")
         assert page.evaluate(OVERLAPS) == [], width
@@ -119,7 +118,7 @@ def test_inputs_break_no_words_and_tables_tell_that_they_scroll(visitor: Visitor
     for width in (1440, 820, 390):
         page.set_viewport_size({"width": width, "height": 900})
         page.goto(f"/studies/{family}")
-        drawn(page)
+        page.locator("#chart svg.figure:visible").wait_for()
         assert page.evaluate(BROKEN) == [], width
         assert page.evaluate("() => document.documentElement.scrollWidth") == width
     region = "() => getComputedStyle(document.querySelector('.scroll'))"
@@ -174,7 +173,7 @@ def test_a_page_on_paper_has_what_is_read_and_no_controls(visitor: Visitor, offi
     page = visitor.page
     page.emulate_media(media="print")
     page.goto(f"/studies/{family}")
-    drawn(page)
+    page.locator("#chart svg.figure:visible").wait_for()
     own = page.evaluate(PAPER)
     assert (own["hidden"], own["figures"], own["facts"]) == ([], True, True)
     facts = page.locator("#particulars").inner_text()
