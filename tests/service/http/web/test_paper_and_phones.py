@@ -164,12 +164,6 @@ PAPER = """() => {
 
 def test_a_page_on_paper_has_what_is_read_and_no_controls(visitor: Visitor, office: Office) -> None:
     family = office.submit(**FAMILY)
-    query = "x=shaft.load&y=efficiency&units=si"
-    saved = office.http.post(
-        "/api/v1/views",
-        json={"page": "curves", "study": family, "name": "Efficiency", "query": query, "in_report": True},
-    )
-    assert saved.status_code == 200
     page = visitor.page
     page.emulate_media(media="print")
     page.goto(f"/studies/{family}")
@@ -179,6 +173,5 @@ def test_a_page_on_paper_has_what_is_read_and_no_controls(visitor: Visitor, offi
     facts = page.locator("#particulars").inner_text()
     for fact in (family, "Vibration drive", "Submitted", "Printed"):
         assert fact in facts
-    assert page.get_by_text("Figures of the report").is_visible()
     pdf = page.pdf(prefer_css_page_size=True)
     assert re.search(rb"/MediaBox \[0 0 59[45][.\d]* 84[12][.\d]*\]", pdf), "sheets of A4"
