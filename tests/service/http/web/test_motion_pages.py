@@ -60,10 +60,10 @@ def outside(page: Page) -> list[str]:
 def test_a_phone_has_the_whole_page(visitor: Visitor, motions: str, which: str) -> None:
     page = visitor.page
     page.goto(f"/studies/{motions}/cases/0{PAGES[which]}")
+    # Of each figure that for a narrow place is shown, and no other; that of a motion comes after its page.
+    expect(page.locator("svg.figure.narrow:visible")).to_have_count(1 if which == "motion" else 2)
     page.evaluate("() => { for (const one of document.querySelectorAll('details')) one.open = true; }")
     assert outside(page) == []
-    # Of each figure that for a narrow place is shown, and no other.
-    assert page.locator("svg.figure.narrow:visible").count() == (1 if which == "motion" else 2)
     assert page.locator("svg.figure:not(.narrow):visible").count() == 0
 
 
