@@ -5,21 +5,24 @@ from __future__ import annotations
 import json
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar, cast
 
 from sprag.service import languages
 from sprag.service.client.errors import RefusedError
 from sprag.service.client.events import StudyEvent
 from sprag.service.client.synchronous.connection import Connection
-from sprag.service.faults import FaultError, choice_of
+from sprag.service.client.wire import plain_body
+from sprag.service.faults import FaultError, choice_of, parameter_error
 from sprag.service.figures.pictures import PICTURES
 from sprag.service.formats import FORMATS, HEADERS
+from sprag.service.http.problems import PROBLEM_TYPES, problem_json
 from sprag.service.http.views import case_detail, whole_detail
 from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.json_text import to_bytes
+from sprag.service.reading.limits import span
 from sprag.service.reading.quantities import SI
 from sprag.service.reading.reader import CAPTIONS, Choice
 from sprag.service.report import REPORT_FORMATS, Office, report_file
@@ -37,23 +40,31 @@ from sprag.service.views.queries import asked
 from sprag.service.views.studies import STUDY_VIEWS
 from sprag.service.views.study_questions import CasesQuestion, ReportQuestion, SelectQuestion
 from sprag.service.views.study_view import study_file
-from sprag.worker.limits import NARROW_STEPS
+from sprag.worker.limits import (
+    MAX_NARROW_STEPS,
+    MAX_SETTLED_PERIODS,
+    MAX_STARTS,
+    MIN_NARROW_STEPS,
+    MIN_SETTLED_PERIODS,
+    NARROW_STEPS,
+)
 from sprag.worker.states import TransitionError
 
 if TYPE_CHECKING:
     from sprag.service.client.wire import Query
+    from sprag.service.faults import Kind
     from sprag.service.jobs.submission import Submission
     from sprag.service.settings import Settings
     from sprag.service.storage.store import Store
     from sprag.service.storage.studies.records import StudyRecord
     from sprag.worker.study import Study
 
+View = TypeVar("View")
+
 _STUDY: Final = re.compile(r"/studies/([^/:]+)(.*)")
 _CASE: Final = re.compile(r"/cases/(\d+)(?:/(\w+))?")
 #: Formats of rows in the order of a service.
 _ROWS: Final = tuple(dict.fromkeys(("json", *FORMATS)))
-#: Statuses of what is refused, where it is not 422 as for wrong input.
-_STATUSES: Final = {"wrong-state": 409, "method-not-allowed": 405, "storage-full": 507}
 
 
 class Here(Connection, ABC):
@@ -84,7 +95,8 @@ class Here(Connection, ABC):
         study_id, part = _parts(path)
         with _refusing():
             if method != "GET":
-                made = self._further(study_id, part, list(arguments.get("params", ())), arguments.get("json"))
+                body = plain_body(arguments.get("json"))
+                made = self._further(study_id, part, list(arguments.get("params", ())), body)
                 record = take_in(self.library.store, made)
                 self.run(record)
                 return {"id": record.id}
@@ -114,11 +126,12 @@ class Here(Connection, ABC):
             return checks.extended_study(library, study_id, to_bytes(body), "json", None, now, {})
         if verb == ":longer":
             kind = checks.kind_to_run_longer(library.store, study_id, given.get("regime"))
-            most = given.get("at_most")
-            return checks.longer_study(library, study_id, kind, None if most is None else int(most), now, {})
+            most = _whole(given, "at_most", MIN_SETTLED_PERIODS, MAX_SETTLED_PERIODS)
+            return checks.longer_study(library, study_id, kind, most, now, {})
         if verb == ":narrow":
             held = pairs([text for name, text in query if name == "at"])
-            return checks.narrowed_study(library, study_id, int(given.get("steps", NARROW_STEPS)), held, now, {})
+            steps = _whole(given, "steps", MIN_NARROW_STEPS, MAX_NARROW_STEPS) or NARROW_STEPS
+            return checks.narrowed_study(library, study_id, steps, held, now, {})
         if verb == ":select":
             question = asked(SelectQuestion, query)
             return checks.selected_study(library, study_id, selection(question, question.limit), now, {})
@@ -153,7 +166,7 @@ class Here(Connection, ABC):
                 return [to_bytes(page_json(study, page))]
             if of_case := _CASE.fullmatch(part):
                 return [self._case(study_id, study, int(of_case[1]), of_case[2], form, query)]
-            view = STUDY_VIEWS[part[1:]]
+            view = _known(STUDY_VIEWS, part[1:])
             choice_of("format", form, ("json", "csv", *PICTURES))
             chosen, title = view.choose(study, asked(view.about.question, query)), study.name or study.model
             return [study_file(library, study_id, view, chosen, choice, title, form)]
@@ -163,9 +176,9 @@ class Here(Connection, ABC):
             raise FaultError("case-not-found", f"The cases of this study are 0 .. {study.cases - 1}.")
         if name is None:
             return to_bytes(case_detail(self.library.store, study_id, study, case))
-        view = CASE_VIEWS[name]
+        view = _known(CASE_VIEWS, name)
         choice_of("format", form, ("json", "csv", *(PICTURES if view.about.pictures else ())))
-        start = next((int(text) for key, text in query if key == "start"), None)
+        start = _whole(dict(query), "start", 0, MAX_STARTS - 1)
         check_start(study, start)
         answer = see(study, case, view, view.choose(study, case, asked(view.about.question, query)), start)
         return drawn(view, answer, form) if form in PICTURES else written(view, answer, form)
@@ -178,6 +191,20 @@ def _parts(path: str) -> tuple[str, str]:
     return found[1], found[2]
 
 
+def _known(views: Mapping[str, View], name: str) -> View:
+    if name not in views:
+        raise FaultError("not-found", f"There is no view {name!r}; these are known: {', '.join(views)}.")
+    return views[name]
+
+
+def _whole(given: Mapping[str, Any], name: str, low: int, high: int) -> int | None:
+    """A whole number of a query within its limits; None where it is not given."""
+    text = str(given.get(name, ""))
+    if text and not (text.isdecimal() and low <= int(text) <= high):
+        raise parameter_error(name, "out-of-range", "must be a whole number", text, span(low, high))
+    return int(text) if text else None
+
+
 @contextmanager
 def _refusing() -> Iterator[None]:
     """Refuse as a service does, so that a script catches one error for both."""
@@ -185,7 +212,6 @@ def _refusing() -> Iterator[None]:
         yield
     except (FaultError, StoreError, TransitionError) as error:
         faults: Sequence[Any] = getattr(error, "faults", ())
-        detail = getattr(error, "detail", str(error))
-        status = 404 if error.code.endswith("not-found") else _STATUSES.get(error.code, 422)
-        problem = {"type": f"/problems/{error.code}", "title": detail, "status": status, "detail": detail}
-        raise RefusedError(status, problem | {"errors": [fault.to_json() for fault in faults]}) from error
+        kind = PROBLEM_TYPES.get(cast("Kind", error.code), PROBLEM_TYPES["wrong-state"])
+        document = problem_json(kind, getattr(error, "detail", str(error)), faults)
+        raise RefusedError(kind.status, document | {"type": f"/problems/{error.code}"}) from error

@@ -51,12 +51,6 @@ class LocalStudy(Study):
         progress = detail["progress"]
         return f"Study({detail['name'] or self.id!r}: {progress['total']:,} cases, {progress['ok']:,} ok)"
 
-    def table(self, units: str | None = None) -> pd.DataFrame:
-        """All rows with all results as a new pandas table, as of a service; `Study.table`."""
-        table = super().table(units)
-        table.attrs["warnings"] = list(self._client.library.store.studies.get(self.id).warnings)
-        return table
-
     def close(self) -> None:
         """Close the database; a temporary one is deleted."""
         self._client.close()
@@ -114,7 +108,7 @@ class _Local(Here):
     def __init__(self, database: str | None = None, processes: int | None = None, content: bytes | None = None) -> None:
         given = {"database": database, "processes": processes}
         known = {name: value for name, value in given.items() if value is not None}
-        self._settings = settings = Settings(**known)  # type: ignore[arg-type]
+        settings = Settings(**known)  # type: ignore[arg-type]
         self._processes, self._kept = processes, database is not None
         stack = ExitStack()
         url = settings.database_url if self._kept else None

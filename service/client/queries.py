@@ -44,12 +44,21 @@ def spec_of(spec: Spec | str | PathLike[str]) -> Spec:
 
 
 def _csv(table: Any) -> str:
-    """The text of a CSV file of a table of cases."""
+    """The text of a CSV file of a table of cases; ArgumentError where a cell has no value."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(table.columns)
-    writer.writerows(zip(*(plain(table[name])[0] for name in table.columns), strict=True))
+    writer.writerows(zip(*(_cells(name, table[name]) for name in table.columns), strict=True))
     return text.getvalue()
+
+
+def _cells(name: str, column: Any) -> list[Any]:
+    """The values of a column of a table of cases."""
+    values, faults = plain(column)
+    if not isinstance(values, list) or faults or None in values:
+        row = next((index for index, value in enumerate(values) if value is None), 0) if isinstance(values, list) else 0
+        raise ArgumentError(f"axes[{name!r}]", list(column)[row], "a number, or a text with a unit, in every row")
+    return values
 
 
 def preset(name: str) -> dict[str, Any]:

@@ -119,18 +119,16 @@ def run_stored(
     chunk_timeout: float,
     kept: bool,
     on_progress: Callable[[Progress], None] | None = None,
-    setting: str = "pool",
 ) -> StudyRecord:
     """Run a study of a database to its end; ``kept``: the database outlives this process.
 
     When another dispatcher is active on the database, it runs the study while this process waits. ``processes`` 0 runs
-    the cases in this process, which suits small studies; 1 or more start a pool, or use the cluster that ``setting``
-    names (`Settings.executor`). At its deadline the study ends with what is done. Raises StoreError and ExecutorError,
-    each with one sentence, and RunInterruptedError on Ctrl-C; the study is then cancelled, so that no later worker
-    continues it.
+    the cases in this process, which suits small studies; 1 or more start a pool. At its deadline the study ends with
+    what is done. Raises StoreError and ExecutorError, each with one sentence, and RunInterruptedError on Ctrl-C; the
+    study is then cancelled, so that no later worker continues it.
     """
     with _noted() as noted:
-        return _run(store, record, _settings(store, processes, chunk_timeout, setting), noted, kept, on_progress, None)
+        return _run(store, record, _settings(store, processes, chunk_timeout, "pool"), noted, kept, on_progress, None)
 
 
 def _settings(store: Store, processes: int, chunk_timeout: float, setting: str) -> WorkerSettings:

@@ -126,6 +126,31 @@ def test_so_is_that_of_a_study_of_another_kind(
         assert here == there
 
 
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda study: study.picture("never.svg", view="nonsense"),
+        lambda study: study.picture("never.svg", view="nonsense", case=0),
+        lambda study: study.narrow(steps=1.5),
+        lambda study: study.run_longer(at_most=7),
+        lambda study: study.trajectory(1, start="x"),
+        lambda study: study.extend([{"path": LOAD, "values": [object()]}]),
+    ],
+)
+def test_what_a_service_refuses_is_refused_here(pair: tuple[Study, Study], ask: Callable[[Study], Any]) -> None:
+    refusals = []
+    for study in pair:
+        with pytest.raises(RefusedError) as refused:
+            ask(study)
+        refusals.append((refused.value.status, refused.value.code))
+    assert refusals[0] == refusals[1]
+
+
+def test_values_of_numpy_are_taken_as_a_service_takes_them(pair: tuple[Study, Study]) -> None:
+    there, here = (study.extend([{"path": LOAD, "values": np.array([3.0, 4.0])}]).detail() for study in pair)
+    assert (there["spec"], there["cases"]) == (here["spec"], here["cases"])
+
+
 def test_pictures_are_those_of_a_service(pair: tuple[Study, Study], tmp_path: Path) -> None:
     there, here = (
         study.picture(tmp_path / f"{place}.svg", LOAD, SPEED, by=FREQUENCY, units="rpm", language="uk").read_bytes()
