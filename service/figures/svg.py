@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Final
-from zlib import crc32
 
 import numpy as np
 
@@ -13,11 +12,12 @@ from sprag.service.figures.figure import Line
 from sprag.service.figures.orders import motion_text
 from sprag.service.figures.painter.elements import (
     LINE,
-    SIZE,
     SMALL,
     cut,
+    dots,
     element,
     lines_of,
+    moved,
     on_paper,
     path_of,
     short,
@@ -36,6 +36,7 @@ from sprag.service.figures.painter.legends import (
 )  # fmt: skip
 from sprag.service.figures.painter.panels import Placed, panel_parts, scale_parts, x_numbers
 from sprag.service.figures.painter.patterns import pattern
+from sprag.service.figures.painter.picture import Painting, panel_group
 from sprag.service.figures.painter.scales import Scale, extent, rounded_scale, tick_text
 from sprag.service.languages import gettext
 from sprag.service.reading.wording import unit_text
@@ -122,8 +123,7 @@ def spark(figure: Figure | Line, width: int = 96, height: int = 32) -> str:
             stroke = "var(--ink)" if line is lines[0] else "var(--edge)"
             parts.append(element("path", d=path_of(*points), fill="none", stroke=stroke, stroke_width=1.5))
         else:
-            dots = "".join(f"M{short(a)} {short(b)}h0" for a, b in zip(*(one.tolist() for one in points), strict=True))
-            parts.append(element("path", d=dots, stroke="var(--ink)", stroke_width=2, stroke_linecap="round"))
+            parts.append(element("path", d=dots(*points), stroke="var(--ink)", stroke_width=2, stroke_linecap="round"))
     size = {"viewBox": f"0 0 {width} {height}", "width": width, "height": height}
     return element("svg", "".join(parts), class_="spark", **size, aria_hidden="true")
 
@@ -137,33 +137,36 @@ class _Column:
     width: float
 
 
-class _Painting:
+class _Painting(Painting):
     """One picture of a figure of a width."""
 
     def __init__(self, figure: Figure, width: float, cases: str, chosen: str) -> None:
-        self._figure, self._width, self._cases, self._chosen = figure, width, cases, chosen
-        self._parts: list[str] = []
-        self._top = 4.0
+        super().__init__(width, cases)
+        self._figure, self._chosen = figure, chosen
         alone = figure.apart or (figure.rows == 1 and not figure.motion)
         high = _ALONE if alone else _MOTION if figure.motion else _AMONG
         self._high = min(high, 0.8 * width / figure.columns)
         self._patterns: dict[str, str] = {}
-        self._definitions: list[str] = []
+        definitions = ""
         for place, (state, (colour, shape, _)) in enumerate(figure.shown_looks.items()):
             if not shape:
                 self._patterns[state] = colour
                 continue
-            self._definitions.append(pattern(f"~{place}", colour, shape))
+            definitions += pattern(f"~{place}", colour, shape)
             self._patterns[state] = f"url(#~{place})"
+        if definitions:
+            self._parts.append(element("defs", definitions))
 
     def element(self, label: str, head: Sequence[str], *, below: bool) -> str:
         """The whole picture."""
         figure = self._figure
+        label = label or ", ".join(panel.y.name for panel in figure.panels)
+        about = described(figure)
         for place, text in enumerate(head):
             self._text(text, bold=not place)
         if figure.note:
             self._text(figure.note)
-            return self._whole(label)
+            return self._whole(label, about)
         if figure.heading:
             self._text(figure.heading)
         columns = self._columns()
@@ -177,34 +180,7 @@ class _Painting:
             self._rows(rows_of(entries, self._width - 8.0, figure.title_of_marks))
         if below and figure.below:
             self._text(figure.below)
-        return self._whole(label)
-
-    def _whole(self, label: str) -> str:
-        """The element around all parts; names of patterns differ from those of other pictures of a page."""
-        inside = "".join(self._parts)
-        if self._definitions:
-            inside = f"<defs>{''.join(self._definitions)}</defs>{inside}"
-            inside = inside.replace("~", f"p{crc32(inside.encode()):x}-") if "~" in inside else inside
-        size = f"0 0 {short(self._width)} {short(self._top + 4.0)}"
-        label = label or ", ".join(panel.y.name for panel in self._figure.panels)
-        role = "group" if "<a " in inside or "data-cases" in inside else "img"
-        return element(
-            "svg", f"{element('desc', escape(described(self._figure)))}{inside}", class_="figure", viewBox=size,
-            width=self._width, height=self._top + 4.0, role=role, aria_label=label,
-            data_root=self._cases or None, font_size=SIZE, fill="var(--ink)",
-        )  # fmt: skip
-
-    def _text(self, text: str, *, bold: bool = False) -> None:
-        """A sentence over the whole width."""
-        for line in lines_of(text, self._width - 4.0, bold=bold):
-            self._top += LINE
-            self._parts.append(text_at(line, 0.0, self._top - 4.0, font_weight=600 if bold else None))
-        self._top += 3.0
-
-    def _rows(self, rows: Rows, left: float = 0.0) -> None:
-        """A legend below what there is."""
-        self._parts.append(element("g", "".join(rows.parts), transform=f"translate({short(left)} {short(self._top)})"))
-        self._top += rows.height + 4.0
+        return self._whole(label, about)
 
     # Layout ---------------------------------------------------------------------------------------------------------
 
@@ -280,12 +256,16 @@ class _Painting:
                 text_at(line, column.left, start + LINE * place, font_weight=600) for place, line in enumerate(title)
             ]
             if legend.parts:
-                shift = f"translate({short(column.left)} {short(top - legend.height - _GAP + 5.0)})"
-                self._parts.append(element("g", "".join(legend.parts), transform=shift))
-            self._parts.append(_panel_group(placed, parts, column.left + column.numbers, top))
+                self._parts.append(moved("".join(legend.parts), column.left, top - legend.height - _GAP + 5.0))
+            left = column.left + column.numbers
+            self._parts.append(
+                panel_group(
+                    parts, (left, top), (placed.width, placed.height, "none"), (placed.x, placed.y),
+                    (placed.across, placed.panel.y), figure.log,
+                )
+            )  # fmt: skip
             if _scaled(figure) and (scale := scale_parts(figure, placed.panel, self._high)):
-                shift = f"translate({short(column.left + column.numbers + column.width + 10.0)} {short(top)})"
-                self._parts.append(element("g", "".join(scale), transform=shift))
+                self._parts.append(moved("".join(scale), left + column.width + 10.0, top))
         self._top = bottom
         if last and figure.spans:
             for column, (placed, _) in zip(columns, row.placed, strict=False):
@@ -301,13 +281,10 @@ class _Painting:
         most = 0
         for column, (placed, _) in zip(columns, row.placed, strict=False):
             left = column.left + column.numbers
-            numbers = element(
-                "g", "".join(x_numbers(placed.x, 0.0)), transform=f"translate({short(left)} {short(self._top)})"
-            )
             names = lines_of(title_of(placed.across), column.width + column.numbers, SMALL)
             most = max(most, len(names))
             right = left + column.width
-            self._parts.append(numbers)
+            self._parts.append(moved("".join(x_numbers(placed.x, 0.0)), left, self._top))
             self._parts += [
                 text_at(line, right, self._top + 34.0 + LINE * place, text_anchor="end", font_size=SMALL)
                 for place, line in enumerate(names)
@@ -372,18 +349,6 @@ class _Row:
     named: list[bool]
     titles: list[tuple[list[str], Rows]]
     head: float
-
-
-def _panel_group(placed: Placed, parts: Sequence[str], left: float, top: float) -> str:
-    """A panel at its place, with the ends of its axes for scripts."""
-    x, y = placed.x, placed.y
-    ends = {"data_x": f"{x.low:.10g} {x.high:.10g} {short(x.start)} {short(x.end)}",
-            "data_y": f"{y.low:.10g} {y.high:.10g} {short(y.start)} {short(y.end)}"}  # fmt: skip
-    area = element("rect", class_="area", width=placed.width, height=placed.height, fill="none", pointer_events="all")
-    units = {"data_units": f"{unit_text(placed.across.unit)}|{unit_text(placed.panel.y.unit)}"}
-    log = {"data_log": " ".join(placed.figure.log)} if placed.figure.log else {}
-    shift = f"translate({short(left)} {short(top)})"
-    return element("g", area + "".join(parts), class_="panel", transform=shift, **ends, **units, **log)
 
 
 def _scaled(figure: Figure) -> bool:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.figures.figure import Figure, Line, Panel, Quantity, line_colours
-from sprag.service.figures.painter.elements import LINE, SIZE, SMALL, element, lines_of, short, text_at
-from sprag.service.figures.painter.legends import Entry, rows_of
+from sprag.service.figures.painter.elements import LINE, SIZE, SMALL, element, lines_of, moved, short, text_at
+from sprag.service.figures.painter.legends import Entry, area, rows_of
 from sprag.service.figures.painter.panels import x_numbers
 from sprag.service.figures.painter.scales import Scale, rounded_scale
 from sprag.service.figures.svg import WIDE, svg, title_of
@@ -57,16 +57,13 @@ def bars_svg(bars: Bars, width: int = WIDE) -> str:
     names = _NAMES * width
     scale = rounded_scale(_ends(bars), 10 * SMALL, zero=True, log=False, unit="1")
     x = Scale(scale.low, scale.high, 0.0, width - names - 24.0)
-    entries = [
-        Entry(element("rect", x=2, y=-5, width=18, height=10, fill=f"var(--series-{place})"), name)
-        for place, name in enumerate(bars.series, 1)
-    ]
+    entries = [Entry(area(f"var(--series-{place})"), name) for place, name in enumerate(bars.series, 1)]
     parts, top = [], LINE
     for line in lines_of(bars.title, width, bold=True):
         parts.append(text_at(line, 0.0, top - 3.0, font_weight=600))
         top += LINE
     legend = rows_of(entries, width)
-    parts.append(element("g", "".join(legend.parts), transform=f"translate(0 {short(top - LINE + 2.0)})"))
+    parts.append(moved("".join(legend.parts), 0.0, top - LINE + 2.0))
     first = top = top + legend.height - 8.0
     for name, values in bars.rows:
         lines = lines_of(name, names - 12.0, SMALL)
@@ -88,7 +85,7 @@ def bars_svg(bars: Bars, width: int = WIDE) -> str:
             parts += _bar(x, names, at, series, value or 0.0, error)
         top += high
     parts.append(element("path", d=f"M{short(names + x.at(0.0))} {short(first)}V{short(top)}", stroke="var(--edge)"))
-    parts.append(element("g", "".join(x_numbers(x, top)), transform=f"translate({short(names)} 0)"))
+    parts.append(moved("".join(x_numbers(x, top)), names, 0.0))
     size = {"viewBox": f"0 0 {width} {short(top + 24.0)}", "width": width, "height": top + 24.0}
     return element(
         "svg", "".join(parts), class_="figure", **size, role="img", aria_label=bars.title, font_size=SIZE,

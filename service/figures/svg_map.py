@@ -14,20 +14,21 @@ from sprag.service.figures.orders import TITLE, map_edges, motion_text, order_ma
 from sprag.service.figures.painter.bitmap import data_address
 from sprag.service.figures.painter.elements import (
     LINE,
-    SIZE,
     SMALL,
     colour_of,
     element,
     halo,
     lines_of,
     markers,
+    moved,
     path_of,
     short,
     text_at,
     text_width,
 )  # fmt: skip
-from sprag.service.figures.painter.legends import Entry, rows_of, sign_of
+from sprag.service.figures.painter.legends import Entry, area, rows_of, sign_of
 from sprag.service.figures.painter.panels import MOST_LINKS, colour_scale, x_numbers
+from sprag.service.figures.painter.picture import Painting, panel_group
 from sprag.service.figures.painter.scales import Scale, step_of, tick_text
 from sprag.service.figures.svg import WIDE, as_file, title_of
 from sprag.service.languages import gettext
@@ -80,11 +81,12 @@ def picture_map(drawn: Map, title: str, *, contours: bool = False) -> str:
     return as_file(map_svg(drawn, contours=contours, label=title, head=head, below=True))
 
 
-class _MapPainting:
+class _MapPainting(Painting):
     """One picture of a map."""
 
     def __init__(self, drawn: Map, width: float, cases: str, *, contours: bool) -> None:
-        self._drawn, self._cases, self._width = drawn, cases, width
+        super().__init__(width, cases)
+        self._drawn = drawn
         self._orders = order_map(drawn)
         self._known = drawn.known() if self._orders is None else self._orders.places
         self._levels = contours and self._orders is None and _has_levels(self._known)
@@ -96,8 +98,6 @@ class _MapPainting:
         self._left = max(text_width(tick_text(value), SMALL) for value in self._y.rising()) + 16.0
         self._plot = width - self._left - _RIGHT
         self._x = Scale(float(across[0]), float(across[-1]), 0.0, self._plot)
-        self._top = 4.0
-        self._parts: list[str] = []
 
     def element(self, label: str, head: Sequence[str], *, below: bool) -> str:
         """The whole picture."""
@@ -105,18 +105,21 @@ class _MapPainting:
         for place, text in enumerate((*head, title_of(z) if self._orders is None else shown(TITLE))):
             self._text(text, bold=place in (0, len(head)))
         self._text(f"↑ {title_of(y)}")
-        self._top += 10.0
+        self._top += 4.0
         known = self._known
         cells = self._filled(known) if self._levels else self._cells(known, self._colours(known))
-        inside = [*cells, *self._points(), *self._marks()]
-        self._group(inside)
+        self._parts.append(
+            panel_group(
+                [*cells, *self._points(), *self._marks(), *self._around()], (self._left, self._top),
+                (self._plot, self._high, "var(--grid)"), (self._x, self._y), (x, y),
+            )
+        )  # fmt: skip
         if self._orders is None and np.isfinite(known).any():
             low, high = float(np.nanmin(known)), float(np.nanmax(known))
-            shift = f"translate({short(self._left + self._plot + 14.0)} {short(self._top)})"
-            self._parts.append(element("g", "".join(colour_scale(low, high, self._high, "")), transform=shift))
+            scale = "".join(colour_scale(low, high, self._high, ""))
+            self._parts.append(moved(scale, self._left + self._plot + 14.0, self._top))
         self._top += self._high
-        shift = f"translate({short(self._left)} {short(self._top)})"
-        self._parts.append(element("g", "".join(x_numbers(self._x, 0.0)), transform=shift))
+        self._parts.append(moved("".join(x_numbers(self._x, 0.0)), self._left, self._top))
         for line in lines_of(title_of(x), self._width - _RIGHT, SMALL):
             self._top += LINE
             self._parts.append(
@@ -124,41 +127,23 @@ class _MapPainting:
             )
         self._top += LINE + 8.0
         self._legend(known, below=below)
-        return self._whole(label or f"{title_of(z)}: {title_of(x)}, {title_of(y)}", z)
+        return self._whole(label or f"{title_of(z)}: {title_of(x)}, {title_of(y)}", self._about(z))
 
-    def _whole(self, label: str, z: Quantity) -> str:
+    def _about(self, z: Quantity) -> str:
         known = self._drawn.known()
-        told = ""
-        if np.isfinite(known).any():
-            low, high = (number(float(end), 4) for end in (np.nanmin(known), np.nanmax(known)))
-            told = element("desc", escape(gettext("{name} from {low} to {high}", name=title_of(z), low=low, high=high)))
-        inside = "".join(self._parts)
-        return element(
-            "svg", told + inside, class_="figure", viewBox=f"0 0 {short(self._width)} {short(self._top + 4.0)}",
-            width=self._width, height=self._top + 4.0, role="group" if "<a " in inside else "img", aria_label=label,
-            font_size=SIZE, fill="var(--ink)",
-        )  # fmt: skip
+        if not np.isfinite(known).any():
+            return ""
+        low, high = (number(float(end), 4) for end in (np.nanmin(known), np.nanmax(known)))
+        return gettext("{name} from {low} to {high}", name=title_of(z), low=low, high=high)
 
-    def _text(self, text: str, *, bold: bool = False) -> None:
-        for line in lines_of(text, self._width - 4.0, bold=bold):
-            self._top += LINE
-            self._parts.append(text_at(line, 0.0, self._top - 4.0, font_weight=600 if bold else None))
-
-    def _group(self, inside: Sequence[str]) -> None:
-        """The cells with the numbers at their left."""
+    def _around(self) -> Iterator[str]:
+        """The edge of the cells with the numbers at their left."""
         ticks = self._y.rising()
         heights = self._y(np.array(ticks)).tolist()
         numbers = "".join(text_at(tick_text(value), -9.0, at + 4.0) for value, at in zip(ticks, heights, strict=True))
-        strokes = element("path", d="".join(f"M-5 {short(at)}h5" for at in heights), stroke="var(--edge)")
-        around = element("rect", width=self._plot, height=self._high, fill="none", stroke="var(--edge)")
-        written = element("g", numbers, class_="y", text_anchor="end", font_size=SMALL, fill="var(--soft)")
-        ends = {"data_x": f"{self._x.low:.10g} {self._x.high:.10g} 0 {short(self._plot)}",
-                "data_y": f"{self._y.low:.10g} {self._y.high:.10g} {short(self._high)} 0"}  # fmt: skip
-        area = element("rect", class_="area", width=self._plot, height=self._high, fill="var(--grid)")
-        shift = f"translate({short(self._left)} {short(self._top)})"
-        self._parts.append(
-            element("g", area + "".join(inside) + strokes + around + written, class_="panel", transform=shift, **ends)
-        )
+        yield element("path", d="".join(f"M-5 {short(at)}h5" for at in heights), stroke="var(--edge)")
+        yield element("rect", width=self._plot, height=self._high, fill="none", stroke="var(--edge)")
+        yield element("g", numbers, class_="y", text_anchor="end", font_size=SMALL, fill="var(--soft)")
 
     def _colours(self, known: Numbers) -> tuple[NDArray[np.int64], list[str]]:
         """Which colour each cell has, -1 for none, and the colours."""
@@ -257,7 +242,8 @@ class _MapPainting:
             across, up = np.meshgrid(drawn.x_values, drawn.y_values)
             x, y, few = across.reshape(-1), up.reshape(-1), across.size <= _MARKED and not self._cases
         if few:
-            known = {"data_cases": " ".join(map(str, drawn.refined.cases.tolist()))} if drawn.refined else {}
+            linked = self._cases and drawn.refined is not None
+            known = {"data_cases": " ".join(map(str, drawn.refined.cases.tolist()))} if linked else {}
             yield element("path", d=markers("circle", 1.1, self._x(x), self._y(y)), fill="#4d4d4d", **known)
 
     def _marks(self) -> Iterator[str]:
@@ -274,16 +260,13 @@ class _MapPainting:
             for marks in doubtful_marks(drawn)
         ]
         for name, (colour, _, _) in self._orders.looks.items() if self._orders is not None else ():
-            entries.append(Entry(element("rect", x=2, y=-5, width=18, height=10, fill=colour), motion_text(name)))
+            entries.append(Entry(area(colour), motion_text(name)))
         missing = int(np.isnan(known).sum())
         if missing:
             text = plural("{count} case without a result", "{count} cases without a result", missing)
-            grey = element("rect", x=2, y=-5, width=18, height=10, fill="var(--grid)")
-            entries.append(Entry(grey, shown(Phrase("not interpolated") if drawn.refined else text)))
+            entries.append(Entry(area("var(--grid)"), shown(Phrase("not interpolated") if drawn.refined else text)))
         if entries:
-            rows = rows_of(entries, self._width - 8.0)
-            self._parts.append(element("g", "".join(rows.parts), transform=f"translate(0 {short(self._top)})"))
-            self._top += rows.height + 4.0
+            self._rows(rows_of(entries, self._width - 8.0))
         if below and drawn.refined is not None:
             self._text(shown(drawn.refined.sentence))
 

@@ -97,6 +97,11 @@ def element(name: str, inside: str = "", **values: object) -> str:
     return f"<{name}{attributes(values)}>{inside}</{name}>" if inside else f"<{name}{attributes(values)}/>"
 
 
+def moved(inside: str, left: float, top: float, **values: object) -> str:
+    """A group whose parts are drawn from a point on."""
+    return element("g", inside, transform=f"translate({short(left)} {short(top)})", **values)
+
+
 def text_at(text: str, x: float, y: float, **values: object) -> str:
     """A text whose base line begins, is centred or ends at a point (``text_anchor``)."""
     return element("text", escape(text), x=x, y=y, **values)

@@ -13,7 +13,7 @@ from sprag.service.figures.painter.elements import (
     element,
     lines_of,
     marker,
-    short,
+    moved,
     text_at,
     text_width,
 )  # fmt: skip
@@ -71,10 +71,11 @@ def sign_of(shape: str, colour: str, size: float = 3.5, *, ring: bool = False) -
 
 def fill_entry(fill: Fill) -> Entry:
     """The entry of an area."""
-    return Entry(_area(colour_of(fill.colour), 0.25), fill.name)
+    return Entry(area(colour_of(fill.colour), 0.25), fill.name)
 
 
-def _area(colour: str, opacity: float | None = None) -> str:
+def area(colour: str, opacity: float | None = None) -> str:
+    """An area as the sign of an entry."""
     return element("rect", x=2, y=-5, width=18, height=10, fill=colour, fill_opacity=opacity)
 
 
@@ -83,12 +84,12 @@ def mark_entries(figure: Figure, patterns: Mapping[str, str]) -> Iterator[Entry]
     for name in figure.regimes:
         yield Entry(sign_of(MARKS[name].symbol, colour_of(MARKS[name].colour)), motion_text(name))
     if figure.banded:
-        yield Entry(_area(NEUTRAL, 0.35), shown(BANDS))
+        yield Entry(area(NEUTRAL, 0.35), shown(BANDS))
     for kind in figure.noted:
         yield Entry(sign_of(NOTE_MARKERS[kind], "var(--soft)", 4.0, ring=kind == "point"), shown(NOTES[kind]))
     for state in figure.shown_looks:
         if state not in figure.regimes or figure.motion:
-            yield Entry(_area(patterns[state]), motion_text(state))
+            yield Entry(area(patterns[state]), motion_text(state))
 
 
 def rows_of(entries: Iterable[Entry], width: float, heading: str = "") -> Rows:
@@ -105,7 +106,7 @@ def rows_of(entries: Iterable[Entry], width: float, heading: str = "") -> Rows:
             left, row = 0.0, row + 1
         middle = LINE * (row + 0.5)
         if sign:
-            parts.append(element("g", sign, transform=f"translate({short(left)} {short(middle)})"))
+            parts.append(moved(sign, left, middle))
         parts += [
             text_at(
                 line, left + behind, middle + 4.0 + LINE * place, font_size=SMALL, font_weight=600 if bold else None

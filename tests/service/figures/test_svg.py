@@ -94,6 +94,17 @@ def test_titles_are_text_never_markup() -> None:
     assert ElementTree.fromstring(picture_svg(named, "<script>")).tag.endswith("svg")
 
 
+def test_texts_stay_as_they_are_beside_patterns() -> None:
+    strip = {"Drive ~5 mm": (("held", 0.0, 0.8), ("url(#~0)", 0.8, 1.6))}
+    drawn = picture_svg(replace(figure(1.0), spans=strip), "Drive ~5 mm")
+    (name,) = set(re.findall(r'<pattern id="(p[0-9a-f]+-)', drawn))
+    assert f'fill="url(#{name}1)"' in drawn
+    assert '"url(#~' not in drawn
+    assert re.findall(r">([^<]*~[^<]*)<", drawn) == [
+        "Drive ~5 mm", "Drive ~5 mm", "Drive ~5 mm: held", "Drive ~5 mm: url(#~0)", "url(#~0)",
+    ]  # fmt: skip
+
+
 def test_axes_can_be_logarithmic_and_run_backwards() -> None:
     drawn = svg(replace(figure(1.0, 10.0), log=("y",), flipped=("x",)))
     assert [text for *_, text in texts(drawn, "y")][::3] == ["10", "100", "1000", "10\u202f000"]

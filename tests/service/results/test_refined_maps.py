@@ -88,7 +88,10 @@ def test_a_picture_tells_how_right_it_is(study: Study) -> None:
     assert found.refined is not None
     picture = paint_map(found, "", "svg")
     assert seen(picture).has(found.refined.sentence)
-    assert seen(map_svg(found, cases="/studies/st_0/cases/")).panels[0].cases == found.refined.cases.tolist()
+    page = map_svg(found, cases="/studies/st_0/cases/")
+    assert seen(page).panels[0].cases == found.refined.cases.tolist()
+    assert all(part in page for part in ('data-root="/studies/st_0/cases/"', 'role="group"', 'data-units="N·m|Hz"'))
+    assert all(part not in map_svg(found) for part in ("data-root", "data-cases", 'role="group"'))
 
 
 def test_before_the_first_rows_nothing_is_known(study: Study) -> None:
