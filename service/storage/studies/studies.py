@@ -95,8 +95,9 @@ if TYPE_CHECKING:
     from sprag.service.storage.work.dispatchers import Dispatchers
     from sprag.worker.ports import Clock
 
-#: Studies kept in memory after reading, and the total number of their axis values, 8 bytes each.
-KEPT_STUDIES = 32
+#: Studies kept in memory after reading, as many as a list has and more, and the total number of their axis values,
+#: 8 bytes each.
+KEPT_STUDIES = 64
 KEPT_VALUES = 2 * MAX_AXIS_VALUES
 _CHANGED = (STUDIES.c.owner, STUDIES.c.revision)
 _LEFT = (STUDIES.c.most_cases, STUDIES.c.cases, STUDIES.c.done)

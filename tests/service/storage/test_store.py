@@ -39,6 +39,14 @@ def test_the_studies_kept_in_memory_are_few_values(url: str, monkeypatch: pytest
         assert store.studies.study(ids[0]) == made[0]
 
 
+def test_as_many_studies_as_a_list_has_are_kept_in_memory(url: str) -> None:
+    with Store.open(url) as store:
+        ids = [store.studies.create({}, fakes.study(3, name=f"study {index}")).id for index in range(50)]
+        for study_id in ids:
+            store.studies.study(study_id)
+        assert list(store.studies._studies) == ids
+
+
 @pytest.mark.parametrize(
     ("url", "code"),
     [
