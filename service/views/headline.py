@@ -20,17 +20,16 @@ from sprag.service.results.curve_cases import select
 from sprag.service.results.headlines.along import along_headline
 from sprag.service.results.headlines.batch import asked_like, batch_headline
 from sprag.service.results.headlines.calibrated import calibrated_headline
-from sprag.service.results.headlines.headline import Gap, Headline, KeyNumber, Trace, amount, digits
+from sprag.service.results.headlines.headline import Headline, KeyNumber, Trace, amount, digits
 from sprag.service.results.headlines.search import search_headline
 from sprag.service.results.key_answers import answers_query, find_answers
 from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.sweeps import hysteresis
 from sprag.service.storage.database.session import in_one_moment
 from sprag.service.views.answers import whole_columns
+from sprag.service.views.relatives import asked_by
 from sprag.service.views.study_view import FEW
 from sprag.worker import models
-from sprag.worker.planning.calibrate.plan import CALIBRATE
-from sprag.worker.planning.goals.plan import GOAL
 from sprag.worker.states import StudyState
 
 if TYPE_CHECKING:
@@ -40,7 +39,7 @@ if TYPE_CHECKING:
     from sprag.worker.planning.refine_plan import RefinePlan
     from sprag.worker.study import Study
 
-__all__ = ["Gap", "Headline", "KeyNumber", "Trace", "headline_of", "is_small", "usual_query"]
+__all__ = ["Headline", "KeyNumber", "Trace", "headline_of", "is_small", "usual_query"]
 
 
 def is_small(study: Study) -> bool:
@@ -124,13 +123,13 @@ def _found(
     curve: str,
 ) -> Headline:
     """The headline of what has been run."""
-    kind = None if study.plan is None else study.plan["kind"]
-    if kind == GOAL:
+    kind = asked_by(study)
+    if kind == "best":
         return search_headline(library.fronts.of(study_id, exact=False), over=record.over)
-    if kind == CALIBRATE:
+    if kind == "measured":
         return calibrated_headline(library.calibrations.of(study_id))
     infos, fetch = models.study_results(study), partial(library.store.rows.for_cases, study_id)
-    if study.spread is not None and kind is None and query is None:
+    if kind == "tolerances" and study.plan is None and query is None:
         return batch_headline(study, infos, asked_like(usual_query(library, study_id)), point, fetch)
     mapped = map_plan(study)
     if mapped is not None and query is None:
@@ -154,17 +153,20 @@ def _of_map(study: Study, plan: RefinePlan, columns: CaseColumns) -> Headline:
         return Headline()
     paths = [axis.paths[0] for axis in plan.adaptive]
     numbers = []
-    for title, place in (("Largest", int(np.nanargmax(values))), ("Smallest", int(np.nanargmin(values)))):
+    named = Name(name, within=True)
+    for label, place in (
+        (Phrase("Largest {name}", name=named), int(np.nanargmax(values))),
+        (Phrase("Smallest {name}", name=named), int(np.nanargmin(values))),
+    ):
         value, own = float(values[place]), study.case_parameters(place)
         x, y = (Amount(own[path], unit_of(study, path), 4) for path in paths)
-        label = Phrase("Largest {name}" if title == "Largest" else "Smallest {name}", name=Name(name, within=True))
         where = Phrase("at {x} and {y}", x=x, y=y)
         numbers.append(KeyNumber(label, value, info.unit, digits(value), where=where, case=place))
     ends = {
         "low": amount(info, float(np.nanmin(values))),
         "high": amount(info, float(np.nanmax(values))),
     }
-    text = Phrase("Over the map {name} reaches from {low} to {high}.", name=Name(name, within=True), **ends)
+    text = Phrase("Over the map {name} reaches from {low} to {high}.", name=named, **ends)
     return Headline((text,), tuple(numbers))
 
 

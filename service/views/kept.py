@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from functools import partial
 from threading import Lock
-from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
+from typing import TYPE_CHECKING, Final, Generic, TypeVar
 
 from cachetools import LRUCache
 
@@ -19,38 +19,57 @@ if TYPE_CHECKING:
     from sprag.service.results.fronts import Designs
     from sprag.service.storage.store import Store
 
+Key = TypeVar("Key")
 Found = TypeVar("Found")
 
 #: Calibrations that are kept.
 _CALIBRATIONS: Final = 16
-#: Headlines that are kept.
-_HEADLINES: Final = 512
 #: Designs that are kept, of all studies together: some 20 MB.
 _DESIGNS: Final = 50_000
 
 
-class _Kept(Generic[Found]):
+class Kept(Generic[Key, Found]):
+    """What has been found, by a key, for all threads."""
+
+    def __init__(self, cache: LRUCache[Key, Found]) -> None:
+        self._lock = Lock()
+        self._cache = cache
+
+    def get(self, key: Key) -> Found | None:
+        """What is kept of the key."""
+        with self._lock:
+            return self._cache.get(key)
+
+    def put(self, key: Key, found: Found) -> Found:
+        """Keep what has been found, and return it."""
+        with self._lock, suppress(ValueError):  # too large to be kept
+            self._cache[key] = found
+        return found
+
+    def of(self, key: Key, find: Callable[[], Found]) -> Found:
+        """What is kept of the key, otherwise what ``find`` finds."""
+        known = self.get(key)
+        return self.put(key, find()) if known is None else known
+
+
+class _OfRows(Generic[Found]):
     """What is found in the rows of a study, anew only when it has other rows."""
 
-    def __init__(self, store: Store, kept: LRUCache[tuple[object, ...], Found]) -> None:
+    def __init__(self, store: Store, cache: LRUCache[tuple[object, ...], Found]) -> None:
         self._store = store
-        self._lock = Lock()
-        self._kept = kept
+        self._kept = Kept(cache)
 
     def _of(self, study_id: str, find: Callable[..., Found], **options: bool) -> Found:
         store = self._store
-        key = (study_id, store.studies.get(study_id).revision, *options.values())
-        with self._lock:
-            found = self._kept.get(key)
-        if found is None:
+
+        def made() -> Found:
             fetch = partial(store.rows.for_cases, study_id)
-            found = find(store.studies.study(study_id), store.studies.rounds(study_id), fetch, **options)
-            with self._lock, suppress(ValueError):  # too large to be kept
-                self._kept[key] = found
-        return found
+            return find(store.studies.study(study_id), store.studies.rounds(study_id), fetch, **options)
+
+        return self._kept.of((study_id, store.studies.get(study_id).revision, *options.values()), made)
 
 
-class Calibrations(_Kept["Calibration"]):
+class Calibrations(_OfRows["Calibration"]):
     """Calibrations, each followed through its rows again, which takes a second, only when it has other rows."""
 
     def __init__(self, store: Store) -> None:
@@ -61,25 +80,7 @@ class Calibrations(_Kept["Calibration"]):
         return self._of(study_id, calibration_of)
 
 
-class Headlines:
-    """The headlines of studies, each found anew only when its study has other rows."""
-
-    def __init__(self) -> None:
-        self._lock = Lock()
-        self._kept: LRUCache[tuple[object, ...], Any] = LRUCache(_HEADLINES)
-
-    def of(self, key: tuple[object, ...], find: Callable[[], Found]) -> Found:
-        """What is kept of the key, which has the revision of the study, or what ``find`` finds."""
-        with self._lock:
-            known: Found | None = self._kept.get(key)
-        if known is None:
-            known = find()
-            with self._lock:
-                self._kept[key] = known
-        return known
-
-
-class Fronts(_Kept["Designs"]):
+class Fronts(_OfRows["Designs"]):
     """The designs of studies, each ranked anew only when the study has other rows.
 
     Ranking takes a time that grows faster than the number of designs, seconds for tens of thousands; a page with its

@@ -3,30 +3,34 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from cachetools import LRUCache
 
+from sprag.service.reading.quantities import TYPED, read_units
 from sprag.service.reading.reader import Choice, Reading, reading_for
 from sprag.service.results.unaffected import Unaffected
 from sprag.service.storage.store import Store
 from sprag.service.views.columns import Columns
-from sprag.service.views.kept import Calibrations, Fronts, Headlines
+from sprag.service.views.kept import Calibrations, Fronts, Kept
 from sprag.worker.pool.child_process import uncounted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from sprag.service.reading.reader import Phrase
+    from sprag.service.results.headlines.headline import Headline
     from sprag.worker.chunking import Chunking
 
-
-#: Headlines that are kept.
-_HEADLINES: Final = 2000
+#: Headlines that are kept: of questions, and of listed studies.
+_TOLD: Final = 512
+_LISTED: Final = 2000
 
 
 def reading_of(store: Store, study_id: str, choice: Choice) -> Reading:
     """The reading of a choice; raises StudyNotFoundError, and SelectionError for units that cannot be shown."""
-    return reading_for(store.studies.study(study_id), store.studies.spec(study_id), choice)
+    spec = store.studies.spec(study_id) if read_units(choice.units)[0] == TYPED else {}
+    return reading_for(store.studies.study(study_id), spec, choice)
 
 
 class Library:
@@ -42,10 +46,11 @@ class Library:
         self.fronts = Fronts(store)
         self.columns = Columns(store)
         self.calibrations = Calibrations(store)
-        self.told = Headlines()
+        #: Headlines by study, its revision, and the question.
+        self.told: Kept[tuple[object, ...], Headline] = Kept(LRUCache(_TOLD))
         self.unaffected = Unaffected()
-        #: Revision, headline and description of listed studies (`views.listed`).
-        self.headlines: LRUCache[str, Any] = LRUCache(_HEADLINES)
+        #: Of listed studies the revision, and headline and description where they have them (`views.listed`).
+        self.headlines: Kept[str, tuple[int, tuple[Headline, Phrase] | None]] = Kept(LRUCache(_LISTED))
 
     def __reduce__(self) -> tuple[Callable[[str, Chunking], Library], tuple[str, Chunking]]:
         return _library, (

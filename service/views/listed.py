@@ -7,22 +7,23 @@ been looked at: each look finds as many more as its time allows, and shows the o
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from sprag.sentences import Name
 from sprag.service.faults import FaultError
 from sprag.service.languages import N_
-from sprag.service.reading.reader import Phrase, Reading, reading_for
+from sprag.service.reading.reader import Phrase, Reading
 from sprag.service.results.choice import characteristic
 from sprag.service.storage.errors import StoreError
 from sprag.service.views.headline import headline_of, is_small
+from sprag.service.views.library import reading_of
+from sprag.service.views.relatives import asked_by
 from sprag.worker import models
-from sprag.worker.planning.calibrate.plan import CALIBRATE
-from sprag.worker.planning.goals.plan import GOAL
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
     from sprag.service.reading.reader import Choice
     from sprag.service.results.headlines.headline import Headline
@@ -51,24 +52,29 @@ def listed(library: Library, records: Iterable[StudyRecord], choice: Choice, sec
 
     A study that runs keeps the headline that it had until there is time for another.
     """
-    kept, found = library.headlines, dict[str, Listed]()
-    until = time.monotonic() + seconds
-    for record in records:
-        known = kept.get(record.id)
-        if (known is None or known[0] != record.revision) and record.done and time.monotonic() < until:
-            known = kept[record.id] = record.revision, _headline(library, record.id)
-        if known is not None and known[1] is not None:
-            headline, about = known[1]
-            store = library.store
-            reading = reading_for(store.studies.study(record.id), store.studies.spec(record.id), choice)
-            found[record.id] = Listed(headline, about, reading)
+    found = {}
+    for record, told in _looked_at(library, records, seconds):
+        with suppress(StoreError):  # deleted or damaged meanwhile
+            if told is not None:
+                found[record.id] = Listed(*told, reading_of(library.store, record.id, choice))
     return found
 
 
-def known(library: Library, records: Iterable[StudyRecord], choice: Choice, seconds: float) -> list[bool]:
+def known(library: Library, records: Iterable[StudyRecord], seconds: float) -> list[bool]:
     """Which of the studies have an answer after another look, for a stream of changes."""
-    found = listed(library, records, choice, seconds)
-    return [record.id in found for record in records]
+    return [told is not None for _record, told in _looked_at(library, records, seconds)]
+
+
+def _looked_at(
+    library: Library, records: Iterable[StudyRecord], seconds: float
+) -> Iterator[tuple[StudyRecord, tuple[Headline, Phrase] | None]]:
+    """The studies with their headlines, and what they are, where that is known after another look."""
+    kept, until = library.headlines, time.monotonic() + seconds
+    for record in records:
+        known = kept.get(record.id)
+        if (known is None or known[0] != record.revision) and record.done and time.monotonic() < until:
+            known = kept.put(record.id, (record.revision, _headline(library, record.id)))
+        yield record, None if known is None else known[1]
 
 
 def _headline(library: Library, study_id: str) -> tuple[Headline, Phrase] | None:
@@ -82,12 +88,12 @@ def _headline(library: Library, study_id: str) -> tuple[Headline, Phrase] | None
 
 def _about(study: Study) -> Phrase:
     """What a study is, in words: ``mean shaft speed along load torque``."""
-    kind = None if study.plan is None else study.plan["kind"]
-    if kind == GOAL:
+    asked = asked_by(study)
+    if asked == "best":
         return Phrase(_GOAL, count=study.cases)
-    if kind == CALIBRATE:
+    if asked == "measured":
         return Phrase(_CALIBRATION)
-    if study.spread is not None:
+    if asked == "tolerances":
         return Phrase(_BATCH)
     query = characteristic(study, models.study_results(study))
     if query is None:

@@ -11,8 +11,8 @@ from sprag.service.results.explore import MOST_SHOWN, Explored, ExploreQuery, ex
 from sprag.service.results.fronts import conditions_of, further_of, goal_of, infos_of
 from sprag.service.results.headlines.along import judged_by
 from sprag.service.results.selection import own_paths
+from sprag.service.views.relatives import asked_by
 from sprag.worker import models
-from sprag.worker.planning.goals.plan import GOAL
 
 if TYPE_CHECKING:
     from sprag.service.views.library import Library
@@ -25,7 +25,7 @@ PLACES: Final = ("rank", "violation", "miss")
 
 def is_search(study: Study) -> bool:
     """Whether the rows are designs."""
-    return study.plan is not None and study.plan["kind"] == GOAL
+    return asked_by(study) == "best"
 
 
 def further_infos(study: Study) -> tuple[ResultInfo, ...]:

@@ -34,7 +34,7 @@ router = page_router()
 
 def _studies(context: Context, given: QueryParams) -> Any:
     records = listed(context, given).studies
-    told = known(context.library, records, current().choice, _SECONDS)
+    told = known(context.library, records, _SECONDS)
     return [[record.id, record.revision, one] for record, one in zip(records, told, strict=True)]
 
 

@@ -44,10 +44,24 @@ def test_a_list_looks_at_each_study_once(service: Service, monkeypatch: pytest.M
     library = service.app.state.context.library
     records = service.store.studies.page().studies
     assert module.listed(library, records, Choice("workshop"), 0.0) == {}, "without time only what is known"
-    assert module.known(library, records, Choice("workshop"), 600.0) == [True, True]
+    assert module.known(library, records, 600.0) == [True, True]
     assert sorted(looks) == sorted(ids)
     service.http.get("/")
     assert len(looks) == 2
+    monkeypatch.setattr(type(service.store.studies), "spec", None)
+    assert module.known(library, records, 600.0) == [True, True], "a look reads no specs"
+    assert module.listed(library, records, Choice("workshop"), 0.0).keys() == set(ids)
+
+
+def test_a_list_is_shown_without_a_study_that_is_deleted_meanwhile(service: Service) -> None:
+    gone, kept = service.submit(), service.submit()
+    for study_id in (gone, kept):
+        service.fill(study_id)
+    library = service.app.state.context.library
+    records = service.store.studies.page().studies
+    assert module.known(library, records, 600.0) == [True, True]
+    service.store.studies.delete(gone)
+    assert module.listed(library, records, Choice("typed"), 600.0).keys() == {kept}
 
 
 def test_what_needs_a_look_has_failed_cases(service: Service) -> None:
