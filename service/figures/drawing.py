@@ -18,8 +18,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 Side = Literal["left", "right"]
-#: Width beside a drawing for labels with values, and the least distance of two of them.
-_LABEL, _APART = 118.0, 17.0
+#: Width beside a drawing for labels with values, and the least distance of two of them, of which one has an index.
+_LABEL, _APART = 118.0, 21.0
+#: Symbols that are so near are one above the other.
+_NEAR: Final = 17.0
 _PRINTED: Final = re.compile(r"<i>(.*)</i>(?:<sub>(.*)</sub>)?")
 _COLOURS: Final = """<style>.drawing text{font:13px sans-serif;fill:#1b2430}
 .drawing .thin,.drawing .dashed,.drawing .leader{fill:none;stroke:#8593a5}.drawing .dashed{stroke-dasharray:9 4 2 4}
@@ -114,7 +116,7 @@ def _letters(drawing: Drawing) -> str:
     """The symbols at their places; of two at one place the first."""
     found, taken = list[str](), list[Dimension]()
     for each in drawing.dimensions:
-        if any(abs(each.x - other.x) < _APART and abs(each.y - other.y) < _APART for other in taken):
+        if any(abs(each.x - other.x) < _NEAR and abs(each.y - other.y) < _NEAR for other in taken):
             continue
         taken.append(each)
         left = each.side == "left"
@@ -126,12 +128,12 @@ def _letters(drawing: Drawing) -> str:
     return "".join(found)
 
 
-def _printed(text: str) -> str:
-    """A symbol with its index as in print, as a part of a text of an SVG."""
+def _printed(text: str, behind: str = "") -> str:
+    """A symbol with its index as in print, and what is behind it, as a part of a text of an SVG."""
     found = _PRINTED.fullmatch(str(symbol(text))) if text else None
-    if found is None:
-        return escape(text)
-    return found[1] + (f'<tspan dy="3" font-size="10">{found[2]}</tspan>' if found[2] else "")
+    base, index = (escape(text), None) if found is None else found.groups()
+    lower = f'<tspan dy="3" font-size="10">{index}</tspan>' if index else ""
+    return base + lower + (f'<tspan dy="-3">{behind}</tspan>' if lower and behind else behind)
 
 
 def _beside(drawing: Drawing, labels: Mapping[str, str]) -> str:
@@ -140,20 +142,13 @@ def _beside(drawing: Drawing, labels: Mapping[str, str]) -> str:
         rows = [each for each in rows_of(drawing, side) if labels.get(each.path)]
         edge, end = (-8.0, ' text-anchor="end"') if side == "left" else (drawing.width + 8.0, "")
         for each, y in zip(rows, _spread([each.y for each in rows], drawing.height), strict=True):
-            symbol_ = f'<tspan class="letter">{_plain(each.symbol)}</tspan> = ' if each.symbol else ""
+            symbol_ = f'<tspan class="letter">{_printed(each.symbol, " = ")}</tspan>' if each.symbol else ""
             found.append(
                 f'<path class="leader" d="M{edge + (4 if side == "left" else -4):g} {y:g}L{each.x:g} {each.y:g}"/>'
                 f'<text data-mark="{escape(each.path)}" x="{edge:g}" y="{y + 4:g}"{end}>'
                 f"{symbol_}{escape(labels[each.path])}</text>"
             )
     return "".join(found)
-
-
-def _plain(text: str) -> str:
-    found = _PRINTED.fullmatch(str(symbol(text)))
-    return escape(text) if found is None else found[1] + (
-        f'<tspan baseline-shift="sub" font-size="10">{found[2]}</tspan>' if found[2] else ""
-    )  # fmt: skip
 
 
 def _spread(places: Sequence[float], height: float) -> list[float]:

@@ -108,7 +108,7 @@ def _spring(base: Mapping[str, float], prefix: str, end: tuple[float, float], ar
     x, y = end
     span = x - _WALL
     lead, coil = 0.16 * span, 0.085 * span
-    turns = "".join(f"l{coil if not index else 2 * coil if 0 < index < 4 else coil:.1f} {sign}" for index, sign in
+    turns = "".join(f"l{2 * coil if 0 < index < 4 else coil:.1f} {sign}" for index, sign in
                     enumerate(("9", "-18", "18", "-18", "9")))  # fmt: skip
     return (
         f'<path class="body" d="M{_WALL:g} {y - 20:g}v40"/><path class="thin" d="M{_WALL:g} {y - 14:g}l-7 7m7 3l-7 7m7 '

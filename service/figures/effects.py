@@ -25,9 +25,6 @@ def effects_figure(found: Sequence[Sensitivity], columns: int = 2) -> Figure:
         for item in found
         for effect in in_order(item)
     )
-    nothing = "" if panels else Phrase("No case has these results yet.")
-    return (
-        Figure(panels[0].x or panels[0].y, panels, columns, note=nothing)
-        if panels
-        else Figure(Quantity("", "1"), (), note=nothing)
-    )
+    if not panels:
+        return Figure(Quantity("", "1"), (), note=Phrase("No case has these results yet."))
+    return Figure(panels[0].x or panels[0].y, panels, columns)

@@ -15,7 +15,7 @@ from sprag.service.reading.reader import Phrase
 #: Colours of lines on white paper, with a contrast of at least 4.5 : 1; pages have others on dark ground. Markers,
 #: dashes and names repeat what they tell apart.
 PALETTE: Final = ("#0b5cad", "#c2500a", "#17713a", "#8a4a9e", "#00798c", "#7a6a00", "#b0396b", "#6b4f3a")
-#: Colours of numbers in their order, from dark to light, so that they read in grey too (after viridis of matplotlib).
+#: Colours of numbers in their order, from dark to light, so that they read in grey too (after viridis).
 _SHADES: Final = ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80", "#5ec962", "#addc30", "#fde725")
 #: Colour of what stands for the whole of other lines, or is drawn for reference only.
 NEUTRAL: Final = "#7a7f87"
@@ -26,7 +26,7 @@ MARKERS: Final = ("circle", "square", "diamond", "triangle-up", "x", "triangle-d
 #: Lines with more points are drawn without markers.
 _MARKED: Final = 60
 #: Look of a state for which its model defines none.
-OTHER_LOOK: Final = ("#999999", "+", "+++")
+OTHER_LOOK: Final = ("#999999", "+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +174,7 @@ class Figure:
     regimes : names of the kinds of motion that occur, where not all are periodic
     spans : for each row of the strip below the panels, its states: (state, begin, end)
     states : what the states are, for the legend
-    looks : colour and two patterns of each state, in the order of the legend
+    looks : colour and pattern of each state, in the order of the legend
     motion : whether it shows a motion, whose lines are read at one x
     heading : a sentence above the panels
     scale : the quantity of the numbers that colour points
@@ -194,7 +194,7 @@ class Figure:
     held: tuple[str, ...] = ()
     spans: Mapping[str, tuple[tuple[str, float, float], ...]] = field(default_factory=dict)
     states: str = Phrase("States")
-    looks: Mapping[str, tuple[str, str, str]] = field(default_factory=dict)
+    looks: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     motion: bool = False
     heading: str = ""
     scale: str = ""
@@ -221,7 +221,7 @@ class Figure:
         return -(-len(self.panels) // self.columns)
 
     @property
-    def shown_looks(self) -> dict[str, tuple[str, str, str]]:
+    def shown_looks(self) -> dict[str, tuple[str, str]]:
         """The states that occur with their looks, in the order of the legend."""
         occurring = {state: None for spans in self.spans.values() for state, _, _ in spans}
         known = [state for state in self.looks if state in occurring]

@@ -26,8 +26,8 @@ STEP: Final = 5
 #: Largest width and height of a drawing, and its margin.
 _WIDTH, _HEIGHT, _MARGIN = 420.0, 260.0, 24.0
 _ROUNDED: Final = 1
-#: Of the train: distance of two shafts, height of its axis, and the radii of wheels (px).
-_APART, _LEVEL, _SMALL, _LARGE = 84.0, 58.0, 13.0, 30.0
+#: Of the train: distance of two shafts, height of its axis, and the largest radius of a wheel (px).
+_APART, _LEVEL, _LARGE = 84.0, 58.0, 30.0
 _STAGES: Final = {
     "gear": N_("gear"), "worm": N_("worm gear"), "belt": N_("belt"), "chain": N_("chain"), "screw_nut": N_("screw"),
     "rack": N_("rack"),

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from sprag.service.results.curves import Curve, Map
 
-Look = tuple[str, str, str]
+Look = tuple[str, str]
 Span = tuple[str, float, float]
 
 #: What the colours mean, alone and with those of regimes.
@@ -27,17 +27,17 @@ TITLE: Final = Phrase("Motion repeats after")
 #: Rows of a strip; more cannot be read. A map shows them.
 MOST_ROWS: Final = 8
 #: Red, green and blue of the fewest, of some and of many periods: a hue for each sequence of doubled periods that
-#: begins with 1, 3 or 5, and one for all others; with the patterns that tell them apart in grey.
+#: begins with 1, 3 or 5, and one for all others; with the pattern that tells them apart in grey.
 _HUES: Final = {
-    1: (((224, 233, 244), (93, 130, 190), (16, 24, 80)), ("", "")),
-    3: (((198, 230, 190), (84, 158, 84), (8, 62, 28)), ("/", "//")),
-    5: (((244, 226, 150), (190, 150, 50), (92, 66, 8)), ("\\", "\\\\")),
-    7: (((226, 212, 238), (150, 110, 190), (62, 20, 104)), ("|", "||")),
+    1: (((224, 233, 244), (93, 130, 190), (16, 24, 80)), ""),
+    3: (((198, 230, 190), (84, 158, 84), (8, 62, 28)), "/"),
+    5: (((244, 226, 150), (190, 150, 50), (92, 66, 8)), "\\"),
+    7: (((226, 212, 238), (150, 110, 190), (62, 20, 104)), "|"),
 }
 #: The number from which on the colour stays the same.
 _DARKEST: Final = 32
 #: Patterns of the regimes, which tell the same in grey.
-_PATTERNS: Final = {"held": ("-", "--"), "coasting": (".", ".."), "irregular": ("x", "xx"), "unsettled": ("+", "++")}
+_PATTERNS: Final = {"held": "-", "coasting": ".", "irregular": "x", "unsettled": "+"}
 
 
 def edges(values: Sequence[float] | NDArray[np.float64], *, whole: bool = False) -> NDArray[np.float64]:
@@ -83,20 +83,20 @@ def motion_text(name: str) -> str:
 
 
 def looks_of(names: Iterable[str | None]) -> dict[str, Look]:
-    """Colour and two patterns of each name that occurs: the fewest periods first, then the regimes."""
+    """Colour and pattern of each name that occurs: the fewest periods first, then the regimes."""
     occurring = {name for name in names if name is not None}
     orders = sorted((int(name.split()[0]), name) for name in occurring if name not in MARKS)
     looks: dict[str, Look] = {name: _order_look(order) for order, name in orders}
-    return looks | {name: (MARKS[name].colour, *_PATTERNS.get(name, ("", ""))) for name in MARKS if name in occurring}
+    return looks | {name: (MARKS[name].colour, _PATTERNS.get(name, "")) for name in MARKS if name in occurring}
 
 
 def _order_look(order: int) -> Look:
     root = order // (order & -order)  # what is left when all doublings are undone
     first = root if root in _HUES else max(_HUES)
-    stops, patterns = _HUES[first]
+    stops, pattern = _HUES[first]
     share = math.log2(order / first) / math.log2(_DARKEST / first)
     parts = (round(float(np.interp(share, (0.0, 0.5, 1.0), channel))) for channel in zip(*stops, strict=True))
-    return "#" + "".join(f"{part:02x}" for part in parts), *patterns
+    return "#" + "".join(f"{part:02x}" for part in parts), pattern
 
 
 def strip_of(curves: Sequence[Curve], units: Mapping[str, str]) -> tuple[dict[str, tuple[Span, ...]], dict[str, Look]]:
@@ -133,7 +133,7 @@ class OrderMap:
 
     Attributes
     ----------
-    looks : colour and two patterns of each name, in their order
+    looks : colour and pattern of each name, in their order
     places : float64 array, shape (y values, x values)
         Place of each case's name among the looks, NaN for a case without.
     names : the same as names
@@ -146,7 +146,7 @@ class OrderMap:
     @property
     def colours(self) -> list[str]:
         """The colours in their order."""
-        return [colour for colour, _, _ in self.looks.values()]
+        return [colour for colour, _ in self.looks.values()]
 
 
 def order_map(drawn: Map) -> OrderMap | None:

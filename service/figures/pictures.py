@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final, Literal, cast, get_args
 
 from sprag.sentences import Sentence
 from sprag.service.faults import refused
 from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.motion import motion_figure
 from sprag.service.figures.read import read_figure
 from sprag.service.figures.svg import WIDE, as_file, picture_svg
 from sprag.service.figures.svg_bars import sensitivity_svg
@@ -24,7 +22,6 @@ if TYPE_CHECKING:
     from sprag.service.reading.reader import Reading
     from sprag.service.results.curves import Curves, Map
     from sprag.service.results.sensitivity import Sensitivity
-    from sprag.worker.models import Presentation, Trajectory
 
 Picture = Literal["svg", "png", "pdf"]
 PICTURES: Final[tuple[Picture, ...]] = get_args(Picture)
@@ -59,21 +56,6 @@ def draw_compare(drawn: Sequence[tuple[str, Curves]], reading: Reading, picture:
     """
     require_drawable([curves for _, curves in drawn])
     return draw_figure(read_figure(curves_figure(drawn), reading), "", picture)
-
-
-def draw_motion(
-    made: Trajectory,
-    shown: Presentation,
-    reading: Reading,
-    title: str,
-    held: Sequence[tuple[str, Trajectory]],
-    at: float | None,
-    picture: Picture,
-) -> bytes:
-    """The motion of one case, beside others with their names: its variables, and below them the states of the parts of
-    the machine. A line marks the place ``at`` (time in s, angle in degrees).
-    """
-    return draw_figure(read_figure(replace(motion_figure(made, shown, held), at=at), reading), title, picture)
 
 
 def draw_map(drawn: Map, title: str, picture: Picture, *, contours: bool = False) -> bytes:

@@ -34,7 +34,7 @@ from sprag.service.figures.painter.legends import (
     mark_entries,
     rows_of,
 )  # fmt: skip
-from sprag.service.figures.painter.panels import Placed, panel_parts, scale_parts, x_numbers
+from sprag.service.figures.painter.panels import Placed, linked, panel_parts, scale_parts, x_numbers
 from sprag.service.figures.painter.patterns import pattern
 from sprag.service.figures.painter.picture import Painting, panel_group
 from sprag.service.figures.painter.scales import Scale, extent, rounded_scale, tick_text
@@ -143,12 +143,14 @@ class _Painting(Painting):
     def __init__(self, figure: Figure, width: float, cases: str, chosen: str) -> None:
         super().__init__(width, cases)
         self._figure, self._chosen = figure, chosen
+        self._linked = cases != "" and linked(figure)
+        self._across = None if figure.apart else self._ends(figure.panels)
         alone = figure.apart or (figure.rows == 1 and not figure.motion)
         high = _ALONE if alone else _MOTION if figure.motion else _AMONG
         self._high = min(high, 0.8 * width / figure.columns)
         self._patterns: dict[str, str] = {}
         definitions = ""
-        for place, (state, (colour, shape, _)) in enumerate(figure.shown_looks.items()):
+        for place, (state, (colour, shape)) in enumerate(figure.shown_looks.items()):
             if not shape:
                 self._patterns[state] = colour
                 continue
@@ -212,13 +214,17 @@ class _Painting(Painting):
         flipped = "y" in figure.flipped
         return scale.over(0.0, self._high) if flipped else scale.over(self._high, 0.0)
 
-    def _x_scale(self, panel: Panel, width: float) -> Scale:
+    def _ends(self, panels: Sequence[Panel]) -> tuple[float, float]:
+        """The least and the largest x of panels."""
         figure = self._figure
-        panels = (panel,) if figure.apart else figure.panels
-        log = "x" in figure.log
         values = [line.x for one in panels for line in one.lines] + [fill.x for one in panels for fill in one.fills]
         values += [np.array([end for _, *ends in spans for end in ends]) for spans in figure.spans.values()]
-        low, high = extent(values, log=log) or (1.0, 10.0)
+        return extent(values, log="x" in figure.log) or (1.0, 10.0)
+
+    def _x_scale(self, panel: Panel, width: float) -> Scale:
+        figure = self._figure
+        log = "x" in figure.log
+        low, high = self._across or self._ends((panel,))
         if high - low <= 1e-12 * max(abs(low), abs(high)):
             room = 0.05 * abs(low) or 0.5
             low, high = (low / 2.0, high * 2.0) if log else (low - room, high + room)
@@ -234,7 +240,7 @@ class _Painting(Painting):
         for column, panel in zip(columns, figure.panels[row * figure.columns :], strict=False):
             placed = Placed(
                 figure, panel, self._x_scale(panel, column.width), self._y_scale(panel), column.width, self._high,
-                self._cases, self._chosen,
+                self._cases, self._linked, self._chosen,
             )  # fmt: skip
             parts, named = panel_parts(placed)
             made.placed.append((placed, parts))
@@ -283,12 +289,8 @@ class _Painting(Painting):
             left = column.left + column.numbers
             names = lines_of(title_of(placed.across), column.width + column.numbers, SMALL)
             most = max(most, len(names))
-            right = left + column.width
             self._parts.append(moved("".join(x_numbers(placed.x, 0.0)), left, self._top))
-            self._parts += [
-                text_at(line, right, self._top + 34.0 + LINE * place, text_anchor="end", font_size=SMALL)
-                for place, line in enumerate(names)
-            ]
+            self._named_below(names, left + column.width)
         self._top += 24.0 + LINE * most
 
     def _strip(self, column: _Column, x: Scale, top: float) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, cast
 
@@ -23,11 +22,10 @@ from sprag.service.figures.painter.elements import (
     moved,
     path_of,
     short,
-    text_at,
     text_width,
 )  # fmt: skip
-from sprag.service.figures.painter.legends import Entry, area, rows_of, sign_of
-from sprag.service.figures.painter.panels import MOST_LINKS, colour_scale, x_numbers
+from sprag.service.figures.painter.legends import Entry, area, regime_entry, rows_of
+from sprag.service.figures.painter.panels import DIGITS, MOST_LINKS, case_link, colour_scale, x_numbers, y_numbers
 from sprag.service.figures.painter.picture import Painting, panel_group
 from sprag.service.figures.painter.scales import Scale, step_of, tick_text
 from sprag.service.figures.svg import WIDE, as_file, title_of
@@ -120,12 +118,9 @@ class _MapPainting(Painting):
             self._parts.append(moved(scale, self._left + self._plot + 14.0, self._top))
         self._top += self._high
         self._parts.append(moved("".join(x_numbers(self._x, 0.0)), self._left, self._top))
-        for line in lines_of(title_of(x), self._width - _RIGHT, SMALL):
-            self._top += LINE
-            self._parts.append(
-                text_at(line, self._left + self._plot, self._top + LINE, text_anchor="end", font_size=SMALL)
-            )
-        self._top += LINE + 8.0
+        name = lines_of(title_of(x), self._width - _RIGHT, SMALL)
+        self._named_below(name, self._left + self._plot)
+        self._top += LINE * (len(name) + 1) + 8.0
         self._legend(known, below=below)
         return self._whole(label or f"{title_of(z)}: {title_of(x)}, {title_of(y)}", self._about(z))
 
@@ -140,10 +135,9 @@ class _MapPainting(Painting):
         """The edge of the cells with the numbers at their left."""
         ticks = self._y.rising()
         heights = self._y(np.array(ticks)).tolist()
-        numbers = "".join(text_at(tick_text(value), -9.0, at + 4.0) for value, at in zip(ticks, heights, strict=True))
         yield element("path", d="".join(f"M-5 {short(at)}h5" for at in heights), stroke="var(--edge)")
         yield element("rect", width=self._plot, height=self._high, fill="none", stroke="var(--edge)")
-        yield element("g", numbers, class_="y", text_anchor="end", font_size=SMALL, fill="var(--soft)")
+        yield y_numbers(ticks, heights, -9.0)
 
     def _colours(self, known: Numbers) -> tuple[NDArray[np.int64], list[str]]:
         """Which colour each cell has, -1 for none, and the colours."""
@@ -184,20 +178,18 @@ class _MapPainting(Painting):
             case, place = int(self._drawn.cases[row, column]), places[row, column]
             names = self._orders.names if self._orders is not None else None
             value = (motion_text(names[row][column] or "") if names is not None else
-                     f"{number(float(known[row, column]), 5)} {unit_text(z.unit)}")  # fmt: skip
+                     f"{number(float(known[row, column]), DIGITS)} {unit_text(z.unit)}")  # fmt: skip
             told = (
                 value,
-                f"{x.name} {number(self._drawn.x_values[column], 5)} {unit_text(x.unit)}",
-                f"{y.name} {number(self._drawn.y_values[row], 5)} {unit_text(y.unit)}",
-                gettext("case {case}", case=case),
+                f"{x.name} {number(self._drawn.x_values[column], DIGITS)} {unit_text(x.unit)}",
+                f"{y.name} {number(self._drawn.y_values[row], DIGITS)} {unit_text(y.unit)}",
             )
-            title = element("title", escape(", ".join(one.rstrip() for one in told)))
             # Cells overlap a little, so that no line is seen between them.
             cell = element(
                 "rect", x=float(left), y=float(top), width=float(right - left) + 0.4, height=float(bottom - top) + 0.4,
                 fill=colours[place],
             )  # fmt: skip
-            yield element("a", title + cell, href=f"{self._cases}{case}", tabindex=-1, data_case=case)
+            yield case_link(self._cases, case, told, cell)
 
     def _filled(self, known: Numbers) -> Iterator[str]:
         """Colours between lines of equal value, and the numbers of these."""
@@ -242,8 +234,8 @@ class _MapPainting(Painting):
             across, up = np.meshgrid(drawn.x_values, drawn.y_values)
             x, y, few = across.reshape(-1), up.reshape(-1), across.size <= _MARKED and not self._cases
         if few:
-            linked = self._cases and drawn.refined is not None
-            known = {"data_cases": " ".join(map(str, drawn.refined.cases.tolist()))} if linked else {}
+            cases = drawn.refined.cases.tolist() if drawn.refined is not None and self._cases else []
+            known = {"data_cases": " ".join(map(str, cases))} if cases else {}
             yield element("path", d=markers("circle", 1.1, self._x(x), self._y(y)), fill="#4d4d4d", **known)
 
     def _marks(self) -> Iterator[str]:
@@ -255,11 +247,8 @@ class _MapPainting(Painting):
 
     def _legend(self, known: Numbers, *, below: bool) -> None:
         drawn = self._drawn
-        entries = [
-            Entry(sign_of(MARKS[marks.regime].symbol, colour_of(MARKS[marks.regime].colour)), motion_text(marks.regime))
-            for marks in doubtful_marks(drawn)
-        ]
-        for name, (colour, _, _) in self._orders.looks.items() if self._orders is not None else ():
+        entries = [regime_entry(marks.regime) for marks in doubtful_marks(drawn)]
+        for name, (colour, _) in self._orders.looks.items() if self._orders is not None else ():
             entries.append(Entry(area(colour), motion_text(name)))
         missing = int(np.isnan(known).sum())
         if missing:

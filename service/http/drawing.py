@@ -30,8 +30,8 @@ DRAWN_FORMATS: Final = dict[Literal["json", "csv"] | pictures.Picture, str](
 )
 #: Formats of the tables of one case.
 TABLE_FORMATS: Final[dict[Literal["json", "csv"], str]] = {"json": MEDIA_TYPES["json"], "csv": MEDIA_TYPES["csv"]}
-#: matplotlib embeds its styles in the picture, which the pages' policy forbids; everything else is disabled.
-_PICTURE_POLICY = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
+#: A map has its cells as a picture within it, which is data; everything else is disabled.
+_PICTURE_POLICY: Final = "default-src 'none'; img-src data:; sandbox"
 
 
 @dataclass(frozen=True, slots=True)

@@ -52,7 +52,7 @@ _SHORT: Final = 200
 def prepare() -> None:
     """Prepare a checking process: load this module and the units, and leave missing kernels to other processes.
 
-    matplotlib and the machine shaft's kernels are loaded on first use, outside the time limit of the request, so that a
+    Typst and the machine shaft's kernels are loaded on first use, outside the time limit of the request, so that a
     replacement process starts sooner.
     """
     units.load()

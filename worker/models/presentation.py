@@ -127,7 +127,7 @@ class Presentation:
     balance : rows of a balance of means: sign, result, label; ``residual`` is the result with the remainder
     panels : plots of a motion, from the names and units of its variables
     references : further lines of a motion, by the title of their panel
-    states : colour and two patterns (plotly's, matplotlib's) of each state; either alone distinguishes them
+    states : colour and pattern of each state; either alone distinguishes them
     phases : lines of the phase portrait, from the names of the variables: (angle, speed, label)
     portrait : description of the phase portrait; "" where there is none
     motion, motion_note : short description of the plots, and a note for the reader
@@ -156,7 +156,7 @@ class Presentation:
     residual: str = ""
     panels: Callable[[Sequence[str], Sequence[str]], tuple[Panel, ...]] = panels_by_unit
     references: Callable[[Trajectory], Mapping[str, tuple[Reference, ...]]] = _no_references
-    states: Mapping[str, tuple[str, str, str]] = field(default_factory=dict)
+    states: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     phases: Callable[[Sequence[str]], tuple[tuple[str, str, str], ...]] = _no_phases
     portrait: str = ""
     motion: str = "Motion of the case"

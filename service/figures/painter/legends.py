@@ -74,6 +74,11 @@ def fill_entry(fill: Fill) -> Entry:
     return Entry(area(colour_of(fill.colour), 0.25), fill.name)
 
 
+def regime_entry(name: str) -> Entry:
+    """The entry of the marks of a regime."""
+    return Entry(sign_of(MARKS[name].symbol, colour_of(MARKS[name].colour)), motion_text(name))
+
+
 def area(colour: str, opacity: float | None = None) -> str:
     """An area as the sign of an entry."""
     return element("rect", x=2, y=-5, width=18, height=10, fill=colour, fill_opacity=opacity)
@@ -82,7 +87,7 @@ def area(colour: str, opacity: float | None = None) -> str:
 def mark_entries(figure: Figure, patterns: Mapping[str, str]) -> Iterator[Entry]:
     """The entries of marks, jumps, notes and states; ``patterns`` fill the states."""
     for name in figure.regimes:
-        yield Entry(sign_of(MARKS[name].symbol, colour_of(MARKS[name].colour)), motion_text(name))
+        yield regime_entry(name)
     if figure.banded:
         yield Entry(area(NEUTRAL, 0.35), shown(BANDS))
     for kind in figure.noted:

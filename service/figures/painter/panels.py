@@ -31,7 +31,7 @@ from sprag.service.reading.wording import number, unit_text
 from sprag.service.results.regimes import MARKS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -48,7 +48,8 @@ _CROWDED: Final = 10_000
 _DENSE: Final = 3
 #: Different colours of points that are coloured by numbers.
 _SHADES: Final = 32
-_DIGITS: Final = 5
+#: Digits of what a link tells.
+DIGITS: Final = 5
 #: Pixels of a scale of colours with its numbers, at whose right end its name ends.
 _SCALE_WIDTH: Final = 52.0
 
@@ -60,6 +61,7 @@ class Placed:
     Attributes
     ----------
     cases : where the case with a number is, which follows; "" where points are no links
+    linked : whether every point is a link of its own
     chosen : key of the line that stands before the others; "" for none
     """
 
@@ -70,6 +72,7 @@ class Placed:
     width: float
     height: float
     cases: str = ""
+    linked: bool = False
     chosen: str = ""
 
     @property
@@ -117,9 +120,14 @@ def _grid(placed: Placed) -> Iterator[str]:
     yield element("path", d="".join(f"M0 {short(at)}h{short(placed.width)}" for at in heights), stroke="var(--grid)")
     zero = 0.0 if 0.0 in ticks else placed.y.low
     yield element("path", d=f"M0 {short(placed.y.at(zero))}h{short(placed.width)}", stroke="var(--edge)")
-    yield element(
+    yield y_numbers(ticks, heights, -7.0)
+
+
+def y_numbers(ticks: Sequence[float], heights: Sequence[float], right: float) -> str:
+    """The numbers at the left of an axis that goes up, which end at ``right``."""
+    return element(
         "g",
-        "".join(text_at(tick_text(value), -7.0, at + 4.0) for value, at in zip(ticks, heights, strict=True)),
+        "".join(text_at(tick_text(value), right, at + 4.0) for value, at in zip(ticks, heights, strict=True)),
         class_="y", text_anchor="end", font_size=SMALL, fill="var(--soft)",
     )  # fmt: skip
 
@@ -203,7 +211,7 @@ def _points(line: Line, placed: Placed, colour: str, kept: NDArray[np.int64], x:
     size = 5.0 if line.ring else 2.9 if line.joined else 3.3
     name = line.name or placed.panel.y.name
     cases = None if line.cases is None else line.cases[kept]
-    if cases is not None and placed.cases and linked(placed.figure):
+    if cases is not None and placed.linked:
         links = _links(placed, line.marker, size, (x, y), (line.x[kept], line.y[kept]), cases, name)
         # An invisible edge is part of what can be clicked.
         edge = look if line.ring else {**look, "stroke": "var(--ink)", "stroke_opacity": 0, "stroke_width": 9}
@@ -254,12 +262,16 @@ def _links(
     outlines = (markers(shape, size, x[place : place + 1], y[place : place + 1]) for place in range(x.size))
     units = unit_text(placed.across.unit), unit_text(placed.panel.y.unit)
     for path, *point, case in zip(outlines, *(one.tolist() for one in values), cases.tolist(), strict=True):
-        told = [f"{number(one, _DIGITS)} {unit}".rstrip() for one, unit in zip(point, units, strict=True)]
-        what = ", ".join(filter(None, (*told, name, gettext("case {case}", case=case))))
-        yield (
-            f'<a href="{escape(placed.cases)}{case}" tabindex="-1" data-case="{case}"><title>{escape(what)}</title>'
-            f'<path d="{path}"/></a>'
-        )
+        told = (f"{number(one, DIGITS)} {unit}" for one, unit in zip(point, units, strict=True))
+        yield case_link(placed.cases, case, (*told, name), element("path", d=path))
+
+
+def case_link(cases: str, case: int, told: Iterable[str], shape: str) -> str:
+    """The link of a shape to its case, below the address ``cases``, with a title of what is told and its number."""
+    what = ", ".join(filter(None, (*(one.rstrip() for one in told), gettext("case {case}", case=case))))
+    return element(
+        "a", element("title", escape(what)) + shape, href=f"{cases}{case}", tabindex=-1, data_case=case
+    )  # fmt: skip
 
 
 def _shades(line: Line, numbers: Numbers, x: Numbers, y: Numbers) -> Iterator[str]:
@@ -283,7 +295,7 @@ def _marks(placed: Placed) -> Iterator[str]:
         x, y, shape = placed.x(marks.x), placed.y(marks.y), MARKS[marks.regime].symbol
         known = np.isfinite(x) & np.isfinite(y)
         x, y, cases = x[known], y[known], marks.cases[known]
-        if placed.cases and linked(placed.figure):
+        if placed.linked:
             name, values = motion_text(marks.regime), (marks.x[known], marks.y[known])
             yield element("g", "".join(_links(placed, shape, 4.0, (x, y), values, cases, name)), **look)
         else:

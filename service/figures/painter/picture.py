@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 from html import escape
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 from zlib import crc32
 
-from sprag.service.figures.painter.elements import LINE, SIZE, element, lines_of, moved, short, text_at
+from sprag.service.figures.painter.elements import LINE, SIZE, SMALL, element, lines_of, moved, short, text_at
 from sprag.service.reading.wording import unit_text
 
 if TYPE_CHECKING:
@@ -36,6 +36,13 @@ class Painting:
             self._parts.append(text_at(line, 0.0, self._top - 4.0, font_weight=600 if bold else None))
         self._top += 3.0
 
+    def _named_below(self, name: Sequence[str], right: float) -> None:
+        """The lines of the name of an x axis below its numbers, which end at ``right``."""
+        self._parts += [
+            text_at(line, right, self._top + 2.0 * LINE + LINE * place, text_anchor="end", font_size=SMALL)
+            for place, line in enumerate(name)
+        ]
+
     def _rows(self, rows: Rows) -> None:
         """A legend below what there is."""
         self._parts.append(moved("".join(rows.parts), 0.0, self._top))
@@ -63,7 +70,7 @@ def panel_group(
 ) -> str:
     """A panel at its place, with width, height and colour of its area, and for scripts ends and units of its axes."""
     width, height, fill = area
-    ends = {
+    ends: dict[str, Any] = {
         f"data_{name}": f"{scale.low:.10g} {scale.high:.10g} {short(scale.start)} {short(scale.end)}"
         for name, scale in zip("xy", scales, strict=True)
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from itertools import pairwise
 from xml.etree import ElementTree
 
 import pytest
@@ -51,3 +52,15 @@ def test_the_train_has_a_wheel_for_each_shaft_of_its_stages() -> None:
     assert train.shapes.count('class="wheel"') == 4
     assert {each.path for each in train.dimensions} >= {"drive.stages.0.ratio", "drive.flywheel.mass"}
     assert "mechanism.slider_crank.crank" in {each.path for each in mechanism.dimensions}
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_labels_beside_a_drawing_do_not_touch(name: str) -> None:
+    study = _study(name)
+    for drawing in drawings(study):
+        text = svg(drawing, {each.path: "1 mm" for each in drawing.dimensions})
+        labels = re.findall(r'<text data-mark="[^"]*" x="(-?[\d.]+)" y="([\d.]+)"', text)
+        for side in {x for x, _ in labels}:
+            rows = sorted(float(y) for x, y in labels if x == side)
+            # 10 px of capital letters, 5 px of an index below the line, and room between both.
+            assert all(below - above >= 20.0 for above, below in pairwise(rows))

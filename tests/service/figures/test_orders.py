@@ -56,7 +56,7 @@ def test_a_strip_has_the_colour_of_each_motion() -> None:
     for columns in (1, 2):
         figure = curves_figure([("", curves(2, (SPEED, "torque.mean")))], columns)
         drawn = picture_svg(figure, "")
-        for colour, _, _ in figure.shown_looks.values():
+        for colour, _ in figure.shown_looks.values():
             assert colour in drawn
         assert drawn.count("<title>20: 2 periods</title>") == columns
         assert seen(drawn).has("Regime; motion repeats after: periodic coasting irregular unsettled")
@@ -77,7 +77,7 @@ def test_colours_tell_every_number_of_periods_and_regime_apart() -> None:
     looks = looks_of(reversed(names))
     assert list(looks)[:3] == ["1 period", "2 periods", "3 periods"]
     assert list(looks)[-4:] == ["held", "coasting", "irregular", "unsettled"]
-    assert len({colour for colour, _, _ in looks.values()}) == len(names)
+    assert len({colour for colour, _ in looks.values()}) == len(names)
 
 
 def test_a_map_of_the_order_has_a_colour_for_each_number_of_periods() -> None:

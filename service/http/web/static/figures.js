@@ -131,9 +131,7 @@ sprag.drawAll = (root) => Promise.all([...root.querySelectorAll("[data-figure]")
     if (!own.length) return;
     const index = Math.min(Math.max((reached?.index ?? -1) + (step ?? 0), 0), own.length - 1);
     reached = { panel, index, point: own[index] };
-    const told = reached;
     tell(panel, own[index].at, own[index].text ?? along(panel, own[index].at));
-    reached = told;
   });
   document.addEventListener("focusout", (event) => { if (event.target.closest?.("svg.figure")) hide(); });
 })();

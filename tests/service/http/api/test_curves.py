@@ -272,6 +272,16 @@ def test_a_picture_shows_only_so_much(service: Service, spec: dict[str, Any]) ->
     assert [(item["code"], item["parameter"]) for item in points.json()["errors"]] == [("too-many", "format")]
 
 
+def test_the_cells_of_a_map_may_be_shown_in_a_file_of_its_own(service: Service, spec: dict[str, Any]) -> None:
+    spec["axes"][0] = {"path": "excitation.frequency", "linspace": [16, 35, 12]}
+    study_id = service.submit(spec)
+    service.fill(study_id)
+    drawn = ask(service, study_id, "x=excitation.frequency&y=shaft.load&z=torque.max&format=svg", "map")
+    assert 'href="data:image/png' in drawn.text
+    assert "style" not in drawn.text
+    assert drawn.headers["content-security-policy"] == "default-src 'none'; img-src data:; sandbox"
+
+
 def test_pictures_are_the_same_for_the_same_numbers(service: Service, spec: dict[str, Any]) -> None:
     spec["axes"][0] = {"path": "excitation.frequency", "linspace": [16, 35, 12]}
     study_id = service.submit(spec)
