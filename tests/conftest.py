@@ -72,7 +72,7 @@ TOGETHER = (
         tuple(f"tests/service/http/web/test_{name}.py" for name in names.split())
         for names in (
             "connection designers goal_forms nights sheet paper_and_phones study_pages",
-            "answers explore form_in_browser keys motion_pages order returning script_texts walks",
+            "form_in_browser keys motion_pages order returning script_texts walks",
         )
     ),
     tuple(f"tests/acceptance/test_{name}.py" for name in ("bad_input", "commands", "notebook")),

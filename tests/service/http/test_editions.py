@@ -109,18 +109,19 @@ def test_a_form_that_was_shown_before_an_edit_replaces_nothing(service: Service)
     address = f"/studies/{_ended(service)}"
     night = service.http.post(f"{API}/schedules", json={"spec": SPEC, "cron": "@daily"}).json()["id"]
     etag = re.compile(r'name="etag" value="([0-9a-f]+)"')
-    for form, target, fields, change, kept in (
-        (address, f"{address}/labels", {"name": "typed", "notes": "n", "tags": "t"}, {"notes": "theirs"}, "typed"),
-        (f"/schedules/{night}", f"/schedules/{night}",
+    for form, target, answer, fields, change, kept in (
+        (address, f"{address}/labels", f"{API}{address}",
+         {"name": "typed", "notes": "n", "tags": "t"}, {"notes": "theirs"}, "typed"),
+        (f"/nights/{night}", f"/nights/{night}", f"{API}/schedules/{night}",
          {"name": "typed", "when": "cron", "cron": "@daily", "zone": "UTC"}, {"priority": 5}, "typed"),
     ):  # fmt: skip
         (shown,) = etag.findall(service.http.get(form).text)
-        assert service.http.patch(f"{API}{form}", json=change).status_code == 200
+        assert service.http.patch(answer, json=change).status_code == 200
         refused = service.http.post(target, data={**fields, "etag": shown})
         assert refused.status_code == 412
         assert f'value="{kept}"' in refused.text
-        assert service.http.get(f"{API}{form}").json().items() >= change.items()
+        assert service.http.get(answer).json().items() >= change.items()
         (again,) = etag.findall(refused.text)
         assert again != shown
         assert service.http.post(target, data={**fields, "etag": again}).status_code == 303
-        assert service.http.get(f"{API}{form}").json()["name"] == "typed"
+        assert service.http.get(answer).json()["name"] == "typed"

@@ -45,7 +45,7 @@ def test_an_old_picture_is_pale_under_a_new_choice_until_it_is_drawn(visitor: Vi
     expect(page.get_by_role("alert")).to_contain_text(LOST)
     expect(page.locator("#told")).to_have_class(re.compile("stale"))
     mend(page)
-    page.wait_for_function("(old) => document.querySelector('#chart .wide').innerHTML !== old", arg=old)
+    page.wait_for_function("(old) => (document.querySelector('#chart .wide')?.innerHTML ?? old) !== old", arg=old)
     expect(page.locator(".stale")).to_have_count(0)
 
 

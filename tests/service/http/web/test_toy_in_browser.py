@@ -10,7 +10,7 @@ from playwright.sync_api import expect
 from sprag.service.storage.part import SystemClock
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.inline import InlineExecutor
-from tests.service.http.web.fields import drawn, fill, named
+from tests.service.http.web.fields import fill, named
 from tests.service.registered import create_table, registered
 from tests.service.test_toy_model import NAME, DampedOscillator
 from tests.serving import served
@@ -51,8 +51,8 @@ def test_a_study_of_the_model_from_its_numbers_to_its_case(service: Service, bro
         study_id = page.url.rpartition("/")[2]
         store = service.store
         Dispatcher(store.work, InlineExecutor(), SystemClock()).run(lambda: store.studies.get(study_id).state.terminal)
-        page.goto(f"/studies/{study_id}/curves")
-        assert drawn(page, ".plot")
+        page.goto(f"/studies/{study_id}")
+        expect(page.locator("#chart svg.wide .panel").first.locator("a[data-case]")).to_have_count(3)
         page.goto(f"/studies/{study_id}/cases/1")
         expect(page.locator("figure svg.figure:visible")).to_have_count(1)
         page.get_by_role("link", name="Change this machine").click()
