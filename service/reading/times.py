@@ -10,7 +10,7 @@ from sprag.service.languages import N_, date_format, gettext, pgettext
 
 #: Days for which the day of the week says enough.
 _WEEK: Final = 6
-_DAYS: Final = (N_("today"), N_("yesterday"), N_("tomorrow"))
+_DAYS: Final = {0: N_("today"), -1: N_("yesterday"), 1: N_("tomorrow")}
 
 
 def _weekday(day: int) -> str:
@@ -30,9 +30,8 @@ def when(moment: datetime, now: datetime, zone: str) -> str:
     """``today 11:14``, ``yesterday 17:02``, ``Mon 09:26`` within a week, otherwise the date and the time."""
     own, here = moment.astimezone(ZoneInfo(zone)), now.astimezone(ZoneInfo(zone))
     days = (own.date() - here.date()) // timedelta(days=1)
-    named = {0: "today", -1: "yesterday", 1: "tomorrow"}.get(days)
-    if named is not None:
-        day = gettext(named)
+    if days in _DAYS:
+        day = gettext(_DAYS[days])
     elif abs(days) <= _WEEK:
         day = _weekday(own.weekday())
     else:

@@ -31,7 +31,6 @@ class FormField:
     Attributes
     ----------
     label, help, range, default, example, symbol, unit, required : of what no catalogue describes, or instead of its
-    mark : part of the sketch that it is about
     lines : height of its text; 0 for a line
     columns : of a table, or the choice (with ``@``) whose value is the column
     without : values of its choices that are not offered
@@ -48,7 +47,6 @@ class FormField:
     symbol: str = ""
     unit: str = ""
     required: bool = False
-    mark: str = ""
     lines: int = 0
     columns: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
@@ -174,7 +172,7 @@ class Form:
     new : values of an empty form
     called : the model in a sentence, such as "a machine shaft"; "" for its title
     with_run : whether its studies have a run, so that cases can start from their neighbours
-    examples : what fields of the study show while they are empty, and a formula
+    examples : what fields of the study show while they are empty
     drawer : what the drawer with the other fields is about
     front : patterns of the paths, with N for numbers, whose fields are always in sight; none: all of them
     normal : what is said about a batch of machines that differ

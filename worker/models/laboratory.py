@@ -25,11 +25,11 @@ class Laboratory:
     sliders : ends proposed for its numbers; the first fits
     main : results that are always in sight, and their labels; by default those of the main curve
     along : the result that is drawn along each number in sight; "" for models that take longer
-    studies : what a study can be asked to vary, and the pattern of the paths
+    studies : what an address can ask to vary, and the pattern of its paths
     """
 
     note: str = ""
     sliders: tuple[SliderKind, ...] = ()
     main: Mapping[str, str] = field(default_factory=dict)
     along: str = ""
-    studies: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    studies: Mapping[str, str] = field(default_factory=dict)

@@ -190,8 +190,7 @@ FORM: Final = Form(
         r"(parts\.N\.)?operation\.(quantity|over|value|steps|formula|csv|scale|gas\.\w+_(area|pressure)|indicator\.csv)",
     ),
     examples={
-        "formula": "2.5 * mechanism.slider_crank.crank",
-        "values": "1; 2; 5 kg*m^2", "from": "200 rpm", "to": "400 rpm", "step": "50 rpm", "value": "300 rpm",
+        "values": "1; 2; 5 kg*m^2", "from": "200 rpm", "to": "400 rpm", "value": "300 rpm",
         "tied": "parts.1.mechanism.slider_crank.crank",
         "columns": "operation.scale\tdrive.inertia [kg*m^2]\n1\t0.2\n1.5\t0.3",
         "points": "operation.scale,drive.inertia [kg*cm^2]\n1,200\n1.5,300",

@@ -18,7 +18,7 @@ LABORATORY: Final = Laboratory(
     main={"irregularity": "Irregularity"},
     along="irregularity",
     studies={
-        "inertia": ("the drive's inertia", r"drive\.inertia"), "masses": ("the masses", r"mechanism\..*mass"),
-        "load": ("the operation's load", r"operation\.scale"),
+        "inertia": r"drive\.inertia", "masses": r"mechanism\..*mass",
+        "load": r"operation\.scale",
     },
 )  # fmt: skip

@@ -15,12 +15,12 @@ _CLUTCH: Final = FormChoice(
                 "clutch/coefficients", "list", "Coefficients",
                 f"c₁; c₂; c₃; … of the torque c₁ + c₂u + c₃u² + … over the windup u, in N·m/rad^(k−1); 1 to "
                 f"{MAX_COEFFICIENTS}",
-                example="0; 200; 0; 20000", mark="clutch", required=True,
+                example="0; 200; 0; 20000", required=True,
             ),
             FormField(
                 "clutch/windup_limit", "number", "Windup limit",
                 "largest windup to which the law was measured; beyond it the law continues straight", range="> 0 rad",
-                default="none", example="0.05 rad", symbol="u_end", unit="rad", mark="clutch",
+                default="none", example="0.05 rad", symbol="u_end", unit="rad",
             ),
         )),
         Option("data", "Measured data", (
@@ -28,11 +28,11 @@ _CLUTCH: Final = FormChoice(
                 "clutch/data", "measured", "Measured angle and torque",
                 "two columns, pasted from a spreadsheet; a header such as angle_deg, torque_Nm names the units, "
                 "without one they are rad and N·m",
-                example="angle_deg\ttorque_Nm\n0\t0\n0.25\t0.878", mark="clutch", required=True, lines=7,
+                example="angle_deg\ttorque_Nm\n0\t0\n0.25\t0.878", required=True, lines=7,
             ),
             FormField(
                 "clutch/accuracy", "number", "Accuracy", "largest residual of the fit that is accepted",
-                range="> 0 N*m", example="0.05 N*m", unit="N*m", mark="clutch", required=True,
+                range="> 0 N*m", example="0.05 N*m", unit="N*m", required=True,
             ),
             FormField("clutch/max_degree"),
             FormField("clutch/through_origin", "tick", "No torque at zero windup", default="on"),
@@ -90,8 +90,7 @@ FORM: Final = Form(
         r"pendulums\.N\.(mass|arm|inertia|spring_rate|spring_arm|backlash)", r"shaft\.(inertia|load)",
     ),
     examples={
-        "formula": "1.1 * pendulums.0.mass * pendulums.0.arm^2 + 2e-4 kg*m^2",
-        "values": "0; 0.1; 0.2 N*m", "from": "20 Hz", "to": "35 Hz", "step": "1 Hz", "value": "0.2 N*m",
+        "values": "0; 0.1; 0.2 N*m", "from": "20 Hz", "to": "35 Hz", "value": "0.2 N*m",
         "tied": "excitation.amplitude_y",
         "columns": "shaft.load [N*mm]\texcitation.frequency [Hz]\n100\t25\n200\t30",
         "points": "shaft.load [N*mm],excitation.frequency [Hz]\n100,25\n200,30",

@@ -18,7 +18,7 @@ LABORATORY: Final = Laboratory(
         "efficiency": "Efficiency",
     },
     studies={
-        "load": ("the load", r"shaft\.load"), "frequency": ("the frequency", r"excitation\.frequency"),
-        "amplitude": ("the horizontal amplitude", r"excitation\.amplitude_x"),
+        "load": r"shaft\.load", "frequency": r"excitation\.frequency",
+        "amplitude": r"excitation\.amplitude_x",
     },
 )  # fmt: skip

@@ -28,13 +28,12 @@ FORM_MODEL: Final = "vibration-drive"
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One field: ``name`` is its JSON Pointer, ``mark`` its letter in the sketch ("" where it is not shown there)."""
+    """One field: ``name`` is its JSON Pointer."""
 
     name: str
     label: str
     help: str = ""
     symbol: str = ""
-    mark: str = ""
     unit: str = ""
     range: str = ""
     required: bool = False
@@ -49,7 +48,6 @@ def field_for(entry: Parameter, path: str) -> Field:
         name="/base/" + path.replace(".", "/"),
         label=_(words(path.rsplit(".", maxsplit=1)[-1])),
         symbol=entry.symbol,
-        mark=path.rsplit(".", maxsplit=1)[-1],
         unit=entry.unit,
         help=_(entry.help),
         range=range_words(entry),

@@ -18,7 +18,7 @@ from sprag.service.http.threads import in_thread
 from sprag.service.http.web.figures.live import along, live_case
 from sprag.service.http.web.form.beginning import beginning
 from sprag.service.http.web.form.entries import Values, plain
-from sprag.service.http.web.form.machine import choices_of, entries, form_of, row_of
+from sprag.service.http.web.form.machine import choices_of, entries, form_of, model_name, row_of
 from sprag.service.http.web.form.machine_spec import base_of
 from sprag.service.http.web.form.own_machine import single_machine
 from sprag.service.http.web.form.sent import ends_of, settle
@@ -130,9 +130,9 @@ async def live(work: Attended, values: Form, width: Annotated[int, Query(ge=240,
 async def curves_along(work: Attended, values: Form) -> Response:
     """Thumbnails of the main result along each number, where the model is computed at once."""
     settle(values)
-    drawn = await work.check(drawn_machine, values)
-    result = "" if drawn is None else models.presentation_of(drawn[0]).laboratory.along
-    if drawn is None or not result:
+    result = models.model_of(model_name(values)).presentation.laboratory.along
+    drawn = await work.check(drawn_machine, values) if result else None
+    if drawn is None:
         return json_response({"sparks": {}})
     studies = await work.check(studies_along, values, drawn[1])
     found = await work.run_case(_along, drawn[0], studies, result)
@@ -174,14 +174,15 @@ async def warm(context: Context) -> None:
                 await context.computer.load(models.shape_of(study))
                 await context.computer.run(live_case, study, reading_for(study, spec, current().choice), _WIDTH)
                 if result := models.presentation_of(study).laboratory.along:
-                    await context.computer.run(_along, study, studies_along(values, spec)[:1], result)
+                    first = (await context.checker.run(studies_along, values, spec))[:1]
+                    await context.computer.run(_along, study, first, result)
     except (ApiError, JobStoppedError, NotCompiledError) as error:
         _LOG.info("The first machines are not computed ahead: %s", error)
 
 
 def named_numbers(model: str, key: str, paths: list[str]) -> list[str]:
     """The numbers that a question such as "the load" is about, among those of a machine."""
-    word = models.model_of(model).presentation.laboratory.studies.get(key)
-    if word is None:
+    pattern = models.model_of(model).presentation.laboratory.studies.get(key)
+    if pattern is None:
         return [path for path in paths if path == key]
-    return [path for path in paths if re.fullmatch(word[1], row_of(model, path)[2])]
+    return [path for path in paths if re.fullmatch(pattern, row_of(model, path)[2])]

@@ -27,7 +27,7 @@ from sprag.worker.models.parameters import general_path, model_parameter
 
 BASE: Final = "/base"
 #: What the form of a model says of a field instead of its catalogue.
-_GIVEN: Final = ("label", "symbol", "mark", "unit", "range", "default", "example", "required")
+_GIVEN: Final = ("label", "symbol", "unit", "range", "default", "example", "required")
 
 
 @dataclass(frozen=True, slots=True)

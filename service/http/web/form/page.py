@@ -108,7 +108,7 @@ async def new_study(
         values = values_of(spec)
         if clone is None and preset is None:
             values |= {
-                name: f"{number:g}" if number.is_integer() else text_of(number)
+                name: text_of(int(number) if number.is_integer() else number)
                 for name, number in _read_numbers(values).items()
             }
     except ValueError:

@@ -93,9 +93,7 @@ def _chosen(name: str) -> Cell:
 def _limit(values: Mapping[str, str], row: str) -> dict[str, Any]:
     kind = values.get(f"{row}/kind", "at_most")
     value, within = values.get(f"{row}/value", ""), values.get(f"{row}/within", "") if kind == "is" else ""
-    # A band in per cent is a share of the value, not its unit.
-    texts = [value, within] if within.strip().endswith("%") else with_last_unit([value, within])
-    value, within = (text.strip() for text in texts)
+    value, within = (text.strip() for text in with_last_unit([value, within]))
     return {kind: plain(value), **({"within": plain(within)} if within else {})}
 
 

@@ -303,10 +303,10 @@ def quantity_of(texts: Sequence[str], si: str, wanted_units: Mapping[str, str], 
     if unit is None:
         return Quantity(tuple(texts), wanted, units)
     if unit:
-        unit = next((own for own in units if own == latin(plain_signs(unit))), unit)
-        if unit not in units and not _is_unit(unit, si):
-            return Quantity(tuple(texts), si, units)  # a mistake stays with its number, and goes with it
-        return Quantity(tuple(number for number, _unit in parts), unit, units if unit in units else (*units, unit))
+        own = next((own for own in units if own == latin(plain_signs(unit))), None)
+        if own is None:  # one that is not offered, or a mistake, stays with its number
+            return Quantity(tuple(texts), si, units)
+        return Quantity(tuple(number for number, _unit in parts), own, units)
     converted = [_converted(number, wanted, si) for number, _unit in parts] if wanted != si else [None]
     if all(text is not None for text in converted):
         return Quantity(tuple(text or "" for text in converted), wanted, units)
@@ -337,14 +337,6 @@ def _listed(texts: Sequence[str]) -> list[tuple[str, str]] | None:
     if len(within) > 1:
         return None
     return [*before, ("; ".join(number for number, _unit in inside), next(iter(within), "")), *last]
-
-
-def _is_unit(unit: str, si: str) -> bool:
-    try:
-        parse_quantity(f"1 {unit}", si)
-    except QuantityError:
-        return False
-    return True
 
 
 def _converted(text: str, unit: str, si: str) -> str | None:

@@ -3,7 +3,7 @@
 
 sprag.sheet = (() => {
   const SECONDS = 3, TURN = 4; // of an excitation period and of a turn of the shaft on the page
-  let frames = null, playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, at = 0, began = 0, busy = false, again = false, started = false;
+  let frames = null, playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, at = 0, began = 0, busy = false, again = false, started = false, answered = "";
   const one = (id) => document.getElementById(id);
   const drawings = () => [...document.querySelectorAll(".picture svg")];
 
@@ -86,7 +86,10 @@ sprag.sheet = (() => {
     busy = true;
     const place = one("live");
     try {
-      const body = encoded(), found = await post(`${place.dataset.live}?width=${Math.max(Math.min(Math.round(place.clientWidth), 1200), 240)}`, body);
+      const body = encoded(), address = `${place.dataset.live}?width=${Math.max(Math.min(Math.round(place.clientWidth), 1200), 240)}`;
+      if (answered === address + body) { if (frames) show(); return; } // a field was only left
+      const found = await post(address, body);
+      answered = address + body;
       place.classList.toggle("stale", !found.answer);
       if (found.answer) {
         const focused = document.activeElement?.id;
@@ -97,10 +100,10 @@ sprag.sheet = (() => {
         for (const each of document.querySelectorAll(".spark")) if (each.id) each.innerHTML = sparks[each.id.slice("spark:".length)] || "";
       }
     } catch (error) {
+      answered = "";
       place.classList.add("stale");
     } finally {
       busy = false;
-      place.dataset.shown = String(Number(place.dataset.shown || 0) + 1);
       if (again) { again = false; ask(); }
     }
   };

@@ -45,7 +45,9 @@ WORDS: Final = r"""() => {
         (["0.03"], "m", "si", (("0.03",), "m")),
         (["0.005"], "rad", "typed", (("0.005",), "rad")),  # has no short text in degrees
         (["1500 rpm"], "Hz", "typed", (("1500",), "rpm")),
-        (["2 ft"], "m", "typed", (("2",), "ft")),
+        (["2 ft"], "m", "typed", (("2 ft",), "m")),
+        (["1500 1/min"], "Hz", "typed", (("1500 1/min",), "Hz")),
+        (["2 mm"], "kg*m^2", "typed", (("2 mm",), "kg*m^2")),
         (["= 2 * shaft.load"], "N*m", "typed", (("= 2 * shaft.load",), "N*m")),
         ([""], "m", "typed", (("",), "mm")),
         (["4"], "1", "typed", (("4",), "")),
