@@ -75,6 +75,12 @@ def parse_number(text: str) -> float | None:
         return None
 
 
+def whole_number(text: str, below: int) -> int | None:
+    """The number that is written with the digits 0 to 9 alone; None of any other text, and from ``below`` on."""
+    plain = text.isascii() and text.isdecimal() and len(text) <= len(str(below))
+    return number if plain and (number := int(text)) < below else None
+
+
 def with_point(text: str) -> str:
     """``text`` with a decimal point where the number at its beginning has a decimal comma beyond doubt."""
     return text.replace(",", ".", 1) if _marks(text) == _Marks(decimal=",") else text

@@ -15,7 +15,7 @@ from typing import Any, Final, Literal, TypeVar, get_args, get_origin, get_type_
 from sprag.service.faults import parameter_error
 from sprag.service.languages import N_
 from sprag.service.reading.limits import span
-from sprag.service.reading.numbers import probability_of
+from sprag.service.reading.numbers import probability_of, whole_number
 
 Question = TypeVar("Question")
 
@@ -181,9 +181,10 @@ def _value(asked: NamedSetting, text: str) -> str | int:
     if asked.type is not int:
         return text
     low, high = asked.setting.low or 0, asked.setting.high or 0
-    if not (text.isdecimal() and text.isascii() and low <= int(text) <= high):
+    number = whole_number(text, high + 1)
+    if number is None or number < low:
         raise parameter_error(asked.alias, "out-of-range", "must be a whole number", text, span(low, high))
-    return int(text)
+    return number
 
 
 @dataclass(frozen=True, slots=True)

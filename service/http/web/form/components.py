@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from sprag.service.http.web.form.entries import Values
 from sprag.service.http.web.form.machine import BASE, form_of, rows_of
+from sprag.service.reading.numbers import whole_number
 from sprag.service.storage.components import ComponentRecord
 from sprag.worker.models.form import Rows
 
@@ -37,8 +38,9 @@ def take_component(values: Values, records: Iterable[ComponentRecord]) -> None:
     if chosen is None or kind is None:
         return
     rows = rows_with_components(values)
-    count, one = rows_of(values, rows) if rows else 0, values.get("component_for", "")
-    indices: Sequence[int] = [int(one)] if one.isdecimal() and int(one) < count else range(count)
+    count = rows_of(values, rows) if rows else 0
+    one = whole_number(values.get("component_for", ""), count)
+    indices: Sequence[int] = range(count) if one is None else [one]
     choice, shared = rows.shared if rows and rows.shared else ("", "")
     rowed = values.get(f"{BASE}/{choice}") == "own"
     if not rowed and any(name.startswith(f"{shared}/") for name in kind.fields.values()):

@@ -57,6 +57,7 @@ from sprag.service.http.web.templates import fragment, page, spec_text
 from sprag.service.http.work import Attended, Work
 from sprag.service.jobs.submission import Submission, take_in
 from sprag.service.presets import preset_names
+from sprag.service.reading.numbers import whole_number
 from sprag.service.reading.together import split_list
 from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.spec.design import design_spec
@@ -134,10 +135,10 @@ def _set(values: Values, given: Mapping[str, str], vary: list[str], along: str |
         listed, _slash, place = name.rpartition("/")
         if name in known:
             values[name] = text
-        elif listed in known and place.isdigit():
+        elif listed in known:
             items = split_list(values.get(listed, ""))
-            if int(place) < len(items):
-                items[int(place)] = text
+            if (at := whole_number(place, len(items))) is not None:
+                items[at] = text
                 values[listed] = "; ".join(items)
     paths = [choice.path for _group, group in _choices(values) for choice in group]
     asked = named_numbers(model_name(values), along, paths) if along else []

@@ -10,6 +10,7 @@ from typing import Final
 from sprag.service.http.web.form.entries import Values, count_in
 from sprag.service.http.web.form.machine import BASE, form_of
 from sprag.service.http.web.form.tolerances import OWN
+from sprag.service.reading.numbers import whole_number
 from sprag.service.spec.kinds.goal import GOAL
 from sprag.worker.limits import MAX_AXES
 from sprag.worker.models.form import Rows
@@ -74,8 +75,8 @@ def reshape(values: Values, wanted: str) -> None:
     part = parts_of(values).get(name)
     if part is not None and verb == "add":
         _add_row(values, name, part)
-    elif part is not None and verb == "drop" and index.isdigit():
-        _drop_row(values, name, part, int(index))
+    elif part is not None and verb == "drop" and (place := whole_number(index, part.most)) is not None:
+        _drop_row(values, name, part, place)
 
 
 def _add_row(values: Values, name: str, part: Part) -> None:

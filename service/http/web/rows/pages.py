@@ -34,6 +34,7 @@ from sprag.service.jobs.submission import take_in
 from sprag.service.json_text import to_bytes
 from sprag.service.languages import _
 from sprag.service.reading.faults import message
+from sprag.service.reading.numbers import whole_number
 from sprag.service.reading.reader import meanings
 from sprag.service.results.explore import ExploreQuery, explored_csv, explored_json
 from sprag.service.results.selection import own_paths
@@ -48,6 +49,7 @@ from sprag.worker.study import SAME_VALUE
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from sprag.service.http.web.rows.asked import Asked
     from sprag.service.reading.reader import Choice, Reading
     from sprag.service.views.library import Library
     from sprag.worker.study import Study
@@ -65,15 +67,25 @@ async def rows_page(work: Attended, study_id: StudyId) -> Response:
     """The rows within conditions; every choice is in the address."""
     context, given = work.context, work.request.query_params.multi_items()
     asked = (context.library, study_id, given, current().choice)
+    changed = await in_thread(_changed, context, study_id, given, current().choice)
+    if changed is not None:
+        return RedirectResponse(f"/studies/{study_id}/rows{changed.link()}", status_code=303)
     view = await (work.check(rows_view, *asked) if await in_thread(_many, context, study_id) else
                   in_thread(rows_view, *asked))  # fmt: skip
-    passing = {"of", "do"} & {name for name, value in given if value.strip()}
-    if passing and not view.asked.faults:
-        changed = view.asked
-        if dict(given).get("do") == "without":
-            changed = changed.other(without=(*changed.query.without, *changed.beside), beside=())
-        return RedirectResponse(f"/studies/{study_id}/rows{changed.link()}", status_code=303)
     return await in_thread(_page, context, study_id, view)
+
+
+def _changed(context: Context, study_id: str, given: Sequence[tuple[str, str]], choice: Choice) -> Asked | None:
+    """What the address leads to whose form has asked for a change; None of any other, and where it cannot be made."""
+    if not {"of", "do"} & {name for name, value in given if value.strip()}:
+        return None
+    study, reading = context.store.studies.study(study_id), reading_of(context.store, study_id, choice)
+    asked = read_asked(given, study, reading)
+    if asked.faults:
+        return None
+    if dict(given).get("do") == "without":
+        return asked.other(without=(*asked.query.without, *asked.beside), beside=())
+    return asked
 
 
 def _many(context: Context, study_id: str) -> bool:
@@ -187,8 +199,9 @@ def rows_file(library: Library, study_id: str, query: ExploreQuery, choice: Choi
 async def run_rows_longer(context: Ctx, work: Attended, study_id: StudyId, fields: RepeatedForm) -> Response:
     """The button below ticked rows: submit a study of them with more time for each."""
     study = await in_thread(context.store.studies.study, study_id)
-    cases = sorted({int(text) for name, text in fields if name == "case" and text.isdecimal()})
-    if not cases or cases[-1] >= study.cases:
+    found = {whole_number(text, study.cases) for name, text in fields if name == "case"}
+    cases = sorted(case for case in found if case is not None)
+    if not cases or None in found:
         raise refused("case", "required", "no case is selected")
     now = context.store.clock.now()
     made = await work.check(checks.longer_study, context.library, study_id, tuple(cases), None, now, {})

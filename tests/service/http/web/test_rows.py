@@ -134,6 +134,16 @@ def test_a_condition_of_the_form_is_typed_in_any_unit_and_takes_the_place_of_the
     assert counted(wrong) == "15 of 30 cases"
 
 
+def test_a_form_leads_to_its_address_without_a_look_at_the_rows(
+    filled: tuple[Service, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    service, study_id = filled
+    monkeypatch.setattr(pages, "rows_view", None)
+    for query in ("of=shaft.load&most=0.3", "case=3&do=without"):
+        answer = service.http.get(f"/studies/{study_id}/rows?{query}", follow_redirects=False)
+        assert answer.status_code == 303
+
+
 def test_the_page_says_which_condition_leaves_nothing(filled: tuple[Service, str]) -> None:
     service, study_id = filled
     query = "where=shaft.load >= 0.8&where=shaft.speed.mean >= 1e30 rad/s"
@@ -198,7 +208,8 @@ def test_ticked_rows_are_side_by_side_left_out_saved_or_run_longer(filled: tuple
     assert [made.case_parameters(case)["shaft.load"] for case in range(2)] == [
         study.case_parameters(case)["shaft.load"] for case in (3, 7)
     ]
-    assert service.http.post(f"{own}/longer", data={"case": ["30"]}).status_code == 422
+    for wrong in ("30", "²", "9" * 5000):
+        assert service.http.post(f"{own}/longer", data={"case": ["3", wrong]}).status_code == 422
     waiting = service.submit({**service.store.studies.spec(study_id), "axes": AXES})
     assert "Not finished: 2." in read(service, f"/studies/{waiting}/rows?case=2")
 
