@@ -11,10 +11,10 @@ from sprag.service.languages import N_
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.reader import Phrase, joined
 from sprag.service.results.calibration import Calibration, calibration_csv, calibration_json, plan_of
+from sprag.service.views.relatives import asked_by
 from sprag.service.views.shown import Column, Shown, ShownTable
 from sprag.service.views.study_questions import CALIBRATION, CalibrationQuestion
 from sprag.service.views.study_view import StudyAnswer, StudyView
-from sprag.worker.planning.calibrate.plan import CALIBRATE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -55,7 +55,7 @@ class CalibrationView(StudyView[CalibrationQuestion, None, Calibration]):
 
     def has(self, study: Study) -> bool:
         """Whether it is a calibration."""
-        return study.plan is not None and study.plan.get("kind") == CALIBRATE
+        return asked_by(study) == "measured"
 
     def shown(self, answer: StudyAnswer[None, Calibration]) -> Shown:
         """What else should be known before the values are used; values, correlations, measured points."""

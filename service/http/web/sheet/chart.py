@@ -32,6 +32,7 @@ from sprag.service.results.tolerances.ribbons import QUANTILES
 from sprag.service.views.calibration import CalibrationView
 from sprag.service.views.drives import RibbonQuery, RibbonView
 from sprag.service.views.front import FrontView
+from sprag.service.views.relatives import asked_by
 from sprag.service.views.study_questions import FrontQuestion
 from sprag.service.views.study_view import StudyAnswer
 from sprag.worker import models
@@ -106,13 +107,13 @@ def chart_of(
     Raises SelectionError. ``cases`` is the address of the cases.
     """
     study = library.store.studies.study(study_id)
-    kind = "" if study.plan is None else study.plan["kind"]
     draw = partial(_drawn, reading=reading, cases=cases)
-    if kind == "goal":
+    kind = asked_by(study)
+    if kind == "best":
         found = FrontView().find(library, study_id, FrontQuestion())
         answer: Any = StudyAnswer(library, study_id, FrontQuestion(), found)
         return draw(FrontView().figure(answer), Phrase("Every design of the search"), "front", "")
-    if kind == "calibrate":
+    if kind == "measured":
         known = library.calibrations.of(study_id)
         answer = StudyAnswer(library, study_id, None, known)
         return draw(
