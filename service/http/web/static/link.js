@@ -168,6 +168,7 @@ sprag.take = (page, selector, { keep = false } = {}) => {
   const index = active ? [...mine.querySelectorAll(stops)].indexOf(active) : -1;
   const scrolled = [...mine.querySelectorAll(".scroll")].map((part) => part.scrollLeft);
   mine.replaceWith(document.adoptNode(theirs));
+  theirs.dispatchEvent(new Event("sprag:drawn", { bubbles: true })); // its figures are stops before the focus is sought
   theirs.querySelectorAll(".scroll").forEach((part, at) => { part.scrollLeft = scrolled[at] || 0; });
   const again = index >= 0 ? theirs.querySelectorAll(stops)[index] : null;
   again?.focus({ preventScroll: true });

@@ -73,8 +73,9 @@ sprag.sheet = (() => {
   // Move the drawings by frames, or by their own; the button plays, the slider shows an instant.
   const move = (given) => {
     frames = given;
-    one("play")?.addEventListener("click", () => play(!playing));
-    one("instant")?.addEventListener("input", (event) => { play(false); at = Number(event.target.value); show(); });
+    const button = one("play"), dial = one("instant");
+    if (button) button.onclick = () => play(!playing); // the page may give further frames to the same button
+    if (dial) dial.oninput = () => { play(false); at = Number(dial.value); show(); };
     show();
     play(playing);
   };

@@ -131,3 +131,10 @@ def test_points_with_turned_and_logarithmic_axes(visitor: Visitor, example: str)
     chosen = page.locator('figure.points [data-case="4"]').first
     chosen.dispatch_event("click")
     expect(page.locator("tr.on")).to_have_attribute("data-case", "4")
+
+
+def test_points_that_take_the_place_of_lines_are_reached_by_keys(visitor: Visitor, example: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{example}/rows")
+    page.get_by_role("link", name="Points").click()
+    expect(page.locator("figure.points svg.figure")).to_have_attribute("tabindex", "0")
